@@ -1,0 +1,44 @@
+# Everything needs only Python 3.11 or newer; the environment is made on first use.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+LAYERS := spec hdl sim cli
+SOURCES := $(LAYERS) tests
+
+export AMARANTH_USE_YOSYS := builtin
+export MPLBACKEND := Agg
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test lint clean
+
+help: ## this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
+
+# An editable install does not show the folder mapping to mypy and editors; the links do.
+$(VENV)/.run: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, not " + sys.version.split()[0])'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install -q --disable-pip-version-check -e .
+	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
+	mkdir -p $$site/tachometry && for layer in $(LAYERS); do ln -sfn "$(CURDIR)/$$layer" $$site/tachometry/$$layer; done
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.run
+	$(BIN)/pip install -q --disable-pip-version-check -e '.[test]'
+	@touch $@
+
+venv: $(VENV)/.test ## the environment in .venv, with all that tests need
+
+demo: $(VENV)/.run ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
+	BIN=$(BIN) sh docs/demo.sh
+
+test: $(VENV)/.test lint ## lint, types and all tests
+	$(BIN)/pytest -q -n auto
+
+lint: $(VENV)/.test ## ruff and mypy
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy $(addprefix -p tachometry.,$(LAYERS))
+
+clean: ## remove what was built, and the environment
+	rm -rf build $(VENV) *.egg-info

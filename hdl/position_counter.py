@@ -1,0 +1,39 @@
+"""Position."""
+
+from amaranth import Module, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class PositionCounter(wiring.Component):
+    """Adds up all steps; wraps in two's complement.
+
+    Latency: a step in clock c is in `position` from clock c + 2 on, as late as `PulseCounter` shows it, so that the
+    two agree while `tick` is high.
+
+    Parameters
+    ----------
+    width : int
+        Bits of the position.
+
+    Members
+    -------
+    step : In(signed(2))
+    position : Out(signed(width))
+
+    Raises
+    ------
+    ValueError
+        If `width` is less than 2.
+    """
+
+    def __init__(self, width: int) -> None:
+        if width < 2:
+            raise ValueError(f"width must be at least 2, not {width}")
+        super().__init__({"step": In(signed(2)), "position": Out(signed(width))})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        step = Signal(signed(2))
+        m.d.sync += [step.eq(self.step), self.position.eq(self.position + step)]
+        return m

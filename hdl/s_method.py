@@ -1,0 +1,95 @@
+"""The S method."""
+
+from amaranth import Cat, Module, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.alteration import AlterationDetector
+from tachometry.hdl.interval import IntervalAccumulator
+from tachometry.hdl.reciprocal import Reciprocal
+from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
+from tachometry.spec import STachometer
+
+
+class SMethod(wiring.Component):
+    """S-method datapath, eqs. (17) and (21) of Tsuji 2009: from pulse numbers to velocity without a divider.
+
+    Latency: `velocity_valid` is high `spec.tick_to_velocity` clocks after `tick`. The velocity is correctly rounded:
+    within half an LSB of the exact quotient, ties towards +∞.
+
+    Parameters
+    ----------
+    spec : STachometer
+
+    Members
+    -------
+    tick : In(1)
+    pulse_count : In(signed)
+        m_e, valid with `tick`.
+    velocity : Out(signed)
+        In counts per tick with `frac_bits` fraction bits; this and all below are held until the next update.
+    velocity_valid : Out(1)
+        One clock per update.
+    interval : Out
+        m_s in ticks.
+    forced, stalled : Out(1)
+    """
+
+    outputs = ("velocity", "velocity_valid", "interval", "forced", "stalled")
+
+    def __init__(self, spec: STachometer) -> None:
+        shapes = {port.name: signed(port.width) if port.signed else port.width for port in spec.ports}
+        super().__init__(
+            {"tick": In(1), "pulse_count": In(shapes["pulse_count"])}
+            | {name: Out(shapes[name]) for name in self.outputs}
+        )
+        self.alteration = AlterationDetector(spec.count_width)
+        self.interval_accumulator = IntervalAccumulator(
+            max_ticks=spec.timing.max_ticks,
+            kept_ticks=spec.kept_ticks,
+            count_width=spec.count_width,
+            numerator_width=spec.numerator_width,
+            cancel=spec.cancel,
+        )
+        self.reciprocal = Reciprocal(spec.reciprocal)
+        self.scaler = (SerialScaler if spec.serial else PipelinedScaler)(
+            spec.reciprocal,
+            base_width=spec.count_width,
+            numerator_width=spec.numerator_width,
+            tag_width=spec.interval_width + 2,
+        )
+
+    @property
+    def probes(self) -> dict[str, Value]:
+        """What a waveform should show of the inside."""
+        return {
+            "alteration": self.alteration.alteration & self.tick,
+            "m_s": self.interval_accumulator.m_s,
+            "numerator": self.interval_accumulator.numerator,
+        }
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.alteration = alteration = self.alteration
+        m.submodules.interval = interval = self.interval_accumulator
+        m.submodules.reciprocal = reciprocal = self.reciprocal
+        m.submodules.scaler = scaler = self.scaler
+        m.d.comb += [
+            alteration.tick.eq(self.tick),
+            alteration.m_e.eq(self.pulse_count),
+            interval.tick.eq(self.tick),
+            interval.m_e.eq(self.pulse_count),
+            interval.previous.eq(alteration.previous),
+            interval.alteration.eq(alteration.alteration),
+            reciprocal.m.eq(interval.m_s),
+            reciprocal.enable.eq(self.tick),
+            scaler.start.eq(interval.update),
+            scaler.base.eq(alteration.previous),
+            scaler.numerator.eq(interval.numerator),
+            scaler.tag.eq(Cat(interval.m_s, interval.forced, interval.stalled)),
+            scaler.q.eq(reciprocal.q),
+            self.velocity.eq(scaler.velocity),
+            self.velocity_valid.eq(scaler.done),
+            Cat(self.interval, self.forced, self.stalled).eq(scaler.tag_out),
+        ]
+        return m

@@ -1,0 +1,87 @@
+"""What every kind of capture shares: its error, the choice of two channels, and files written whole or not at all."""
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+Channel = str | int
+
+
+class CaptureError(ValueError):
+    """A capture cannot be read or written; the message is one line, with what is wrong and what is allowed."""
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn the errors of the file system while `path` is read into a `CaptureError`."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise CaptureError(f"{path} does not exist") from None
+    except OSError as error:
+        raise CaptureError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Open a file that takes the place of `path` when all is written, and leaves nothing behind after an error."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with beside.open("wb") as file:
+            yield file
+        beside.replace(path)
+    except BaseException as error:
+        beside.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise CaptureError(f"cannot write {path}: {error.strerror or error}") from error
+        raise
+
+
+def choose_channels(
+    path: Path, channels: Mapping[int, str], a: Channel | None = None, b: Channel | None = None
+) -> tuple[int, int]:
+    """Find the numbers of the two encoder lines among the channels of a capture.
+
+    Parameters
+    ----------
+    path : Path
+        File that messages name.
+    channels : mapping from number to name
+        Channels that the capture holds, in order; numbers count from 0, as sigrok's D0 to D7 do.
+    a, b : str, int or None
+        Name of the channel (in this spelling, else in any case), else its number. When not given: the channels named
+        A and B if there are both, else the first two.
+
+    Raises
+    ------
+    CaptureError
+        If there are fewer than two channels, if one is unknown, or if both are the same.
+    """
+    listed = ", ".join(f"{name} ({number})" for number, name in channels.items())
+    if len(channels) < 2:
+        raise CaptureError(f"{path} must have at least two logic channels, not {listed or 'none'}")
+
+    def find(wanted: Channel) -> int | None:
+        if isinstance(wanted, int):
+            return wanted if wanted in channels else None
+        exact = [number for number, name in channels.items() if name == wanted]
+        alike = [number for number, name in channels.items() if name.casefold() == wanted.casefold()]
+        if exact or alike:
+            return (exact or alike)[0]
+        return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
+
+    default_a, default_b = find("A"), find("B")
+    if default_a is None or default_b is None:
+        default_a, default_b = list(channels)[:2]
+    number_a = default_a if a is None else find(a)
+    number_b = default_b if b is None else find(b)
+    for line, number, wanted in (("a", number_a, a), ("b", number_b, b)):
+        if number is None:
+            raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {wanted!r}")
+    assert number_a is not None
+    assert number_b is not None
+    if number_a == number_b:
+        raise CaptureError(f"channels a and b of {path} must be two of {listed}, not both {channels[number_a]}")
+    return number_a, number_b

@@ -1,0 +1,140 @@
+"""Amaranth's own simulator: needs nothing else, and is slow."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from amaranth import Cat, Value
+from amaranth.sim import Simulator
+
+from tachometry.hdl import Tachometer
+from tachometry.sim.recording import PinTrace
+from tachometry.sim.results import Run, Ticks, Updates
+from tachometry.sim.waveform import Waveform
+from tachometry.spec import TachometerSpec
+
+# The simulator counts in femtoseconds; a nanosecond per clock keeps every instant exact. Waveforms have true times.
+_PERIOD = 1e-9
+_CLOCKS_PER_CALL = 10_000
+
+_TICK = ("pulse_count", "position", "overflow")
+_UPDATE = ("velocity", "interval", "forced", "stalled")
+
+
+class PySim:
+    """The engine that is always there."""
+
+    name = "pysim"
+
+    def run(
+        self,
+        spec: TachometerSpec,
+        trace: PinTrace,
+        *,
+        vcd: Path | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> Run:
+        """See `Engine.run`."""
+        core = Tachometer(spec)
+        simulator = Simulator(core)
+        simulator.add_clock(_PERIOD)
+
+        async def drive(ctx: Any) -> None:
+            now = 0
+            rows = zip(trace.clock.tolist(), trace.a.tolist(), trace.b.tolist(), strict=True)
+            for clock, a, b in rows:
+                if clock > now:
+                    await ctx.delay((clock - now) * _PERIOD)
+                    now = clock
+                ctx.set(core.a, a)
+                ctx.set(core.b, b)
+
+        simulator.add_testbench(drive)
+
+        ticks: list[tuple[int, ...]] = []
+        updates: list[tuple[int, ...]] = []
+        errors: list[int] = []
+        strobes = Cat(core.tick, core.velocity_valid, core.decode_error)
+        tick_values = Cat(*(getattr(core, name) for name in _TICK))
+        update_values = Cat(*(getattr(core, name) for name in _UPDATE))
+
+        async def collect(ctx: Any) -> None:
+            clock = 0
+            async for _, _, strobe, tick, update in ctx.tick().sample(strobes, tick_values, update_values):
+                if strobe & 1:
+                    ticks.append((clock, tick))
+                if strobe & 2:
+                    updates.append((clock, update))
+                if strobe & 4:
+                    errors.append(clock)
+                clock += 1
+
+        simulator.add_process(collect)
+
+        with ExitStack() as stack:
+            waveform = None
+            if vcd is not None:
+                shown = _shown(core)
+                widths = {name: (len(value), value.shape().signed) for name, value in shown.items()}
+                waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, widths))
+                _watch(simulator, waveform, shown)
+            for clock in range(0, trace.n_clocks, _CLOCKS_PER_CALL):
+                done = min(clock + _CLOCKS_PER_CALL, trace.n_clocks)
+                simulator.run_until(done * _PERIOD)
+                if progress is not None:
+                    progress(done)
+            if waveform is not None:
+                waveform.close(trace.n_clocks)
+
+        ports = {port.name: (port.width, port.signed) for port in spec.ports}
+        tick_arrays = _unpack(ticks, {name: ports[name] for name in _TICK})
+        update_arrays = _unpack(updates, {name: ports[name] for name in _UPDATE})
+        return Run(trace.n_clocks, Ticks(**tick_arrays), Updates(**update_arrays), np.array(errors, dtype=np.int64))
+
+
+def _shown(core: Tachometer) -> dict[str, Value]:
+    """Signals of the waveform, in the order in which they are shown."""
+    return {
+        "a": core.a,
+        "b": core.b,
+        "decode_error": core.decode_error,
+        "tick": core.tick,
+        "m_e": core.pulse_count,
+        "overflow": core.overflow,
+        **core.datapath.probes,
+        "velocity_valid": core.velocity_valid,
+        "velocity": core.velocity,
+        "interval": core.interval,
+        "forced": core.forced,
+        "stalled": core.stalled,
+        "position": core.position,
+    }
+
+
+def _watch(simulator: Simulator, waveform: Waveform, shown: dict[str, Value]) -> None:
+    packed = Cat(*shown.values())
+
+    async def watch(ctx: Any) -> None:
+        clock = 0
+        async for _, _, value in ctx.tick().sample(packed):
+            waveform.sample(clock, value)
+            clock += 1
+
+    simulator.add_process(watch)
+
+
+def _unpack(rows: list[tuple[int, ...]], fields: dict[str, tuple[int, bool]]) -> dict[str, np.ndarray]:
+    """Columns of rows (clock, packed values); `fields` gives width and signedness, least significant first."""
+    columns: dict[str, np.ndarray] = {"clock": np.array([clock for clock, _ in rows], dtype=np.int64)}
+    shift = 0
+    for name, (width, is_signed) in fields.items():
+        mask, sign = (1 << width) - 1, 1 << (width - 1)
+        values = ((packed >> shift) & mask for _, packed in rows)
+        if is_signed:
+            values = ((value ^ sign) - sign for value in values)
+        flag = name in ("overflow", "forced", "stalled")
+        columns[name] = np.array(list(values), dtype=np.bool_ if flag else np.int64)
+        shift += width
+    return columns

@@ -1,0 +1,68 @@
+"""The manifest that lies beside the Verilog."""
+
+import re
+from dataclasses import asdict
+from typing import Any
+
+from tachometry.spec.tachometer import TachometerSpec
+
+_KEYWORDS = frozenset(
+    """
+    always and assign automatic begin buf bufif0 bufif1 case casex casez cell cmos config deassign default defparam
+    design disable edge else end endcase endconfig endfunction endgenerate endmodule endprimitive endspecify endtable
+    endtask event for force forever fork function generate genvar highz0 highz1 if ifnone incdir include initial inout
+    input instance integer join large liblist library localparam macromodule medium module nand negedge nmos nor
+    noshowcancelled not notif0 notif1 or output parameter pmos posedge primitive pull0 pull1 pulldown pullup
+    pulsestyle_ondetect pulsestyle_onevent rcmos real realtime reg release repeat rnmos rpmos rtran rtranif0 rtranif1
+    scalared showcancelled signed small specify specparam strong0 strong1 supply0 supply1 table task time tran tranif0
+    tranif1 tri tri0 tri1 triand trior trireg unsigned use vectored wait wand weak0 weak1 while wire wor xnor xor
+    """.split()
+)
+
+
+def check_module_name(name: str) -> str:
+    """`name`, if it can be the name of a Verilog module.
+
+    Raises
+    ------
+    ValueError
+        If it is no plain identifier, or a keyword of Verilog-2001.
+    """
+    if name in _KEYWORDS:
+        raise ValueError(f"name must not be a Verilog keyword, which {name!r} is")
+    if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,63}", name) is None:
+        raise ValueError(f"name must be a letter or _ and up to 63 letters, digits or _, not {name!r}")
+    return name
+
+
+def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
+    """All that a program or a driver must know of the exported core.
+
+    Raises
+    ------
+    ValueError
+        If `name` cannot be the name of a module.
+    """
+    return {
+        "module": check_module_name(name),
+        "method": spec.method,
+        "clock_hz": spec.timing.clock_hz,
+        "tick_cycles": spec.timing.tick_cycles,
+        "max_ticks": spec.timing.max_ticks,
+        "counts_per_rev": spec.encoder.counts_per_rev,
+        "decoding": spec.encoder.decoding,
+        "velocity": {
+            "width": spec.velocity_width,
+            "frac_bits": spec.frac_bits,
+            "unit": "count/tick",
+            "rad_per_s_per_lsb": spec.rad_per_s_per_lsb,
+        },
+        "interval_unit_cycles": spec.interval_unit_cycles,
+        "latency_cycles": {
+            "pin_to_count": spec.pin_to_count,
+            "tick_latency": spec.tick_latency,
+            "tick_to_velocity": spec.tick_to_velocity,
+        },
+        "ports": [asdict(port) for port in spec.ports],
+        "parameters": spec.parameters,
+    }
