@@ -21,11 +21,8 @@ class InputConditioner(wiring.Component):
         High from the first clock in which the level before the present one is real as well.
     """
 
-    a: In(1)
-    b: In(1)
-    level_a: Out(1)
-    level_b: Out(1)
-    ready: Out(1)
+    def __init__(self) -> None:
+        super().__init__({"a": In(1), "b": In(1), "level_a": Out(1), "level_b": Out(1), "ready": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

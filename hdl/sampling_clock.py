@@ -24,13 +24,11 @@ class SamplingClock(wiring.Component):
         If `tick_cycles` is less than 1.
     """
 
-    last: Out(1)
-
     def __init__(self, tick_cycles: int) -> None:
         if tick_cycles < 1:
             raise ValueError(f"tick_cycles must be at least 1, not {tick_cycles}")
         self._tick_cycles = tick_cycles
-        super().__init__()
+        super().__init__({"last": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -61,6 +61,10 @@ class _Scaler(wiring.Component):
     def _initial(self) -> ValueLike:
         return (self.base << self._point) | self._reciprocal.rounding
 
+    def _result(self, total: ValueLike) -> ValueLike:
+        """Floor of a total from which a bit has been dropped for every bit of N."""
+        return total >> self._surplus
+
 
 class SerialScaler(_Scaler):
     """One bit of N a clock. `start` may come again as soon as `done` has."""
@@ -88,7 +92,7 @@ class SerialScaler(_Scaler):
             m.d.sync += [
                 running.eq(0),
                 adding.eq(0),
-                self.velocity.eq(shifted >> self._surplus),
+                self.velocity.eq(self._result(shifted)),
                 self.tag_out.eq(tag),
             ]
         with m.If(self.start):
@@ -123,7 +127,7 @@ class PipelinedScaler(_Scaler):
             if last:
                 m.d.sync += self.done.eq(valid)
                 with m.If(valid):
-                    m.d.sync += [self.velocity.eq(shifted >> self._surplus), self.tag_out.eq(tag)]
+                    m.d.sync += [self.velocity.eq(self._result(shifted)), self.tag_out.eq(tag)]
             else:
                 valid, bits, tag, q = delay(valid), delay(bits[1:]), delay(tag), delay(q)
                 total = delay(shifted)

@@ -1,5 +1,7 @@
 """The whole core."""
 
+from typing import Any
+
 from amaranth import Module, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
@@ -12,7 +14,7 @@ from tachometry.hdl.s_method import SMethod
 from tachometry.hdl.sampling_clock import SamplingClock
 from tachometry.spec import TachometerSpec
 
-DATAPATHS = {"s": SMethod}
+DATAPATHS: dict[str, Any] = {"s": SMethod}
 
 
 class Tachometer(wiring.Component):
@@ -28,7 +30,8 @@ class Tachometer(wiring.Component):
     Members
     -------
     The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain: `a`, `b` in; `velocity`,
-    `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `stalled` out.
+    `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `stalled`
+    out.
     """
 
     def __init__(self, spec: TachometerSpec) -> None:

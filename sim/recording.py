@@ -39,8 +39,12 @@ class Recording:
             raise ValueError(f"duration must be at least {self.time[-1]} s, not {self.duration} s")
 
     def place(self, clock_hz: int) -> "PinTrace":
-        """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one."""
-        clock = np.ceil(self.time * clock_hz).astype(np.int64)
+        """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one.
+
+        A change within rounding of an edge, such as a decimal time on the clock's grid, is seen at that edge.
+        """
+        edges = self.time * clock_hz
+        clock = np.ceil(edges - 2 * np.spacing(edges)).astype(np.int64)
         n_clocks = int(np.floor(self.duration * clock_hz))
         last = np.append(clock[1:] != clock[:-1], True) & (
             clock < max(n_clocks, 1)

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.pulse_counter import PulseCounter
+from tachometry.spec import TachometerSpec
+
+
+def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0.5) -> None:
+    rng = np.random.default_rng(seed)
+    n_ticks = 200
+    steps = rng.choice([-1, 0, 1], size=(n_ticks, tick_cycles), p=[0.9 - forward, 0.1, forward])
+    rows = [
+        {"step": int(step), "last": int(clock == tick_cycles - 1)} for tick in steps for clock, step in enumerate(tick)
+    ] + [{"step": 0, "last": 0}] * 3
+    seen = clock_by_clock(PulseCounter(tick_cycles, max_count), rows, ["tick", "pulse_count", "overflow"])
+    strobes = [clock for clock, row in enumerate(seen) if row["tick"]]
+    assert strobes == [(k + 1) * tick_cycles - 1 + TachometerSpec.tick_latency for k in range(n_ticks)], seed
+    sums = steps.sum(axis=1)
+    assert [seen[c]["pulse_count"] for c in strobes] == np.clip(sums, -max_count, max_count).tolist(), seed
+    assert [seen[c]["overflow"] for c in strobes] == (np.abs(sums) > max_count).astype(int).tolist(), seed
+    # Held from strobe to strobe.
+    for here, after in zip(strobes, strobes[1:], strict=False):
+        assert all(seen[c]["pulse_count"] == seen[here]["pulse_count"] for c in range(here, after)), seed
+
+
+@pytest.mark.parametrize(("tick_cycles", "max_count"), [(1, 1), (2, 2), (3, 3), (5, 2), (16, 16), (16, 4), (16, 1)])
+def test_counts_every_step_once(tick_cycles: int, max_count: int) -> None:
+    check_counts(tick_cycles, max_count, seed=tick_cycles)
+
+
+@pytest.mark.parametrize("forward", [0.0, 0.9])
+def test_full_speed_both_ways(forward: float) -> None:
+    check_counts(8, 8, seed=1, forward=forward)
+    check_counts(8, 7, seed=2, forward=forward)
+
+
+def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
+    with mutant(PulseCounter, "count.eq(self.step)", "count.eq(0)"), caught():
+        check_counts(5, 5, seed=0)
+
+
+def test_mutant_that_saturates_one_late_is_caught() -> None:
+    with mutant(PulseCounter, "value > limit, value < -limit", "value > limit + 1, value < -limit"), caught():
+        check_counts(16, 4, seed=0)
+
+
+def test_bad_max_count() -> None:
+    with pytest.raises(ValueError, match=r"^max_count must be from 1 to 8, not 9$"):
+        PulseCounter(8, 9)

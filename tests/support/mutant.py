@@ -1,0 +1,37 @@
+"""Mutants: the source of a box with one thing wrong, to show that a test would notice."""
+
+import inspect
+import sys
+import types
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+
+@contextmanager
+def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
+    """Within this context, `right` in the source of the class `box` reads `wrong`, wherever the class is used.
+
+    The text must stand in the source of its module exactly once.
+    """
+    module = sys.modules[box.__module__]
+    source = inspect.getsource(module)
+    assert source.count(right) == 1, f"{right!r} stands {source.count(right)} times in {module.__name__}"
+    changed = types.ModuleType(module.__name__)
+    exec(compile(source.replace(right, wrong), f"<mutant of {module.__file__}>", "exec"), changed.__dict__)
+    with pytest.MonkeyPatch.context() as patch:
+        for user in list(sys.modules.values()):
+            if getattr(user, "__name__", "").startswith(("tachometry.", "tests.")) or user is module:
+                for name, value in list(vars(user).items()):
+                    if value is box:
+                        patch.setattr(user, name, getattr(changed, box.__name__))
+        yield
+
+
+@contextmanager
+def caught() -> Iterator[None]:
+    """The code within must fail an assertion."""
+    with pytest.raises(AssertionError):
+        yield
