@@ -9,9 +9,9 @@ from typing import BinaryIO, NoReturn, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .capture_file import CaptureError, Channel, choose_channels, reading, replacing
-from .recording import Recording
-from .sigrok import read_sr, write_sr
+from tachometry.sim.capture_file import CaptureError, Channel, choose_channels, reading, replacing
+from tachometry.sim.recording import Recording
+from tachometry.sim.sigrok import read_sr, write_sr
 
 __all__ = ["READERS", "CaptureError", "read_capture", "read_csv", "read_sr", "write_csv", "write_sr"]
 

@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .capture_file import CaptureError, Channel, choose_channels, reading, replacing
-from .recording import PinTrace, Recording
-from .run_zip import RunZip
+from tachometry.sim.capture_file import CaptureError, Channel, choose_channels, reading, replacing
+from tachometry.sim.recording import PinTrace, Recording
+from tachometry.sim.run_zip import RunZip
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
 ONE = np.uint8(1)

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
@@ -21,7 +23,7 @@ def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0
     assert [seen[c]["pulse_count"] for c in strobes] == np.clip(sums, -max_count, max_count).tolist(), seed
     assert [seen[c]["overflow"] for c in strobes] == (np.abs(sums) > max_count).astype(int).tolist(), seed
     # Held from strobe to strobe.
-    for here, after in zip(strobes, strobes[1:], strict=False):
+    for here, after in itertools.pairwise(strobes):
         assert all(seen[c]["pulse_count"] == seen[here]["pulse_count"] for c in range(here, after)), seed
 
 

@@ -1,0 +1,327 @@
+"""Motion profiles and vibration: the angle and the speed of a shaft as functions of time.
+
+A motion is a row of segments, each a constant acceleration plus at most one sine; all are evaluated at once. Only
+operations that IEEE 754 rounds exactly are used (`sin2pi` in place of numpy's sine, whose last bit depends on the
+processor), so that equal motions give equal bits on every machine.
+"""
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import accumulate
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+# A unit is its factor and the power of ten to apply to the decimal number before it is rounded: 7us is exactly 7e-6.
+Units = dict[str, tuple[float, int]]
+_SPEED: Units = {"rad/s": (1.0, 0), "rev/s": (2 * math.pi, 0), "rpm": (math.pi / 30, 0)}
+_TIME: Units = {"s": (1.0, 0), "ms": (1.0, -3), "us": (1.0, -6)}
+_FREQUENCY: Units = {"Hz": (1.0, 0), "kHz": (1.0, 3)}
+_ANGLE: Units = {"rad": (1.0, 0), "mrad": (1.0, -3), "deg": (math.pi / 180, 0)}
+
+_FIELDS: dict[str, dict[str, Units]] = {
+    "constant": {"SPEED": _SPEED, "TIME": _TIME},
+    "ramp": {"FROM": _SPEED, "TO": _SPEED, "TIME": _TIME},
+    "sine": {"AMPLITUDE": _SPEED, "FREQUENCY": _FREQUENCY, "TIME": _TIME},
+    "trapezoid": {"SPEED": _SPEED, "ACCEL_TIME": _TIME, "HOLD_TIME": _TIME},
+    "stop": {"TIME": _TIME},
+}
+_FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items())
+_CSV_HEADER = ["time", "angle_rad"]
+
+# (-1)^n (2 pi)^(2n+1) / (2n+1)!, highest power first
+_SINE_SERIES = (
+    0.0011309237482517963,
+    -0.012031585942120627,
+    0.10422916220813984,
+    -0.7181223017785006,
+    3.819952584848282,
+    -15.09464257682299,
+    42.058693944897655,
+    -76.70585975306139,
+    81.60524927607506,
+    -41.34170224039976,
+    6.283185307179586,
+)
+
+
+def _sine_of_quarter(turns: FloatArray) -> FloatArray:
+    """sin(2 pi turns) for |turns| <= 1/4."""
+    square = turns * turns
+    total = np.full_like(turns, _SINE_SERIES[0])
+    for coefficient in _SINE_SERIES[1:]:
+        total = total * square + coefficient
+    return total * turns
+
+
+def sin2pi(phase: ArrayLike) -> FloatArray:
+    """Sine of a phase in turns, the same bits on every machine; |error| < 1e-15."""
+    phase = np.asarray(phase, dtype=np.float64)
+    turns = phase - np.floor(phase + 0.5)
+    return _sine_of_quarter(np.where(np.abs(turns) > 0.25, np.copysign(0.5, turns) - turns, turns))
+
+
+def cos2pi(phase: ArrayLike) -> FloatArray:
+    """Cosine of a phase in turns, the same bits on every machine; |error| < 1e-15."""
+    phase = np.asarray(phase, dtype=np.float64)
+    return _sine_of_quarter(0.25 - np.abs(phase - np.floor(phase + 0.5)))
+
+
+class _Segment(NamedTuple):
+    duration: float
+    start_speed: float = 0.0
+    acceleration: float = 0.0
+    sine_speed: float = 0.0
+    sine_frequency: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Angle and speed of a shaft from time 0 to `duration`.
+
+    In segment j, with u = t - breakpoints[j], the speed is
+    start_speed[j] + constant_acceleration[j] u + sine_speed[j] sin(2 pi sine_frequency[j] u).
+
+    Parameters
+    ----------
+    breakpoints : float64 array, shape (n + 1,), seconds, strictly increasing, first entry 0
+        Where segments begin, and where the last one ends: speed and acceleration are smooth in between.
+    start_angle : float64 array, shape (n,), rad
+    start_speed : float64 array, shape (n,), rad/s
+    constant_acceleration : float64 array, shape (n,), rad/s^2
+    sine_speed : float64 array, shape (n,), rad/s
+    sine_frequency : float64 array, shape (n,), Hz
+        0 in segments without a sine.
+
+    Raises
+    ------
+    ValueError
+        If a segment is too short to be told from a moment, or a number is not finite.
+    """
+
+    breakpoints: FloatArray
+    start_angle: FloatArray
+    start_speed: FloatArray
+    constant_acceleration: FloatArray
+    sine_speed: FloatArray
+    sine_frequency: FloatArray
+
+    def __post_init__(self) -> None:
+        if not all(np.all(np.isfinite(values)) for values in vars(self).values()):
+            raise ValueError("times, angles and speeds of a motion must be finite")
+        if len(self.breakpoints) < 2 or self.breakpoints[0] != 0 or np.any(np.diff(self.breakpoints) <= 0):
+            raise ValueError("times of a motion must begin at 0 and increase by more than their rounding error")
+
+    @staticmethod
+    def _joined(segments: Iterable[_Segment]) -> "Motion":
+        rows = list(segments)
+        duration, speed, acceleration, sine_speed, frequency = np.array(rows, dtype=np.float64).T
+        with np.errstate(all="ignore"):  # Motion refuses what is not finite
+            travel = duration * (speed + 0.5 * acceleration * duration) + _sine_angle(sine_speed, frequency, duration)
+        start_angle = np.array(list(accumulate(travel[:-1], initial=0.0)))
+        breakpoints = np.array(list(accumulate(duration, initial=0.0)))
+        return Motion(breakpoints, start_angle, speed, acceleration, sine_speed, frequency)
+
+    @property
+    def duration(self) -> float:
+        """Length of the motion, seconds."""
+        return float(self.breakpoints[-1])
+
+    @property
+    def max_travel(self) -> float:
+        """Upper bound on the way travelled to and fro, rad."""
+        duration = np.diff(self.breakpoints)
+        with np.errstate(over="ignore"):
+            end_speed = self.start_speed + self.constant_acceleration * duration
+            mean_speed = 0.5 * np.abs(self.start_speed) + 0.5 * np.abs(end_speed) + np.abs(self.sine_speed)
+            return float(np.sum(mean_speed * duration))
+
+    def angle(self, t: ArrayLike) -> FloatArray:
+        """Angle in rad at times `t` in seconds; before and after the motion, as at its ends."""
+        j, u = self._locate(t)
+        angle = self.start_angle[j] + u * (self.start_speed[j] + 0.5 * self.constant_acceleration[j] * u)
+        if self._has_sine:
+            angle = angle + _sine_angle(self.sine_speed[j], self.sine_frequency[j], u)
+        return angle
+
+    def speed(self, t: ArrayLike) -> FloatArray:
+        """Speed in rad/s at times `t` in seconds; at a breakpoint, that of the segment that begins."""
+        j, u = self._locate(t)
+        speed = self.start_speed[j] + self.constant_acceleration[j] * u
+        if self._has_sine:
+            speed = speed + self.sine_speed[j] * sin2pi(self.sine_frequency[j] * u)
+        return speed
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        """Acceleration in rad/s^2 at times `t` in seconds; at a breakpoint, that of the segment that begins."""
+        j, u = self._locate(t)
+        acceleration = self.constant_acceleration[j]
+        if self._has_sine:
+            rate = 2 * math.pi * self.sine_frequency[j]
+            acceleration = acceleration + self.sine_speed[j] * rate * cos2pi(self.sine_frequency[j] * u)
+        return acceleration
+
+    @property
+    def _has_sine(self) -> bool:
+        return bool(np.any(self.sine_frequency))
+
+    def _locate(self, t: ArrayLike) -> tuple[NDArray[np.intp], FloatArray]:
+        """Segment of each time, and time since that segment began."""
+        time = np.clip(np.asarray(t, dtype=np.float64), 0.0, self.duration)
+        j = np.searchsorted(self.breakpoints[1:-1], time, side="right")
+        return j, time - self.breakpoints[j]
+
+
+def _sine_angle(speed: FloatArray, frequency: FloatArray, u: FloatArray) -> FloatArray:
+    """Integral of speed sin(2 pi frequency u), free of the cancellation in 1 - cos."""
+    half = sin2pi(0.5 * frequency * u)
+    return speed * half * half / np.where(frequency > 0, math.pi * frequency, 1.0)
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """A sinusoidal vibration of the shaft on top of its motion, beginning at its centre.
+
+    Parameters
+    ----------
+    amplitude_rad : float, rad, more than 0
+    frequency_hz : float, Hz, more than 0
+    """
+
+    amplitude_rad: float
+    frequency_hz: float
+
+    def __post_init__(self) -> None:
+        for name, value in (("amplitude", self.amplitude_rad), ("frequency", self.frequency_hz)):
+            if not 0 < value < math.inf:
+                raise ValueError(f"vibration {name} must be more than 0, not {value}")
+
+    @staticmethod
+    def parse(text: str) -> "Vibration":
+        """Read AMPLITUDE:FREQUENCY, such as 1mrad:50Hz (rad, mrad or deg; Hz or kHz)."""
+        amplitude, colon, frequency = text.partition(":")
+        if not colon or ":" in frequency:
+            raise ValueError(f"vibration must be AMPLITUDE:FREQUENCY, not {text!r}")
+        return Vibration(
+            _number(amplitude, _ANGLE, "vibration amplitude"), _number(frequency, _FREQUENCY, "vibration frequency")
+        )
+
+    def angle(self, t: ArrayLike) -> FloatArray:
+        """Angle in rad at times in seconds."""
+        return self.amplitude_rad * sin2pi(self._phase(t))
+
+    def speed(self, t: ArrayLike) -> FloatArray:
+        """Speed in rad/s at times in seconds."""
+        return self.amplitude_rad * self._rate * cos2pi(self._phase(t))
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        """Acceleration in rad/s^2 at times in seconds."""
+        return -self.amplitude_rad * self._rate * self._rate * sin2pi(self._phase(t))
+
+    @property
+    def _rate(self) -> float:
+        return 2 * math.pi * self.frequency_hz
+
+    def _phase(self, t: ArrayLike) -> FloatArray:
+        return self.frequency_hz * np.asarray(t, dtype=np.float64)
+
+
+def parse_motion(text: str) -> Motion:
+    """Read a motion.
+
+    Parameters
+    ----------
+    text : str
+        Segments joined by `+`: constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME,
+        trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, stop:TIME. Or csv:FILE alone: a table with the header `time,angle_rad`
+        (seconds, rad) between whose rows the angle is interpolated linearly; its first time becomes 0.
+        Speeds are in rad/s (default), rev/s or rpm, times in s (default), ms or us, frequencies in Hz (default) or kHz.
+
+    Raises
+    ------
+    ValueError
+        If the text or the file is not of this form.
+    """
+    kind, _, file = text.strip().partition(":")
+    if kind == "csv":
+        return _read_csv(file)
+    # a + before a digit is a sign or part of an exponent
+    return Motion._joined(
+        segment for part in re.split(r"\+(?![\d.])", text) for segment in _parse_segment(part.strip())
+    )
+
+
+def _parse_segment(text: str) -> list[_Segment]:
+    kind, *numbers = text.split(":")
+    if kind == "csv":
+        raise ValueError(f"csv:FILE must be the whole motion, not a segment of it: {text!r}")
+    fields = _FIELDS.get(kind)
+    if fields is None or len(numbers) != len(fields):
+        raise ValueError(f"motion segment must be one of {_FORMS}, csv:FILE, not {text!r}")
+    values = []
+    for (name, units), number in zip(fields.items(), numbers, strict=True):
+        value = _number(number, units, f"{name} of {kind}")
+        if units is not _SPEED and value <= 0:
+            raise ValueError(f"{name} of {kind} must be more than 0 {next(iter(units))}, not {number!r}")
+        values.append(value)
+    match kind, values:
+        case "constant", [speed, duration]:
+            return [_Segment(duration, speed)]
+        case "ramp", [start, end, duration]:
+            return [_Segment(duration, start, (end - start) / duration)]
+        case "sine", [amplitude, frequency, duration]:
+            return [_Segment(duration, sine_speed=amplitude, sine_frequency=frequency)]
+        case "trapezoid", [speed, rise, hold]:
+            return [_Segment(rise, 0.0, speed / rise), _Segment(hold, speed), _Segment(rise, speed, -speed / rise)]
+        case _:
+            return [_Segment(values[0])]
+
+
+def _number(text: str, units: Units, name: str) -> float:
+    """Value of a decimal number with one of `units` behind it, or with none: then the first of them is meant."""
+    match = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d{1,4}))?\s*([a-zA-Z/]*)", text.strip(), re.ASCII)
+    default = next(iter(units))
+    if match is None or (match[3] or default) not in units:
+        raise ValueError(f"{name} must be a number in {', '.join(units)} (default {default}), not {text!r}")
+    factor, exponent = units[match[3] or default]
+    value = float(f"{match[1]}e{int(match[2] or 0) + exponent}") * factor
+    if not math.isfinite(value):
+        raise ValueError(f"{name} must be finite, not {text!r}")
+    return value
+
+
+def _read_csv(file: str) -> Motion:
+    try:
+        lines = Path(file).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise ValueError(f"motion file {file!r} cannot be read: {reason}") from error
+    if not lines or [cell.strip() for cell in lines[0].split(",")] != _CSV_HEADER:
+        raise ValueError(f"{file}:1: header must be 'time,angle_rad', not {lines[0] if lines else ''!r}")
+    rows: list[tuple[float, float]] = []
+    for number, line in enumerate(lines[1:], start=2):
+        if not line.strip():
+            continue
+        try:
+            time, angle = map(float, line.split(","))
+        except ValueError:
+            raise ValueError(f"{file}:{number}: row must be two numbers TIME,ANGLE, not {line!r}") from None
+        if not (math.isfinite(time) and math.isfinite(angle)):
+            raise ValueError(f"{file}:{number}: time and angle must be finite, not {line!r}")
+        if rows and time <= rows[-1][0]:
+            raise ValueError(f"{file}:{number}: time must be more than {rows[-1][0]} s, not {time} s")
+        rows.append((time, angle))
+    if len(rows) < 2:
+        raise ValueError(f"{file}:{len(lines)}: file must have at least 2 rows, not {len(rows)}")
+    table = np.array(rows)
+    breakpoints, angle_rad = table[:, 0] - table[0, 0], table[:, 1]
+    zero = np.zeros(len(rows) - 1)
+    with np.errstate(all="ignore"):  # Motion refuses what is not finite
+        slope = np.diff(angle_rad) / np.diff(breakpoints)
+    return Motion(breakpoints, angle_rad[:-1], slope, zero, zero, zero)

@@ -1,0 +1,208 @@
+"""The figure of a run: velocity, its error, pulse numbers and measurement times."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+import matplotlib.ticker
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from tachometry.sim.results import Run
+from tachometry.sim.tables import held_velocity, velocity_error
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import format_time
+
+FloatArray = NDArray[np.float64]
+TrueSpeed = Callable[[FloatArray], FloatArray]
+
+# Nothing of the user's settings, of the day or of a version gets into a figure.
+_STYLE = {
+    "svg.hashsalt": "tachometry",
+    "pdf.compression": 0,  # zlib promises what its output unpacks to, not which bytes it is
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "0.92",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.labelcolor": "0.15",
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 0.9,
+}
+_METADATA: dict[str, dict[str, None]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None, "Creator": None},
+    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+_ESTIMATE, _ERROR, _COUNT, _FORCED = "#2a78c8", "#b3261e", "#2e6b3e", "#d9730d"
+
+_COLUMNS = 1500  # about one for each pixel across
+_TRUE_POINTS = 20_000  # at least: a vibration must be seen even when ticks are few
+_MOST_MULTIPLES = 12  # lines at multiples of the unit velocity that still can be told apart
+
+
+def save_plot(path: Path, spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None = None) -> None:
+    """Draw a run into a file whose kind its suffix tells: `.png`, `.svg` or `.pdf`.
+
+    Equal runs give equal files. What has more points than the figure has columns is reduced to the first, least,
+    greatest and last of each column, which draws the same line.
+
+    Parameters
+    ----------
+    path : Path
+    spec : TachometerSpec
+    run : Run
+    true_speed : callable or None
+        True speed in rad/s at times in seconds; without it there is no error panel.
+    """
+    suffix = path.suffix.lower()
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_STYLE)
+        figure = _draw(spec, run, true_speed)
+        figure.savefig(path, format=suffix[1:], dpi=160, metadata=_METADATA[suffix])
+
+
+def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = _COLUMNS) -> NDArray[np.int64]:
+    """Indices of the first, least, greatest and last point in each of `n_columns` equal stretches of x, in order.
+
+    A line through them covers the same pixels as one through all. `x` does not decrease.
+    """
+    if len(x) <= 4 * n_columns:
+        return np.arange(len(x))
+    column = ((x - x[0]) * (n_columns / (x[-1] - x[0]))).astype(np.int64)
+    first = np.flatnonzero(np.diff(column, prepend=-1))
+    last = np.append(first[1:], len(x)) - 1
+    by_value = np.lexsort((y, column))  # columns stay together: each begins and ends where it did
+    return np.unique(np.concatenate([first, by_value[first], by_value[last], last]))
+
+
+def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figure:
+    seconds = run.n_clocks / spec.timing.clock_hz
+    scale, unit = next(((k, u) for k, u in ((1, "s"), (1e3, "ms")) if seconds * k >= 1), (1e6, "µs"))
+    panels = ["velocity", "error", "count", "interval"] if true_speed else ["velocity", "count", "interval"]
+    heights = {"velocity": 3.0, "error": 1.6, "count": 1.3, "interval": 1.3}
+    figure = Figure(figsize=(10, 1.1 * sum(heights[p] for p in panels) + 1.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=[heights[p] for p in panels])
+    panel = dict(zip(panels, axes[:, 0], strict=True))
+
+    _velocity(panel["velocity"], spec, run, true_speed, scale)
+    if true_speed:
+        _error(panel["error"], spec, run, true_speed, scale)
+    _count(panel["count"], spec, run, scale)
+    _interval(panel["interval"], spec, run, scale)
+    panel["velocity"].set_title(_title(spec), loc="left")
+    panel["interval"].set_xlabel(f"time ({unit})")
+    panel["interval"].set_xlim(0, seconds * scale)
+    figure.align_ylabels()
+    return figure
+
+
+def _title(spec: TachometerSpec) -> str:
+    timing = spec.timing
+    equation = {True: ", eq. (21)", False: ", eq. (17)"}.get(spec.parameters.get("cancel"), "")
+    return (
+        f"{spec.method.upper()} method{equation}: {spec.encoder.pulses_per_rev} PPR ×{spec.encoder.decoding}, "
+        f"$T_s$ = {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
+        f"clock {_frequency(timing.clock_hz)}, $ω_u$ = {spec.unit_velocity:.5g} rad/s"
+    )
+
+
+def _frequency(hertz: int) -> str:
+    size, unit = next((s, u) for s, u in ((10**6, "MHz"), (10**3, "kHz"), (1, "Hz")) if hertz >= s)
+    return f"{hertz / size:.9g} {unit}"
+
+
+def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None, scale: float) -> None:
+    clock_hz, updates = spec.timing.clock_hz, run.updates
+    clock, velocity = _held_to_end(updates.clock, updates.velocity * spec.rad_per_s_per_lsb, run.n_clocks)
+    kept = columns(clock, velocity)
+    time = clock[kept] / clock_hz * scale
+    axes.plot(time, velocity[kept], color=_ESTIMATE, drawstyle="steps-post", label="estimate (held)")
+    if true_speed:
+        instants = np.linspace(0, run.n_clocks / clock_hz, max(_TRUE_POINTS, 2 * len(run.ticks.clock)))
+        speed = true_speed(instants)
+        # Below the steps where they can be told apart, else above the band that they merge to.
+        over = len(kept) < len(clock)
+        colour, width = ("black", 0.8) if over else ("0.6", 1.8)
+        kept = columns(instants, speed)
+        axes.plot(
+            instants[kept] * scale,
+            speed[kept],
+            color=colour,
+            linewidth=width,
+            zorder=3 if over else 1.9,
+            label="shaft (true)",
+        )
+    axes.set_ylabel("velocity (rad/s)")
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=2)
+    _multiples(axes, spec.unit_velocity)
+
+
+def _held_to_end(clock: NDArray[np.int64], values: NDArray[np.generic], n_clocks: int) -> tuple[FloatArray, FloatArray]:
+    """Points of a step line that ends with the run."""
+    if not len(clock):
+        return np.empty(0), np.empty(0)
+    return np.append(clock, n_clocks).astype(np.float64), np.append(values, values[-1]).astype(np.float64)
+
+
+def _multiples(axes: Axes, unit_velocity: float) -> None:
+    """An axis in counts per tick, and lines at whole numbers of them if they are few."""
+    right = axes.secondary_yaxis("right", functions=(lambda v: v / unit_velocity, lambda n: n * unit_velocity))
+    right.set_ylabel("$ω/ω_u$ (counts per tick)")
+    right.spines["right"].set_visible(True)
+    low, high = (v / unit_velocity for v in axes.get_ylim())
+    if high - low <= _MOST_MULTIPLES:
+        right.yaxis.set_major_locator(matplotlib.ticker.MultipleLocator(1))
+        for n in range(int(np.ceil(low)), int(np.floor(high)) + 1):
+            axes.axhline(n * unit_velocity, color="0.75", linewidth=0.7, linestyle=(0, (1, 3)), zorder=0.5)
+
+
+def _error(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed, scale: float) -> None:
+    held = held_velocity(spec, run)
+    error = held.velocity_rad_s - true_speed(held.time)
+    kept = columns(held.time, error)
+    axes.axhline(0, color="0.6", linewidth=0.7)
+    axes.plot(held.time[kept] * scale, error[kept], color=_ERROR)
+    axes.set_ylabel("error (rad/s)")
+    statistics = velocity_error(held, true_speed)
+    if statistics:
+        axes.set_title(
+            f"held − true at every tick: RMS {statistics.rms:.3g}, mean {statistics.mean:.3g}, "
+            f"max {statistics.max:.3g} rad/s",
+            loc="left",
+            fontsize=8,
+        )
+
+
+def _count(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
+    ticks = run.ticks
+    clock, m_e = _held_to_end(ticks.clock, ticks.pulse_count, run.n_clocks)
+    kept = columns(clock, m_e)
+    axes.plot(clock[kept] / spec.timing.clock_hz * scale, m_e[kept], color=_COUNT, drawstyle="steps-post")
+    axes.set_ylim(m_e.min() - 0.5, m_e.max() + 0.5)
+    axes.set_ylabel("$m_e$ (counts)")
+    axes.yaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True, nbins=5))
+
+
+def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
+    updates = run.updates
+    for forced, colour, label in ((False, _ESTIMATE, "alteration"), (True, _FORCED, "forced")):
+        chosen = updates.forced == forced
+        time = updates.clock[chosen] / spec.timing.clock_hz
+        m_s = updates.interval[chosen]
+        kept = columns(time, m_s)
+        axes.plot(time[kept] * scale, m_s[kept], ".", color=colour, markersize=2.5, label=label)
+    axes.set_yscale("log")
+    axes.set_ylim(0.8, spec.timing.max_ticks * 1.25)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_ylabel("$m_s$ (ticks)")
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=2)

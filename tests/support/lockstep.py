@@ -1,0 +1,126 @@
+"""Random motions through hardware and golden model, side by side, and what they covered."""
+
+import itertools
+from collections import Counter
+from fractions import Fraction
+
+import numpy as np
+
+from tachometry.sim import golden
+from tachometry.sim.encoder import Encoding, VirtualEncoder
+from tachometry.sim.engine import Engine
+from tachometry.sim.golden.s_method import alterations
+from tachometry.sim.motion import Vibration, parse_motion
+from tachometry.sim.recording import PinTrace
+from tachometry.sim.results import Run, compare
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+
+PULSES_PER_REV = 100
+CLOCK_HZ = 1_000_000
+MIN_TICKS, MIN_UPDATES = 2000, 200
+
+STATES = ("00", "10", "11", "01")
+LEGAL = [f"{STATES[k]}->{STATES[(k + d) % 4]}" for k in range(4) for d in (1, -1)]
+ILLEGAL = [f"{STATES[k]}->{STATES[(k + 2) % 4]}" for k in range(4)]
+EVENTS = [
+    "suppressed return",
+    "alteration at max_ticks",
+    "forced, then alteration",
+    "m_s = 1",
+    "m_e saturated",
+    "sign change",
+    "stalled",
+    *LEGAL,
+    *ILLEGAL,
+]
+
+
+def random_case(seed: int) -> tuple[STachometer, Encoding]:
+    """A configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
+    rng = np.random.default_rng(seed)
+    tick_cycles = int(rng.choice([2, 2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 16]))
+    max_ticks = int(rng.choice([2, 3, 5, 10, 20]))
+    decoding = int(rng.choice([1, 2, 4, 4]))
+    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks)
+    duration = n_ticks * tick_cycles / CLOCK_HZ
+    # One step takes at least a clock, and one decoded count takes 4/decoding of them.
+    fastest = tick_cycles * decoding / 4
+    unit = 2 * np.pi * CLOCK_HZ / (PULSES_PER_REV * decoding * tick_cycles)
+    speeds = unit * np.minimum(
+        rng.choice([0.004, 0.05, 0.3, 1.003, 1.4, 3.25]) * rng.uniform(0.9, 1.1, size=4), 0.9 * fastest
+    )
+    speeds *= rng.choice([-1, 1], size=4)
+    parts = [
+        f"constant:{speeds[0]}rad/s:{duration / 4}s",
+        f"ramp:{speeds[0]}rad/s:{speeds[1]}rad/s:{duration / 4}s",
+        f"sine:{speeds[2]}rad/s:{rng.choice([1, 3, 20]) / duration}Hz:{duration / 4}s",
+        f"stop:{duration / 8}s",
+        f"ramp:0rad/s:{speeds[3]}rad/s:{duration / 8}s",
+    ]
+    order = rng.permutation(len(parts))
+    pitch = 2 * np.pi / (4 * PULSES_PER_REV)
+    encoder = VirtualEncoder(
+        PULSES_PER_REV,
+        vibration=Vibration(rng.uniform(0, 3) * pitch, 10 / duration) if rng.random() < 0.6 else None,
+        jitter=float(rng.choice([0, 0.05, 0.3])),
+        nonuniformity=float(rng.choice([0, 0.1])),
+        illegal=float(rng.choice([0, 0, 0.02])),
+        start_angle_rad=float(rng.uniform(0, 2 * np.pi)),
+        seed=seed,
+    )
+    max_speed = Speed(Fraction(round(unit * rng.uniform(0.2, 3), 3))) if rng.random() < 0.5 else None
+    spec = STachometer(
+        encoder=Encoder(PULSES_PER_REV, decoding),
+        timing=Timing(CLOCK_HZ, tick_cycles, max_ticks),
+        frac_bits=int(rng.integers(4, 25)),
+        max_speed=max_speed,
+        cancel=bool(rng.random() < 0.75),
+    )
+    return spec, encoder.record(parse_motion("+".join(parts[k] for k in order)))
+
+
+def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
+    """How often each event of the coverage table happened."""
+    m_e, updates = run.ticks.pulse_count, run.updates
+    changed = np.diff(m_e, prepend=0) != 0
+    by_count = ~updates.forced
+    sign = np.sign(updates.velocity)
+    found = Counter(
+        {
+            "suppressed return": np.count_nonzero(changed & ~alterations(m_e)),
+            "alteration at max_ticks": np.count_nonzero(by_count & (updates.interval == spec.timing.max_ticks)),
+            "forced, then alteration": np.count_nonzero(updates.forced[:-1] & by_count[1:]),
+            "m_s = 1": np.count_nonzero(updates.interval == 1),
+            "m_e saturated": np.count_nonzero(run.ticks.overflow),
+            "sign change": np.count_nonzero(sign[1:] * sign[:-1] < 0),
+            "stalled": np.count_nonzero(updates.stalled),
+        }
+    )
+    lines = [f"{a}{b}" for a, b in zip(trace.a, trace.b, strict=True)]
+    found.update(f"{before}->{after}" for before, after in itertools.pairwise(lines))
+    return found
+
+
+def lockstep(seed: int, engine: Engine) -> tuple[list[str], Counter[str]]:
+    """Run one random case; what went wrong, and what it covered."""
+    spec, encoding = random_case(seed)
+    trace = encoding.recording.place(CLOCK_HZ)
+    expected, actual = golden.run(spec, trace), engine.run(spec, trace)
+    problems = [f"seed {seed}: {mismatch}" for mismatch in compare(expected, actual)[1]]
+    if len(actual.ticks.clock) < MIN_TICKS or len(actual.updates.clock) < MIN_UPDATES:
+        problems.append(f"seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
+    problems += [f"seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
+    return problems, covered(spec, trace, actual)
+
+
+def _lost_counts(spec: STachometer, encoding: Encoding, run: Run) -> list[str]:
+    """Hold the position against the shaft's angle, tick by tick, unless an illegal transition was reported.
+
+    Jitter makes an edge come early or late, but never twice or not at all.
+    """
+    if len(run.errors):
+        return []
+    sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / CLOCK_HZ
+    turned = encoding.true_position(sampled, spec.encoder.decoding)
+    wrong = np.flatnonzero(np.abs(run.ticks.position - turned) > (encoding.encoder.jitter > 0))
+    return [f"position of tick {k}: {run.ticks.position[k]}, not {turned[k]}" for k in wrong[:1]]
