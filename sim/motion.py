@@ -124,8 +124,8 @@ class Motion:
         duration, speed, acceleration, sine_speed, frequency = np.array(rows, dtype=np.float64).T
         with np.errstate(all="ignore"):  # Motion refuses what is not finite
             travel = duration * (speed + 0.5 * acceleration * duration) + _sine_angle(sine_speed, frequency, duration)
-        start_angle = np.array(list(accumulate(travel[:-1], initial=0.0)))
-        breakpoints = np.array(list(accumulate(duration, initial=0.0)))
+            start_angle = np.array(list(accumulate(travel[:-1], initial=0.0)))
+            breakpoints = np.array(list(accumulate(duration, initial=0.0)))
         return Motion(breakpoints, start_angle, speed, acceleration, sine_speed, frequency)
 
     @property

@@ -99,7 +99,7 @@ def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figur
         _error(panel["error"], spec, run, true_speed, scale)
     _count(panel["count"], spec, run, scale)
     _interval(panel["interval"], spec, run, scale)
-    panel["velocity"].set_title(_title(spec), loc="left")
+    figure.suptitle(_title(spec), fontsize=10)
     panel["interval"].set_xlabel(f"time ({unit})")
     panel["interval"].set_xlim(0, seconds * scale)
     figure.align_ylabels()
@@ -131,7 +131,7 @@ def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
         instants = np.linspace(0, run.n_clocks / clock_hz, max(_TRUE_POINTS, 2 * len(run.ticks.clock)))
         speed = true_speed(instants)
         # Below the steps where they can be told apart, else above the band that they merge to.
-        over = len(kept) < len(clock)
+        over = len(clock) > _COLUMNS // 4
         colour, width = ("black", 0.8) if over else ("0.6", 1.8)
         kept = columns(instants, speed)
         axes.plot(

@@ -152,6 +152,7 @@ def test_max_travel_bounds_the_way(text: str) -> None:
         ("constant:1e999:1", "SPEED of constant must be finite, not '1e999'"),
         ("constant:1:1e999s", "TIME of constant must be finite, not '1e999s'"),
         ("constant:1e300:1e300s", "times, angles and speeds of a motion must be finite"),
+        ("stop:1e308s+stop:1e308s", "times, angles and speeds of a motion must be finite"),
         ("stop:1e9s+stop:1e-9s", "times of a motion must begin at 0 and increase by more than their rounding error"),
     ],
 )
