@@ -6,7 +6,7 @@ counts negative and is subtracted. The one takes a clock per bit and a single ad
 update rate. Their latency is the same.
 """
 
-from amaranth import Module, Mux, Signal, ValueLike, signed
+from amaranth import Cat, Module, Mux, Signal, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -73,20 +73,29 @@ class SerialScaler(_Scaler):
         m = Module()
         total = Signal(self._sum_shape)
         bits = Signal(self._steps)
-        step = Signal(range(self._steps))
+        step = Signal(range(self._steps + 1))
         running, adding, last = Signal(), Signal(), Signal()
         tag = Signal.like(self.tag)
 
-        # Where a bit of N is 0, its q is cleared on the way into the register.
-        q = Signal.like(self.q)
-        m.d.sync += [q.eq(self.q), bits.eq(bits >> 1), adding.eq(running)]
+        # What is added next: q, nothing where a bit of N is 0, −q = ~q + 1 where its sign bit is 1.
+        sign = step == self._steps - 1
+        addend = Signal.like(self.q)
+        borrow = Signal()
+        m.d.sync += [
+            addend.eq(self.q ^ sign.replicate(len(self.q))),
+            borrow.eq(sign & bits[0]),
+            bits.eq(bits >> 1),
+            adding.eq(running),
+            last.eq(sign),
+        ]
         with m.If(~bits[0]):
-            m.d.sync += q.eq(0)
+            m.d.sync += addend.eq(0)
+        with m.If(running):
+            m.d.sync += step.eq(step + 1)
 
-        m.d.comb += last.eq(step == self._steps - 1)
-        shifted = Mux(last, total - q, total + q) >> 1
+        shifted = (total + Cat(addend, borrow).as_signed() + borrow)[1:].as_signed()
         with m.If(adding):
-            m.d.sync += [total.eq(shifted), step.eq(step + 1)]
+            m.d.sync += total.eq(shifted)
         m.d.sync += self.done.eq(adding & last)
         with m.If(adding & last):
             m.d.sync += [

@@ -151,7 +151,7 @@ MUTANTS = {
         "return total >> self._surplus",
         "return (total >> self._surplus) & ~~total[: self._surplus].any()",
     ),
-    "the sign bit counts positive": ("Mux(last, total - q, total + q)", "(total + q)"),
+    "the sign bit counts positive": ("self.q ^ sign.replicate(len(self.q))", "self.q"),
     "half down": ("| self._reciprocal.rounding", "| (1 << (self._reciprocal.scale_bits - 1))"),
 }
 
