@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint clean
+.PHONY: help venv demo test size lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -25,6 +25,11 @@ $(VENV)/.run: pyproject.toml
 
 $(VENV)/.test: $(VENV)/.run
 	$(BIN)/pip install -q --disable-pip-version-check -e '.[test]'
+	@command -v c++ g++ clang++ >/dev/null || $(BIN)/pip install -q --disable-pip-version-check ziglang
+	@touch $@
+
+$(VENV)/.size: $(VENV)/.run
+	$(BIN)/pip install -q --disable-pip-version-check -e '.[size]'
 	@touch $@
 
 venv: $(VENV)/.test ## the environment in .venv, with all that tests need
@@ -33,7 +38,10 @@ demo: $(VENV)/.run ## the paper's experiment: Verilog, waveform, plot and exact 
 	BIN=$(BIN) sh docs/demo.sh
 
 test: $(VENV)/.test lint ## lint, types and all tests
-	$(BIN)/pytest -q -n auto
+	$(BIN)/pytest -q -n auto --dist worksteal
+
+size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
+	$(BIN)/python bench/size.py -o docs/size.md
 
 lint: $(VENV)/.test ## ruff and mypy
 	$(BIN)/ruff check .

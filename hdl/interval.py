@@ -74,8 +74,9 @@ class IntervalAccumulator(wiring.Component):
         opening = Signal.like(self.m_e)
         longest = Signal()
         d1 = self.m_e - self.previous
+        # m_s changes with a tick only, so there is a clock to compare it in.
+        m.d.sync += longest.eq(self.m_s == self._max_ticks)
         m.d.comb += [
-            longest.eq(self.m_s == self._max_ticks),
             self.update.eq(self.tick & (self.alteration | longest)),
             self.forced.eq(longest & ~self.alteration),
             # A forced window ends as it went on, in `previous`; only its opening tick may differ.

@@ -83,6 +83,7 @@ class SMethod(wiring.Component):
             interval.alteration.eq(alteration.alteration),
             reciprocal.m.eq(interval.m_s),
             reciprocal.enable.eq(self.tick),
+            scaler.load.eq(self.tick),
             scaler.start.eq(interval.update),
             scaler.base.eq(alteration.previous),
             scaler.numerator.eq(interval.numerator),

@@ -1,9 +1,9 @@
 """base + N·q, rounded: the arithmetic that turns a reciprocal into a velocity.
 
-Both scalers form ⌊(base·2^(f+k) + N·q + E + 2^(k−1)) / 2^k⌋, which spec/reciprocal.py shows to be correctly rounded, by
+Both scalers form base·2^f + ⌊(N·q + E + 2^(k−1)) / 2^k⌋, which spec/reciprocal.py shows to be correctly rounded, by
 adding q for every bit of N, the least significant first, and dropping a bit of the sum each time; the sign bit of N
-counts negative and is subtracted. The one takes a clock per bit and a single adder, the other an adder per bit and any
-update rate. Their latency is the same.
+counts negative. The one takes a clock per bit and a single adder, the other an adder per bit and any update rate. Their
+latency is the same.
 """
 
 from amaranth import Cat, Module, Mux, Signal, ValueLike, signed
@@ -16,7 +16,7 @@ from tachometry.spec.reciprocal import Reciprocal
 class _Scaler(wiring.Component):
     """What both scalers share.
 
-    Latency: `done` is high as many clocks after `start` as N has bits, and two more.
+    Latency: `done` is high as many clocks after `start` as N has bits, and three more.
 
     Parameters
     ----------
@@ -28,9 +28,11 @@ class _Scaler(wiring.Component):
 
     Members
     -------
+    load : In(1)
+        `base`, `numerator` and `tag` are valid.
     start : In(1)
+        And they are to be used; only together with `load`.
     base, numerator, tag : In
-        Valid with `start`.
     q : In(reciprocal.width)
         Reciprocal, valid in the clock after `start`.
     done : Out(1)
@@ -39,14 +41,15 @@ class _Scaler(wiring.Component):
     """
 
     def __init__(self, reciprocal: Reciprocal, *, base_width: int, numerator_width: int, tag_width: int) -> None:
-        self._reciprocal = reciprocal
         self._steps = numerator_width
-        self._sum_shape = signed(reciprocal.frac_bits + reciprocal.scale_bits + base_width)
-        # Where the integer part begins, and what is left to drop when all bits of N are done.
-        self._point = reciprocal.frac_bits + reciprocal.scale_bits
+        self._rounding = reciprocal.rounding
+        self._frac_bits = reciprocal.frac_bits
+        # What is left to drop when all bits of N are done.
         self._surplus = reciprocal.scale_bits - numerator_width
+        self._total_shape = signed(reciprocal.width + 1)
         super().__init__(
             {
+                "load": In(1),
                 "start": In(1),
                 "base": In(signed(base_width)),
                 "numerator": In(signed(numerator_width)),
@@ -58,59 +61,56 @@ class _Scaler(wiring.Component):
             }
         )
 
-    def _initial(self) -> ValueLike:
-        return (self.base << self._point) | self._reciprocal.rounding
-
-    def _result(self, total: ValueLike) -> ValueLike:
-        """Floor of a total from which a bit has been dropped for every bit of N."""
-        return total >> self._surplus
+    def _result(self, base: Signal, total: Signal) -> ValueLike:
+        """The velocity, from a total of which a bit has been dropped for every bit of N."""
+        return (base << self._frac_bits) + (total >> self._surplus)
 
 
 class SerialScaler(_Scaler):
-    """One bit of N a clock. `start` may come again as soon as `done` has."""
+    """One bit of N a clock. `load` may come again as soon as `done` has."""
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        total = Signal(self._sum_shape)
-        bits = Signal(self._steps)
-        step = Signal(range(self._steps + 1))
-        running, adding, last = Signal(), Signal(), Signal()
-        tag = Signal.like(self.tag)
+        # Only what says that something is under way needs a reset; the rest is loaded before it is used.
+        running, adding, last, added = Signal(), Signal(), Signal(), Signal()
+        total = Signal(self._total_shape, reset_less=True)
+        bits = Signal(self._steps, reset_less=True)
+        step = Signal(range(self._steps + 1), reset_less=True)
+        base = Signal.like(self.base, reset_less=True)
+        tag = Signal.like(self.tag, reset_less=True)
 
         # What is added next: q, nothing where a bit of N is 0, −q = ~q + 1 where its sign bit is 1.
         sign = step == self._steps - 1
-        addend = Signal.like(self.q)
-        borrow = Signal()
+        addend = Signal.like(self.q, reset_less=True)
+        borrow = Signal(reset_less=True)
         m.d.sync += [
             addend.eq(self.q ^ sign.replicate(len(self.q))),
             borrow.eq(sign & bits[0]),
             bits.eq(bits >> 1),
+            step.eq(step + 1),
             adding.eq(running),
-            last.eq(sign),
+            last.eq(running & sign),
+            added.eq(last),
+            self.done.eq(added),
         ]
         with m.If(~bits[0]):
             m.d.sync += addend.eq(0)
-        with m.If(running):
-            m.d.sync += step.eq(step + 1)
-
-        shifted = (total + Cat(addend, borrow).as_signed() + borrow)[1:].as_signed()
+        with m.If(sign):
+            m.d.sync += running.eq(0)
         with m.If(adding):
-            m.d.sync += total.eq(shifted)
-        m.d.sync += self.done.eq(adding & last)
-        with m.If(adding & last):
+            # The carry into the adder comes from an additional bit at its end.
+            sum_ = Cat(1, total).as_signed() + Cat(borrow, addend, borrow).as_signed()
+            m.d.sync += total.eq(sum_ >> 2)
+        with m.If(added):
+            m.d.sync += [self.velocity.eq(self._result(base, total)), self.tag_out.eq(tag)]
+        with m.If(self.load):
             m.d.sync += [
-                running.eq(0),
-                adding.eq(0),
-                self.velocity.eq(self._result(shifted)),
-                self.tag_out.eq(tag),
-            ]
-        with m.If(self.start):
-            m.d.sync += [
-                total.eq(self._initial()),
+                total.eq(self._rounding),
                 bits.eq(self.numerator),
                 step.eq(0),
+                base.eq(self.base),
                 tag.eq(self.tag),
-                running.eq(1),
+                running.eq(self.start),
             ]
         return m
 
@@ -121,23 +121,21 @@ class PipelinedScaler(_Scaler):
     def elaborate(self, platform: object) -> Module:
         m = Module()
 
-        def delay(value: ValueLike) -> Signal:
-            register = Signal.like(value)
-            m.d.sync += register.eq(value)
-            return register
+        def delay(*values: Signal) -> list[Signal]:
+            registers = [Signal.like(value) for value in values]
+            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
+            return registers
 
-        valid, bits, tag = delay(self.start), delay(self.numerator), delay(self.tag)
-        total = Signal(self._sum_shape)
-        m.d.sync += total.eq(self._initial())
-        valid, bits, tag, total, q = delay(valid), delay(bits), delay(tag), delay(total), delay(self.q)
+        valid, bits, base, tag = delay(self.start, self.numerator, self.base, self.tag)
+        valid, bits, base, tag, q = delay(valid, bits, base, tag, self.q)
+        total: ValueLike = self._rounding
         for step in range(self._steps):
+            sum_ = Signal(self._total_shape)
             last = step == self._steps - 1
-            shifted = Mux(bits[0], total - q if last else total + q, total) >> 1
-            if last:
-                m.d.sync += self.done.eq(valid)
-                with m.If(valid):
-                    m.d.sync += [self.velocity.eq(self._result(shifted)), self.tag_out.eq(tag)]
-            else:
-                valid, bits, tag, q = delay(valid), delay(bits[1:]), delay(tag), delay(q)
-                total = delay(shifted)
+            m.d.sync += sum_.eq(Mux(bits[step], total - q if last else total + q, total) >> 1)
+            total = sum_
+            valid, bits, base, tag, q = delay(valid, bits, base, tag, q)
+        m.d.sync += self.done.eq(valid)
+        with m.If(valid):
+            m.d.sync += [self.velocity.eq(self._result(base, total)), self.tag_out.eq(tag)]
         return m

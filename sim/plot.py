@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import matplotlib.ticker
@@ -20,8 +21,7 @@ FloatArray = NDArray[np.float64]
 TrueSpeed = Callable[[FloatArray], FloatArray]
 
 # Nothing of the user's settings, of the day or of a version gets into a figure.
-_STYLE = {
-    "svg.hashsalt": "tachometry",
+_STYLE: dict[Any, Any] = {
     "pdf.compression": 0,  # zlib promises what its output unpacks to, not which bytes it is
     "font.size": 9,
     "axes.titlesize": 10,
@@ -38,10 +38,13 @@ _STYLE = {
 }
 _METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
-    ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 _ESTIMATE, _ERROR, _COUNT, _FORCED = "#2a78c8", "#b3261e", "#2e6b3e", "#d9730d"
+
+# Inches.
+_HEIGHTS = {"velocity": 3.2, "error": 1.7, "count": 1.4, "interval": 1.4}
+_WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 10.0, 0.8, 0.6, 0.6, 0.5, 0.3
 
 _COLUMNS = 1500  # about one for each pixel across
 _TRUE_POINTS = 20_000  # at least: a vibration must be seen even when ticks are few
@@ -49,7 +52,7 @@ _MOST_MULTIPLES = 12  # lines at multiples of the unit velocity that still can b
 
 
 def save_plot(path: Path, spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None = None) -> None:
-    """Draw a run into a file whose kind its suffix tells: `.png`, `.svg` or `.pdf`.
+    """Draw a run into a file whose kind its suffix tells: `.png` or `.pdf`.
 
     Equal runs give equal files. What has more points than the figure has columns is reduced to the first, least,
     greatest and last of each column, which draws the same line.
@@ -87,28 +90,41 @@ def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = _COLUMNS) ->
 def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figure:
     seconds = run.n_clocks / spec.timing.clock_hz
     scale, unit = next(((k, u) for k, u in ((1, "s"), (1e3, "ms")) if seconds * k >= 1), (1e6, "µs"))
-    panels = ["velocity", "error", "count", "interval"] if true_speed else ["velocity", "count", "interval"]
-    heights = {"velocity": 3.0, "error": 1.6, "count": 1.3, "interval": 1.3}
-    figure = Figure(figsize=(10, 1.1 * sum(heights[p] for p in panels) + 1.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=[heights[p] for p in panels])
-    panel = dict(zip(panels, axes[:, 0], strict=True))
-
-    _velocity(panel["velocity"], spec, run, true_speed, scale)
+    figure, panels = _panels([name for name in _HEIGHTS if true_speed or name != "error"])
+    _velocity(panels["velocity"], spec, run, true_speed, scale)
     if true_speed:
-        _error(panel["error"], spec, run, true_speed, scale)
-    _count(panel["count"], spec, run, scale)
-    _interval(panel["interval"], spec, run, scale)
-    figure.suptitle(_title(spec), fontsize=10)
-    panel["interval"].set_xlabel(f"time ({unit})")
-    panel["interval"].set_xlim(0, seconds * scale)
-    figure.align_ylabels()
+        _error(panels["error"], spec, run, true_speed, scale)
+    _count(panels["count"], spec, run, scale)
+    _interval(panels["interval"], spec, run, scale)
+    figure.suptitle(_title(spec), y=1 - 0.1 / figure.get_figheight(), fontsize=10)
+    panels["interval"].set_xlabel(f"time ({unit})")
+    panels["interval"].set_xlim(0, seconds * scale)
     return figure
+
+
+def _panels(names: list[str]) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with one panel below the other.
+
+    They are placed by hand: what Matplotlib's layout engine computes differs from run to run in the last bits.
+    """
+    height = _TOP + _BOTTOM + sum(_HEIGHTS[name] for name in names) + _GAP * (len(names) - 1)
+    figure = Figure(figsize=(_WIDTH, height))
+    FigureCanvasAgg(figure)
+    panels: dict[str, Axes] = {}
+    upper = height - _TOP
+    for name in names:
+        lower = upper - _HEIGHTS[name]
+        place = (_LEFT / _WIDTH, lower / height, 1 - (_LEFT + _RIGHT) / _WIDTH, _HEIGHTS[name] / height)
+        panels[name] = figure.add_axes(place, sharex=panels.get(names[0]))
+        panels[name].tick_params(labelbottom=name == names[-1])
+        panels[name].yaxis.set_label_coords(-0.065, 0.5)
+        upper = lower - _GAP
+    return figure, panels
 
 
 def _title(spec: TachometerSpec) -> str:
     timing = spec.timing
-    equation = {True: ", eq. (21)", False: ", eq. (17)"}.get(spec.parameters.get("cancel"), "")
+    equation = f", eq. ({21 if spec.parameters['cancel'] else 17})" if "cancel" in spec.parameters else ""
     return (
         f"{spec.method.upper()} method{equation}: {spec.encoder.pulses_per_rev} PPR ×{spec.encoder.decoding}, "
         f"$T_s$ = {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
@@ -156,7 +172,14 @@ def _held_to_end(clock: NDArray[np.int64], values: NDArray[np.generic], n_clocks
 
 def _multiples(axes: Axes, unit_velocity: float) -> None:
     """An axis in counts per tick, and lines at whole numbers of them if they are few."""
-    right = axes.secondary_yaxis("right", functions=(lambda v: v / unit_velocity, lambda n: n * unit_velocity))
+
+    def counts(velocity: Any) -> Any:
+        return velocity / unit_velocity
+
+    def rad_per_s(count: Any) -> Any:
+        return count * unit_velocity
+
+    right = axes.secondary_yaxis("right", functions=(counts, rad_per_s))
     right.set_ylabel("$ω/ω_u$ (counts per tick)")
     right.spines["right"].set_visible(True)
     low, high = (v / unit_velocity for v in axes.get_ylim())
@@ -190,7 +213,7 @@ def _count(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     axes.plot(clock[kept] / spec.timing.clock_hz * scale, m_e[kept], color=_COUNT, drawstyle="steps-post")
     axes.set_ylim(m_e.min() - 0.5, m_e.max() + 0.5)
     axes.set_ylabel("$m_e$ (counts)")
-    axes.yaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True, nbins=5))
+    axes.yaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True, nbins=5, min_n_ticks=1))
 
 
 def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:

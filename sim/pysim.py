@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from amaranth import Cat, Value
+from amaranth import Cat, Module, Signal, Value
 from amaranth.sim import Simulator
 
 from tachometry.hdl import Tachometer
@@ -21,6 +21,26 @@ _CLOCKS_PER_CALL = 10_000
 
 _TICK = ("pulse_count", "position", "overflow")
 _UPDATE = ("velocity", "interval", "forced", "stalled")
+
+
+async def drive(ctx: Any, trace: PinTrace, a: Signal, b: Signal, period: float) -> None:
+    """Let a trace play on two signals, in a testbench of Amaranth's simulator that begins at time 0.
+
+    Parameters
+    ----------
+    ctx : simulator context
+    trace : PinTrace
+    a, b : Signal
+    period : float, seconds
+        Of the simulated clock, whose edges lie in the middle of each period, as `Simulator.add_clock` has them.
+    """
+    now = 0
+    for clock, level_a, level_b in zip(trace.clock.tolist(), trace.a.tolist(), trace.b.tolist(), strict=True):
+        if clock > now:
+            await ctx.delay((clock - now) * period)
+            now = clock
+        ctx.set(a, level_a)
+        ctx.set(b, level_b)
 
 
 class PySim:
@@ -38,27 +58,24 @@ class PySim:
     ) -> Run:
         """See `Engine.run`."""
         core = Tachometer(spec)
-        simulator = Simulator(core)
+        top = Module()
+        top.submodules.core = core
+        strobes = _packed(top, [core.tick, core.velocity_valid, core.decode_error])
+        tick_values = _packed(top, [getattr(core, name) for name in _TICK])
+        update_values = _packed(top, [getattr(core, name) for name in _UPDATE])
+        shown = _shown(core) if vcd is not None else {}
+        shown_values = _packed(top, list(shown.values()))
+        simulator = Simulator(top)
         simulator.add_clock(_PERIOD)
 
-        async def drive(ctx: Any) -> None:
-            now = 0
-            rows = zip(trace.clock.tolist(), trace.a.tolist(), trace.b.tolist(), strict=True)
-            for clock, a, b in rows:
-                if clock > now:
-                    await ctx.delay((clock - now) * _PERIOD)
-                    now = clock
-                ctx.set(core.a, a)
-                ctx.set(core.b, b)
+        async def bench(ctx: Any) -> None:
+            await drive(ctx, trace, core.a, core.b, _PERIOD)
 
-        simulator.add_testbench(drive)
+        simulator.add_testbench(bench)
 
         ticks: list[tuple[int, ...]] = []
         updates: list[tuple[int, ...]] = []
         errors: list[int] = []
-        strobes = Cat(core.tick, core.velocity_valid, core.decode_error)
-        tick_values = Cat(*(getattr(core, name) for name in _TICK))
-        update_values = Cat(*(getattr(core, name) for name in _UPDATE))
 
         async def collect(ctx: Any) -> None:
             clock = 0
@@ -76,10 +93,9 @@ class PySim:
         with ExitStack() as stack:
             waveform = None
             if vcd is not None:
-                shown = _shown(core)
                 widths = {name: (len(value), value.shape().signed) for name, value in shown.items()}
                 waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, widths))
-                _watch(simulator, waveform, shown)
+                _watch(simulator, waveform, shown_values)
             for clock in range(0, trace.n_clocks, _CLOCKS_PER_CALL):
                 done = min(clock + _CLOCKS_PER_CALL, trace.n_clocks)
                 simulator.run_until(done * _PERIOD)
@@ -113,9 +129,14 @@ def _shown(core: Tachometer) -> dict[str, Value]:
     }
 
 
-def _watch(simulator: Simulator, waveform: Waveform, shown: dict[str, Value]) -> None:
-    packed = Cat(*shown.values())
+def _packed(top: Module, values: list[Value]) -> Signal:
+    """One signal of many: the simulator compiles it, where it would interpret a `Cat` anew in every clock."""
+    packed = Signal(sum(map(len, values)))
+    top.d.comb += packed.eq(Cat(*values))
+    return packed
 
+
+def _watch(simulator: Simulator, waveform: Waveform, packed: Signal) -> None:
     async def watch(ctx: Any) -> None:
         clock = 0
         async for _, _, value in ctx.tick().sample(packed):

@@ -51,7 +51,8 @@ def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
     clock = clock[clock < run.n_clocks]
     latest = np.searchsorted(updates.clock, clock, side="right") - 1
     clock, latest = clock[latest >= 0], latest[latest >= 0]
-    return HeldVelocity(clock / spec.timing.clock_hz, updates.velocity[latest] * spec.rad_per_s_per_lsb)
+    velocity = updates.velocity[latest].astype(np.float64) * spec.rad_per_s_per_lsb
+    return HeldVelocity(clock.astype(np.float64) / spec.timing.clock_hz, velocity)
 
 
 def velocity_error(

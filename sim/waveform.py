@@ -4,7 +4,7 @@ from pathlib import Path
 from types import TracebackType
 
 from vcd import VCDWriter
-from vcd.gtkw import GTKWSave
+from vcd.gtkw import GTKWFlag, GTKWSave
 
 _SCOPE = "tachometer"
 
@@ -29,7 +29,7 @@ class Waveform:
         self._clock_hz = clock_hz
         self._widths = widths
         self._file = path.open("w", newline="\n")
-        self._writer = VCDWriter(self._file, timescale="1 ps")
+        self._writer = VCDWriter(self._file, timescale="1 ps", date="")
         # Registered as undefined: the first sample defines them.
         self._variables = [
             self._writer.register_var(_SCOPE, name, "wire", size=width, init="x") for name, (width, _) in widths.items()
@@ -60,8 +60,8 @@ class Waveform:
             for name, (width, is_signed) in self._widths.items():
                 trace = f"{_SCOPE}.{name}" + (f"[{width - 1}:0]" if width > 1 else "")
                 if name in ("velocity", "position"):
-                    flags = ["analog_step"] if name == "velocity" else ["analog_interpolated"]
-                    save.trace(trace, datafmt="signed", extraflags=flags)
+                    flag = GTKWFlag.analog_step if name == "velocity" else GTKWFlag.analog_interpolated
+                    save.trace(trace, datafmt="signed", extraflags=flag)
                     for _ in range(4):
                         save.blank(analog_extend=True)
                 else:

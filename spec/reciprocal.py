@@ -2,7 +2,7 @@
 
 Every estimate has the form b + N/(2^s·m) with integers b, N and 1 ≤ m ≤ max_m. The hardware forms
 
-    raw = ⌊ (b·2^(f+k) + N·q(m) + E + 2^(k−1)) / 2^k ⌋,   q(m) = ⌊2^(f+g)/m⌋,   k = g + s,
+    raw = b·2^f + ⌊(N·q(m) + E + 2^(k−1)) / 2^k⌋,   q(m) = ⌊2^(f+g)/m⌋,   k = g + s,
 
 which is ⌊2^f·x + ½⌋ for the exact x, ties included, because
 

@@ -55,8 +55,8 @@ class STachometer(TachometerSpec):
 
     @property
     def tick_to_velocity(self) -> int:
-        """One clock for the table, one for its register, then one a bit of N."""
-        return self.numerator_width + 2
+        """One clock for the table, one for its register, one a bit of N, one to add b."""
+        return self.numerator_width + 3
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -11,8 +11,10 @@ def make(max_ticks: int = 4) -> IntervalAccumulator:
 
 
 def test_length_grows_and_keeps_its_newer_half() -> None:
-    rows = [{"tick": 1, "alteration": int(k in (2, 13))} for k in range(16)]
-    seen = clock_by_clock(make(), rows, ["m_s", "update", "forced"])
+    rows = []
+    for k in range(16):
+        rows += [{"tick": 1, "alteration": int(k in (2, 13))}, {"tick": 0}]
+    seen = clock_by_clock(make(), rows, ["m_s", "update", "forced"])[::2]
     assert [row["m_s"] for row in seen] == [1, 2, 3, 1, 2, 3, 4, 3, 4, 3, 4, 3, 4, 3, 1, 2]
     assert [k for k, row in enumerate(seen) if row["update"]] == [2, 6, 8, 10, 12, 13]
     assert [k for k, row in enumerate(seen) if row["update"] and row["forced"]] == [6, 8, 10, 12]

@@ -23,12 +23,16 @@ def compiler() -> tuple[str, ...]:
     return (sys.executable, "-m", "ziglang", "c++")
 
 
-def build(component: wiring.Component, main: str, folder: Path) -> Path:
-    """Compile `component`, as the class `cxxrtl_design::p_top`, together with the C++ text `main`."""
-    os.environ["AMARANTH_USE_YOSYS"] = "builtin"
-    source = folder / "main.cc"
-    source.write_text(cxxrtl.convert(component, name="top", emit_src=False) + main)
-    program = folder / "main"
+def compile_program(text: str, folder: Path) -> Path:
+    """Compile a C++ text that uses CXXRTL's headers."""
+    source, program = folder / "main.cc", folder / "main"
+    source.write_text(text)
     command = [*compiler(), "-std=c++17", "-O2", "-w", f"-I{_HEADERS}", "-o", str(program), str(source)]
     subprocess.run(command, check=True)
     return program
+
+
+def build(component: wiring.Component, main: str, folder: Path) -> Path:
+    """Compile `component`, as the class `cxxrtl_design::p_top`, together with the C++ text `main`."""
+    os.environ["AMARANTH_USE_YOSYS"] = "builtin"
+    return compile_program(cxxrtl.convert(component, name="top", emit_src=False) + main, folder)

