@@ -34,6 +34,8 @@ class PositionCounter(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        step = Signal(signed(2))
-        m.d.sync += [step.eq(self.step), self.position.eq(self.position + step)]
+        late = Signal.like(self.step)
+        step = Signal.like(self.position)
+        m.d.comb += step.eq(late)
+        m.d.sync += [late.eq(self.step), self.position.eq(self.position + step)]
         return m

@@ -1,6 +1,6 @@
 """m_e, the pulse number of a tick."""
 
-from amaranth import Module, Mux, Signal, signed
+from amaranth import Const, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -9,8 +9,13 @@ def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
     """`value` held within −limit … +limit, and a flag that is high where that changed it."""
     held = Signal(signed(limit.bit_length() + 1))
     changed = Signal()
-    above, below = value > limit, value < -limit
-    m.d.comb += [held.eq(Mux(above, limit, Mux(below, -limit, value))), changed.eq(above | below)]
+    above, below = Signal(), Signal()
+    m.d.comb += [
+        above.eq(value > Const(limit, value.shape())),
+        below.eq(value < Const(-limit, value.shape())),
+        held.eq(Mux(above, limit, Mux(below, -limit, value))),
+        changed.eq(above | below),
+    ]
     return held, changed
 
 
@@ -63,10 +68,12 @@ class PulseCounter(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         count = Signal(signed(self._tick_cycles.bit_length() + 1))
+        step = Signal.like(count)
         complete = Signal()
-        m.d.sync += [complete.eq(self.last), self.tick.eq(complete), count.eq(count + self.step)]
+        m.d.comb += step.eq(self.step)
+        m.d.sync += [complete.eq(self.last), self.tick.eq(complete), count.eq(count + step)]
         with m.If(complete):
-            m.d.sync += count.eq(self.step)
+            m.d.sync += count.eq(step)
         if self._max_count == self._tick_cycles:
             held, overflow = count, 0
         else:

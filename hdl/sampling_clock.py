@@ -1,6 +1,6 @@
 """The sampling period."""
 
-from amaranth import Module, Signal, signed
+from amaranth import Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
@@ -39,7 +39,7 @@ class SamplingClock(wiring.Component):
         start = self._tick_cycles - 2
         left = Signal(signed(start.bit_length() + 1), init=start)
         m.d.comb += self.last.eq(left[-1])
-        m.d.sync += left.eq(left - 1)
+        m.d.sync += left.eq(left - Const(1, left.shape()))
         with m.If(self.last):
             m.d.sync += left.eq(start)
         return m

@@ -6,7 +6,7 @@ counts negative. The one takes a clock per bit and a single adder, the other an 
 latency is the same.
 """
 
-from amaranth import Cat, Module, Mux, Signal, ValueLike, signed
+from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -63,7 +63,9 @@ class _Scaler(wiring.Component):
 
     def _result(self, base: Signal, total: Signal) -> ValueLike:
         """The velocity, from a total of which a bit has been dropped for every bit of N."""
-        return (base << self._frac_bits) + (total >> self._surplus)
+        shape = self.velocity.shape()
+        # Both terms may be taken modulo the width of the sum, which is known to fit.
+        return (base << self._frac_bits) + Value.cast(total >> self._surplus)[: shape.width].as_signed()
 
 
 class SerialScaler(_Scaler):

