@@ -4,12 +4,14 @@ import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from pathlib import Path
 
 from support.lockstep import EVENTS, lockstep
 
 from tachometry.sim.pysim import PySim
 
 SEEDS = range(200)
+TABLE = Path(__file__).parent.parent / "build" / "lockstep_coverage.txt"
 
 
 def test_random_motions() -> None:
@@ -20,6 +22,7 @@ def test_random_motions() -> None:
             problems += wrong
             coverage += found
     table = "\n".join(f"{event:<26}{coverage[event]:>9}" for event in EVENTS)
-    print(table)
+    TABLE.parent.mkdir(exist_ok=True)
+    TABLE.write_text(f"{table}\n")
     assert not problems, "\n".join(problems[:20])
     assert all(coverage[event] for event in EVENTS), table
