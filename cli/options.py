@@ -20,6 +20,7 @@ _PARAMETERS = {
     "max_time": "--max-time",
     "frac_bits": "--frac-bits",
     "max_speed": "--max-speed",
+    "position_width": "--position-width",
 }
 _SAME_NAME = (
     "clock",
@@ -151,6 +152,14 @@ _CORE_OPTIONS = [
         "beyond it the velocity saturates and overflow is flagged, the position stays exact. "
         "[default: one count per clock]",
     ),
+    option(
+        _CORE,
+        "--position-width",
+        type=int,
+        default=32,
+        metavar="N",
+        help="Bits of the position, 8 to 48; it wraps in two's complement.",
+    ),
 ]
 
 
@@ -169,6 +178,7 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
         frac_bits: int,
         cancel: bool,
         max_speed: str | None,
+        position_width: int,
         **others: Any,
     ) -> Any:
         spec = STachometer(
@@ -177,6 +187,7 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
             frac_bits=frac_bits,
             max_speed=None if max_speed is None else Speed.parse(max_speed),
             cancel=cancel,
+            position_width=position_width,
         )
         return command(spec=spec, **others)
 

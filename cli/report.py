@@ -109,7 +109,9 @@ def _counts(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tupl
     if truth is None:
         return [("counts in", "unknown"), ("counts out", str(out))]
     into = counts_in(spec, run, truth)
-    difference = "" if out == into else f" ({out - into:+d})"
+    half = 1 << (spec.position_width - 1)  # the position may have wrapped
+    lost = (out - into + half) % (2 * half) - half
+    difference = f" ({lost:+d})" if lost else ""
     return [("counts in", str(into)), ("counts out", f"{out}{difference}")]
 
 

@@ -156,7 +156,8 @@ def replay(
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
-    CAPTURE is a sigrok session (.sr), or a text (.csv) with the header time,a,b, times in seconds and levels 0 or 1.
+    CAPTURE is a sigrok session (.sr), a text (.csv) with the header time,a,b, times in seconds and levels 0 or 1, or a
+    waveform (.vcd), whose one-bit variables are named with their scopes: --a top.a --b top.b.
     Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
 
     Equal options and captures give equal files. Exit status 1 if hardware and golden model differ.

@@ -1,4 +1,4 @@
-"""Captures of a logic analyser as a `Recording`: sigrok sessions (`.sr`) and change lists as text (`.csv`)."""
+"""Captures of a logic analyser as a `Recording`: sigrok sessions (`.sr`), text (`.csv`), waveforms (`.vcd`)."""
 
 import io
 import os
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from tachometry.sim.capture_file import CaptureError, Channel, choose_channels, reading, replacing
 from tachometry.sim.recording import Recording
 from tachometry.sim.sigrok import read_sr, write_sr
+from tachometry.sim.vcd_capture import read_vcd
 
-__all__ = ["READERS", "CaptureError", "read_capture", "read_csv", "read_sr", "write_csv", "write_sr"]
+__all__ = ["READERS", "CaptureError", "read_capture", "read_csv", "read_sr", "read_vcd", "write_csv", "write_sr"]
 
 BLOCK = 4 << 20  # bytes of text parsed at once
 LONGEST_HEADER = 1 << 16  # bytes
@@ -118,7 +119,7 @@ class Reader(Protocol):
     ) -> Recording: ...
 
 
-READERS: dict[str, Reader] = {".sr": read_sr, ".csv": read_csv}
+READERS: dict[str, Reader] = {".sr": read_sr, ".csv": read_csv, ".vcd": read_vcd}
 
 
 def read_capture(
@@ -132,7 +133,7 @@ def read_capture(
     Parameters
     ----------
     path : path
-        A sigrok session `.sr` (see `read_sr`) or a text `.csv` (see `read_csv`).
+        A sigrok session `.sr` (see `read_sr`), a text `.csv` (see `read_csv`) or a waveform `.vcd` (see `read_vcd`).
     a, b : str, int or None
         Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named A and B
         (in any case) if there are both, else the first two.
@@ -147,7 +148,7 @@ def read_capture(
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise CaptureError(f"a capture must be a {' or '.join(READERS)} file, not {path}")
+        raise CaptureError(f"a capture must be a .sr, .csv or .vcd file, not {path}")
     return reader(path, a, b, samplerate_hz)
 
 

@@ -38,6 +38,8 @@ class TachometerSpec:
     max_speed : Speed or None
         Greatest speed to be measured. It narrows every number that depends on it; pulses beyond it saturate m_e and
         raise `overflow`. None: as wide as the tick has clocks.
+    position_width : int
+        Bits of `position`, which wraps.
 
     Raises
     ------
@@ -49,9 +51,9 @@ class TachometerSpec:
     timing: Timing
     frac_bits: int = 16
     max_speed: Speed | None = None
+    position_width: int = 32
 
     method: ClassVar[str]
-    position_width: ClassVar[int] = 32
     # Two synchroniser flip-flops; the decoder looks at the second and its past.
     pin_to_count: ClassVar[int] = 2
     # The clock after the window completes the sum, the next saturates and registers it.
@@ -60,6 +62,8 @@ class TachometerSpec:
     def __post_init__(self) -> None:
         if not 4 <= self.frac_bits <= 24:
             raise ValueError(f"frac_bits must be from 4 to 24, not {self.frac_bits}")
+        if not 8 <= self.position_width <= 48:
+            raise ValueError(f"position_width must be from 8 to 48, not {self.position_width}")
 
     @property
     def max_count(self) -> int:
@@ -136,6 +140,7 @@ class TachometerSpec:
             "max_ticks": self.timing.max_ticks,
             "frac_bits": self.frac_bits,
             "max_speed": None if self.max_speed is None else str(self.max_speed),
+            "position_width": self.position_width,
         }
 
     def seconds(self, clocks: int) -> Fraction:

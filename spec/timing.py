@@ -72,7 +72,7 @@ def _whole(what: str, given: str | int, period: Fraction, name: str, given_in: F
     periods = seconds / period
     if periods.denominator == 1:
         return int(periods)
-    below, above = (f"{n} {name}s ({format_time(n * period)})" for n in (int(periods), int(periods) + 1))
+    below, above = (f"{n} {name}{'s' * (n != 1)} ({format_time(n * period)})" for n in (int(periods), int(periods) + 1))
     nearest = above if periods < 1 else f"{below} and {above}"
     raise ValueError(
         f"{what} must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"

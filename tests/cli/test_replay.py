@@ -69,7 +69,7 @@ def test_samplerate(tmp_path: Path) -> None:
     ("name", "options", "message"),
     [
         ("none.sr", "", "none.sr does not exist"),
-        ("c.txt", "", "a capture must be a .sr or .csv file, not"),
+        ("c.txt", "", "a capture must be a .sr, .csv or .vcd file, not"),
         ("empty.csv", "", "header of"),
         ("text.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
         ("cut.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),

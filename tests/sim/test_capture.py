@@ -292,9 +292,9 @@ def assert_error(path: Path, message: str, **options: str | int | float | None) 
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["x.vcd", "x", "x.sr.gz"])
+@pytest.mark.parametrize("name", ["x.txt", "x", "x.sr.gz"])
 def test_suffix(tmp_path: Path, name: str) -> None:
-    assert_error(tmp_path / name, "a capture must be a .sr or .csv file, not PATH")
+    assert_error(tmp_path / name, "a capture must be a .sr, .csv or .vcd file, not PATH")
 
 
 @pytest.mark.parametrize("name", ["x.sr", "x.csv", "X.SR"])

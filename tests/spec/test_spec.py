@@ -51,7 +51,7 @@ ERRORS = [
     ),
     (
         lambda: Timing.parse("48MHz", "1ns", "10ms"),
-        "tick must be a whole number of clocks, not 1ns (0.048); nearest: 1 clocks (20.8333333ns)",
+        "tick must be a whole number of clocks, not 1ns (0.048); nearest: 1 clock (20.8333333ns)",
     ),
     (
         lambda: Timing.parse("48MHz", "20us", "10.01ms"),
@@ -65,6 +65,10 @@ ERRORS = [
     (lambda: Speed(Fraction(1), "m/s"), "unit of a speed must be one of rad/s, rev/s, rpm, not 'm/s'"),
     (lambda: STachometer(encoder=Encoder(500), timing=TIMING, frac_bits=3), "frac_bits must be from 4 to 24, not 3"),
     (lambda: STachometer(encoder=Encoder(500), timing=TIMING, frac_bits=25), "frac_bits must be from 4 to 24, not 25"),
+    (
+        lambda: STachometer(encoder=Encoder(500), timing=TIMING, position_width=7),
+        "position_width must be from 8 to 48, not 7",
+    ),
     (lambda: parse_frequency("clock", -5), "clock must be a positive whole number of Hz, not -5"),
 ]
 
@@ -125,6 +129,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "max_ticks": 500,
         "frac_bits": 16,
         "max_speed": "400rad/s",
+        "position_width": 32,
         "cancel": False,
     }
     assert described["counts_per_rev"] == 2000

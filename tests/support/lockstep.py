@@ -30,6 +30,7 @@ EVENTS = [
     "m_e saturated",
     "sign change",
     "stalled",
+    "position wrapped",
     *LEGAL,
     *ILLEGAL,
 ]
@@ -75,6 +76,7 @@ def random_case(seed: int) -> tuple[STachometer, Encoding]:
         frac_bits=int(rng.integers(4, 25)),
         max_speed=max_speed,
         cancel=bool(rng.random() < 0.75),
+        position_width=int(rng.choice([8, 16, 32, 48])),
     )
     return spec, encoder.record(parse_motion("+".join(parts[k] for k in order)))
 
@@ -94,6 +96,7 @@ def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
             "m_e saturated": np.count_nonzero(run.ticks.overflow),
             "sign change": np.count_nonzero(sign[1:] * sign[:-1] < 0),
             "stalled": np.count_nonzero(updates.stalled),
+            "position wrapped": np.count_nonzero(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
         }
     )
     lines = [f"{a}{b}" for a, b in zip(trace.a, trace.b, strict=True)]
@@ -122,5 +125,7 @@ def _lost_counts(spec: STachometer, encoding: Encoding, run: Run) -> list[str]:
         return []
     sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / CLOCK_HZ
     turned = encoding.true_position(sampled, spec.encoder.decoding)
-    wrong = np.flatnonzero(np.abs(run.ticks.position - turned) > (encoding.encoder.jitter > 0))
+    half = 1 << (spec.position_width - 1)
+    difference = (run.ticks.position - turned + half) % (2 * half) - half
+    wrong = np.flatnonzero(np.abs(difference) > (encoding.encoder.jitter > 0))
     return [f"position of tick {k}: {run.ticks.position[k]}, not {turned[k]}" for k in wrong[:1]]
