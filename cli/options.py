@@ -21,6 +21,7 @@ _PARAMETERS = {
     "frac_bits": "--frac-bits",
     "max_speed": "--max-speed",
     "position_width": "--position-width",
+    "filter_clocks": "--filter",
 }
 _SAME_NAME = (
     "clock",
@@ -160,6 +161,16 @@ _CORE_OPTIONS = [
         metavar="N",
         help="Bits of the position, 8 to 48; it wraps in two's complement.",
     ),
+    option(
+        _CORE,
+        "--filter",
+        "filter_clocks",
+        type=int,
+        default=0,
+        metavar="N",
+        help="Glitch filter: a level counts when it has held for N clocks, 0 to 255; costs N clocks of latency. "
+        "What it swallows is counted.",
+    ),
 ]
 
 
@@ -179,6 +190,7 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
         cancel: bool,
         max_speed: str | None,
         position_width: int,
+        filter_clocks: int,
         **others: Any,
     ) -> Any:
         spec = STachometer(
@@ -188,6 +200,7 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
             max_speed=None if max_speed is None else Speed.parse(max_speed),
             cancel=cancel,
             position_width=position_width,
+            filter_clocks=filter_clocks,
         )
         return command(spec=spec, **others)
 

@@ -83,6 +83,8 @@ def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches
         *_counts(spec, run, truth),
         ("errors flagged", _flagged(run, truth)),
     ]
+    if spec.filter_clocks:
+        rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
     if n_overflows:
         rows.append(("overflow", f"{n_overflows} ticks: faster than --max-speed, velocity saturated"))
     return rows + _errors(spec, run, truth)

@@ -45,7 +45,7 @@ class Tachometer(wiring.Component):
             }
         )
         cycles = spec.timing.tick_cycles
-        self.conditioner = InputConditioner()
+        self.conditioner = InputConditioner(spec.filter_clocks)
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
         self.sampling_clock = SamplingClock(cycles)
         self.pulse_counter = PulseCounter(cycles, spec.max_count)
@@ -83,4 +83,6 @@ class Tachometer(wiring.Component):
             datapath.pulse_count.eq(self.pulse_count),
         ]
         m.d.comb += [getattr(self, name).eq(getattr(datapath, name)) for name in datapath.outputs]
+        if self._spec.filter_clocks:
+            m.d.comb += self.swallowed_edges.eq(conditioner.swallowed_edges)
         return m

@@ -20,6 +20,7 @@ _PERIOD = 1e-9
 _CLOCKS_PER_CALL = 10_000
 
 _TICK = ("pulse_count", "position", "overflow")
+_OPTIONAL_TICK = ("swallowed_edges",)
 _UPDATE = ("velocity", "interval", "forced", "stalled")
 
 
@@ -61,7 +62,9 @@ class PySim:
         top = Module()
         top.submodules.core = core
         strobes = _packed(top, [core.tick, core.velocity_valid, core.decode_error])
-        tick_values = _packed(top, [getattr(core, name) for name in _TICK])
+        ports = {port.name: (port.width, port.signed) for port in spec.ports}
+        of_tick = [*_TICK, *(name for name in _OPTIONAL_TICK if name in ports)]
+        tick_values = _packed(top, [getattr(core, name) for name in of_tick])
         update_values = _packed(top, [getattr(core, name) for name in _UPDATE])
         shown = _shown(core) if vcd is not None else {}
         shown_values = _packed(top, list(shown.values()))
@@ -104,8 +107,8 @@ class PySim:
             if waveform is not None:
                 waveform.close(trace.n_clocks)
 
-        ports = {port.name: (port.width, port.signed) for port in spec.ports}
-        tick_arrays = _unpack(ticks, {name: ports[name] for name in _TICK})
+        tick_arrays = _unpack(ticks, {name: ports[name] for name in of_tick})
+        tick_arrays |= {name: np.zeros(len(ticks), np.int64) for name in _OPTIONAL_TICK if name not in ports}
         update_arrays = _unpack(updates, {name: ports[name] for name in _UPDATE})
         return Run(trace.n_clocks, Ticks(**tick_arrays), Updates(**update_arrays), np.array(errors, dtype=np.int64))
 

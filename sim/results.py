@@ -16,12 +16,15 @@ class Ticks:
         Clock in which `tick` is high.
     pulse_count, position : int64 arrays, shape (n,), counts
     overflow : bool array, shape (n,)
+    swallowed_edges : int64 array, shape (n,)
+        All zero without a filter.
     """
 
     clock: NDArray[np.int64]
     pulse_count: NDArray[np.int64]
     position: NDArray[np.int64]
     overflow: NDArray[np.bool_]
+    swallowed_edges: NDArray[np.int64]
 
 
 @dataclass(frozen=True)

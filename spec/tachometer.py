@@ -40,6 +40,8 @@ class TachometerSpec:
         raise `overflow`. None: as wide as the tick has clocks.
     position_width : int
         Bits of `position`, which wraps.
+    filter_clocks : int
+        Clocks for which a level must hold to be believed; 0 for no filter.
 
     Raises
     ------
@@ -52,10 +54,9 @@ class TachometerSpec:
     frac_bits: int = 16
     max_speed: Speed | None = None
     position_width: int = 32
+    filter_clocks: int = 0
 
     method: ClassVar[str]
-    # Two synchroniser flip-flops; the decoder looks at the second and its past.
-    pin_to_count: ClassVar[int] = 2
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
 
@@ -64,6 +65,13 @@ class TachometerSpec:
             raise ValueError(f"frac_bits must be from 4 to 24, not {self.frac_bits}")
         if not 8 <= self.position_width <= 48:
             raise ValueError(f"position_width must be from 8 to 48, not {self.position_width}")
+        if not 0 <= self.filter_clocks <= 255:
+            raise ValueError(f"filter_clocks must be from 0 to 255, not {self.filter_clocks}")
+
+    @property
+    def pin_to_count(self) -> int:
+        """Clocks from the sampling of a level to its step: the two synchroniser flip-flops and the filter."""
+        return 2 + self.filter_clocks
 
     @property
     def max_count(self) -> int:
@@ -126,6 +134,7 @@ class TachometerSpec:
             Port("decode_error", "output"),
             Port("overflow", "output"),
             Port("stalled", "output"),
+            *([Port("swallowed_edges", "output", 16)] if self.filter_clocks else []),
         )
 
     @property
@@ -141,6 +150,7 @@ class TachometerSpec:
             "frac_bits": self.frac_bits,
             "max_speed": None if self.max_speed is None else str(self.max_speed),
             "position_width": self.position_width,
+            "filter_clocks": self.filter_clocks,
         }
 
     def seconds(self, clocks: int) -> Fraction:

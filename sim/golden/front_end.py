@@ -34,6 +34,46 @@ def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[N
     return np.where(counted, step, 0), turn == 2
 
 
+def filter_line(
+    clock: NDArray[np.int64], level: NDArray[np.uint8], clocks: int
+) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.int64]]:
+    """Glitch filter: a level counts only when it holds for so many clocks; the first one counts at once.
+
+    Parameters
+    ----------
+    clock, level : arrays, shape (n,)
+        Change list of one line.
+    clocks : int
+
+    Returns
+    -------
+    clock, level : arrays
+        Change list of what passes, dated when it was first sampled.
+    returned : int64 array
+        Clocks at which a level that did not pass went back.
+    """
+    lasts = np.append(clock[1:] - clock[:-1] >= clocks, True)
+    lasts[0] = True
+    latest = np.maximum.accumulate(np.where(lasts, np.arange(len(clock)), 0))
+    believed = level[latest]  # after each change, once it has held or gone
+    glitch = np.flatnonzero(~lasts & (level != believed))
+    changed = np.append(True, believed[1:] != believed[:-1])
+    return clock[changed], level[changed], clock[glitch + 1]
+
+
+def filter_lines(
+    clock: NDArray[np.int64], a: NDArray[np.uint8], b: NDArray[np.uint8], clocks: int
+) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint8], NDArray[np.int64]]:
+    """The filter on both lines: their common change list, and when glitches ended, in order."""
+    lines = []
+    for level in (a, b):
+        changed = np.append(True, level[1:] != level[:-1])
+        lines.append(filter_line(clock[changed], level[changed], clocks))
+    common = np.union1d(lines[0][0], lines[1][0])
+    a, b = (level[np.searchsorted(at, common, side="right") - 1] for at, level, _ in lines)
+    return common, a, b, np.sort(np.concatenate([lines[0][2], lines[1][2]]))
+
+
 def count(
     spec: TachometerSpec,
     clock: NDArray[np.int64],
@@ -56,6 +96,9 @@ def count(
     errors : int64 array
         Clocks in which `decode_error` is high.
     """
+    returned = np.empty(0, dtype=np.int64)
+    if spec.filter_clocks:
+        clock, a, b, returned = filter_lines(clock, a, b, spec.filter_clocks)
     step, illegal = decode(a, b, spec.encoder.decoding)
     at = clock[1:] + spec.pin_to_count
     cycles = spec.timing.tick_cycles
@@ -64,11 +107,15 @@ def count(
     sums = np.zeros(n_ticks, dtype=np.int64)
     np.add.at(sums, at[inside] // cycles, step[inside])
     limit, half = spec.max_count, 1 << (spec.position_width - 1)
+    strobe = (np.arange(n_ticks, dtype=np.int64) + 1) * cycles - 1 + spec.tick_latency
+    # Two clocks for the synchroniser, one for the counter.
+    glitches = np.searchsorted(returned + 3, strobe, side="right")
     ticks = Ticks(
-        clock=(np.arange(n_ticks, dtype=np.int64) + 1) * cycles - 1 + spec.tick_latency,
+        clock=strobe,
         pulse_count=np.clip(sums, -limit, limit),
         position=(np.cumsum(sums) + half) % (2 * half) - half,
         overflow=np.abs(sums) > limit,
+        swallowed_edges=2 * np.minimum(glitches, (1 << 15) - 1),
     )
     errors = at[illegal]
     return ticks, errors[errors < n_clocks]

@@ -52,6 +52,7 @@ def test_defaults(tmp_path: Path) -> None:
         "frac_bits": 16,
         "max_speed": None,
         "position_width": 32,
+        "filter_clocks": 0,
         "cancel": True,
     }
 

@@ -272,3 +272,11 @@ def test_ctrl_c_from_a_terminal(tmp_path: Path) -> None:
     out, err = process.communicate(timeout=30)
     assert (process.returncode, out, err) == (130, "", "tachometry: interrupted\n")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture[str]) -> None:
+    # Each line changes every 21 clocks or so; some levels hold for less than 18.
+    assert run("simulate", *CORE, "--motion", "constant:30:200ms", "--jitter", "0.3", "--filter", "18") == 0
+    rows = summary(capsys.readouterr().out)
+    assert int(rows["edges swallowed"].split()[0]) > 0
+    assert rows["mismatches"] == "0"

@@ -59,12 +59,14 @@ def run_verilog(spec: TachometerSpec, folder: Path, changes: np.ndarray, n_clock
     rows = np.fromfile(folder / "rows", dtype=np.int64).reshape(-1, 1 + len(ports))
     column = {"clock": rows[:, 0]} | {port.name: rows[:, k + 1] for k, port in enumerate(ports)}
 
+    column.setdefault("swallowed_edges", np.zeros(len(rows), dtype=np.int64))
+
     def at(strobe: str, *names: str) -> list[np.ndarray]:
         return [column[name][column[strobe] == 1] for name in ("clock", *names)]
 
     return Run(
         n_clocks,
-        Ticks(*at("tick", "pulse_count", "position", "overflow")),
+        Ticks(*at("tick", "pulse_count", "position", "overflow", "swallowed_edges")),
         Updates(*at("velocity_valid", "velocity", "interval", "forced", "stalled")),
         at("decode_error")[0],
     )

@@ -16,7 +16,13 @@ AFTER = SPEC.tick_to_velocity
 TICK = np.array([21, 41, 61, 81, 101])
 RUN = Run(
     n_clocks=101 + AFTER,
-    ticks=Ticks(TICK, np.array([0, 1, 1, -2, -2]), np.array([0, 1, 2, 0, -2]), np.zeros(5, dtype=np.bool_)),
+    ticks=Ticks(
+        TICK,
+        np.array([0, 1, 1, -2, -2]),
+        np.array([0, 1, 2, 0, -2]),
+        np.zeros(5, dtype=np.bool_),
+        np.zeros(5, np.int64),
+    ),
     updates=Updates(
         TICK[[1, 3]] + AFTER,
         np.array([3, -5]),

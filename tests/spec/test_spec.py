@@ -69,6 +69,10 @@ ERRORS = [
         lambda: STachometer(encoder=Encoder(500), timing=TIMING, position_width=7),
         "position_width must be from 8 to 48, not 7",
     ),
+    (
+        lambda: STachometer(encoder=Encoder(500), timing=TIMING, filter_clocks=256),
+        "filter_clocks must be from 0 to 255, not 256",
+    ),
     (lambda: parse_frequency("clock", -5), "clock must be a positive whole number of Hz, not -5"),
 ]
 
@@ -130,6 +134,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "frac_bits": 16,
         "max_speed": "400rad/s",
         "position_width": 32,
+        "filter_clocks": 0,
         "cancel": False,
     }
     assert described["counts_per_rev"] == 2000

@@ -31,6 +31,7 @@ EVENTS = [
     "sign change",
     "stalled",
     "position wrapped",
+    "glitch swallowed",
     *LEGAL,
     *ILLEGAL,
 ]
@@ -77,6 +78,7 @@ def random_case(seed: int) -> tuple[STachometer, Encoding]:
         max_speed=max_speed,
         cancel=bool(rng.random() < 0.75),
         position_width=int(rng.choice([8, 16, 32, 48])),
+        filter_clocks=int(rng.choice([0, 0, 0, 1, 2, 5])),
     )
     return spec, encoder.record(parse_motion("+".join(parts[k] for k in order)))
 
@@ -96,6 +98,7 @@ def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
             "m_e saturated": np.count_nonzero(run.ticks.overflow),
             "sign change": np.count_nonzero(sign[1:] * sign[:-1] < 0),
             "stalled": np.count_nonzero(updates.stalled),
+            "glitch swallowed": run.ticks.swallowed_edges[-1] // 2,
             "position wrapped": np.count_nonzero(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
         }
     )
@@ -121,7 +124,7 @@ def _lost_counts(spec: STachometer, encoding: Encoding, run: Run) -> list[str]:
 
     Jitter makes an edge come early or late, but never twice or not at all.
     """
-    if len(run.errors):
+    if len(run.errors) or run.ticks.swallowed_edges[-1]:
         return []
     sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / CLOCK_HZ
     turned = encoding.true_position(sampled, spec.encoder.decoding)

@@ -19,7 +19,7 @@ def model(max_ticks: int, *, cancel: bool = True, frac_bits: int = 16) -> SModel
 def as_ticks(m_e: list[int]) -> Ticks:
     clock = 16 * np.arange(len(m_e), dtype=np.int64)
     numbers = np.array(m_e, dtype=np.int64)
-    return Ticks(clock, numbers, np.cumsum(numbers), np.zeros(len(m_e), dtype=bool))
+    return Ticks(clock, numbers, np.cumsum(numbers), np.zeros(len(m_e), dtype=bool), np.zeros(len(m_e), np.int64))
 
 
 def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
