@@ -134,6 +134,8 @@ CONFIGURATIONS = (
     Configuration("frac-bits-8", "8 fraction bits", replace(REFERENCE, frac_bits=8)),
     Configuration("frac-bits-24", "24 fraction bits", replace(REFERENCE, frac_bits=24)),
     Configuration("x1", "x1 decoding", replace(REFERENCE, encoder=Encoder(500, 1))),
+    Configuration("position-16", "16-bit position", replace(REFERENCE, position_width=16)),
+    Configuration("filter-4", "glitch filter, 4 clocks", replace(REFERENCE, filter_clocks=4)),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )
 

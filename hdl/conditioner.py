@@ -64,11 +64,12 @@ class InputConditioner(wiring.Component):
             self.level_a.eq(filter_a.filtered),
             self.level_b.eq(filter_b.filtered),
         ]
-        glitches = Signal(15)
-        one, two = filter_a.swallowed ^ filter_b.swallowed, filter_a.swallowed & filter_b.swallowed
-        m.d.comb += self.swallowed_edges.eq(Cat(0, glitches))
-        with m.If(two & ~glitches[1:].all()):
-            m.d.sync += glitches.eq(glitches + 2)
-        with m.Elif((one | two) & ~glitches.all()):
-            m.d.sync += glitches.eq(glitches + 1)
+        glitches, sum_ = Signal(15), Signal(16)
+        m.d.comb += [
+            sum_.eq(glitches + (filter_a.swallowed + filter_b.swallowed)),
+            self.swallowed_edges.eq(Cat(0, glitches)),
+        ]
+        m.d.sync += glitches.eq(sum_)
+        with m.If(sum_[-1]):
+            m.d.sync += glitches.eq(0x7FFF)
         return m
