@@ -139,6 +139,7 @@ times the edge rate. Edges closer than a clock are flagged as errors or lost."""
     metavar="CHANNEL",
     help="Line B. Without both options: the channels named A and B, else the first two.",
 )
+@option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index. Without it there is none.")
 @option(
     _CAPTURE,
     "--samplerate",
@@ -151,6 +152,7 @@ def replay(
     capture: Path,
     a: str | None,
     b: str | None,
+    z: str | None,
     samplerate: str | None,
     targets: dict[str, Path],
 ) -> int:
@@ -165,7 +167,7 @@ def replay(
     from tachometry.sim.capture import read_capture
 
     outputs = Outputs(targets, inputs=[capture])
-    recording = read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate))
+    recording = read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), z)
     return _run_and_report(spec, str(capture), recording, None, outputs)
 
 

@@ -18,7 +18,6 @@ __all__ = ["READERS", "CaptureError", "read_capture", "read_csv", "read_sr", "re
 
 BLOCK = 4 << 20  # bytes of text parsed at once
 LONGEST_HEADER = 1 << 16  # bytes
-ONE = np.uint8(1)
 ROWS = 1 << 16  # rows written at once
 
 
@@ -27,14 +26,15 @@ def read_csv(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
+    z: Channel | None = None,
     *,
     _block: int = BLOCK,
 ) -> Recording:
-    """Read two channels of a text with the header `time,a,b`, times in seconds and levels 0 or 1.
+    """Read two or three channels of a text with the header `time,a,b`, times in seconds and levels 0 or 1.
 
     Rows are change points or samples; rows that change nothing are dropped. Times count from the first row, and the
-    last row ends the recording. There may be more columns after `time`, or others: each is a channel, and only the
-    two chosen are parsed. Fields are plain numbers, without quotes; lines end in LF or CR LF.
+    last row ends the recording. There may be more columns after `time`, or others: each is a channel, and only
+    those chosen are parsed. Fields are plain numbers, without quotes; lines end in LF or CR LF.
 
     Parameters
     ----------
@@ -44,6 +44,8 @@ def read_csv(
         B (in any case) if there are both, else the first two.
     samplerate_hz : None
         Not allowed: a row has its time.
+    z : str, int or None
+        Column of the index line, likewise; when not given, the recording has none.
 
     Raises
     ------
@@ -60,8 +62,7 @@ def read_csv(
     last_level = 255
     with reading(path), path.open("rb") as file:
         names = _read_header(path, file)
-        number_a, number_b = choose_channels(path, dict(enumerate(names[1:])), a, b)
-        columns = (0, number_a + 1, number_b + 1)
+        columns = (0, *(number + 1 for number in choose_channels(path, dict(enumerate(names[1:])), a, b, z)))
         for line, block in _blocks(file, _block):
             values = _parse(path, line, block, names, columns)
             block_time = values[:, 0]
@@ -73,19 +74,20 @@ def read_csv(
                 raise CaptureError(
                     f"{path} line {line + back[0]}: time must be at least {late} s as before, not {early} s"
                 )
-            block_level = (values[:, 1] + 2 * values[:, 2]).astype(np.uint8)
+            block_level = (values[:, 1:] @ 2.0 ** np.arange(len(columns) - 1)).astype(np.uint8)
             changed = np.diff(block_level, prepend=np.uint8(last_level)) != 0
             time.append(block_time[changed] - start)
             level.append(block_level[changed])
             last_time, last_level = float(block_time[-1]), int(block_level[-1])
     if not level:
         raise CaptureError(f"{path} must have at least one row after its header, not 0")
-    levels = np.concatenate(level)
-    return Recording(np.concatenate(time), levels & ONE, levels >> ONE, last_time - start)
+    return Recording.of_level(np.concatenate(time), np.concatenate(level), last_time - start, n_lines=len(columns) - 1)
 
 
 def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
-    """Write a recording as text with the header `time,a,b`; `read_csv` gives back the same changes and duration.
+    """Write a recording as text with the header `time,a,b`, or `time,a,b,z` if it has an index line.
+
+    `read_csv`, told of `z`, gives back the same changes and duration.
 
     Times are the shortest decimals that read as the same float64, equal on every machine. A last row without a change
     marks the end of the recording.
@@ -101,21 +103,23 @@ def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
     CaptureError
         If the file cannot be written.
     """
-    time, a, b = recording.time + 0.0, recording.a, recording.b  # no -0.0
-    if recording.duration > time[-1]:
-        time, a, b = np.append(time, recording.duration), np.append(a, a[-1]), np.append(b, b[-1])
+    lines = (recording.time + 0.0, recording.a, recording.b, recording.z)  # no -0.0
+    columns: list[NDArray[np.generic]] = [line for line in lines if line is not None]
+    if recording.duration > recording.time[-1]:
+        columns = [np.append(column, column[-1]) for column in columns]
+        columns[0][-1] = recording.duration
     with replacing(Path(path)) as file:
-        file.write(b"time,a,b\n")
-        for first in range(0, len(time), ROWS):
-            rows = zip(*(column[first : first + ROWS].tolist() for column in (time, a, b)), strict=True)
-            file.write("".join(f"{t!r},{level_a},{level_b}\n" for t, level_a, level_b in rows).encode())
+        file.write(f"{','.join(('time', 'a', 'b', 'z')[: len(columns)])}\n".encode())
+        for first in range(0, len(columns[0]), ROWS):
+            rows = zip(*(column[first : first + ROWS].tolist() for column in columns), strict=True)
+            file.write("".join(f"{','.join(map(repr, row))}\n" for row in rows).encode())
 
 
 class Reader(Protocol):
     """A function that reads one kind of capture."""
 
     def __call__(
-        self, path: Path, a: Channel | None, b: Channel | None, samplerate_hz: float | None, /
+        self, path: Path, a: Channel | None, b: Channel | None, samplerate_hz: float | None, z: Channel | None, /
     ) -> Recording: ...
 
 
@@ -127,8 +131,9 @@ def read_capture(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
+    z: Channel | None = None,
 ) -> Recording:
-    """Read the two encoder lines from a capture; the suffix tells its kind.
+    """Read the encoder lines from a capture; the suffix tells its kind.
 
     Parameters
     ----------
@@ -139,6 +144,8 @@ def read_capture(
         (in any case) if there are both, else the first two.
     samplerate_hz : float or None, Hz
         Only for a `.sr` that has no samplerate.
+    z : str, int or None
+        Channel of the index line, likewise; when not given, the recording has none.
 
     Raises
     ------
@@ -149,7 +156,7 @@ def read_capture(
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise CaptureError(f"a capture must be a .sr, .csv or .vcd file, not {path}")
-    return reader(path, a, b, samplerate_hz)
+    return reader(path, a, b, samplerate_hz, z)
 
 
 def _read_header(path: Path, file: BinaryIO) -> list[str]:
@@ -175,8 +182,8 @@ def _blocks(file: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
         yield line, last + b"\n"
 
 
-def _parse(path: Path, line: int, block: bytes, names: list[str], columns: tuple[int, int, int]) -> NDArray[np.float64]:
-    """Give time, a and b of a block as an array of shape (rows, 3), all finite, levels 0 or 1."""
+def _parse(path: Path, line: int, block: bytes, names: list[str], columns: tuple[int, ...]) -> NDArray[np.float64]:
+    """Give time and levels of a block as an array of a column each, all finite, levels 0 or 1."""
     text = np.frombuffer(block, np.uint8)
     commas_before = np.searchsorted(np.flatnonzero(text == ord(",")), np.flatnonzero(text == ord("\n")))
     n_fields = np.diff(commas_before, prepend=0) + 1
@@ -201,7 +208,7 @@ def _refuse(path: Path, line: int, wrong: NDArray[np.bool_], rule: str, values: 
         raise CaptureError(f"{path} line {line + row}: {rule}, not {values[row]:.15g}")
 
 
-def _name_the_bad_cell(path: Path, line: int, lines: str, names: list[str], columns: tuple[int, int, int]) -> NoReturn:
+def _name_the_bad_cell(path: Path, line: int, lines: str, names: list[str], columns: tuple[int, ...]) -> NoReturn:
     for number, row in enumerate(lines.split("\n")[:-1], line):
         fields = row.split(",")
         for column in columns:

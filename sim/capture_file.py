@@ -1,5 +1,6 @@
-"""What every kind of capture shares: its error, the choice of two channels, and files written whole or not at all."""
+"""What every kind of capture shares: its error, the choice of channels, and files written whole or not at all."""
 
+import itertools
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -40,9 +41,13 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def choose_channels(
-    path: Path, channels: Mapping[int, str], a: Channel | None = None, b: Channel | None = None
-) -> tuple[int, int]:
-    """Find the numbers of the two encoder lines among the channels of a capture.
+    path: Path,
+    channels: Mapping[int, str],
+    a: Channel | None = None,
+    b: Channel | None = None,
+    z: Channel | None = None,
+) -> tuple[int, ...]:
+    """Find the numbers of the encoder lines among the channels of a capture: of A, B and, if it is wanted, Z.
 
     Parameters
     ----------
@@ -53,11 +58,13 @@ def choose_channels(
     a, b : str, int or None
         Name of the channel (in this spelling, else in any case), else its number. When not given: the channels named
         A and B if there are both, else the first two.
+    z : str, int or None
+        Likewise; when not given, there is no index line.
 
     Raises
     ------
     CaptureError
-        If there are fewer than two channels, if one is unknown, or if both are the same.
+        If there are fewer than two channels, if one is unknown, or if two are the same.
     """
     listed = ", ".join(f"{name} ({number})" for number, name in channels.items())
     if len(channels) < 2:
@@ -75,13 +82,16 @@ def choose_channels(
     default_a, default_b = find("A"), find("B")
     if default_a is None or default_b is None:
         default_a, default_b = list(channels)[:2]
-    number_a = default_a if a is None else find(a)
-    number_b = default_b if b is None else find(b)
-    for line, number, wanted in (("a", number_a, a), ("b", number_b, b)):
+    wanted = {"a": default_a if a is None else a, "b": default_b if b is None else b} | ({} if z is None else {"z": z})
+    numbers: dict[str, int] = {}
+    for line, channel in wanted.items():
+        number = find(channel)
         if number is None:
-            raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {wanted!r}")
-    assert number_a is not None
-    assert number_b is not None
-    if number_a == number_b:
-        raise CaptureError(f"channels a and b of {path} must be two of {listed}, not both {channels[number_a]}")
-    return number_a, number_b
+            raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {channel!r}")
+        numbers[line] = number
+    for one, other in itertools.combinations(numbers, 2):
+        if (number := numbers[one]) == numbers[other]:
+            raise CaptureError(
+                f"channels {one} and {other} of {path} must be two of {listed}, not both {channels[number]}"
+            )
+    return tuple(numbers.values())

@@ -24,7 +24,6 @@ from tachometry.sim.recording import PinTrace, Recording
 from tachometry.sim.run_zip import RunZip
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
-ONE = np.uint8(1)
 UNIT_HZ = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 # What zipfile raises for a damaged file: besides its own error, those of the layers below, by what is damaged.
 ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError)
@@ -35,10 +34,11 @@ def read_sr(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
+    z: Channel | None = None,
     *,
     _piece: int = CHUNK,
 ) -> Recording:
-    """Read two channels of a sigrok session, version 1 or 2.
+    """Read two or three channels of a sigrok session, version 1 or 2.
 
     Sample k is taken at k / samplerate; a change is dated at the first sample that shows it, and the duration is the
     number of samples / samplerate. Change times are rounded down to float64 and the duration up, hence
@@ -52,6 +52,8 @@ def read_sr(
         A and B if there are both, else the first two.
     samplerate_hz : float or None, Hz
         For a file that has no samplerate.
+    z : str, int or None
+        Channel of the index line, likewise; when not given, the recording has none.
 
     Raises
     ------
@@ -65,16 +67,16 @@ def read_sr(
     with reading(path), _damage_named(path), zipfile.ZipFile(path) as archive:
         session = _read_session(path, archive)
         rate = _agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
-        bit_a, bit_b = choose_channels(path, session.channels, a, b)
-        sample, level, n_samples = _changes(session, bit_a, bit_b, _pieces(path, archive, session, _piece))
+        bits = choose_channels(path, session.channels, a, b, z)
+        sample, level, n_samples = _changes(session, bits, _pieces(path, archive, session, _piece))
     if n_samples == 0:
         raise CaptureError(f"{path} must have at least one sample, not 0")
     duration = float(_divide(np.array([n_samples]), rate, up=True)[0])
-    return Recording(_divide(sample, rate, up=False), level & ONE, level >> ONE, duration)
+    return Recording.of_level(_divide(sample, rate, up=False), level, duration, n_lines=len(bits))
 
 
 def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
-    """Write a trace as a sigrok session of version 2 with channels A and B, one sample a clock.
+    """Write a trace as a sigrok session of version 2 with channels A, B and, if there is one, Z, one sample a clock.
 
     Equal traces give equal files, byte for byte on any machine, whatever its zlib (see `run_zip`). Read back and placed
     on the same clock, the file gives the same trace.
@@ -98,10 +100,10 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
         raise ValueError(f"clock_hz must be at least 1, not {clock_hz}")
     if trace.n_clocks < 1:
         raise ValueError(f"n_clocks must be at least 1, not {trace.n_clocks}")
-    level = trace.a | trace.b << ONE
+    level = trace.level
     with replacing(Path(path)) as file, RunZip(file) as archive:
         archive.add_text("version", "2")
-        archive.add_text("metadata", _metadata(clock_hz))
+        archive.add_text("metadata", _metadata(clock_hz, "AB" if trace.z is None else "ABZ"))
         for number, first in enumerate(range(0, trace.n_clocks, _chunk), 1):
             end = min(first + _chunk, trace.n_clocks)
             row = int(np.searchsorted(trace.clock, first, "right")) - 1  # the row that holds at `first`
@@ -110,7 +112,7 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
             archive.add_runs(f"logic-1-{number}", level[row:row_end], np.diff(starts, append=end))
 
 
-def _metadata(samplerate_hz: int) -> str:
+def _metadata(samplerate_hz: int, channels: str) -> str:
     # In the largest unit that leaves an integer: older sigroks do not read fractions.
     unit, prefix = next(
         (hz, p) for hz, p in ((10**9, "G"), (10**6, "M"), (10**3, "k"), (1, "")) if not samplerate_hz % hz
@@ -121,11 +123,10 @@ def _metadata(samplerate_hz: int) -> str:
         "",
         "[device 1]",
         "capturefile=logic-1",
-        "total probes=2",
+        f"total probes={len(channels)}",
         f"samplerate={samplerate_hz // unit} {prefix}Hz",
         "total analog=0",
-        "probe1=A",
-        "probe2=B",
+        *(f"probe{number}={name}" for number, name in enumerate(channels, 1)),
         "unitsize=1",
     ]
     return "\n".join(lines) + "\n"
@@ -236,13 +237,15 @@ def _pieces(path: Path, archive: zipfile.ZipFile, session: _Session, piece: int)
 
 
 def _changes(
-    session: _Session, bit_a: int, bit_b: int, pieces: Iterator[NDArray[np.uint8]]
+    session: _Session, bits: tuple[int, ...], pieces: Iterator[NDArray[np.uint8]]
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], int]:
-    """Give the samples that differ from the one before (the first always does), their a + 2 b, and the sample count."""
+    """Give the samples that differ from the one before (the first always does), their levels, and the sample count."""
     n_samples, before = 0, 255
     sample, level = [], []
     for data in pieces:
-        now = data[:, bit_a // 8] >> bit_a % 8 & 1 | (data[:, bit_b // 8] >> bit_b % 8 & 1) << 1
+        now = np.zeros(len(data), np.uint8)
+        for line, bit in enumerate(bits):
+            now |= (data[:, bit // 8] >> bit % 8 & 1) << line
         changed = np.flatnonzero(now[1:] != now[:-1]) + 1
         if now[0] != before:
             changed = np.append(0, changed)

@@ -1,4 +1,4 @@
-"""Waveforms (`.vcd`) as captures: two one-bit variables of a simulation or of a logic analyser's export."""
+"""Waveforms (`.vcd`) as captures: one-bit variables of a simulation or of a logic analyser's export."""
 
 import os
 from collections.abc import Iterator
@@ -19,10 +19,11 @@ def read_vcd(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
+    z: Channel | None = None,
 ) -> Recording:
-    """Read two one-bit variables of a Value Change Dump.
+    """Read two or three one-bit variables of a Value Change Dump.
 
-    The recording begins when both variables have first been 0 or 1, and ends with the last time in the file.
+    The recording begins when all of them have first been 0 or 1, and ends with the last time in the file.
 
     Parameters
     ----------
@@ -32,12 +33,14 @@ def read_vcd(
         given: the variables whose names without scopes are a and b, if there is one of each, else the first two.
     samplerate_hz : None
         Not allowed: a waveform has its times.
+    z : str, int or None
+        Variable of the index line, likewise; when not given, the recording has none.
 
     Raises
     ------
     CaptureError
         If the file is missing, no VCD, or cut short; for an unknown variable; for a level other than 0 or 1 after the
-        first of both.
+        first of all.
     """
     path = Path(path)
     if samplerate_hz is not None:
@@ -45,8 +48,8 @@ def read_vcd(
     with reading(path), path.open("rb") as file:
         tokens = _tokens(path, file)
         names, codes, scale = _declarations(path, tokens)
-        number_a, number_b = choose_channels(path, names, *_default(names, a, b))
-        return _changes(path, tokens, codes[number_a], codes[number_b], scale)
+        numbers = choose_channels(path, names, *_default(names, a, b), z)
+        return _changes(path, tokens, [codes[number] for number in numbers], scale)
 
 
 def _tokens(path: Path, file: BinaryIO) -> Iterator[Token]:
@@ -92,21 +95,21 @@ def _default(names: dict[int, str], a: Channel | None, b: Channel | None) -> tup
     return only("a") if a is None else a, only("b") if b is None else b
 
 
-def _changes(path: Path, tokens: Iterator[Token], code_a: str, code_b: str, scale: tuple[int, int]) -> Recording:
-    level = {code_a: "x", code_b: "x"}
+def _changes(path: Path, tokens: Iterator[Token], lines: list[str], scale: tuple[int, int]) -> Recording:
+    level = dict.fromkeys(lines, "x")
     times: list[int] = []
-    levels: list[tuple[str, str]] = []
+    levels: list[tuple[str, ...]] = []
     now = 0
 
     def note() -> None:
-        pair = (level[code_a], level[code_b])
-        if not times and not {*pair} <= {"0", "1"}:
+        row = tuple(level[code] for code in lines)
+        if not times and not {*row} <= {"0", "1"}:
             return
-        if not levels or pair != levels[-1]:
-            if not {*pair} <= {"0", "1"}:
-                raise CaptureError(f"levels of {path} must be 0 or 1, not {''.join(pair)} at time {now}")
+        if not levels or row != levels[-1]:
+            if not {*row} <= {"0", "1"}:
+                raise CaptureError(f"levels of {path} must be 0 or 1, not {''.join(row)} at time {now}")
             times.append(now)
-            levels.append(pair)
+            levels.append(row)
 
     for token in tokens:
         if token.kind is TokenKind.CHANGE_TIME:
@@ -118,8 +121,8 @@ def _changes(path: Path, tokens: Iterator[Token], code_a: str, code_b: str, scal
                 level[change.id_code] = change.value.lower()
     note()
     if not times:
-        raise CaptureError(f"{path} must tell the levels of both lines, 0 or 1, at least once")
+        raise CaptureError(f"{path} must tell the levels of all lines, 0 or 1, at least once")
     numerator, denominator = scale
     seconds = np.array([(time - times[0]) * numerator / denominator for time in times])
-    a, b = np.array(levels, dtype=np.uint8).T
-    return Recording(seconds, a, b, (now - times[0]) * numerator / denominator)
+    a, b, *z = np.array(levels, dtype=np.uint8).T
+    return Recording(seconds, a, b, (now - times[0]) * numerator / denominator, *z)

@@ -43,7 +43,7 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
             ["--motion", "--vibration", "--jitter", "--nonuniformity", "--illegal", "--seed", *OUTPUTS],
             ["Motion", "Encoder faults", "Outputs"],
         ),
-        ("replay", ["CAPTURE", "--a", "--b", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),
+        ("replay", ["CAPTURE", "--a", "--b", "--z", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),
     ],
 )
 def test_every_option_is_explained(

@@ -68,7 +68,7 @@ def test_the_waveform_of_a_simulation_replays_as_the_same_pins(tmp_path: Path, c
         (HEAD[:60], ("0", "1"), "{path} must be a whole VCD file: "),
         ("", ("0", "1"), "{path} must be a whole VCD file: its declarations do not end"),
         (HEAD + BODY + "#40\nz!\n", ("0", "1"), "levels of {path} must be 0 or 1, not z1 at time 40"),
-        (HEAD + "#0\n1!\n", ("0", "1"), "{path} must tell the levels of both lines, 0 or 1, at least once"),
+        (HEAD + "#0\n1!\n", ("0", "1"), "{path} must tell the levels of all lines, 0 or 1, at least once"),
         ("no waveform", ("0", "1"), "{path} must be a whole VCD file: "),
     ],
 )
