@@ -74,8 +74,6 @@ class IntervalAccumulator(wiring.Component):
         opening = Signal.like(self.m_e)
         longest = Signal()
         d1 = self.m_e - self.previous
-        # m_s changes with a tick only, so there is a clock to compare it in.
-        m.d.sync += longest.eq(self.m_s == self._max_ticks)
         m.d.comb += [
             self.update.eq(self.tick & (self.alteration | longest)),
             self.forced.eq(longest & ~self.alteration),
@@ -84,9 +82,12 @@ class IntervalAccumulator(wiring.Component):
             self.numerator.eq(opening - self.previous + d1 if self._cancel else d1),
         ]
         with m.If(self.tick):
-            m.d.sync += self.m_s.eq(Mux(longest, self._kept_ticks + 1, self.m_s + 1))
+            m.d.sync += [
+                self.m_s.eq(Mux(longest, self._kept_ticks + 1, self.m_s + 1)),
+                longest.eq(Mux(longest, self._kept_ticks + 1 == self._max_ticks, self.m_s == self._max_ticks - 1)),
+            ]
             with m.If(self.alteration):
-                m.d.sync += self.m_s.eq(1)
+                m.d.sync += [self.m_s.eq(1), longest.eq(0)]
             with m.If(self.update):
                 # After a forced update the kept half opens with the number that the window ends with.
                 m.d.sync += opening.eq(self.m_e)

@@ -1,12 +1,16 @@
 """The S method."""
 
+from typing import Any
+
 from amaranth import Cat, Module, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.alteration import AlterationDetector
+from tachometry.hdl.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.interval import IntervalAccumulator
 from tachometry.hdl.reciprocal import Reciprocal
+from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec import STachometer
 
@@ -51,8 +55,14 @@ class SMethod(wiring.Component):
             numerator_width=spec.numerator_width,
             cancel=spec.cancel,
         )
-        self.reciprocal = Reciprocal(spec.reciprocal)
-        self.scaler = (SerialScaler if spec.serial else PipelinedScaler)(
+        self._carried = spec.carried
+        if spec.carried:
+            self.reciprocal: Any = CarriedReciprocal(spec.reciprocal)
+            scaler: Any = SerialRemainderScaler if spec.serial else PipelinedRemainderScaler
+        else:
+            self.reciprocal = Reciprocal(spec.reciprocal)
+            scaler = SerialScaler if spec.serial else PipelinedScaler
+        self.scaler = scaler(
             spec.reciprocal,
             base_width=spec.count_width,
             numerator_width=spec.numerator_width,
@@ -89,6 +99,7 @@ class SMethod(wiring.Component):
             scaler.numerator.eq(interval.numerator),
             scaler.tag.eq(Cat(interval.m_s, interval.forced, interval.stalled)),
             scaler.q.eq(reciprocal.q),
+            *([scaler.r.eq(reciprocal.r)] if self._carried else []),
             self.velocity.eq(scaler.velocity),
             self.velocity_valid.eq(scaler.done),
             Cat(self.interval, self.forced, self.stalled).eq(scaler.tag_out),

@@ -3,8 +3,12 @@
 from dataclasses import dataclass
 from typing import Any
 
+from tachometry.spec.carried_reciprocal import CarriedReciprocal
 from tachometry.spec.reciprocal import Reciprocal
 from tachometry.spec.tachometer import TachometerSpec, signed_width
+
+# Up to this many ticks 1/m_s is looked up in a table of block RAM; for longer measurements it is carried along.
+MAX_TABLE = 2048
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,24 +43,42 @@ class STachometer(TachometerSpec):
         return (4 if self.cancel else 2) * self.max_count
 
     @property
-    def reciprocal(self) -> Reciprocal:
-        """The reciprocal of m_s."""
-        return Reciprocal(self.timing.max_ticks, self.max_numerator, self.frac_bits, halvings=int(self.cancel))
+    def reciprocal(self) -> Reciprocal | CarriedReciprocal:
+        """The reciprocal of m_s: looked up, or carried along where a table would be large."""
+        shape = (self.timing.max_ticks, self.max_numerator, self.frac_bits, int(self.cancel))
+        carried = CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
+        return carried if self.timing.max_ticks > max(MAX_TABLE, carried.depth) else Reciprocal(*shape)
+
+    @property
+    def carried(self) -> bool:
+        """Whether the reciprocal is carried along."""
+        return isinstance(self.reciprocal, CarriedReciprocal)
 
     @property
     def numerator_width(self) -> int:
-        """Bits of N, signed: as many additions does the product N·q take."""
+        """Bits of N, signed: as many additions does its product take."""
         return signed_width(self.max_numerator)
 
     @property
     def serial(self) -> bool:
-        """Whether ticks are far enough apart for one adder to form the product bit by bit."""
-        return self.timing.tick_cycles >= self.tick_to_velocity
+        """Whether ticks are far enough apart for one adder to form the velocity step by step."""
+        return self.timing.tick_cycles >= self._serial_latency
 
     @property
     def tick_to_velocity(self) -> int:
-        """One clock for the table, one for its register, one a bit of N, one to add b."""
-        return self.numerator_width + 3
+        return self._serial_latency if self.serial else self._pipelined_latency
+
+    @property
+    def _serial_latency(self) -> int:
+        # A clock for the table, one for its register, one a bit of N, one to add b; carried, again one for every digit
+        # of N·R/m, and one to round.
+        return 2 * self.numerator_width + 4 if self.carried else self.numerator_width + 3
+
+    @property
+    def _pipelined_latency(self) -> int:
+        reciprocal = self.reciprocal
+        digits = reciprocal.digits if isinstance(reciprocal, CarriedReciprocal) else 0
+        return self.numerator_width + digits + 3
 
     @property
     def parameters(self) -> dict[str, Any]:

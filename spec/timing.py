@@ -6,7 +6,7 @@ from fractions import Fraction
 from tachometry.spec.units import format_time, parse_frequency, parse_time
 
 MAX_TICK_CYCLES = 1 << 20
-MAX_TICKS = 2000
+MAX_TICKS = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Timing:
     def __post_init__(self) -> None:
         if self.clock_hz < 1:
             raise ValueError(f"clock_hz must be at least 1, not {self.clock_hz}")
-        if not 2 <= self.tick_cycles <= MAX_TICK_CYCLES:
-            raise ValueError(f"tick_cycles must be from 2 to {MAX_TICK_CYCLES}, not {self.tick_cycles}")
+        if not 1 <= self.tick_cycles <= MAX_TICK_CYCLES:
+            raise ValueError(f"tick_cycles must be from 1 to {MAX_TICK_CYCLES}, not {self.tick_cycles}")
         if not 2 <= self.max_ticks <= MAX_TICKS:
             raise ValueError(f"max_ticks must be from 2 to {MAX_TICKS}, not {self.max_ticks}")
 
