@@ -124,6 +124,7 @@ BARS = {
     "HX8K": {"LC": 400, "RAM": 4, "Fmax": 115},
     "UP5K": {"Fmax": 48},
 }
+EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
 # The first is what the others are compared with.
@@ -136,6 +137,19 @@ CONFIGURATIONS = (
     Configuration("x1", "x1 decoding", replace(REFERENCE, encoder=Encoder(500, 1))),
     Configuration("position-16", "16-bit position", replace(REFERENCE, position_width=16)),
     Configuration("filter-4", "glitch filter, 4 clocks", replace(REFERENCE, filter_clocks=4)),
+    Configuration(
+        "every-clock",
+        "a tick per clock, up to 2^16 ticks",
+        STachometer(encoder=Encoder(500, 4), timing=Timing(48_000_000, 1, 1 << 16)),
+        EVERY_CLOCK_BARS,
+        False,
+    ),
+    Configuration(
+        "long",
+        "at most 2^16 ticks (1.3 s)",
+        replace(REFERENCE, timing=Timing(48_000_000, 960, 1 << 16)),
+        is_option=False,
+    ),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )
 

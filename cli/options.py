@@ -122,7 +122,7 @@ _CORE_OPTIONS = [
         default="10ms",
         metavar="TIME",
         help="Longest measurement: after it an update is forced, so that standstill is seen. "
-        "Same units, 2 to 2000 whole ticks; a plain number is clocks.",
+        "Same units, 2 to 2^20 whole ticks; a plain number is clocks.",
     ),
     option(
         _CORE,

@@ -1,6 +1,6 @@
 """The window of a measurement: its length and the pulse numbers at its ends."""
 
-from amaranth import Module, Mux, Signal, signed
+from amaranth import Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -73,6 +73,7 @@ class IntervalAccumulator(wiring.Component):
         m = Module()
         opening = Signal.like(self.m_e)
         longest = Signal()
+        after_forced = self._kept_ticks + 1
         d1 = self.m_e - self.previous
         m.d.comb += [
             self.update.eq(self.tick & (self.alteration | longest)),
@@ -82,10 +83,9 @@ class IntervalAccumulator(wiring.Component):
             self.numerator.eq(opening - self.previous + d1 if self._cancel else d1),
         ]
         with m.If(self.tick):
-            m.d.sync += [
-                self.m_s.eq(Mux(longest, self._kept_ticks + 1, self.m_s + 1)),
-                longest.eq(Mux(longest, self._kept_ticks + 1 == self._max_ticks, self.m_s == self._max_ticks - 1)),
-            ]
+            m.d.sync += [self.m_s.eq(self.m_s + 1), longest.eq(self.m_s == self._max_ticks - 1)]
+            with m.If(longest):
+                m.d.sync += [self.m_s.eq(after_forced), longest.eq(after_forced == self._max_ticks)]
             with m.If(self.alteration):
                 m.d.sync += [self.m_s.eq(1), longest.eq(0)]
             with m.If(self.update):

@@ -6,7 +6,7 @@ which leave a remainder of either sign (non-restoring), and one more rounds it. 
 one pair of adders, the other all steps at once for any update rate.
 """
 
-from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
+from amaranth import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -50,9 +50,7 @@ class _RemainderScaler(wiring.Component):
         Valid with `done`, and held until the next.
     """
 
-    def __init__(
-        self, reciprocal: CarriedReciprocal, *, base_width: int, numerator_width: int, tag_width: int
-    ) -> None:
+    def __init__(self, reciprocal: CarriedReciprocal, *, base_width: int, numerator_width: int, tag_width: int) -> None:
         self._frac_bits = reciprocal.frac_bits
         self._m_width = reciprocal.remainder_width
         self._steps = numerator_width

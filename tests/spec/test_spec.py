@@ -32,9 +32,9 @@ ERRORS = [
     (lambda: Encoder(1 << 24, 2), "pulses_per_rev must be from 1 to 8388608 with x2 decoding, not 16777216"),
     (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, not 3"),
     (lambda: Timing(0, 2, 2), "clock_hz must be at least 1, not 0"),
-    (lambda: Timing(1, 1, 2), "tick_cycles must be from 2 to 1048576, not 1"),
-    (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 2000, not 1"),
-    (lambda: Timing(1, 2, 2001), "max_ticks must be from 2 to 2000, not 2001"),
+    (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, not 0"),
+    (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 1048576, not 1"),
+    (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, not 1048577"),
     (
         lambda: Timing.parse("48 m", "20us", "10ms"),
         "clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48 m'",

@@ -23,7 +23,7 @@ def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
     exec(compile(source.replace(right, wrong), f"<mutant of {module.__file__}>", "exec"), changed.__dict__)
     with pytest.MonkeyPatch.context() as patch:
         for user in list(sys.modules.values()):
-            if getattr(user, "__name__", "").startswith(("tachometry.", "tests.")) or user is module:
+            if getattr(user, "__name__", "").startswith(("tachometry.", "tests.", "support.")) or user is module:
                 for name, value in list(vars(user).items()):
                     if value is box:
                         patch.setattr(user, name, getattr(changed, box.__name__))

@@ -1,0 +1,120 @@
+"""Reciprocal and scaler as the S method wires them, and all their answers from a compiled simulation."""
+
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+from numpy.typing import NDArray
+
+from support.compiled import build
+from tachometry.hdl.carried_reciprocal import CarriedReciprocal
+from tachometry.hdl.reciprocal import Reciprocal
+from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
+from tachometry.spec import STachometer
+
+
+class Quotient(wiring.Component):
+    """base + N/(2^s·m): the reciprocal takes `m` with `enable`, the scaler its operands with `load` and `start`."""
+
+    def __init__(self, spec: STachometer, *, serial: bool) -> None:
+        self._carried = spec.carried
+        if spec.carried:
+            self.reciprocal: Any = CarriedReciprocal(spec.reciprocal)
+            scaler: Any = SerialRemainderScaler if serial else PipelinedRemainderScaler
+        else:
+            self.reciprocal = Reciprocal(spec.reciprocal)
+            scaler = SerialScaler if serial else PipelinedScaler
+        self.scaler = scaler(
+            spec.reciprocal,
+            base_width=spec.count_width,
+            numerator_width=spec.numerator_width,
+            tag_width=spec.interval_width,
+        )
+        inputs = ("load", "start", "base", "numerator")
+        outputs = ("done", "velocity", "tag_out")
+        members: dict[str, Any] = {"m": In(spec.interval_width), "enable": In(1)}
+        members |= {name: In(getattr(self.scaler, name).shape()) for name in inputs}
+        members |= {name: Out(getattr(self.scaler, name).shape()) for name in outputs}
+        self._wires = inputs, outputs
+        super().__init__(members)
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.reciprocal, m.submodules.scaler = self.reciprocal, self.scaler
+        m.d.comb += [
+            self.reciprocal.m.eq(self.m),
+            self.reciprocal.enable.eq(self.enable),
+            self.scaler.tag.eq(self.m),
+            self.scaler.q.eq(self.reciprocal.q),
+        ]
+        if self._carried:
+            m.d.comb += self.scaler.r.eq(self.reciprocal.r)
+        inputs, outputs = self._wires
+        m.d.comb += [getattr(self.scaler, name).eq(getattr(self, name)) for name in inputs]
+        m.d.comb += [getattr(self, name).eq(getattr(self.scaler, name)) for name in outputs]
+        return m
+
+
+# Every m with every numerator, start after start as fast as the scaler takes them; answers leave as 64-bit integers.
+_MAIN = """
+#include <cstdio>
+#include <cstdint>
+#include <vector>
+int main(int, char **argv) {{
+  cxxrtl_design::p_top top;
+  std::vector<int64_t> answers;
+  auto clock = [&] {{
+    top.p_clk.set<bool>(false); top.step();
+    if (top.p_done.get<bool>()) {{
+      uint64_t raw = top.p_velocity.get<uint64_t>();
+      answers.push_back(int64_t(raw << (64 - {width})) >> (64 - {width}));
+    }}
+    top.p_clk.set<bool>(true); top.step();
+  }};
+  const int numerators[] = {{{numerators}}};
+  for (int m = 1; m <= {max_m}; m++) {{
+    top.p_m.set<uint32_t>(m);
+    top.p_enable.set<bool>(true);
+    for (int n : numerators) {{
+      top.p_base.set<uint32_t>(uint32_t(-(n >> {base_shift})) & {base_mask}u);
+      top.p_numerator.set<uint32_t>(uint32_t(n) & {mask}u);
+      top.p_load.set<bool>(true); top.p_start.set<bool>(true); clock();
+      top.p_enable.set<bool>(false); top.p_load.set<bool>(false); top.p_start.set<bool>(false);
+      for (int k = 1; k < {distance}; k++) clock();
+    }}
+  }}
+  for (int k = 0; k < 100; k++) clock();
+  FILE *file = fopen(argv[1], "wb");
+  fwrite(answers.data(), 8, answers.size(), file);
+  return fclose(file);
+}}
+"""
+
+
+def every_quotient(
+    spec: STachometer, numerators: Sequence[int], distance: int, folder: Path
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """(base, N, m, velocity) for m = 1, 2 … max_ticks with every N each, `distance` clocks apart.
+
+    The base is one for which the ends of the window are within the range of m_e.
+    """
+    shift = 1 + spec.reciprocal.halvings
+    main = _MAIN.format(
+        width=spec.velocity_width,
+        max_m=spec.timing.max_ticks,
+        numerators=", ".join(map(str, numerators)),
+        base_shift=shift,
+        base_mask=(1 << spec.count_width) - 1,
+        mask=(1 << spec.numerator_width) - 1,
+        distance=distance,
+    )
+    answers = folder / "answers"
+    subprocess.run([build(Quotient(spec, serial=distance > 1), main, folder), answers], check=True)
+    m, n = np.meshgrid(np.arange(1, spec.timing.max_ticks + 1), np.array(numerators), indexing="ij")
+    return -(n.ravel() >> shift), n.ravel(), m.ravel(), np.fromfile(answers, dtype=np.int64)
