@@ -38,8 +38,8 @@ class Disc:
     ----------
     pitch_rad : float
         Mean distance of edges: 2 pi / (4 pulses_per_rev).
-    offset : float64 array, each more than -0.5 and less than 0.5
-        Displacement of edges, in pitches. One entry 0 makes an ideal disc.
+    offset : float64 array, each more than -1 and less than 1
+        Displacement of edges, in pitches; edges must stay in order. One entry 0 makes an ideal disc.
     """
 
     pitch_rad: float

@@ -1,8 +1,6 @@
 """The virtual encoder: what the lines of an incremental encoder do while its shaft moves, and what is true meanwhile.
 
 The truth is computed from the shaft's angle, never from the lines, so that it can judge whatever reads the lines.
-Everything is drawn from raw PCG64 words and evaluated with operations that IEEE 754 rounds exactly: equal inputs give
-equal bits on every machine.
 """
 
 import math
@@ -12,19 +10,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tachometry.sim.crossings import Disc, find_crossings
-from tachometry.sim.motion import FloatArray, Motion, Vibration, cos2pi
+from tachometry.sim import imperfections
+from tachometry.sim.crossings import Disc, IntArray, find_crossings
+from tachometry.sim.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY, Bounce
+from tachometry.sim.motion import FloatArray, Motion, Vibration
 from tachometry.sim.recording import Recording
 
 MAX_EDGES = 200_000_000
 MAX_PULSES_PER_REV = 1 << 26
 
-_CHUNK = 1 << 16
-_LN2 = 0.6931471805599453
-_CLIP = 0.49  # of the gap to a neighbour: two edges that move towards each other still keep their order
-
-# Streams of random numbers, children of the seed: switching one disturbance on leaves the others as they were.
-_NONUNIFORMITY, _JITTER, _ILLEGAL = range(3)
+_LEVELS = np.array([0, 1, 3, 2], dtype=np.uint8)  # A + 2 B in the quarters
 
 
 @dataclass(frozen=True)
@@ -85,7 +80,22 @@ class VirtualEncoder:
     start_angle_rad : float, rad
         Added to the angle of the motion. At 0, a motion from angle 0 begins exactly on edge 0, which has been passed.
     seed : int, at least 0
-        Of all random numbers. Nonuniformity, jitter and illegal transitions have streams of their own.
+        Of all random numbers. Each imperfection has a stream of its own.
+    phase_error_deg : float, electrical degrees, more than -90 and less than 90
+        The centre of B's pulse comes this much later, forwards, than a quarter period after the centre of A's.
+    duty_error_deg : float, electrical degrees, more than -90 and less than 90
+        The pulses of both lines are this much wider than 180, and the pauses narrower. Phase error, duty error and
+        nonuniformity (a pitch is 90 degrees, and both edges of a state may be off) must add up to less than 90: then
+        no state vanishes. They are of the disc, hence part of the truth.
+    bounce : Bounce or None
+        After an edge the line falls back and returns so many times, at random moments within the bounce time or half
+        the time to the next edge of either line, whichever is less. Edges that come together do not bounce.
+    lost : float, from 0 to 1
+        Probability that a line misses a pulse: it stays low, and two edges are lost. A pulse that begins before the
+        recording or ends after it is not missed.
+    index : bool
+        Whether there is an index line Z: high once a turn, in the quarter that begins at shaft angle 0, and gated as
+        usual: only while A and B are low.
 
     Raises
     ------
@@ -100,6 +110,11 @@ class VirtualEncoder:
     illegal: float = 0.0
     start_angle_rad: float = 0.0
     seed: int = 0
+    phase_error_deg: float = 0.0
+    duty_error_deg: float = 0.0
+    bounce: Bounce | None = None
+    lost: float = 0.0
+    index: bool = False
 
     def __post_init__(self) -> None:
         if not 1 <= self.pulses_per_rev <= MAX_PULSES_PER_REV:
@@ -107,8 +122,18 @@ class VirtualEncoder:
         for name, value in (("jitter", self.jitter), ("nonuniformity", self.nonuniformity)):
             if not 0 <= value < 0.5:
                 raise ValueError(f"{name} must be from 0 to less than 0.5, not {value}")
-        if not 0 <= self.illegal <= 1:
-            raise ValueError(f"illegal must be from 0 to 1, not {self.illegal}")
+        for name, value in (("illegal", self.illegal), ("lost", self.lost)):
+            if not 0 <= value <= 1:
+                raise ValueError(f"{name} must be from 0 to 1, not {value}")
+        for name, value in (("phase_error_deg", self.phase_error_deg), ("duty_error_deg", self.duty_error_deg)):
+            if not -90 < value < 90:
+                raise ValueError(f"{name} must be more than -90 and less than 90, not {value}")
+        errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * self.nonuniformity
+        if not errors < 90:
+            raise ValueError(
+                "phase error, duty error and twice the nonuniformity together must be less than 90 electrical degrees, "
+                f"not {errors:.6g}"
+            )
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
         if self.seed < 0:
@@ -120,7 +145,11 @@ class VirtualEncoder:
         n_edges = 4 * self.pulses_per_rev
         offset = np.zeros(1)
         if self.nonuniformity > 0:
-            offset = self.nonuniformity * (2 * _uniform(self._stream(_NONUNIFORMITY), n_edges) - 1)
+            random = self._stream(NONUNIFORMITY)
+            offset = self.nonuniformity * (2 * imperfections.uniform(random, n_edges) - 1)
+        if self.phase_error_deg or self.duty_error_deg:
+            displaced = imperfections.displaced_edges(self.phase_error_deg, self.duty_error_deg)
+            offset = offset + np.tile(displaced, max(len(offset) // 4, 1))
         return Disc(2 * math.pi / n_edges, offset)
 
     def record(self, motion: Motion) -> "Encoding":
@@ -132,42 +161,41 @@ class VirtualEncoder:
             If that could be more than `MAX_EDGES` edges, those from angle 0 to the start included.
         """
         shaft = _VibratingShaft(motion, self.vibration, self.start_angle_rad)
-        n_edges = shaft.reach / self.disc.pitch_rad
+        n_edges = shaft.reach / self.disc.pitch_rad * (1 + 2 * self.bounce.count if self.bounce else 1)
         if not n_edges <= MAX_EDGES:
             raise ValueError(
-                f"motion must be of at most {MAX_EDGES} encoder edges, start angle included, not {n_edges:.3g}"
+                f"motion must be of at most {MAX_EDGES} encoder edges, start angle {'and bounce ' * bool(self.bounce)}"
+                f"included, not {n_edges:.3g}"
             )
         time, quarter = find_crossings(shaft, self.disc)
-        time = np.append(0.0, self._jittered(time, motion.duration))
-        quarter = np.append(self.disc.quarter(shaft.angle(np.zeros(1))), quarter) & 3
-        seen = ~self._late(quarter)
-        time, quarter = time[seen], quarter[seen]
-        a = (quarter == 1) | (quarter == 2)
-        b = quarter >= 2
-        recording = Recording(time, a.astype(np.uint8), b.astype(np.uint8), motion.duration)
-        return Encoding(self, motion, recording, int(np.count_nonzero(~seen)))
+        if self.jitter:
+            time = imperfections.jittered(time, motion.duration, self.jitter, self._stream(JITTER))
+        time = np.append(0.0, time)
+        quarter = np.append(self.disc.quarter(shaft.angle(np.zeros(1))), quarter)
+        recording, n_illegal, n_lost = self._lines(time, quarter, motion.duration)
+        return Encoding(self, motion, recording, n_illegal, n_lost)
 
-    def _jittered(self, time: FloatArray, duration: float) -> FloatArray:
-        if self.jitter == 0:
-            return time
-        gap = np.diff(time, prepend=0.0, append=duration)
-        shift = np.clip(self.jitter * _gaussian(self._stream(_JITTER), len(time)), -_CLIP, _CLIP)
-        return time + shift * np.minimum(gap[:-1], gap[1:])
-
-    def _late(self, quarter: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Rows of a recording (row 0: the levels at rest) that come at the instant of the next row."""
-        late = np.zeros(len(quarter), dtype=np.bool_)
-        if self.illegal == 0:
-            return late
-        drawn = _uniform(self._stream(_ILLEGAL), len(quarter) - 1)[:-1] < self.illegal
-        drawn &= (quarter[2:] - quarter[:-2]) & 3 == 2  # the two edges are of different lines
-        index = np.arange(len(drawn))
-        last_undrawn = np.maximum.accumulate(np.where(drawn, -1, index))
-        late[1:-1] = drawn & ((index - last_undrawn) & 1 == 1)  # of edges drawn in a row every other one: pairs
-        return late
+    def _lines(self, time: FloatArray, quarter: IntArray, duration: float) -> tuple[Recording, int, int]:
+        """What the lines make of quarters that begin at some times, and how many edges came together or were lost."""
+        level, n_lost, n_illegal = _LEVELS[quarter & 3], 0, 0
+        if self.lost:
+            level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
+        row = np.flatnonzero(np.append(True, level[1:] != level[:-1]))
+        if self.illegal:
+            late = imperfections.late_edges(level, row, self.illegal, self._stream(ILLEGAL))
+            row, n_illegal = row[~late], int(np.count_nonzero(late))
+        if self.bounce:
+            random = self._stream(BOUNCE)
+            times, level = imperfections.chattering(time, level, row, duration, self.bounce, random)
+        else:
+            times, level = time[row], level[row]
+        if self.index:
+            slot = quarter % (4 * self.pulses_per_rev) == 0
+            times, level = imperfections.gated_index(times, level, time, slot)
+        return Recording.of_level(times, level, duration, n_lines=2 + self.index), n_illegal, n_lost
 
     def _stream(self, which: int) -> np.random.PCG64:
-        return np.random.PCG64(np.random.SeedSequence(self.seed).spawn(3)[which])
+        return imperfections.stream(self.seed, which)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,18 +210,22 @@ class Encoding:
         The lines, in seconds.
     n_illegal : int
         Number of instants at which both lines change.
+    n_lost : int
+        Number of edges that are missing, two for each pulse.
     """
 
     encoder: VirtualEncoder
     motion: Motion
     recording: Recording
     n_illegal: int
+    n_lost: int
 
     def true_position(self, t: ArrayLike, decoding: int = 4) -> NDArray[np.int64]:
         """Counts since time 0 that an ideal decoder of the disc would have at times `t` in seconds.
 
-        Decoding 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low. Vibration and nonuniformity
-        are in it; jitter and illegal transitions, which are faults of the lines, are not.
+        Decoding 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low. Vibration and what
+        is of the disc (nonuniformity, phase and duty error) are in it; jitter, bounce, lost pulses and illegal
+        transitions, which are faults of the lines, are not.
         """
         if decoding not in (1, 2, 4):
             raise ValueError(f"decoding must be 1, 2 or 4, not {decoding}")
@@ -212,30 +244,3 @@ class Encoding:
     @property
     def _shaft(self) -> _VibratingShaft:
         return _VibratingShaft(self.motion, self.encoder.vibration, self.encoder.start_angle_rad)
-
-
-def _uniform(stream: np.random.PCG64, n: int) -> FloatArray:
-    """Uniform in [0, 1), from the raw words, which numpy promises never to change."""
-    return (stream.random_raw(n) >> np.uint64(11)).astype(np.float64) * 2.0**-53
-
-
-def _gaussian(stream: np.random.PCG64, n: int) -> FloatArray:
-    """Standard normal (Box and Muller); numpy's own differs between versions and C libraries."""
-    normal = np.empty(n)
-    for begin in range(0, n, _CHUNK):
-        part = normal[begin : begin + _CHUNK]
-        u, v = _uniform(stream, 2 * len(part)).reshape(-1, 2).T
-        part[:] = np.sqrt(-2 * _log(1 - u)) * cos2pi(v)
-    return normal
-
-
-def _log(x: FloatArray) -> FloatArray:
-    """Natural logarithm, the same bits on every machine; |error| < 1e-15 max(1, |log x|)."""
-    mantissa, exponent = np.frexp(x)
-    low = mantissa < math.sqrt(0.5)
-    mantissa, exponent = np.where(low, 2 * mantissa, mantissa), exponent - low
-    s = np.asarray((mantissa - 1) / (mantissa + 1), dtype=np.float64)
-    series = np.zeros_like(s)
-    for n in range(19, 0, -2):
-        series = series * (s * s) + 2 / n
-    return s * series + exponent * _LN2

@@ -21,16 +21,16 @@ FloatArray = NDArray[np.float64]
 # A unit is its factor and the power of ten to apply to the decimal number before it is rounded: 7us is exactly 7e-6.
 Units = dict[str, tuple[float, int]]
 _SPEED: Units = {"rad/s": (1.0, 0), "rev/s": (2 * math.pi, 0), "rpm": (math.pi / 30, 0)}
-_TIME: Units = {"s": (1.0, 0), "ms": (1.0, -3), "us": (1.0, -6)}
+TIME: Units = {"s": (1.0, 0), "ms": (1.0, -3), "us": (1.0, -6)}
 _FREQUENCY: Units = {"Hz": (1.0, 0), "kHz": (1.0, 3)}
 _ANGLE: Units = {"rad": (1.0, 0), "mrad": (1.0, -3), "deg": (math.pi / 180, 0)}
 
 _FIELDS: dict[str, dict[str, Units]] = {
-    "constant": {"SPEED": _SPEED, "TIME": _TIME},
-    "ramp": {"FROM": _SPEED, "TO": _SPEED, "TIME": _TIME},
-    "sine": {"AMPLITUDE": _SPEED, "FREQUENCY": _FREQUENCY, "TIME": _TIME},
-    "trapezoid": {"SPEED": _SPEED, "ACCEL_TIME": _TIME, "HOLD_TIME": _TIME},
-    "stop": {"TIME": _TIME},
+    "constant": {"SPEED": _SPEED, "TIME": TIME},
+    "ramp": {"FROM": _SPEED, "TO": _SPEED, "TIME": TIME},
+    "sine": {"AMPLITUDE": _SPEED, "FREQUENCY": _FREQUENCY, "TIME": TIME},
+    "trapezoid": {"SPEED": _SPEED, "ACCEL_TIME": TIME, "HOLD_TIME": TIME},
+    "stop": {"TIME": TIME},
 }
 _FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items())
 _CSV_HEADER = ["time", "angle_rad"]
@@ -209,7 +209,8 @@ class Vibration:
         if not colon or ":" in frequency:
             raise ValueError(f"vibration must be AMPLITUDE:FREQUENCY, not {text!r}")
         return Vibration(
-            _number(amplitude, _ANGLE, "vibration amplitude"), _number(frequency, _FREQUENCY, "vibration frequency")
+            parse_number(amplitude, _ANGLE, "vibration amplitude"),
+            parse_number(frequency, _FREQUENCY, "vibration frequency"),
         )
 
     def angle(self, t: ArrayLike) -> FloatArray:
@@ -266,7 +267,7 @@ def _parse_segment(text: str) -> list[_Segment]:
         raise ValueError(f"motion segment must be one of {_FORMS}, csv:FILE, not {text!r}")
     values = []
     for (name, units), number in zip(fields.items(), numbers, strict=True):
-        value = _number(number, units, f"{name} of {kind}")
+        value = parse_number(number, units, f"{name} of {kind}")
         if units is not _SPEED and value <= 0:
             raise ValueError(f"{name} of {kind} must be more than 0 {next(iter(units))}, not {number!r}")
         values.append(value)
@@ -283,7 +284,7 @@ def _parse_segment(text: str) -> list[_Segment]:
             return [_Segment(values[0])]
 
 
-def _number(text: str, units: Units, name: str) -> float:
+def parse_number(text: str, units: Units, name: str) -> float:
     """Value of a decimal number with one of `units` behind it, or with none: then the first of them is meant."""
     match = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d{1,4}))?\s*([a-zA-Z/]*)", text.strip(), re.ASCII)
     default = next(iter(units))

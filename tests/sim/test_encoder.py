@@ -1,49 +1,15 @@
-"""The virtual encoder: edges against closed forms, lines against the truth, faults against their definition."""
+"""The virtual encoder: edges against closed forms, lines against the truth."""
 
 import hashlib
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from support.lines import FORWARD, GOLDEN, PITCH, PPR, decode, decoded_at, levels, record
 
 from tachometry.sim import crossings
-from tachometry.sim.encoder import Encoding, Vibration, VirtualEncoder, _gaussian, _log
-from tachometry.sim.motion import parse_motion
-from tachometry.sim.recording import Recording
-
-PPR = 1000
-PITCH = 2 * math.pi / (4 * PPR)
-
-FORWARD = [(0, 0), (1, 0), (1, 1), (0, 1)]
-
-
-def record(motion: str, **parameters: object) -> Encoding:
-    return VirtualEncoder(**{"pulses_per_rev": PPR, **parameters}).record(parse_motion(motion))  # type: ignore[arg-type]
-
-
-def decode(recording: Recording, decoding: int) -> tuple[list[int], int]:
-    """Position after each row, and the number of illegal transitions."""
-    position, illegal = [0], 0
-    rows = levels(recording)
-    for before, now in pairwise(rows):
-        step = {1: 1, 3: -1}.get((FORWARD.index(now) - FORWARD.index(before)) % 4, 0)
-        illegal += step == 0
-        a_changes = before[0] != now[0]
-        if (decoding == 2 and not a_changes) or (decoding == 1 and not (a_changes and now[1] == 0)):
-            step = 0
-        position.append(position[-1] + step)
-    return position, illegal
-
-
-def decoded_at(encoding: Encoding, t: NDArray[np.float64], decoding: int) -> NDArray[np.int64]:
-    position = np.array(decode(encoding.recording, decoding)[0])
-    return position[np.searchsorted(encoding.recording.time, t, side="right") - 1]
-
-
-def levels(recording: Recording) -> list[tuple[int, int]]:
-    return list(zip(recording.a.tolist(), recording.b.tolist(), strict=True))
+from tachometry.sim.encoder import VirtualEncoder
+from tachometry.sim.motion import Vibration
 
 
 def test_constant_speed_gives_equally_spaced_edges() -> None:
@@ -185,131 +151,6 @@ def test_truth_of_one_moment() -> None:
     assert [encoding.true_position(0.999, d) for d in (1, 2, 4)] == [999, 1998, 3996]
 
 
-def test_nonuniformity_is_of_the_disc() -> None:
-    encoding = record("constant:1rev/s:3s", nonuniformity=0.3, pulses_per_rev=64, start_angle_rad=math.pi / 256, seed=5)
-    edges = encoding.recording.time[1:] * 256
-    first, second, third = edges[:256], edges[256:512], edges[512:]
-    np.testing.assert_allclose(second - first, 256, rtol=1e-12)
-    np.testing.assert_allclose(third - second, 256, rtol=1e-12)
-    offset = first - (np.arange(256) + 0.5)
-    np.testing.assert_allclose(offset, np.roll(encoding.encoder.disc.offset, -1), atol=1e-10)
-    assert 0.28 < np.max(np.abs(offset)) <= 0.3
-    assert np.std(offset) == pytest.approx(0.3 / math.sqrt(3), rel=0.1)
-
-
-def test_jitter_has_the_given_deviation() -> None:
-    parameters = {"start_angle_rad": PITCH / 2}
-    ideal = record("constant:10rev/s:5s", **parameters).recording
-    shaken = record("constant:10rev/s:5s", jitter=0.05, **parameters).recording
-    shift = (shaken.time - ideal.time)[2:-2] * 40 * PPR
-    n = len(shift)
-    assert n > 190_000
-    assert np.mean(shift) == pytest.approx(0, abs=5 * 0.05 / math.sqrt(n))
-    assert np.std(shift) == pytest.approx(0.05, rel=5 / math.sqrt(2 * n))
-    assert np.mean((shift / np.std(shift)) ** 4) == pytest.approx(3, abs=5 * math.sqrt(24 / n))
-    assert np.mean(shift[1:] * shift[:-1]) / 0.05**2 == pytest.approx(0, abs=5 / math.sqrt(n))
-    assert levels(shaken) == levels(ideal)
-
-
-def test_jitter_keeps_the_order_of_edges() -> None:
-    motion = "sine:30:7Hz:1s"
-    parameters = {"vibration": Vibration(2e-3, 333), "nonuniformity": 0.4}
-    ideal, shaken = (record(motion, jitter=jitter, **parameters).recording for jitter in (0, 0.499))
-    gap = np.diff(ideal.time, append=ideal.duration)
-    assert len(gap) > 5000
-    assert np.all(np.diff(shaken.time) > 0)
-    room = np.minimum(gap[:-1], gap[1:])
-    assert np.max(np.abs(shaken.time - ideal.time)[1:] / room) == pytest.approx(0.49, rel=1e-6)
-    assert levels(shaken) == levels(ideal)
-
-
-def test_jitter_keeps_edges_within_the_recording() -> None:
-    for seed in range(20):
-        shaken = record("constant:1rev/s:1ms", start_angle_rad=0.999 * PITCH, jitter=0.4, seed=seed).recording
-        assert 0 < shaken.time[1] < 0.0015 / (4 * PPR)
-        assert shaken.time[4] < 1e-3 - 1e-6
-
-
-def test_jitter_is_no_part_of_the_truth() -> None:
-    t = np.linspace(0, 1, 999)
-    still, shaken = (record("constant:5:1s", jitter=jitter).true_position(t) for jitter in (0, 0.3))
-    assert np.array_equal(still, shaken)
-
-
-def test_a_longer_motion_begins_with_the_same_noise() -> None:
-    short, long = (record(f"constant:5:{t}s", jitter=0.1, illegal=0.1).recording for t in (1, 2))
-    n = len(short.time) - 3  # the end of the recording is a neighbour of the last edge
-    np.testing.assert_allclose(short.time[:n], long.time[:n], rtol=1e-14)
-
-
-def test_illegal_transitions_are_pairs_of_edges_at_the_instant_of_the_later() -> None:
-    ideal, faulty = (record("constant:5rev/s:1s", illegal=illegal) for illegal in (0, 0.1))
-    n = len(ideal.recording.time) - 1
-    assert faulty.n_illegal == decode(faulty.recording, 4)[1]
-    assert len(faulty.recording.time) == len(ideal.recording.time) - faulty.n_illegal
-    assert faulty.n_illegal / n == pytest.approx(0.1 / 1.1, abs=5 * math.sqrt(0.1 / n))
-    row = np.searchsorted(ideal.recording.time, faulty.recording.time)
-    assert np.array_equal(ideal.recording.time[row], faulty.recording.time)
-    assert np.array_equal(ideal.recording.a[row], faulty.recording.a)
-    assert np.array_equal(ideal.recording.b[row], faulty.recording.b)
-    assert set(np.diff(row).tolist()) == {1, 2}
-    t = np.linspace(0, 1, 999)
-    assert np.array_equal(ideal.true_position(t), faulty.true_position(t))
-
-
-def test_with_certainty_edges_merge_two_by_two() -> None:
-    encoding = record("constant:1rev/s:1750us", illegal=1, start_angle_rad=PITCH / 2)
-    assert levels(encoding.recording) == [(0, 0), (1, 1), (0, 0), (1, 1), (0, 1)]
-    assert encoding.n_illegal == 3
-    np.testing.assert_allclose(encoding.recording.time[1:] * 4 * PPR, [1.5, 3.5, 5.5, 6.5], rtol=1e-12)
-
-
-def test_edges_of_one_line_do_not_merge() -> None:
-    encoding = record("stop:1s", vibration=Vibration(PITCH / 2, 50), illegal=1)
-    assert encoding.n_illegal == 0
-    assert len(encoding.recording.time) > 99
-    turning = record("constant:1rev/s:625us+constant:-1rev/s:625us", illegal=1, start_angle_rad=PITCH / 2)
-    # edges 1 2 | 3 . 3 reversed | 2 1 reversed: 3 and its return are of one line, its return and 2 reversed are not
-    assert levels(turning.recording) == [(0, 0), (1, 1), (0, 1), (1, 0), (0, 0)]
-
-
-@pytest.mark.parametrize("motion", ["stop:1s", "constant:1rev/s:300us"])
-def test_with_less_than_two_edges_there_is_nothing_to_merge(motion: str) -> None:
-    assert record(motion, illegal=1, jitter=0.1).n_illegal == 0
-
-
-def test_disturbances_have_streams_of_their_own() -> None:
-    uneven, all_on, illegal, jitter, both = (
-        record("constant:1rev/s:1s", start_angle_rad=PITCH / 2, seed=3, **disturbances)
-        for disturbances in (
-            {"nonuniformity": 0.1},
-            {"nonuniformity": 0.1, "jitter": 0.05, "illegal": 0.1},
-            {"illegal": 0.1},
-            {"jitter": 0.05},
-            {"jitter": 0.05, "illegal": 0.1},
-        )
-    )
-    assert np.array_equal(uneven.encoder.disc.offset, all_on.encoder.disc.offset)
-    assert levels(illegal.recording) == levels(both.recording) == levels(all_on.recording)
-    assert np.all(np.isin(both.recording.time, jitter.recording.time))
-
-
-def test_streams_and_seeds_differ() -> None:
-    streams = [VirtualEncoder(1, seed=seed)._stream(which) for seed in range(2) for which in range(3)]
-    assert len({int(stream.random_raw()) for stream in streams}) == 6
-
-
-GOLDEN = {
-    "motion": "ramp:0:400rad/s:50ms+sine:100:35Hz:100ms+stop:20ms+constant:-300rpm:80ms",
-    "vibration": Vibration(1e-3, 487.0),
-    "nonuniformity": 0.2,
-    "jitter": 0.07,
-    "illegal": 0.01,
-    "start_angle_rad": 0.4,
-    "seed": 2007,
-}
-
-
 def test_equal_inputs_give_equal_bytes_on_every_machine() -> None:
     recording = record(**GOLDEN).recording  # type: ignore[arg-type]
     assert len(recording.time) == 11921
@@ -326,7 +167,7 @@ def test_equal_inputs_give_equal_bytes_on_every_machine() -> None:
 def test_chunks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = record(**GOLDEN).recording  # type: ignore[arg-type]
     monkeypatch.setattr(crossings, "_CHUNK", 61)
-    monkeypatch.setattr("tachometry.sim.encoder._CHUNK", 67)
+    monkeypatch.setattr("tachometry.sim.imperfections._CHUNK", 67)
     parts = record(**GOLDEN).recording  # type: ignore[arg-type]
     assert np.array_equal(whole.time, parts.time)
     assert levels(whole) == levels(parts)
@@ -340,19 +181,6 @@ def test_interpolation_finds_what_bisection_finds(monkeypatch: pytest.MonkeyPatc
     # an edge cannot be told more sharply than the angle's rounding allows at its speed
     assert np.quantile(np.abs(fast - slow), 0.99) < 1e-15
     np.testing.assert_allclose(fast, slow, rtol=0, atol=1e-11)
-
-
-def test_logarithm() -> None:
-    x = np.concatenate([np.random.default_rng(1).random(10_000), [2.0**-53, 0.5, math.sqrt(0.5), 1.0]])
-    exact = np.array([math.log(value) for value in x])
-    assert np.max(np.abs(_log(x) - exact) / np.maximum(1, np.abs(exact))) < 1e-15
-
-
-def test_gaussian_reaches_its_tails() -> None:
-    normal = _gaussian(np.random.PCG64(1), 400_000)
-    for sigma in (1, 2, 3, 4):
-        expected = 400_000 * math.erfc(sigma / math.sqrt(2))
-        assert np.sum(np.abs(normal) > sigma) == pytest.approx(expected, abs=5 * math.sqrt(expected))
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.lines import PITCH, PPR, decode, record
 
 from tachometry.cli.main import main
 from tachometry.sim.capture import CaptureError, read_capture, write_csv, write_sr
+from tachometry.sim.imperfections import Bounce
 from tachometry.sim.recording import PinTrace, Recording
 
 
@@ -98,3 +100,43 @@ def test_replay_takes_the_index_along(tmp_path: Path) -> None:
         main(["replay", str(tmp_path / "x.csv"), *core, str(tmp_path / "y.sr")])
     assert stop.value.code == 0
     assert rows(read_capture(tmp_path / "y.sr", z="Z").place(1_000_000)) == rows(TRACE)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_the_index_is_a_quarter_wide_and_begins_at_angle_0(direction: int) -> None:
+    recording = record(f"constant:{direction}rev/s:3s", start_angle_rad=-10.5 * PITCH, index=True).recording
+    assert recording.z is not None
+    time, change = recording.time[1:], np.diff(recording.z.astype(int))
+    ends = -10.5 + direction * np.stack([time[change > 0], time[change < 0]]) * 4 * PPR  # in pitches
+    np.testing.assert_allclose(ends[0] % (4 * PPR), 0 if direction > 0 else 1, atol=1e-6)
+    np.testing.assert_allclose(ends[1] - ends[0], direction, atol=1e-6)
+    assert ends.shape == (2, 3)
+    assert set(np.unique(recording.level)) == {0, 1, 2, 3, 4}
+    assert decode(recording, 4)[1] == 0
+
+
+def test_a_shaft_at_rest_on_the_index_shows_it() -> None:
+    assert rows(record("stop:1s", index=True).recording) == [(0, 0, 1)]
+    assert rows(record("stop:1s", index=True, start_angle_rad=4.5 * PITCH).recording) == [(0, 0, 0)]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_index_is_gated_and_leaves_the_lines_alone(seed: int) -> None:
+    faults: dict[str, object] = {
+        "jitter": 0.3,
+        "phase_error_deg": 20.0,
+        "duty_error_deg": -40.0,
+        "bounce": Bounce(2, 1e-4) if seed % 2 else None,
+        "illegal": (0, 0.2, 0.9)[seed % 3],
+        "lost": (0, 0.3)[seed % 4 // 2],
+        "pulses_per_rev": 2,
+        "seed": seed,
+    }
+    bare, indexed = (record("ramp:-200:300:300ms", index=index, **faults).recording for index in (False, True))
+    lines = indexed.level & 3
+    kept = np.append(True, lines[1:] != lines[:-1])
+    assert np.array_equal(indexed.time[kept], bare.time)
+    assert np.array_equal(lines[kept], bare.level)
+    assert indexed.z is not None
+    assert not np.any(lines[indexed.z == 1])
+    assert np.count_nonzero(np.diff(indexed.z)) >= (10, 5, 0)[seed % 3]
