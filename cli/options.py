@@ -22,6 +22,8 @@ _PARAMETERS = {
     "max_speed": "--max-speed",
     "position_width": "--position-width",
     "filter_clocks": "--filter",
+    "phase_error_deg": "--phase-error",
+    "duty_error_deg": "--duty-error",
 }
 _SAME_NAME = (
     "clock",
@@ -32,6 +34,8 @@ _SAME_NAME = (
     "jitter",
     "nonuniformity",
     "illegal",
+    "bounce",
+    "lost",
     "seed",
     "samplerate",
     "motion",

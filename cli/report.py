@@ -83,6 +83,8 @@ def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches
         *_counts(spec, run, truth),
         ("errors flagged", _flagged(run, truth)),
     ]
+    if truth is not None and truth.n_lost:
+        rows.append(("edges lost", f"{truth.n_lost} (pulses that the encoder missed: {truth.n_lost // 2})"))
     if spec.filter_clocks:
         rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
     if n_overflows:

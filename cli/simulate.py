@@ -40,11 +40,19 @@ Examples:
   tachometry simulate --ppr 1024 --clock 500kHz --tick 100us \\
       --motion trapezoid:900rpm:100ms:50ms+stop:20ms \\
       --jitter 0.05 --illegal 0.001 --vcd run.vcd --trace run.csv
+  tachometry simulate --ppr 24 --clock 100kHz --tick 2ms --max-time 100ms \\
+      --motion constant:15rpm:1s --bounce 5:1ms --filter 110 --plot knob.png
 
 The simulator runs some 10,000 clocks a second: choose a --clock that is a few
 times the edge rate.""",
 )
 @core_options
+@option(
+    "Encoder",
+    "--index-line",
+    is_flag=True,
+    help="The encoder has an index line Z, high for a quarter period once a turn; --save-capture shows it.",
+)
 @option(
     _MOTION,
     "--motion",
@@ -76,6 +84,37 @@ times the edge rate.""",
 )
 @option(
     _FAULTS,
+    "--phase-error",
+    type=float,
+    default=0,
+    metavar="DEGREES",
+    help="B's pulse comes this many electrical degrees later than 90 after A's, between -90 and 90.",
+)
+@option(
+    _FAULTS,
+    "--duty-error",
+    type=float,
+    default=0,
+    metavar="DEGREES",
+    help="Pulses of A and B are this many electrical degrees wider than 180, between -90 and 90.",
+)
+@option(
+    _FAULTS,
+    "--bounce",
+    metavar="COUNT:TIME",
+    help="Contact bounce, such as 3:500us (s, ms or us): after an edge the line falls back COUNT times within TIME, "
+    "or within half the way to the next edge.",
+)
+@option(
+    _FAULTS,
+    "--lost",
+    type=float,
+    default=0,
+    metavar="PROBABILITY",
+    help="Probability that a line misses a pulse: it stays low, and two edges are lost.",
+)
+@option(
+    _FAULTS,
     "--illegal",
     type=float,
     default=0,
@@ -86,10 +125,15 @@ times the edge rate.""",
 @output_options
 def simulate(
     spec: TachometerSpec,
+    index_line: bool,
     motion: str,
     vibration: str | None,
     jitter: float,
     nonuniformity: float,
+    phase_error: float,
+    duty_error: float,
+    bounce: str | None,
+    lost: float,
     illegal: float,
     seed: int,
     targets: dict[str, Path],
@@ -102,6 +146,7 @@ def simulate(
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """
     from tachometry.sim.encoder import VirtualEncoder
+    from tachometry.sim.imperfections import Bounce
     from tachometry.sim.motion import Vibration, parse_motion
 
     kind, _, table = motion.strip().partition(":")
@@ -113,6 +158,11 @@ def simulate(
         nonuniformity=nonuniformity,
         illegal=illegal,
         seed=seed,
+        phase_error_deg=phase_error,
+        duty_error_deg=duty_error,
+        bounce=None if bounce is None else Bounce.parse(bounce),
+        lost=lost,
+        index=index_line,
     )
     truth = encoder.record(parse_motion(motion))
     return _run_and_report(spec, "--motion", truth.recording, truth, outputs)

@@ -31,6 +31,7 @@ def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> N
 
 
 CORE = "--ppr --decoding --clock --tick --max-time --method --frac-bits --cancel --no-cancel --max-speed".split()
+FAULTS = "--jitter --nonuniformity --phase-error --duty-error --bounce --lost --illegal".split()
 OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
 
 
@@ -40,7 +41,7 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
         ("generate", ["--name", "--output", "-o"], ["Files"]),
         (
             "simulate",
-            ["--motion", "--vibration", "--jitter", "--nonuniformity", "--illegal", "--seed", *OUTPUTS],
+            [*"--index-line --motion --vibration --seed".split(), *FAULTS, *OUTPUTS],
             ["Motion", "Encoder faults", "Outputs"],
         ),
         ("replay", ["CAPTURE", "--a", "--b", "--z", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),

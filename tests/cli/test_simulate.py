@@ -15,7 +15,9 @@ import pytest
 
 from tachometry.cli.main import main
 from tachometry.sim import golden
+from tachometry.sim.capture import read_capture
 from tachometry.sim.encoder import VirtualEncoder
+from tachometry.sim.imperfections import Bounce
 from tachometry.sim.motion import parse_motion
 from tachometry.sim.pysim import PySim
 from tachometry.sim.results import Run
@@ -127,6 +129,42 @@ def test_counts_that_are_lost_are_told(capsys: pytest.CaptureFixture[str]) -> No
     assert table["errors flagged"] == f"{flagged} (the encoder made {flagged} illegal transitions)"
 
 
+def test_pulses_that_are_missed_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    options = "--motion constant:20:200ms --lost 0.05 --seed 3".split()
+    assert run("simulate", *CORE, *options) == 0
+    table = summary(capsys.readouterr().out)
+    edges, missed = table["edges lost"].split(" ", 1)
+    out, lost = table["counts out"].split()
+    assert int(out) - int(table["counts in"]) == int(lost.strip("()")) == -2 * int(edges) < 0  # 4 counts a pulse
+    assert missed == f"(pulses that the encoder missed: {int(edges) // 2})"
+    assert table["errors flagged"] == "0 (the encoder made 0 illegal transitions)"
+
+
+def test_every_imperfection_reaches_the_pins_and_so_does_the_index(tmp_path: Path) -> None:
+    options = (
+        "--phase-error 20 --duty-error -30 --nonuniformity 0.1 --jitter 0.05 --bounce 2:100us --lost 0.05 "
+        "--illegal 0.02 --seed 5 --index-line"
+    )
+    assert run("simulate", *CORE, *MOTION, *options.split(), "--save-capture", tmp_path / "s.sr") == 0
+    encoder = VirtualEncoder(
+        100,
+        phase_error_deg=20,
+        duty_error_deg=-30,
+        nonuniformity=0.1,
+        jitter=0.05,
+        bounce=Bounce(2, 100e-6),
+        lost=0.05,
+        illegal=0.02,
+        seed=5,
+        index=True,
+    )
+    wanted = encoder.record(parse_motion(MOTION[1])).recording.place(20_000)
+    seen = read_capture(tmp_path / "s.sr", z="Z").place(20_000)
+    assert np.array_equal(seen.clock, wanted.clock)
+    assert np.array_equal(seen.level, wanted.level)
+    assert np.any(wanted.level == 4)
+
+
 def test_overflow_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("simulate", *CORE, "--motion", "constant:100:20ms", "--max-speed", "50rad/s") == 0
     assert "faster than --max-speed" in summary(capsys.readouterr().out)["overflow"]
@@ -200,6 +238,15 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
         ("--motion stop:1s --jitter nan", "--jitter must be from 0 to less than 0.5, not nan"),
         ("--motion stop:1s --nonuniformity -1", "--nonuniformity must be from 0 to less than 0.5, not -1.0"),
         ("--motion stop:1s --illegal 2", "--illegal must be from 0 to 1, not 2.0"),
+        ("--motion stop:1s --phase-error 90", "--phase-error must be more than -90 and less than 90, not 90.0"),
+        ("--motion stop:1s --duty-error nan", "--duty-error must be more than -90 and less than 90, not nan"),
+        ("--motion stop:1s --duty-error 50 --phase-error -50", "must be less than 90 electrical degrees, not 100"),
+        ("--motion stop:1s --phase-error 20deg", "Invalid value for '--phase-error': '20deg' is not a valid float"),
+        ("--motion stop:1s --bounce 1ms", "--bounce must be COUNT:TIME, such as 3:500us, not '1ms'"),
+        ("--motion stop:1s --bounce 0:1ms", "--bounce count must be from 1 to 1000, not 0"),
+        ("--motion stop:1s --bounce 3:0us", "--bounce time must be more than 0 s, not 0.0 s"),
+        ("--motion stop:1s --lost 1.5", "--lost must be from 0 to 1, not 1.5"),
+        ("--motion stop:1s --lost nan", "--lost must be from 0 to 1, not nan"),
         ("--motion stop:1s --seed -1", "--seed must be at least 0, not -1"),
         ("--motion stop:1s --max-time 1ms", "--max-time, in ticks, must be from 2 to 1048576, not 1"),
         ("--motion constant:1e9:1e9s", "--motion must be of at most 200000000 encoder edges"),
