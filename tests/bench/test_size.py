@@ -1,30 +1,15 @@
-import importlib.util
 import re
-import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 from support.compiled import lint
+from support.script import load
 
 from tachometry.hdl import export
 from tachometry.spec import Encoder, STachometer, Timing
 
-
-def load() -> ModuleType:
-    """bench/size.py, which is a script and in no package."""
-    file = Path(__file__).parents[2] / "bench" / "size.py"
-    described = importlib.util.spec_from_file_location("bench_size", file)
-    assert described is not None
-    assert described.loader is not None
-    module = importlib.util.module_from_spec(described)
-    sys.modules["bench_size"] = module  # dataclasses look their module up
-    described.loader.exec_module(module)
-    return module
-
-
-size = load()
+size = load("size")
 SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
 
 

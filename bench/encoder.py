@@ -1,0 +1,186 @@
+"""What imperfections of an encoder look like and what the core makes of them: picture and table of docs/encoder.md.
+
+The lines are drawn and the golden model run at constant speed; everything is exact, so that the files are the same on
+every machine. `python bench/encoder.py` writes docs/encoder.svg and the table in docs/encoder.md anew.
+"""
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim import golden
+from tachometry.sim.encoder import Encoding, VirtualEncoder
+from tachometry.sim.golden.front_end import decode
+from tachometry.sim.imperfections import Bounce
+from tachometry.sim.motion import parse_motion
+from tachometry.sim.results import Run
+from tachometry.sim.tables import HeldVelocity, held_velocity, velocity_error
+from tachometry.spec import Encoder, STachometer, Timing
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+TABLE = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end of table -->)", re.DOTALL)
+
+FloatArray = NDArray[np.float64]
+
+# The table: 500 lines, an edge in 30.6 or 326 clocks.
+CORE = STachometer(encoder=Encoder(500), timing=Timing.parse("1MHz", "100us", "10ms"))
+FAST, SLOW = 3.27, 0.307  # counts of x4 per tick
+DURATION_S, SETTLED_S = 0.5, 0.05
+SHOWN = slice(600, 616)  # ticks
+
+# The picture: periods of an encoder with two in a turn, a seed that shows one lost pulse and one illegal, and pixels.
+PULSES_PER_REV, PERIODS, SEED = 2, 4, 17
+LEFT, WIDTH, TOP, ROW, LANE, GAP, COUNT = 190, 560, 32, 108, 12, 5, 2
+GREY, BLACK, BLUE, RED = "#bbb", "#222", "#2a78c8", "#b3261e"
+
+
+@dataclass(frozen=True)
+class Example:
+    """An imperfection as the table has it, and in a magnitude that can be seen.
+
+    Parameters
+    ----------
+    option : str
+        What the command line calls it.
+    measured, drawn : dict
+        Parameters of the encoder for the table and for the picture; without the latter it is not drawn.
+    decoding, filter_clocks : int
+        Of the core.
+    """
+
+    option: str
+    measured: dict[str, Any] = field(default_factory=dict)
+    drawn: dict[str, Any] = field(default_factory=dict)
+    decoding: int = 4
+    filter_clocks: int = 0
+
+
+BOUNCE = {"bounce": Bounce(3, 8e-6)}
+EXAMPLES = (
+    Example("none"),
+    Example("--jitter 0.05", {"jitter": 0.05}, {"jitter": 0.15}),
+    Example("--nonuniformity 0.1", {"nonuniformity": 0.1}, {"nonuniformity": 0.35}),
+    Example("--phase-error 30", {"phase_error_deg": 30}, {"phase_error_deg": 30}),
+    Example("--phase-error 30 --decoding 1", {"phase_error_deg": 30}, decoding=1),
+    Example("--duty-error 30", {"duty_error_deg": 30}, {"duty_error_deg": 30}),
+    Example("--duty-error 30 --decoding 1", {"duty_error_deg": 30}, decoding=1),
+    Example("--bounce 3:8us", BOUNCE, {"bounce": Bounce(3, 0.06)}),
+    Example("--bounce 3:8us --filter 9", BOUNCE, filter_clocks=9),
+    Example("--lost 0.01", {"lost": 0.01}, {"lost": 0.2}),
+    Example("--illegal 0.01", {"illegal": 0.01}, {"illegal": 0.15}),
+)
+
+
+def turn(counts_per_tick: float, encoder: VirtualEncoder, spec: STachometer) -> tuple[Encoding, Run]:
+    """An encoder at constant speed on a core's golden model."""
+    speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.seconds(spec.timing.tick_cycles)))
+    encoding = encoder.record(parse_motion(f"constant:{speed!r}rev/s:{DURATION_S}s"))
+    return encoding, golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
+
+
+def velocity_errors(spec: STachometer, encoding: Encoding, run: Run) -> str:
+    """RMS and mean error of the held velocity in per cent of the speed, once the start is forgotten."""
+    held = held_velocity(spec, run)
+    settled = held.time >= SETTLED_S
+    error = velocity_error(HeldVelocity(held.time[settled], held.velocity_rad_s[settled]), encoding.true_speed)
+    assert error is not None
+    percent = 100 / float(encoding.true_speed(0.0))
+    return f"{error.rms * percent:.1f} % ({error.mean * percent:+.1f} %)"
+
+
+def measure(example: Example) -> list[str]:
+    """A row of the table."""
+    ppr = CORE.encoder.pulses_per_rev
+    spec = replace(CORE, encoder=Encoder(ppr, example.decoding), filter_clocks=example.filter_clocks)
+    encoder = VirtualEncoder(ppr, start_angle_rad=math.pi / (4 * ppr), seed=SEED, **example.measured)
+    fast, slow = (turn(counts, encoder, spec) for counts in (FAST, SLOW))
+    encoding, run = fast
+    sampled = (run.ticks.clock[-1] - spec.tick_latency - spec.pin_to_count) / spec.timing.clock_hz
+    true = int(encoding.true_position(sampled, example.decoding))
+    return [
+        f"`{example.option}`" if example.measured else example.option,
+        f"{run.ticks.position[-1] - true} of {true}",
+        str(len(run.errors)),
+        str(run.ticks.swallowed_edges[-1]),
+        " ".join(map(str, run.ticks.pulse_count[SHOWN])),
+        velocity_errors(spec, *fast),
+        velocity_errors(spec, *slow),
+    ]
+
+
+def table() -> str:
+    """Markdown."""
+    head = [
+        "encoder and core",
+        "position off (counts)",
+        "`decode_error`",
+        "`swallowed_edges`",
+        f"m_e at {FAST} counts per tick",
+        f"velocity error, RMS (mean), at {FAST} counts per tick",
+        f"and at {SLOW}",
+    ]
+    rows = [head, ["---"] * len(head), *map(measure, EXAMPLES)]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def staircase(time: FloatArray, value: NDArray[Any], end: float, bottom: float, height: float, colour: str) -> str:
+    """A line of SVG: each value from its time on, one unit being `height` pixels above `bottom`."""
+    x, y = LEFT + np.append(time, end) / end * WIDTH, bottom - value * float(height)
+    corners = zip(np.repeat(x, 2)[1:-1], np.repeat(y, 2), strict=True)
+    points = " ".join(f"{px:.1f},{py:.1f}" for px, py in corners)
+    return f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.3"/>\n'
+
+
+def text(x: float, y: float, words: str, anchor: str = "start") -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{BLACK}">{words}</text>\n'
+
+
+def draw(name: str, drawn: dict[str, Any], top: float) -> str:
+    """Lines of an encoder over those of an ideal one, and the positions that a decoder makes of both."""
+    encoder = VirtualEncoder(PULSES_PER_REV, start_angle_rad=math.pi / (4 * PULSES_PER_REV), seed=SEED, index=True)
+    motion = parse_motion(f"constant:1rev/s:{PERIODS / PULSES_PER_REV}s")
+    svg = text(8, top + 2 * LANE, name)
+    bottoms = [top + (number + 1) * LANE + number * GAP for number in range(3)]
+    floor = bottoms[-1] + GAP + 4 * PERIODS * COUNT
+    for label, bottom in zip((*"ABZ", "position"), (*bottoms, floor - 2 * PERIODS * COUNT), strict=True):
+        svg += text(LEFT - 8, bottom - 2, label, anchor="end")
+    for colours, changes in (((GREY, GREY), {}), ((BLACK, BLUE), drawn)):
+        recording = replace(encoder, **changes).record(motion).recording
+        assert recording.z is not None
+        for bottom, line in zip(bottoms, (recording.a, recording.b, recording.z), strict=True):
+            svg += staircase(recording.time, line, motion.duration, bottom, LANE, colours[0])
+        step, illegal = decode(recording.a, recording.b, 4)
+        position = np.append(0, np.cumsum(step))
+        svg += staircase(recording.time, position, motion.duration, floor, COUNT, colours[1])
+        for row in np.flatnonzero(illegal) + 1:
+            x, y = LEFT + recording.time[row] / motion.duration * WIDTH, floor - position[row] * COUNT
+            svg += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{RED}"/>\n'
+    return svg
+
+
+def picture() -> str:
+    """SVG."""
+    shown = [example for example in EXAMPLES if example.drawn]
+    size = f"{LEFT + WIDTH + 20} {TOP + len(shown) * ROW}"
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" font-family="DejaVu Sans, Arial, sans-serif"'
+    svg += f' font-size="11">\n<rect width="{LEFT + WIDTH + 20}" height="{TOP + len(shown) * ROW}" fill="white"/>\n'
+    svg += text(LEFT, 16, "grey: ideal encoder; black: lines; blue: position that is decoded; red: decode_error")
+    for number, example in enumerate(shown):
+        svg += draw(example.option.split()[0], example.drawn, TOP + number * ROW)
+    return svg + "</svg>\n"
+
+
+def main() -> None:
+    """Write both."""
+    (DOCS / "encoder.svg").write_text(picture(), encoding="utf-8")
+    page = DOCS / "encoder.md"
+    page.write_text(TABLE.sub(lambda _: table(), page.read_text("utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,40 @@
+"""The picture and the table of docs/encoder.md are those of bench/encoder.py, and tell what the page says."""
+
+import inspect
+from pathlib import Path
+
+import pytest
+from support.script import load
+
+from tachometry.sim.encoder import VirtualEncoder
+
+encoder = load("encoder")
+PAGE = (encoder.DOCS / "encoder.md").read_text("utf-8")
+PICTURE = (encoder.DOCS / "encoder.svg").read_bytes()
+
+
+def test_the_page_is_up_to_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(encoder, "DOCS", tmp_path)
+    (tmp_path / "encoder.md").write_text(encoder.TABLE.sub("", PAGE), "utf-8")
+    encoder.main()
+    assert (tmp_path / "encoder.md").read_text("utf-8") == PAGE
+    assert (tmp_path / "encoder.svg").read_bytes() == PICTURE
+
+
+def test_every_parameter_is_on_the_page() -> None:
+    for name in inspect.signature(VirtualEncoder).parameters:
+        assert name in {"pulses_per_rev", "start_angle_rad", "seed"} or f"`{name}" in PAGE, name
+
+
+def test_what_the_page_says_of_the_core() -> None:
+    rows = [line.strip("| \n").split(" | ") for line in encoder.table().splitlines()[2:]]
+    table = {row[0].strip("`"): row for row in rows}
+    off = {option: int(row[1].split()[0]) for option, row in table.items()}
+    errors = {option: int(row[2]) for option, row in table.items()}
+    for option in table:
+        faulty = option in ("--lost 0.01", "--illegal 0.01")
+        assert (abs(off[option]) > 200) == faulty
+        assert (errors[option] > 100) == (option == "--illegal 0.01")
+        assert (int(table[option][3]) > 1000) == ("--filter" in option)
+    assert off["--lost 0.01"] % 4 == 0
+    assert off["--illegal 0.01"] == -2 * errors["--illegal 0.01"]
