@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 import click
 
 from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.timing import whole_clocks
+from tachometry.spec.velocity_output import NATIVE, UNITS, parse_lsb
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -22,6 +24,11 @@ _PARAMETERS = {
     "max_speed": "--max-speed",
     "position_width": "--position-width",
     "filter_clocks": "--filter",
+    "velocity_bits": "--velocity-width",
+    "index_reset": "--index-reset",
+    "max_tick_cycles": "--max-tick-period, in clocks,",
+    "max_tick_period": "--max-tick-period",
+    "tick_in": "--tick-in",
     "phase_error_deg": "--phase-error",
     "duty_error_deg": "--duty-error",
 }
@@ -39,6 +46,9 @@ _SAME_NAME = (
     "seed",
     "samplerate",
     "motion",
+    "unit",
+    "lsb",
+    "z",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
 
@@ -129,6 +139,18 @@ _CORE_OPTIONS = [
         "Same units, 2 to 2^20 whole ticks; a plain number is clocks.",
     ),
     option(
+        _TIMING,
+        "--external-tick",
+        is_flag=True,
+        help="A rise of tick_in ends a sampling period, as of a PWM carrier; --tick is its nominal length.",
+    ),
+    option(
+        _TIMING,
+        "--max-tick-period",
+        metavar="TIME",
+        help="Longest external tick: after it the core makes one itself and flags tick_error. [default: 2 --tick]",
+    ),
+    option(
         _CORE,
         "--method",
         type=click.Choice(["s"]),
@@ -137,11 +159,29 @@ _CORE_OPTIONS = [
     ),
     option(
         _CORE,
+        "--unit",
+        type=click.Choice(UNITS),
+        default=NATIVE,
+        help="Unit of the velocity; other than count/tick it costs a constant multiplication, and is off by less than "
+        "one LSB.",
+    ),
+    option(
+        _CORE,
         "--frac-bits",
         type=int,
-        default=16,
         metavar="N",
-        help="Fraction bits of the velocity, 4 to 24; its unit is one count per tick.",
+        help="Fraction bits of the velocity: its LSB is 2^-N of the unit. In count/tick 4 to 24. "
+        "[default: 16 in count/tick, else 10]",
+    ),
+    option(_CORE, "--lsb", metavar="2^-N", help="The same in other words."),
+    option(
+        _CORE,
+        "--velocity-width",
+        "velocity_bits",
+        type=int,
+        metavar="N",
+        help="Bits of the velocity, 8 to 64; what does not fit saturates, and velocity_overflow is flagged. "
+        "[default: as many as it can need]",
     ),
     option(
         _CORE,
@@ -175,7 +215,21 @@ _CORE_OPTIONS = [
         help="Glitch filter: a level counts when it has held for N clocks, 0 to 255; costs N clocks of latency. "
         "What it swallows is counted.",
     ),
+    option(_CORE, "--index", is_flag=True, help="Line z: its rising edge captures the position in index_position."),
+    option(_CORE, "--index-reset", is_flag=True, help="And sets the position to 0."),
 ]
+
+
+# Options that are parameters of the core by the same name.
+_PASSED = ("velocity_bits", "position_width", "filter_clocks", "index", "index_reset")
+
+
+def _max_tick_cycles(timing: Timing, external: bool, period: str | None) -> int | None:
+    if not external:
+        if period is not None:
+            raise ValueError("max_tick_period must be given together with --external-tick")
+        return None
+    return 2 * timing.tick_cycles if period is None else whole_clocks("max_tick_period", period, timing.clock_hz)
 
 
 def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -190,21 +244,29 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
         clock: str,
         tick: str,
         max_time: str,
-        frac_bits: int,
+        unit: str,
+        frac_bits: int | None,
+        lsb: str | None,
         cancel: bool,
         max_speed: str | None,
-        position_width: int,
-        filter_clocks: int,
+        external_tick: bool,
+        max_tick_period: str | None,
         **others: Any,
     ) -> Any:
+        timing = Timing.parse(clock, tick, max_time)
+        if frac_bits is None:
+            frac_bits = (16 if unit == NATIVE else 10) if lsb is None else parse_lsb(lsb)
+        elif lsb is not None:
+            raise ValueError("lsb must not be given together with --frac-bits")
         spec = STachometer(
             encoder=Encoder(ppr, decoding),
-            timing=Timing.parse(clock, tick, max_time),
+            timing=timing,
+            unit=unit,
             frac_bits=frac_bits,
             max_speed=None if max_speed is None else Speed.parse(max_speed),
             cancel=cancel,
-            position_width=position_width,
-            filter_clocks=filter_clocks,
+            max_tick_cycles=_max_tick_cycles(timing, external_tick, max_tick_period),
+            **{name: others.pop(name) for name in _PASSED},
         )
         return command(spec=spec, **others)
 

@@ -87,8 +87,15 @@ def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches
         rows.append(("edges lost", f"{truth.n_lost} (pulses that the encoder missed: {truth.n_lost // 2})"))
     if spec.filter_clocks:
         rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
+    if spec.index:
+        last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
+        rows.append(("index", f"{len(run.index.clock)} times{last}"))
+    if spec.max_tick_cycles:
+        rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
     if n_overflows:
         rows.append(("overflow", f"{n_overflows} ticks: faster than --max-speed, velocity saturated"))
+    if n_saturated := int(np.count_nonzero(updates.velocity_overflow)):
+        rows.append(("velocity overflow", f"{n_saturated} updates: beyond --velocity-width, saturated"))
     return rows + _errors(spec, run, truth)
 
 
@@ -109,7 +116,8 @@ def _sampled(clock: int, clock_hz: int) -> float:
 
 
 def _counts(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tuple[str, str]]:
-    out = int(run.ticks.position[-1])
+    # An index that resets the position does not undo what has been counted.
+    out = int(run.ticks.pulse_count.sum() if spec.index_reset else run.ticks.position[-1])
     if truth is None:
         return [("counts in", "unknown"), ("counts out", str(out))]
     into = counts_in(spec, run, truth)

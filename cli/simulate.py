@@ -48,12 +48,6 @@ times the edge rate.""",
 )
 @core_options
 @option(
-    "Encoder",
-    "--index-line",
-    is_flag=True,
-    help="The encoder has an index line Z, high for a quarter period once a turn; --save-capture shows it.",
-)
-@option(
     _MOTION,
     "--motion",
     required=True,
@@ -125,7 +119,6 @@ times the edge rate.""",
 @output_options
 def simulate(
     spec: TachometerSpec,
-    index_line: bool,
     motion: str,
     vibration: str | None,
     jitter: float,
@@ -162,7 +155,7 @@ def simulate(
         duty_error_deg=duty_error,
         bounce=None if bounce is None else Bounce.parse(bounce),
         lost=lost,
-        index=index_line,
+        index=spec.index,
     )
     truth = encoder.record(parse_motion(motion))
     return _run_and_report(spec, "--motion", truth.recording, truth, outputs)
@@ -189,7 +182,8 @@ times the edge rate. Edges closer than a clock are flagged as errors or lost."""
     metavar="CHANNEL",
     help="Line B. Without both options: the channels named A and B, else the first two.",
 )
-@option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index. Without it there is none.")
+@option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index, for --index.")
+@option(_CAPTURE, "--tick-in", metavar="CHANNEL", help="The external tick, for --external-tick.")
 @option(
     _CAPTURE,
     "--samplerate",
@@ -203,6 +197,7 @@ def replay(
     a: str | None,
     b: str | None,
     z: str | None,
+    tick_in: str | None,
     samplerate: str | None,
     targets: dict[str, Path],
 ) -> int:
@@ -216,8 +211,11 @@ def replay(
     """
     from tachometry.sim.capture import read_capture
 
+    for wanted, line, channel in ((spec.index, "z", z), (spec.max_tick_cycles, "tick_in", tick_in)):
+        if wanted and channel is None:
+            raise ValueError(f"{line} must be given with {'--index' if line == 'z' else '--external-tick'}")
     outputs = Outputs(targets, inputs=[capture])
-    recording = read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), z)
+    recording = read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), z, tick_in)
     return _run_and_report(spec, str(capture), recording, None, outputs)
 
 
@@ -232,9 +230,12 @@ def _run_and_report(
     from tachometry.cli.report import clocks_progress, print_summary
     from tachometry.sim import golden
     from tachometry.sim.pysim import PySim
+    from tachometry.sim.recording import nominal_ticks
     from tachometry.sim.results import compare
 
     trace = recording.place(spec.timing.clock_hz)
+    if spec.max_tick_cycles and trace.tick_in is None:
+        trace = trace.with_tick_in(nominal_ticks(spec, trace.n_clocks))
     _require_a_tick(spec, source, trace)
     with outputs:
         expected = golden.run(spec, trace)
@@ -247,7 +248,7 @@ def _run_and_report(
 
 
 def _require_a_tick(spec: TachometerSpec, source: str, trace: PinTrace) -> None:
-    needed = spec.timing.tick_cycles + spec.tick_latency
+    needed = spec.longest_tick + spec.tick_latency
     if trace.n_clocks < needed:
         raise ValueError(
             f"{source} must last at least {needed} clocks of --clock ({format_time(spec.seconds(needed))}), "

@@ -19,6 +19,10 @@ class PositionCounter(wiring.Component):
     Members
     -------
     step : In(signed(2))
+    clear : In(1)
+        `position` is 0 in the next clock, whatever has been counted.
+    next : Out(signed(width))
+        `position` of the next clock, if it is not cleared.
     position : Out(signed(width))
 
     Raises
@@ -30,12 +34,17 @@ class PositionCounter(wiring.Component):
     def __init__(self, width: int) -> None:
         if width < 2:
             raise ValueError(f"width must be at least 2, not {width}")
-        super().__init__({"step": In(signed(2)), "position": Out(signed(width))})
+        super().__init__(
+            {"step": In(signed(2)), "clear": In(1), "next": Out(signed(width)), "position": Out(signed(width))}
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         late = Signal.like(self.step)
         step = Signal.like(self.position)
         m.d.comb += step.eq(late)
-        m.d.sync += [late.eq(self.step), self.position.eq(self.position + step)]
+        m.d.comb += self.next.eq(self.position + step)
+        m.d.sync += [late.eq(self.step), self.position.eq(self.next)]
+        with m.If(self.clear):
+            m.d.sync += self.position.eq(0)
         return m

@@ -12,7 +12,7 @@ from tachometry.hdl.interval import IntervalAccumulator
 from tachometry.hdl.reciprocal import Reciprocal
 from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
-from tachometry.spec import STachometer
+from tachometry.spec import STachometer, carried_reciprocal
 
 
 class SMethod(wiring.Component):
@@ -31,7 +31,7 @@ class SMethod(wiring.Component):
     pulse_count : In(signed)
         m_e, valid with `tick`.
     velocity : Out(signed)
-        In counts per tick with `frac_bits` fraction bits; this and all below are held until the next update.
+        In counts per tick with `native_frac_bits` fraction bits; this and all below are held until the next update.
     velocity_valid : Out(1)
         One clock per update.
     interval : Out
@@ -39,13 +39,17 @@ class SMethod(wiring.Component):
     forced, stalled : Out(1)
     """
 
-    outputs = ("velocity", "velocity_valid", "interval", "forced", "stalled")
-
     def __init__(self, spec: STachometer) -> None:
-        shapes = {port.name: signed(port.width) if port.signed else port.width for port in spec.ports}
         super().__init__(
-            {"tick": In(1), "pulse_count": In(shapes["pulse_count"])}
-            | {name: Out(shapes[name]) for name in self.outputs}
+            {
+                "tick": In(1),
+                "pulse_count": In(signed(spec.count_width)),
+                "velocity": Out(signed(spec.native_width)),
+                "velocity_valid": Out(1),
+                "interval": Out(spec.interval_width),
+                "forced": Out(1),
+                "stalled": Out(1),
+            }
         )
         self.alteration = AlterationDetector(spec.count_width)
         self.interval_accumulator = IntervalAccumulator(
@@ -55,8 +59,8 @@ class SMethod(wiring.Component):
             numerator_width=spec.numerator_width,
             cancel=spec.cancel,
         )
-        self._carried = spec.carried
-        if spec.carried:
+        self._carried = isinstance(spec.reciprocal, carried_reciprocal.CarriedReciprocal)
+        if isinstance(spec.reciprocal, carried_reciprocal.CarriedReciprocal):
             self.reciprocal: Any = CarriedReciprocal(spec.reciprocal)
             scaler: Any = SerialRemainderScaler if spec.serial else PipelinedRemainderScaler
         else:

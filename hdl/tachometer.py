@@ -2,16 +2,19 @@
 
 from typing import Any
 
-from amaranth import Module, signed
+from amaranth import Cat, Module, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.conditioner import InputConditioner
 from tachometry.hdl.decoder import QuadratureDecoder
+from tachometry.hdl.external_tick import ExternalTick
+from tachometry.hdl.index_capture import IndexCapture
 from tachometry.hdl.position_counter import PositionCounter
 from tachometry.hdl.pulse_counter import PulseCounter
 from tachometry.hdl.s_method import SMethod
 from tachometry.hdl.sampling_clock import SamplingClock
+from tachometry.hdl.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.spec import TachometerSpec
 
 DATAPATHS: dict[str, Any] = {"s": SMethod}
@@ -31,7 +34,7 @@ class Tachometer(wiring.Component):
     -------
     The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain: `a`, `b` in; `velocity`,
     `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `stalled`
-    out.
+    out; and those of its options.
     """
 
     def __init__(self, spec: TachometerSpec) -> None:
@@ -44,13 +47,21 @@ class Tachometer(wiring.Component):
                 if port.name not in ("clk", "rst")
             }
         )
-        cycles = spec.timing.tick_cycles
-        self.conditioner = InputConditioner(spec.filter_clocks)
+        self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
-        self.sampling_clock = SamplingClock(cycles)
-        self.pulse_counter = PulseCounter(cycles, spec.max_count)
+        self.sampling_clock: Any = (
+            ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles)
+            if spec.max_tick_cycles
+            else SamplingClock(spec.timing.tick_cycles)
+        )
+        self.pulse_counter = PulseCounter(spec.longest_tick, spec.max_count)
         self.position_counter = PositionCounter(spec.position_width)
+        self.index_capture = IndexCapture(spec.position_width) if spec.index else None
         self.datapath = DATAPATHS[spec.method](spec)
+        self.velocity_output: Any = None
+        if spec.output is not None:
+            box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
+            self.velocity_output = box(spec.output, native_width=spec.native_width, tag_width=spec.interval_width + 2)
 
     @property
     def spec(self) -> TachometerSpec:
@@ -82,7 +93,38 @@ class Tachometer(wiring.Component):
             datapath.tick.eq(self.tick),
             datapath.pulse_count.eq(self.pulse_count),
         ]
-        m.d.comb += [getattr(self, name).eq(getattr(datapath, name)) for name in datapath.outputs]
+        tags = [self.interval, self.forced, self.stalled]
+        found = Cat(datapath.interval, datapath.forced, datapath.stalled)
+        if self.velocity_output is None:
+            m.d.comb += [
+                self.velocity.eq(datapath.velocity),
+                self.velocity_valid.eq(datapath.velocity_valid),
+                Cat(tags).eq(found),
+            ]
+        else:
+            m.submodules.velocity_output = output = self.velocity_output
+            m.d.comb += [
+                output.start.eq(datapath.velocity_valid),
+                output.native.eq(datapath.velocity),
+                output.tag.eq(found),
+                self.velocity.eq(output.velocity),
+                self.velocity_valid.eq(output.done),
+                self.velocity_overflow.eq(output.velocity_overflow),
+                Cat(tags).eq(output.tag_out),
+            ]
+        if self.index_capture is not None:
+            m.submodules.index_capture = index = self.index_capture
+            m.d.comb += [
+                conditioner.z.eq(self.z),
+                index.level_z.eq(conditioner.level_z),
+                index.ready.eq(conditioner.ready),
+                index.position.eq(position_counter.next),
+                position_counter.clear.eq(index.rises & int(self._spec.index_reset)),
+                self.index_position.eq(index.index_position),
+                self.index_valid.eq(index.index_valid),
+            ]
+        if self._spec.max_tick_cycles:
+            m.d.comb += [sampling_clock.tick_in.eq(self.tick_in), self.tick_error.eq(sampling_clock.tick_error)]
         if self._spec.filter_clocks:
             m.d.comb += self.swallowed_edges.eq(conditioner.swallowed_edges)
         return m

@@ -2,14 +2,14 @@
 
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.capture_file import CaptureError, Channel, choose_channels, reading, replacing
+from tachometry.sim.capture_file import NONE, CaptureError, Channel, choose_channels, reading, replacing
 from tachometry.sim.recording import Recording
 from tachometry.sim.sigrok import read_sr, write_sr
 from tachometry.sim.vcd_capture import read_vcd
@@ -26,11 +26,11 @@ def read_csv(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
-    z: Channel | None = None,
+    others: Mapping[str, Channel] = NONE,
     *,
     _block: int = BLOCK,
 ) -> Recording:
-    """Read two or three channels of a text with the header `time,a,b`, times in seconds and levels 0 or 1.
+    """Read two to four channels of a text with the header `time,a,b`, times in seconds and levels 0 or 1.
 
     Rows are change points or samples; rows that change nothing are dropped. Times count from the first row, and the
     last row ends the recording. There may be more columns after `time`, or others: each is a channel, and only
@@ -44,8 +44,8 @@ def read_csv(
         B (in any case) if there are both, else the first two.
     samplerate_hz : None
         Not allowed: a row has its time.
-    z : str, int or None
-        Column of the index line, likewise; when not given, the recording has none.
+    others : mapping of str to str or int
+        Columns of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def read_csv(
     last_level = 255
     with reading(path), path.open("rb") as file:
         names = _read_header(path, file)
-        columns = (0, *(number + 1 for number in choose_channels(path, dict(enumerate(names[1:])), a, b, z)))
+        columns = (0, *(number + 1 for number in choose_channels(path, dict(enumerate(names[1:])), a, b, others)))
         for line, block in _blocks(file, _block):
             values = _parse(path, line, block, names, columns)
             block_time = values[:, 0]
@@ -81,13 +81,13 @@ def read_csv(
             last_time, last_level = float(block_time[-1]), int(block_level[-1])
     if not level:
         raise CaptureError(f"{path} must have at least one row after its header, not 0")
-    return Recording.of_level(np.concatenate(time), np.concatenate(level), last_time - start, n_lines=len(columns) - 1)
+    return Recording.of_level(np.concatenate(time), np.concatenate(level), last_time - start, ("a", "b", *others))
 
 
 def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
-    """Write a recording as text with the header `time,a,b`, or `time,a,b,z` if it has an index line.
+    """Write a recording as text with the header `time,a,b`, and `z` and `tick_in` if it has these lines.
 
-    `read_csv`, told of `z`, gives back the same changes and duration.
+    `read_csv`, told of them, gives back the same changes and duration.
 
     Times are the shortest decimals that read as the same float64, equal on every machine. A last row without a change
     marks the end of the recording.
@@ -103,13 +103,12 @@ def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
     CaptureError
         If the file cannot be written.
     """
-    lines = (recording.time + 0.0, recording.a, recording.b, recording.z)  # no -0.0
-    columns: list[NDArray[np.generic]] = [line for line in lines if line is not None]
+    columns: list[NDArray[np.generic]] = [recording.time + 0.0, *recording.lines.values()]  # no -0.0
     if recording.duration > recording.time[-1]:
         columns = [np.append(column, column[-1]) for column in columns]
         columns[0][-1] = recording.duration
     with replacing(Path(path)) as file:
-        file.write(f"{','.join(('time', 'a', 'b', 'z')[: len(columns)])}\n".encode())
+        file.write(f"{','.join(('time', *recording.lines))}\n".encode())
         for first in range(0, len(columns[0]), ROWS):
             rows = zip(*(column[first : first + ROWS].tolist() for column in columns), strict=True)
             file.write("".join(f"{','.join(map(repr, row))}\n" for row in rows).encode())
@@ -119,7 +118,13 @@ class Reader(Protocol):
     """A function that reads one kind of capture."""
 
     def __call__(
-        self, path: Path, a: Channel | None, b: Channel | None, samplerate_hz: float | None, z: Channel | None, /
+        self,
+        path: Path,
+        a: Channel | None,
+        b: Channel | None,
+        samplerate_hz: float | None,
+        others: Mapping[str, Channel],
+        /,
     ) -> Recording: ...
 
 
@@ -132,6 +137,7 @@ def read_capture(
     b: Channel | None = None,
     samplerate_hz: float | None = None,
     z: Channel | None = None,
+    tick_in: Channel | None = None,
 ) -> Recording:
     """Read the encoder lines from a capture; the suffix tells its kind.
 
@@ -144,8 +150,8 @@ def read_capture(
         (in any case) if there are both, else the first two.
     samplerate_hz : float or None, Hz
         Only for a `.sr` that has no samplerate.
-    z : str, int or None
-        Channel of the index line, likewise; when not given, the recording has none.
+    z, tick_in : str, int or None
+        Channels of the index line and of the external tick, likewise; what is not given, the recording has not.
 
     Raises
     ------
@@ -156,7 +162,8 @@ def read_capture(
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise CaptureError(f"a capture must be a .sr, .csv or .vcd file, not {path}")
-    return reader(path, a, b, samplerate_hz, z)
+    others = {name: channel for name, channel in (("z", z), ("tick_in", tick_in)) if channel is not None}
+    return reader(path, a, b, samplerate_hz, others)
 
 
 def _read_header(path: Path, file: BinaryIO) -> list[str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 Channel = str | int
+NONE: Mapping[str, Channel] = {}
 
 
 class CaptureError(ValueError):
@@ -45,9 +46,9 @@ def choose_channels(
     channels: Mapping[int, str],
     a: Channel | None = None,
     b: Channel | None = None,
-    z: Channel | None = None,
+    others: Mapping[str, Channel] = NONE,
 ) -> tuple[int, ...]:
-    """Find the numbers of the encoder lines among the channels of a capture: of A, B and, if it is wanted, Z.
+    """Find the numbers of the encoder lines among the channels of a capture: of A, B and what else is wanted.
 
     Parameters
     ----------
@@ -58,8 +59,8 @@ def choose_channels(
     a, b : str, int or None
         Name of the channel (in this spelling, else in any case), else its number. When not given: the channels named
         A and B if there are both, else the first two.
-    z : str, int or None
-        Likewise; when not given, there is no index line.
+    others : mapping of str to str or int
+        Likewise, of further lines by their names.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def choose_channels(
     default_a, default_b = find("A"), find("B")
     if default_a is None or default_b is None:
         default_a, default_b = list(channels)[:2]
-    wanted = {"a": default_a if a is None else a, "b": default_b if b is None else b} | ({} if z is None else {"z": z})
+    wanted = {"a": default_a if a is None else a, "b": default_b if b is None else b} | dict(others)
     numbers: dict[str, int] = {}
     for line, channel in wanted.items():
         number = find(channel)

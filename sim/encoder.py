@@ -192,7 +192,7 @@ class VirtualEncoder:
         if self.index:
             slot = quarter % (4 * self.pulses_per_rev) == 0
             times, level = imperfections.gated_index(times, level, time, slot)
-        return Recording.of_level(times, level, duration, n_lines=2 + self.index), n_illegal, n_lost
+        return Recording.of_level(times, level, duration, ("a", "b", "z")[: 2 + self.index]), n_illegal, n_lost
 
     def _stream(self, which: int) -> np.random.PCG64:
         return imperfections.stream(self.seed, which)

@@ -1,6 +1,6 @@
 """Amaranth's own simulator: needs nothing else, and is slow."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -8,40 +8,39 @@ from typing import Any
 import numpy as np
 from amaranth import Cat, Module, Signal, Value
 from amaranth.sim import Simulator
+from numpy.typing import NDArray
 
 from tachometry.hdl import Tachometer
 from tachometry.sim.recording import PinTrace
-from tachometry.sim.results import Run, Ticks, Updates
+from tachometry.sim.results import STROBES, Run, observed
 from tachometry.sim.waveform import Waveform
-from tachometry.spec import TachometerSpec
+from tachometry.spec import Port, TachometerSpec
 
 # The simulator counts in femtoseconds; a nanosecond per clock keeps every instant exact. Waveforms have true times.
 _PERIOD = 1e-9
 _CLOCKS_PER_CALL = 10_000
 
-_TICK = ("pulse_count", "position", "overflow")
-_OPTIONAL_TICK = ("swallowed_edges",)
-_UPDATE = ("velocity", "interval", "forced", "stalled")
 
-
-async def drive(ctx: Any, trace: PinTrace, a: Signal, b: Signal, period: float) -> None:
-    """Let a trace play on two signals, in a testbench of Amaranth's simulator that begins at time 0.
+async def drive(ctx: Any, trace: PinTrace, pins: Mapping[str, Signal], period: float) -> None:
+    """Let a trace play on signals, in a testbench of Amaranth's simulator that begins at time 0.
 
     Parameters
     ----------
     ctx : simulator context
     trace : PinTrace
-    a, b : Signal
+    pins : mapping of str to Signal
+        By the names of the lines: `a`, `b`, and `z` and `tick_in` if there are.
     period : float, seconds
         Of the simulated clock, whose edges lie in the middle of each period, as `Simulator.add_clock` has them.
     """
     now = 0
-    for clock, level_a, level_b in zip(trace.clock.tolist(), trace.a.tolist(), trace.b.tolist(), strict=True):
+    levels = (trace.lines[name].tolist() for name in pins)
+    for clock, *row in zip(trace.clock.tolist(), *levels, strict=True):
         if clock > now:
             await ctx.delay((clock - now) * period)
             now = clock
-        ctx.set(a, level_a)
-        ctx.set(b, level_b)
+        for pin, level in zip(pins.values(), row, strict=True):
+            ctx.set(pin, level)
 
 
 class PySim:
@@ -61,34 +60,27 @@ class PySim:
         core = Tachometer(spec)
         top = Module()
         top.submodules.core = core
-        strobes = _packed(top, [core.tick, core.velocity_valid, core.decode_error])
-        ports = {port.name: (port.width, port.signed) for port in spec.ports}
-        of_tick = [*_TICK, *(name for name in _OPTIONAL_TICK if name in ports)]
-        tick_values = _packed(top, [getattr(core, name) for name in of_tick])
-        update_values = _packed(top, [getattr(core, name) for name in _UPDATE])
+        outputs = [port for port in spec.ports if port.direction == "output"]
+        strobe = Signal()
+        top.d.comb += strobe.eq(Cat(getattr(core, port.name) for port in outputs if port.name in STROBES).any())
+        values = _packed(top, [getattr(core, port.name) for port in outputs])
         shown = _shown(core) if vcd is not None else {}
         shown_values = _packed(top, list(shown.values()))
         simulator = Simulator(top)
         simulator.add_clock(_PERIOD)
 
         async def bench(ctx: Any) -> None:
-            await drive(ctx, trace, core.a, core.b, _PERIOD)
+            await drive(ctx, trace, {port.name: getattr(core, port.name) for port in _pins(spec, trace)}, _PERIOD)
 
         simulator.add_testbench(bench)
 
-        ticks: list[tuple[int, ...]] = []
-        updates: list[tuple[int, ...]] = []
-        errors: list[int] = []
+        rows: list[tuple[int, int]] = []
 
         async def collect(ctx: Any) -> None:
             clock = 0
-            async for _, _, strobe, tick, update in ctx.tick().sample(strobes, tick_values, update_values):
-                if strobe & 1:
-                    ticks.append((clock, tick))
-                if strobe & 2:
-                    updates.append((clock, update))
-                if strobe & 4:
-                    errors.append(clock)
+            async for _, _, any_strobe, packed in ctx.tick().sample(strobe, values):
+                if any_strobe:
+                    rows.append((clock, packed))
                 clock += 1
 
         simulator.add_process(collect)
@@ -107,29 +99,34 @@ class PySim:
             if waveform is not None:
                 waveform.close(trace.n_clocks)
 
-        tick_arrays = _unpack(ticks, {name: ports[name] for name in of_tick})
-        tick_arrays |= {name: np.zeros(len(ticks), np.int64) for name in _OPTIONAL_TICK if name not in ports}
-        update_arrays = _unpack(updates, {name: ports[name] for name in _UPDATE})
-        return Run(trace.n_clocks, Ticks(**tick_arrays), Updates(**update_arrays), np.array(errors, dtype=np.int64))
+        return observed(spec, trace.n_clocks, _unpack(rows, [(port.width, port.signed) for port in outputs]))
+
+
+def _pins(spec: TachometerSpec, trace: PinTrace) -> list[Port]:
+    """The inputs that a trace drives.
+
+    Raises
+    ------
+    ValueError
+        If the trace lacks one.
+    """
+    pins = [port for port in spec.ports if port.direction == "input" and port.name not in ("clk", "rst")]
+    missing = [port.name for port in pins if port.name not in trace.lines]
+    if missing:
+        raise ValueError(f"the trace must have the lines of the core, and lacks {', '.join(missing)}")
+    return pins
 
 
 def _shown(core: Tachometer) -> dict[str, Value]:
     """Signals of the waveform, in the order in which they are shown."""
-    return {
-        "a": core.a,
-        "b": core.b,
-        "decode_error": core.decode_error,
-        "tick": core.tick,
-        "m_e": core.pulse_count,
-        "overflow": core.overflow,
-        **core.datapath.probes,
-        "velocity_valid": core.velocity_valid,
-        "velocity": core.velocity,
-        "interval": core.interval,
-        "forced": core.forced,
-        "stalled": core.stalled,
-        "position": core.position,
-    }
+    inner = {"m_e": core.pulse_count, **core.datapath.probes}
+    order = (
+        *("a", "b", "z", "tick_in", "decode_error", "tick", "tick_error", *inner, "overflow", "velocity_valid"),
+        *("velocity", "velocity_overflow", "interval", "forced", "stalled", "index_valid", "index_position"),
+        *("position", "swallowed_edges"),
+    )
+    ports = {port.name for port in core.spec.ports}
+    return {name: inner[name] if name in inner else getattr(core, name) for name in order if name in ports | {*inner}}
 
 
 def _packed(top: Module, values: list[Value]) -> Signal:
@@ -149,16 +146,12 @@ def _watch(simulator: Simulator, waveform: Waveform, packed: Signal) -> None:
     simulator.add_process(watch)
 
 
-def _unpack(rows: list[tuple[int, ...]], fields: dict[str, tuple[int, bool]]) -> dict[str, np.ndarray]:
-    """Columns of rows (clock, packed values); `fields` gives width and signedness, least significant first."""
-    columns: dict[str, np.ndarray] = {"clock": np.array([clock for clock, _ in rows], dtype=np.int64)}
+def _unpack(rows: list[tuple[int, int]], shapes: list[tuple[int, bool]]) -> NDArray[np.int64]:
+    """Rows (clock, packed values) as columns; `shapes` gives width and signedness, least significant first."""
+    columns = [[clock for clock, _ in rows]]
     shift = 0
-    for name, (width, is_signed) in fields.items():
-        mask, sign = (1 << width) - 1, 1 << (width - 1)
-        values = ((packed >> shift) & mask for _, packed in rows)
-        if is_signed:
-            values = ((value ^ sign) - sign for value in values)
-        flag = name in ("overflow", "forced", "stalled")
-        columns[name] = np.array(list(values), dtype=np.bool_ if flag else np.int64)
+    for width, is_signed in shapes:
+        mask, sign = (1 << width) - 1, (1 << (width - 1)) if is_signed else 0
+        columns.append([(((packed >> shift) & mask) ^ sign) - sign for _, packed in rows])
         shift += width
-    return columns
+    return np.array(columns, dtype=np.int64).T

@@ -2,32 +2,49 @@
 
 A `Recording` is what a virtual encoder or a logic analyser gives: the instants at which the lines change. `place`
 puts it on a clock, as the first synchroniser flip-flop would see it; the `PinTrace` that results is what every engine
-and every golden model takes. Both grow with the number of edges, never with the number of clocks. The index line Z may
-be absent from both; where it is there, a row may change Z alone.
+and every golden model takes. Both grow with the number of edges, never with the number of clocks. The index line Z and
+the external tick may be absent from both; where they are there, a row may change them alone.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-_ONE, _TWO = np.uint8(1), np.uint8(2)
+from tachometry.spec import TachometerSpec
+from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
+
+LINES = ("a", "b", "z", "tick_in")
 
 
 class _Lines:
     a: NDArray[np.uint8]
     b: NDArray[np.uint8]
     z: NDArray[np.uint8] | None
+    tick_in: NDArray[np.uint8] | None
+
+    @property
+    def lines(self) -> dict[str, NDArray[np.uint8]]:
+        """The lines that are there, by name."""
+        every = {name: getattr(self, name) for name in LINES}
+        return {name: line for name, line in every.items() if line is not None}
 
     @property
     def level(self) -> NDArray[np.uint8]:
-        """a + 2 b + 4 z of each row; an absent Z is 0."""
-        level = self.a | self.b << _ONE
-        return level if self.z is None else level | self.z << _TWO
+        """A number for each row, with a bit for each of `lines`, the first lowest."""
+        level = np.zeros_like(self.a)
+        for bit, line in enumerate(self.lines.values()):
+            level |= line << np.uint8(bit)
+        return level
 
 
-def _same_length(*columns: NDArray[np.generic] | None) -> bool:
-    return len({len(column) for column in columns if column is not None}) == 1
+def _split(level: NDArray[np.uint8], lines: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
+    return {name: level >> np.uint8(bit) & np.uint8(1) for bit, name in enumerate(lines)}
+
+
+def _same_length(*columns: NDArray[np.generic]) -> bool:
+    return len({len(column) for column in columns}) == 1
 
 
 @dataclass(frozen=True)
@@ -42,8 +59,8 @@ class Recording(_Lines):
         Levels of the lines from `time` on. Row 0 is the level at rest before the first edge.
     duration : float, seconds
         Length of the recording; not before the last change.
-    z : uint8 array, shape (n,), 0 or 1, or None
-        Levels of the index line; None if it is absent.
+    z, tick_in : uint8 arrays, shape (n,), 0 or 1, or None
+        Levels of the index line and of the external tick; None if it is absent.
     """
 
     time: NDArray[np.float64]
@@ -51,9 +68,10 @@ class Recording(_Lines):
     b: NDArray[np.uint8]
     duration: float
     z: NDArray[np.uint8] | None = None
+    tick_in: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
-        if not (len(self.time) and _same_length(self.time, self.a, self.b, self.z)):
+        if not (len(self.time) and _same_length(self.time, *self.lines.values())):
             raise ValueError("a recording must have as many times as levels, and at least one row")
         if self.time[0] != 0 or np.any(np.diff(self.time) < 0):
             raise ValueError("times of a recording must begin at 0 and must not decrease")
@@ -62,11 +80,10 @@ class Recording(_Lines):
 
     @staticmethod
     def of_level(
-        time: NDArray[np.float64], level: NDArray[np.uint8], duration: float, *, n_lines: int = 2
+        time: NDArray[np.float64], level: NDArray[np.uint8], duration: float, lines: Sequence[str] = ("a", "b")
     ) -> "Recording":
-        """The recording whose `level` is given, with two lines or, with Z, three."""
-        a, b, *z = (level >> np.uint8(bit) & _ONE for bit in range(n_lines))
-        return Recording(time, a, b, duration, *z)
+        """The recording with these lines whose `level` is given."""
+        return Recording(time, duration=duration, **_split(level, lines))
 
     def place(self, clock_hz: int) -> "PinTrace":
         """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one.
@@ -81,9 +98,9 @@ class Recording(_Lines):
         )  # of changes in one clock, the last
         row = np.flatnonzero(last)
         level = self.level[row]
-        row = row[np.append(True, level[1:] != level[:-1])]
-        z = None if self.z is None else self.z[row]
-        return PinTrace(clock[row], self.a[row], self.b[row], max(n_clocks, 1), z)
+        changed = np.append(True, level[1:] != level[:-1])
+        lines = _split(level[changed], list(self.lines))
+        return PinTrace(clock[row[changed]], n_clocks=max(n_clocks, 1), **lines)
 
 
 @dataclass(frozen=True)
@@ -97,8 +114,8 @@ class PinTrace(_Lines):
     a, b : uint8 arrays, shape (n,), 0 or 1
     n_clocks : int
         Number of clocks to run.
-    z : uint8 array, shape (n,), 0 or 1, or None
-        Index line; None if it is absent.
+    z, tick_in : uint8 arrays, shape (n,), 0 or 1, or None
+        Index line and external tick; None if it is absent.
     """
 
     clock: NDArray[np.int64]
@@ -106,9 +123,29 @@ class PinTrace(_Lines):
     b: NDArray[np.uint8]
     n_clocks: int
     z: NDArray[np.uint8] | None = None
+    tick_in: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
-        if not (len(self.clock) and _same_length(self.clock, self.a, self.b, self.z)):
+        if not (len(self.clock) and _same_length(self.clock, *self.lines.values())):
             raise ValueError("a pin trace must have as many clocks as levels, and at least one row")
         if self.clock[0] != 0 or np.any(np.diff(self.clock) <= 0):
             raise ValueError("clocks of a pin trace must begin at 0 and must increase")
+
+    def with_tick_in(self, rises: NDArray[np.int64]) -> "PinTrace":
+        """The same trace with an external tick that is high for one clock from each of the clocks `rises`.
+
+        They increase by at least 2; those from `n_clocks` on are left out.
+        """
+        rises = rises[rises < self.n_clocks]
+        clock = np.union1d(self.clock, np.stack([rises, rises + 1]))
+        held = np.searchsorted(self.clock, clock, side="right") - 1
+        lines = {name: line[held] for name, line in self.lines.items()}
+        lines["tick_in"] = np.isin(clock, rises).astype(np.uint8)
+        return PinTrace(clock, n_clocks=self.n_clocks, **lines)
+
+
+def nominal_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
+    """Clocks at which an external tick rises that is exactly as long as nominal, in step with the core's reset."""
+    cycles = spec.timing.tick_cycles
+    ends = np.arange(2 * cycles - 1 if cycles <= TICK_IN_TO_WINDOW_END + 1 else cycles - 1, n_clocks, cycles)
+    return ends.astype(np.int64) - TICK_IN_TO_WINDOW_END

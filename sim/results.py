@@ -1,9 +1,13 @@
 """What a core shows at its ports, as arrays: the common language of engines and golden models."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tachometry.spec import TachometerSpec
 
 
 @dataclass(frozen=True)
@@ -36,10 +40,12 @@ class Updates:
     clock : int64 array, shape (n,)
         Clock in which `velocity_valid` is high.
     velocity : int64 array, shape (n,)
-        Raw value, 2^−frac_bits counts per tick.
+        Raw value, in 2^−frac_bits of the spec's unit.
     interval : int64 array, shape (n,)
         m_s.
     forced, stalled : bool arrays, shape (n,)
+    velocity_overflow : bool array, shape (n,)
+        The velocity was saturated; never where it is as wide as it can need.
     """
 
     clock: NDArray[np.int64]
@@ -47,6 +53,22 @@ class Updates:
     interval: NDArray[np.int64]
     forced: NDArray[np.bool_]
     stalled: NDArray[np.bool_]
+    velocity_overflow: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Index:
+    """One row per strobe of `index_valid`; none without an index.
+
+    Parameters
+    ----------
+    clock : int64 array, shape (n,)
+        Clock in which `index_valid` is high.
+    index_position : int64 array, shape (n,), counts
+    """
+
+    clock: NDArray[np.int64]
+    index_position: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -58,14 +80,54 @@ class Run:
     n_clocks : int
     ticks : Ticks
     updates : Updates
+    index : Index
     errors : int64 array
         Clocks in which `decode_error` was high.
+    tick_errors : int64 array
+        Clocks in which `tick_error` was high; none without an external tick.
     """
 
     n_clocks: int
     ticks: Ticks
     updates: Updates
+    index: Index
     errors: NDArray[np.int64]
+    tick_errors: NDArray[np.int64]
+
+
+STROBES = ("tick", "velocity_valid", "index_valid", "decode_error", "tick_error")
+
+
+def observed(spec: TachometerSpec, n_clocks: int, rows: NDArray[np.int64]) -> Run:
+    """The run that was seen at the output ports.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    n_clocks : int
+    rows : int64 array, shape (n, 1 + number of outputs)
+        The clock, and all outputs in the order of the ports, in every clock with one of the `STROBES`.
+    """
+    outputs = [port for port in spec.ports if port.direction == "output"]
+    columns = {port.name: rows[:, k].astype(bool if port.width == 1 else np.int64) for k, port in enumerate(outputs, 1)}
+    columns["clock"] = rows[:, 0]
+    absent = np.zeros(len(rows), dtype=bool)
+
+    def at(strobe: str, names: Iterable[str]) -> list[NDArray[Any]]:
+        high = columns.get(strobe, absent)
+        return [columns.get(name, absent)[high] for name in names]
+
+    def group(strobe: str, kind: type[Any]) -> Any:
+        return kind(*at(strobe, (field.name for field in fields(kind))))
+
+    return Run(
+        n_clocks,
+        group("tick", Ticks),
+        group("velocity_valid", Updates),
+        group("index_valid", Index),
+        *at("decode_error", ["clock"]),
+        *at("tick_error", ["clock"]),
+    )
 
 
 @dataclass(frozen=True)
@@ -92,8 +154,8 @@ def compare(expected: Run, actual: Run) -> tuple[int, list[Mismatch]]:
         The first of them in each signal that differs.
     """
     count, first = 0, []
-    pairs = [("errors", expected.errors, actual.errors)]
-    for group in ("ticks", "updates"):
+    pairs = [(name, getattr(expected, name), getattr(actual, name)) for name in ("errors", "tick_errors")]
+    for group in ("ticks", "updates", "index"):
         left, right = getattr(expected, group), getattr(actual, group)
         pairs += [(f"{group}.{f.name}", getattr(left, f.name), getattr(right, f.name)) for f in fields(left)]
     for signal, left, right in pairs:

@@ -14,7 +14,7 @@ from typing import BinaryIO, Self
 import numpy as np
 from numpy.typing import NDArray
 
-N_LEVELS = 8  # values of a byte that the code book below holds
+N_LEVELS = 16  # values of a byte that the code book below holds: four lines
 LONGEST = 258  # longest match of deflate
 STORED, DEFLATED = 0, 8
 VERSION, DATE = 20, 0x0021  # PKZIP 2.0; 1980-01-01, the earliest that a zip can tell

@@ -10,7 +10,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,11 +19,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.capture_file import CaptureError, Channel, choose_channels, reading, replacing
+from tachometry.sim.capture_file import NONE, CaptureError, Channel, choose_channels, reading, replacing
 from tachometry.sim.recording import PinTrace, Recording
 from tachometry.sim.run_zip import RunZip
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
+_CHANNELS = {"a": "A", "b": "B", "z": "Z", "tick_in": "TICK"}
 UNIT_HZ = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 # What zipfile raises for a damaged file: besides its own error, those of the layers below, by what is damaged.
 ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError)
@@ -34,11 +35,11 @@ def read_sr(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
-    z: Channel | None = None,
+    others: Mapping[str, Channel] = NONE,
     *,
     _piece: int = CHUNK,
 ) -> Recording:
-    """Read two or three channels of a sigrok session, version 1 or 2.
+    """Read two to four channels of a sigrok session, version 1 or 2.
 
     Sample k is taken at k / samplerate; a change is dated at the first sample that shows it, and the duration is the
     number of samples / samplerate. Change times are rounded down to float64 and the duration up, hence
@@ -52,8 +53,8 @@ def read_sr(
         A and B if there are both, else the first two.
     samplerate_hz : float or None, Hz
         For a file that has no samplerate.
-    z : str, int or None
-        Channel of the index line, likewise; when not given, the recording has none.
+    others : mapping of str to str or int
+        Channels of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
 
     Raises
     ------
@@ -67,16 +68,16 @@ def read_sr(
     with reading(path), _damage_named(path), zipfile.ZipFile(path) as archive:
         session = _read_session(path, archive)
         rate = _agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
-        bits = choose_channels(path, session.channels, a, b, z)
+        bits = choose_channels(path, session.channels, a, b, others)
         sample, level, n_samples = _changes(session, bits, _pieces(path, archive, session, _piece))
     if n_samples == 0:
         raise CaptureError(f"{path} must have at least one sample, not 0")
     duration = float(_divide(np.array([n_samples]), rate, up=True)[0])
-    return Recording.of_level(_divide(sample, rate, up=False), level, duration, n_lines=len(bits))
+    return Recording.of_level(_divide(sample, rate, up=False), level, duration, ("a", "b", *others))
 
 
 def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
-    """Write a trace as a sigrok session of version 2 with channels A, B and, if there is one, Z, one sample a clock.
+    """Write a trace as a sigrok session of version 2, channels A, B, and Z and TICK if there are, one sample a clock.
 
     Equal traces give equal files, byte for byte on any machine, whatever its zlib (see `run_zip`). Read back and placed
     on the same clock, the file gives the same trace.
@@ -103,7 +104,7 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
     level = trace.level
     with replacing(Path(path)) as file, RunZip(file) as archive:
         archive.add_text("version", "2")
-        archive.add_text("metadata", _metadata(clock_hz, "AB" if trace.z is None else "ABZ"))
+        archive.add_text("metadata", _metadata(clock_hz, [_CHANNELS[name] for name in trace.lines]))
         for number, first in enumerate(range(0, trace.n_clocks, _chunk), 1):
             end = min(first + _chunk, trace.n_clocks)
             row = int(np.searchsorted(trace.clock, first, "right")) - 1  # the row that holds at `first`
@@ -112,7 +113,7 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
             archive.add_runs(f"logic-1-{number}", level[row:row_end], np.diff(starts, append=end))
 
 
-def _metadata(samplerate_hz: int, channels: str) -> str:
+def _metadata(samplerate_hz: int, channels: list[str]) -> str:
     # In the largest unit that leaves an integer: older sigroks do not read fractions.
     unit, prefix = next(
         (hz, p) for hz, p in ((10**9, "G"), (10**6, "M"), (10**3, "k"), (1, "")) if not samplerate_hz % hz

@@ -1,14 +1,14 @@
 """Waveforms (`.vcd`) as captures: one-bit variables of a simulation or of a logic analyser's export."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from vcd.reader import ScopeDecl, Token, TokenKind, VarDecl, VCDParseError, tokenize
 
-from tachometry.sim.capture_file import CaptureError, Channel, choose_channels, reading
+from tachometry.sim.capture_file import NONE, CaptureError, Channel, choose_channels, reading
 from tachometry.sim.recording import Recording
 
 _UNITS = {"s": 0, "ms": 3, "us": 6, "ns": 9, "ps": 12, "fs": 15}
@@ -19,9 +19,9 @@ def read_vcd(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
-    z: Channel | None = None,
+    others: Mapping[str, Channel] = NONE,
 ) -> Recording:
-    """Read two or three one-bit variables of a Value Change Dump.
+    """Read two to four one-bit variables of a Value Change Dump.
 
     The recording begins when all of them have first been 0 or 1, and ends with the last time in the file.
 
@@ -33,8 +33,8 @@ def read_vcd(
         given: the variables whose names without scopes are a and b, if there is one of each, else the first two.
     samplerate_hz : None
         Not allowed: a waveform has its times.
-    z : str, int or None
-        Variable of the index line, likewise; when not given, the recording has none.
+    others : mapping of str to str or int
+        Variables of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
 
     Raises
     ------
@@ -48,8 +48,8 @@ def read_vcd(
     with reading(path), path.open("rb") as file:
         tokens = _tokens(path, file)
         names, codes, scale = _declarations(path, tokens)
-        numbers = choose_channels(path, names, *_default(names, a, b), z)
-        return _changes(path, tokens, [codes[number] for number in numbers], scale)
+        numbers = choose_channels(path, names, *_default(names, a, b), others)
+        return _changes(path, tokens, dict(zip(("a", "b", *others), (codes[k] for k in numbers), strict=True)), scale)
 
 
 def _tokens(path: Path, file: BinaryIO) -> Iterator[Token]:
@@ -95,14 +95,14 @@ def _default(names: dict[int, str], a: Channel | None, b: Channel | None) -> tup
     return only("a") if a is None else a, only("b") if b is None else b
 
 
-def _changes(path: Path, tokens: Iterator[Token], lines: list[str], scale: tuple[int, int]) -> Recording:
-    level = dict.fromkeys(lines, "x")
+def _changes(path: Path, tokens: Iterator[Token], lines: dict[str, str], scale: tuple[int, int]) -> Recording:
+    level = dict.fromkeys(lines.values(), "x")
     times: list[int] = []
     levels: list[tuple[str, ...]] = []
     now = 0
 
     def note() -> None:
-        row = tuple(level[code] for code in lines)
+        row = tuple(level[code] for code in lines.values())
         if not times and not {*row} <= {"0", "1"}:
             return
         if not levels or row != levels[-1]:
@@ -124,5 +124,5 @@ def _changes(path: Path, tokens: Iterator[Token], lines: list[str], scale: tuple
         raise CaptureError(f"{path} must tell the levels of all lines, 0 or 1, at least once")
     numerator, denominator = scale
     seconds = np.array([(time - times[0]) * numerator / denominator for time in times])
-    a, b, *z = np.array(levels, dtype=np.uint8).T
-    return Recording(seconds, a, b, (now - times[0]) * numerator / denominator, *z)
+    columns = dict(zip(lines, np.array(levels, dtype=np.uint8).T, strict=True))
+    return Recording(seconds, duration=(now - times[0]) * numerator / denominator, **columns)

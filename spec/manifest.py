@@ -4,7 +4,7 @@ import re
 from dataclasses import asdict
 from typing import Any
 
-from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END, TachometerSpec
 
 _KEYWORDS = frozenset(
     """
@@ -54,7 +54,7 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
         "velocity": {
             "width": spec.velocity_width,
             "frac_bits": spec.frac_bits,
-            "unit": "count/tick",
+            "unit": spec.unit,
             "rad_per_s_per_lsb": spec.rad_per_s_per_lsb,
         },
         "interval_unit_cycles": spec.interval_unit_cycles,
@@ -62,7 +62,13 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             "pin_to_count": spec.pin_to_count,
             "tick_latency": spec.tick_latency,
             "tick_to_velocity": spec.tick_to_velocity,
+            **({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if spec.max_tick_cycles else {}),
         },
+        **(
+            {"external_tick_cycles": {"min": spec.min_tick_cycles, "max": spec.max_tick_cycles}}
+            if spec.max_tick_cycles
+            else {}
+        ),
         "ports": [asdict(port) for port in spec.ports],
         "parameters": spec.parameters,
     }

@@ -45,7 +45,7 @@ class STachometer(TachometerSpec):
     @property
     def reciprocal(self) -> Reciprocal | CarriedReciprocal:
         """The reciprocal of m_s: looked up, or carried along where a table would be large."""
-        shape = (self.timing.max_ticks, self.max_numerator, self.frac_bits, int(self.cancel))
+        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, int(self.cancel))
         carried = CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
         return carried if self.timing.max_ticks > max(MAX_TABLE, carried.depth) else Reciprocal(*shape)
 
@@ -62,10 +62,10 @@ class STachometer(TachometerSpec):
     @property
     def serial(self) -> bool:
         """Whether ticks are far enough apart for one adder to form the velocity step by step."""
-        return self.timing.tick_cycles >= self._serial_latency
+        return self.has_room(self._serial_latency)
 
     @property
-    def tick_to_velocity(self) -> int:
+    def datapath_latency(self) -> int:
         return self._serial_latency if self.serial else self._pipelined_latency
 
     @property

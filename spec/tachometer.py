@@ -6,13 +6,23 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from tachometry.spec.encoder import Encoder
-from tachometry.spec.timing import Timing
+from tachometry.spec.timing import MAX_TICK_CYCLES, Timing
 from tachometry.spec.units import Speed
+from tachometry.spec.velocity_output import NATIVE, UNITS, VelocityOutput, per_count
+
+MAX_NATIVE_FRAC_BITS = 24
+TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
 
 
 def signed_width(limit: int) -> int:
     """Bits of a two's complement number that holds -limit … +limit."""
     return limit.bit_length() + 1
+
+
+def _ceil_log2(number: Fraction) -> int:
+    """The least k for which 2^k is at least `number`."""
+    k = number.numerator.bit_length() - number.denominator.bit_length()  # off by one at most
+    return k + 1 if number > Fraction(2) ** k else k if number > Fraction(2) ** (k - 1) else k - 1
 
 
 @dataclass(frozen=True)
@@ -33,8 +43,12 @@ class TachometerSpec:
     ----------
     encoder : Encoder
     timing : Timing
+    unit : str
+        Of `velocity`: `count/tick`, `rad/s`, `rev/s` or `rpm`.
     frac_bits : int
-        Fraction bits of `velocity`, in counts per tick.
+        One LSB of `velocity` is 2^−frac_bits of its unit.
+    velocity_bits : int or None
+        Bits of `velocity`, which saturates and raises `velocity_overflow`; None: as many as it can need.
     max_speed : Speed or None
         Greatest speed to be measured. It narrows every number that depends on it; pulses beyond it saturate m_e and
         raise `overflow`. None: as wide as the tick has clocks.
@@ -42,6 +56,13 @@ class TachometerSpec:
         Bits of `position`, which wraps.
     filter_clocks : int
         Clocks for which a level must hold to be believed; 0 for no filter.
+    index : bool
+        A rising index line Z captures the position.
+    index_reset : bool
+        And sets it to 0.
+    max_tick_cycles : int or None
+        Ticks come from outside, this many clocks apart at most; the tick of `timing` is their nominal period. None: the
+        core makes the ticks.
 
     Raises
     ------
@@ -51,22 +72,100 @@ class TachometerSpec:
 
     encoder: Encoder
     timing: Timing
+    unit: str = NATIVE
     frac_bits: int = 16
+    velocity_bits: int | None = None
     max_speed: Speed | None = None
     position_width: int = 32
     filter_clocks: int = 0
+    index: bool = False
+    index_reset: bool = False
+    max_tick_cycles: int | None = None
 
     method: ClassVar[str]
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
-        if not 4 <= self.frac_bits <= 24:
-            raise ValueError(f"frac_bits must be from 4 to 24, not {self.frac_bits}")
+        self._check_output()
         if not 8 <= self.position_width <= 48:
             raise ValueError(f"position_width must be from 8 to 48, not {self.position_width}")
         if not 0 <= self.filter_clocks <= 255:
             raise ValueError(f"filter_clocks must be from 0 to 255, not {self.filter_clocks}")
+        if self.index_reset and not self.index:
+            raise ValueError("index_reset must be given together with an index")
+        if self.max_tick_cycles is not None:
+            shortest = self.timing.tick_cycles
+            if shortest < 2:
+                raise ValueError("tick_cycles must be at least 2 with an external tick, not 1")
+            if not shortest <= self.max_tick_cycles <= MAX_TICK_CYCLES:
+                raise ValueError(
+                    f"max_tick_cycles must be from {shortest}, one tick, to {MAX_TICK_CYCLES}, "
+                    f"not {self.max_tick_cycles}"
+                )
+
+    def _check_output(self) -> None:
+        if self.unit not in UNITS:
+            raise ValueError(f"unit must be one of {', '.join(UNITS)}, not {self.unit!r}")
+        if self.velocity_bits is not None and not 8 <= self.velocity_bits <= 64:
+            raise ValueError(f"velocity_bits must be from 8 to 64, not {self.velocity_bits}")
+        coarsest, finest = self.frac_bits_range(self.unit)
+        if coarsest <= self.frac_bits <= finest:
+            return
+        if self.unit == NATIVE:
+            raise ValueError(f"frac_bits must be from {coarsest} to {finest}, not {self.frac_bits}")
+        raise ValueError(
+            f"lsb must be from 2^{-finest} to 2^{-coarsest} {self.unit} with this encoder and tick, "
+            f"not 2^{-self.frac_bits}"
+        )
+
+    def frac_bits_range(self, unit: str) -> tuple[int, int]:
+        """Fewest and most fraction bits of the velocity in `unit`."""
+        if unit == NATIVE:
+            return 4, MAX_NATIVE_FRAC_BITS
+        # The greatest speed must be at least one LSB, and one count per tick at most 2^22.
+        count = per_count(unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
+        return 1 - _ceil_log2(count * self.max_count), MAX_NATIVE_FRAC_BITS - 2 - _ceil_log2(count)
+
+    @property
+    def native_frac_bits(self) -> int:
+        """Fraction bits of the velocity in counts per tick, of which one in another unit is made."""
+        if self.unit == NATIVE:
+            return self.frac_bits
+        return max(4, _ceil_log2(self._lsb_per_count) + 2)
+
+    @property
+    def native_width(self) -> int:
+        """Bits of the velocity in counts per tick: a mean of pulse numbers never exceeds the largest of them."""
+        return self.count_width + self.native_frac_bits
+
+    @property
+    def output(self) -> VelocityOutput | None:
+        """How `velocity` is made of the native velocity; None if that is the output."""
+        if self.unit == NATIVE and self.velocity_bits is None:
+            return None
+        native = 1 << self.native_frac_bits
+        return VelocityOutput(self._lsb_per_count / native, self.max_count * native, self.velocity_bits)
+
+    @property
+    def _lsb_per_count(self) -> Fraction:
+        count = per_count(self.unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
+        return count * Fraction(2) ** self.frac_bits
+
+    @property
+    def longest_tick(self) -> int:
+        """Most clocks in a tick."""
+        return self.timing.tick_cycles if self.max_tick_cycles is None else self.max_tick_cycles
+
+    @property
+    def min_tick_cycles(self) -> int:
+        """Fewest clocks between two external ticks: what works step by step must be done."""
+        output = self.output_latency if self.output_serial else 0
+        return max(2, self.datapath_latency if self.serial else 0, output)
+
+    def has_room(self, clocks: int) -> bool:
+        """Whether a tick is long enough for work of so many clocks; external ones may come in half the time."""
+        return self.timing.tick_cycles >= (clocks if self.max_tick_cycles is None else 2 * clocks)
 
     @property
     def pin_to_count(self) -> int:
@@ -75,11 +174,11 @@ class TachometerSpec:
 
     @property
     def max_count(self) -> int:
-        """Largest |m_e|: ⌈max_speed/ω_u⌉, at most one count per clock."""
-        cycles = self.timing.tick_cycles
+        """Largest |m_e|: ⌈max_speed/ω_u⌉, for the longest tick, at most one count per clock."""
+        cycles = self.longest_tick
         if self.max_speed is None:
             return cycles
-        return min(cycles, self.max_speed.ceil_counts(self.encoder.counts_per_rev, self.timing.tick_seconds))
+        return min(cycles, self.max_speed.ceil_counts(self.encoder.counts_per_rev, self.seconds(cycles)))
 
     @property
     def unit_velocity(self) -> float:
@@ -89,7 +188,7 @@ class TachometerSpec:
     @property
     def rad_per_s_per_lsb(self) -> float:
         """Value of one LSB of `velocity` in rad/s."""
-        return self.unit_velocity / (1 << self.frac_bits)
+        return float(self.unit_velocity / self._lsb_per_count)
 
     @property
     def count_width(self) -> int:
@@ -98,8 +197,8 @@ class TachometerSpec:
 
     @property
     def velocity_width(self) -> int:
-        """Bits of `velocity`: a mean of pulse numbers never exceeds the largest of them."""
-        return self.count_width + self.frac_bits
+        """Bits of `velocity`."""
+        return self.native_width if self.output is None else self.output.port_width
 
     @property
     def interval_width(self) -> int:
@@ -112,9 +211,33 @@ class TachometerSpec:
         return self.timing.tick_cycles
 
     @property
+    def serial(self) -> bool:
+        """Whether the datapath needs the time between two ticks."""
+        raise NotImplementedError
+
+    @property
+    def datapath_latency(self) -> int:
+        """Clocks from `tick` to the native velocity."""
+        raise NotImplementedError
+
+    @property
+    def output_serial(self) -> bool:
+        """Whether `velocity` is made of the native one bit by bit."""
+        output = self.output
+        return output is not None and len(output.digits) > 2 and self.has_room(output.serial_latency)
+
+    @property
+    def output_latency(self) -> int:
+        """Clocks from the native velocity to `velocity`."""
+        output = self.output
+        if output is None:
+            return 0
+        return output.serial_latency if self.output_serial else output.pipelined_latency
+
+    @property
     def tick_to_velocity(self) -> int:
         """Clocks from `tick` to `velocity_valid`."""
-        raise NotImplementedError
+        return self.datapath_latency + self.output_latency
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -124,6 +247,8 @@ class TachometerSpec:
             Port("rst", "input"),
             Port("a", "input"),
             Port("b", "input"),
+            *([Port("z", "input")] if self.index else []),
+            *([Port("tick_in", "input")] if self.max_tick_cycles else []),
             Port("velocity", "output", self.velocity_width, signed=True),
             Port("velocity_valid", "output"),
             Port("interval", "output", self.interval_width),
@@ -134,6 +259,10 @@ class TachometerSpec:
             Port("decode_error", "output"),
             Port("overflow", "output"),
             Port("stalled", "output"),
+            *([Port("velocity_overflow", "output")] if self.output else []),
+            *([Port("index_valid", "output")] if self.index else []),
+            *([Port("index_position", "output", self.position_width, signed=True)] if self.index else []),
+            *([Port("tick_error", "output")] if self.max_tick_cycles else []),
             *([Port("swallowed_edges", "output", 16)] if self.filter_clocks else []),
         )
 
@@ -147,10 +276,15 @@ class TachometerSpec:
             "clock_hz": self.timing.clock_hz,
             "tick_cycles": self.timing.tick_cycles,
             "max_ticks": self.timing.max_ticks,
+            "unit": self.unit,
             "frac_bits": self.frac_bits,
+            "velocity_bits": self.velocity_bits,
             "max_speed": None if self.max_speed is None else str(self.max_speed),
             "position_width": self.position_width,
             "filter_clocks": self.filter_clocks,
+            "index": self.index,
+            "index_reset": self.index_reset,
+            "max_tick_cycles": self.max_tick_cycles,
         }
 
     def seconds(self, clocks: int) -> Fraction:

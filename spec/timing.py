@@ -51,7 +51,7 @@ class Timing:
             two nearest that are.
         """
         clock_hz = parse_frequency("clock", int(clock) if str(clock).isdecimal() else clock)
-        tick_cycles = _whole("tick", tick, Fraction(1, clock_hz), "clock")
+        tick_cycles = whole_clocks("tick", tick, clock_hz)
         max_ticks = _whole(
             "max_time", max_time, Fraction(tick_cycles, clock_hz), "tick", given_in=Fraction(1, clock_hz)
         )
@@ -61,6 +61,11 @@ class Timing:
     def tick_seconds(self) -> Fraction:
         """T_s in seconds, exactly."""
         return Fraction(self.tick_cycles, self.clock_hz)
+
+
+def whole_clocks(what: str, given: str | int, clock_hz: int) -> int:
+    """A time such as `40us`, or a number of clocks, as a whole number of clocks; ValueError if it is none."""
+    return _whole(what, given, Fraction(1, clock_hz), "clock")
 
 
 def _whole(what: str, given: str | int, period: Fraction, name: str, given_in: Fraction | None = None) -> int:

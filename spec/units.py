@@ -10,8 +10,8 @@ _FREQUENCY = {"Hz": Fraction(1), "kHz": Fraction(10**3), "MHz": Fraction(10**6),
 _SPEED = {"rad/s": (Fraction(1), True), "rev/s": (Fraction(1), False), "rpm": (Fraction(1, 60), False)}
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/]*)")
 
-# π to 50 digits: speeds in rad/s are compared with whole counts, which needs more than a double.
-_PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
+# π to 50 digits: speeds in rad/s are compared with whole counts and scaled by constants of up to 48 bits.
+PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 
 
 def _quantity(what: str, text: str, units: dict[str, object]) -> tuple[Fraction, str]:
@@ -79,7 +79,7 @@ class Speed:
         """⌈speed / ω_u⌉: the most counts that one tick can hold at this speed, ω_u = 2π/(P·T_s)."""
         size, radians = _SPEED[self.unit]
         counts = self.value * size * counts_per_rev * tick_seconds
-        return math.ceil(counts / (2 * _PI) if radians else counts)
+        return math.ceil(counts / (2 * PI) if radians else counts)
 
     def __str__(self) -> str:
         number = self.value.numerator if self.value.denominator == 1 else float(self.value)

@@ -1,9 +1,12 @@
 """Golden front end: from sampled levels to steps, pulse numbers and positions."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.results import Ticks
+from tachometry.sim.recording import PinTrace
+from tachometry.sim.results import Index, Ticks
 from tachometry.spec import TachometerSpec
 
 # Where a pair of levels stands in the forward cycle 00, 10, 11, 01 of (A, B).
@@ -61,61 +64,68 @@ def filter_line(
     return clock[changed], level[changed], clock[glitch + 1]
 
 
-def filter_lines(
-    clock: NDArray[np.int64], a: NDArray[np.uint8], b: NDArray[np.uint8], clocks: int
-) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint8], NDArray[np.int64]]:
-    """The filter on both lines: their common change list, and when glitches ended, in order."""
-    lines = []
-    for level in (a, b):
+def filter_lines(trace: PinTrace, names: Sequence[str], clocks: int) -> tuple[PinTrace, NDArray[np.int64]]:
+    """The filter on the lines of these names: the trace of what passes, and when glitches ended, in order."""
+    passed = {}
+    for name in names:
+        level = trace.lines[name]
         changed = np.append(True, level[1:] != level[:-1])
-        lines.append(filter_line(clock[changed], level[changed], clocks))
-    common = np.union1d(lines[0][0], lines[1][0])
-    a, b = (level[np.searchsorted(at, common, side="right") - 1] for at, level, _ in lines)
-    return common, a, b, np.sort(np.concatenate([lines[0][2], lines[1][2]]))
+        passed[name] = filter_line(trace.clock[changed], level[changed], clocks)
+    common = np.unique(np.concatenate([clock for clock, _, _ in passed.values()]))
+    lines = {name: level[np.searchsorted(at, common, side="right") - 1] for name, (at, level, _) in passed.items()}
+    returned = np.sort(np.concatenate([glitches for _, _, glitches in passed.values()]))
+    return PinTrace(common, n_clocks=trace.n_clocks, **lines), returned
 
 
-def count(
-    spec: TachometerSpec,
-    clock: NDArray[np.int64],
-    a: NDArray[np.uint8],
-    b: NDArray[np.uint8],
-    n_clocks: int,
-) -> tuple[Ticks, NDArray[np.int64]]:
-    """Pulse numbers and positions of all ticks whose strobe falls within `n_clocks`.
+def count(spec: TachometerSpec, trace: PinTrace, last: NDArray[np.int64]) -> tuple[Ticks, Index, NDArray[np.int64]]:
+    """Pulse numbers and positions of all ticks, and positions at the index.
 
     Parameters
     ----------
     spec : TachometerSpec
-    clock, a, b : arrays, shape (n,)
-        Change list as in `PinTrace`.
-    n_clocks : int
+    trace : PinTrace
+    last : int64 array
+        Last clock of each window.
 
     Returns
     -------
     ticks : Ticks
+    index : Index
     errors : int64 array
         Clocks in which `decode_error` is high.
     """
     returned = np.empty(0, dtype=np.int64)
     if spec.filter_clocks:
-        clock, a, b, returned = filter_lines(clock, a, b, spec.filter_clocks)
-    step, illegal = decode(a, b, spec.encoder.decoding)
-    at = clock[1:] + spec.pin_to_count
-    cycles = spec.timing.tick_cycles
-    n_ticks = max(0, (n_clocks - spec.tick_latency) // cycles)
-    inside = at < n_ticks * cycles
-    sums = np.zeros(n_ticks, dtype=np.int64)
-    np.add.at(sums, at[inside] // cycles, step[inside])
-    limit, half = spec.max_count, 1 << (spec.position_width - 1)
-    strobe = (np.arange(n_ticks, dtype=np.int64) + 1) * cycles - 1 + spec.tick_latency
+        trace, returned = filter_lines(trace, ("a", "b", "z") if spec.index else ("a", "b"), spec.filter_clocks)
+    step, illegal = decode(trace.a, trace.b, spec.encoder.decoding)
+    at = trace.clock[1:] + spec.pin_to_count
+    total = np.concatenate([[0], np.cumsum(step)])  # total[k] = sum of the first k steps
+
+    def steps_through(clock: NDArray[np.int64]) -> NDArray[np.int64]:
+        return total[np.searchsorted(at, clock, side="right")]
+
+    reached = steps_through(last)
+    sums = np.diff(reached, prepend=0)
+    rises = at[:0] if trace.z is None or not spec.index else at[(trace.z[1:] == 1) & (trace.z[:-1] == 0)]
+    captured = steps_through(rises)
+    # What is taken off the position: before any index, and after each.
+    origin = np.append(0, captured) if spec.index_reset else np.zeros(len(rises) + 1, dtype=np.int64)
+
+    def wrapped(position: NDArray[np.int64]) -> NDArray[np.int64]:
+        half = 1 << (spec.position_width - 1)
+        return (position + half) % (2 * half) - half
+
+    strobe = last + spec.tick_latency
     # Two clocks for the synchroniser, one for the counter.
     glitches = np.searchsorted(returned + 3, strobe, side="right")
     ticks = Ticks(
         clock=strobe,
-        pulse_count=np.clip(sums, -limit, limit),
-        position=(np.cumsum(sums) + half) % (2 * half) - half,
-        overflow=np.abs(sums) > limit,
+        pulse_count=np.clip(sums, -spec.max_count, spec.max_count),
+        position=wrapped(reached - origin[np.searchsorted(rises, last, side="right")]),
+        overflow=np.abs(sums) > spec.max_count,
         swallowed_edges=2 * np.minimum(glitches, (1 << 15) - 1),
     )
+    seen = rises + spec.tick_latency < trace.n_clocks
+    index = Index((rises + spec.tick_latency)[seen], wrapped(captured - origin[:-1])[seen])
     errors = at[illegal]
-    return ticks, errors[errors < n_clocks]
+    return ticks, index, errors[errors < trace.n_clocks]

@@ -88,7 +88,7 @@ class SModel:
         self._spec = spec
 
     def updates(self, ticks: Ticks, n_clocks: int) -> Updates:
-        """All updates whose strobe falls within `n_clocks`."""
+        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
         spec, m_e = self._spec, ticks.pulse_count
         i, m_s, forced = windows(alterations(m_e), spec.timing.max_ticks)
         at = i + 1  # m_e(−1) = 0 comes first
@@ -97,10 +97,10 @@ class SModel:
         if spec.cancel:
             # Eq. (21), doubled: m_e(i−m_s) + 2·Σ_{j=1}^{m_s−1} m_e(i−j) + m_e(i), over 2·m_s.
             numerator = numbers[at - m_s] + 2 * (total[at] - total[at - m_s + 1]) + numbers[at]
-            velocity = round_quotient(numerator, 2 * m_s, spec.frac_bits)
+            velocity = round_quotient(numerator, 2 * m_s, spec.native_frac_bits)
         else:
             # Eq. (17): Σ_{j=0}^{m_s−1} m_e(i−j), over m_s.
-            velocity = round_quotient(total[at + 1] - total[at - m_s + 1], m_s, spec.frac_bits)
+            velocity = round_quotient(total[at + 1] - total[at - m_s + 1], m_s, spec.native_frac_bits)
         moving = np.concatenate([[0], np.cumsum(numbers != 0)])
         clock = ticks.clock[i] + spec.tick_to_velocity
         seen = clock < n_clocks
@@ -110,4 +110,5 @@ class SModel:
             interval=m_s[seen],
             forced=forced[seen],
             stalled=(forced & (moving[at + 1] == moving[at - m_s]))[seen],
+            velocity_overflow=np.zeros(np.count_nonzero(seen), dtype=np.bool_),
         )

@@ -49,10 +49,15 @@ def test_defaults(tmp_path: Path) -> None:
         "clock_hz": 48_000_000,
         "tick_cycles": 960,
         "max_ticks": 500,
+        "unit": "count/tick",
         "frac_bits": 16,
+        "velocity_bits": None,
         "max_speed": None,
         "position_width": 32,
         "filter_clocks": 0,
+        "index": False,
+        "index_reset": False,
+        "max_tick_cycles": None,
         "cancel": True,
     }
 

@@ -143,7 +143,7 @@ def test_pulses_that_are_missed_are_told(capsys: pytest.CaptureFixture[str]) -> 
 def test_every_imperfection_reaches_the_pins_and_so_does_the_index(tmp_path: Path) -> None:
     options = (
         "--phase-error 20 --duty-error -30 --nonuniformity 0.1 --jitter 0.05 --bounce 2:100us --lost 0.05 "
-        "--illegal 0.02 --seed 5 --index-line"
+        "--illegal 0.02 --seed 5 --index"
     )
     assert run("simulate", *CORE, *MOTION, *options.split(), "--save-capture", tmp_path / "s.sr") == 0
     encoder = VirtualEncoder(

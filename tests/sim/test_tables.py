@@ -1,11 +1,12 @@
 """The tables of a run, on a run made by hand."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tachometry.sim.results import Run, Ticks, Updates
+from tachometry.sim.results import Index, Run, Ticks, Updates
 from tachometry.sim.tables import held_velocity, velocity_error, write_counts, write_trace
 from tachometry.spec import Encoder, STachometer, Timing
 
@@ -13,6 +14,7 @@ SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
 LSB = SPEC.rad_per_s_per_lsb
 AFTER = SPEC.tick_to_velocity
 # Ticks 0 to 4; ticks 1 and 3 cause an update; the clocks end before an update of tick 4 could come.
+NONE = np.array([], dtype=np.int64)
 TICK = np.array([21, 41, 61, 81, 101])
 RUN = Run(
     n_clocks=101 + AFTER,
@@ -29,8 +31,11 @@ RUN = Run(
         np.array([2, 2]),
         np.array([False, True]),
         np.array([False, False]),
+        np.array([False, False]),
     ),
-    errors=np.array([], dtype=np.int64),
+    index=Index(NONE, NONE),
+    errors=NONE,
+    tick_errors=NONE,
 )
 
 
@@ -49,8 +54,8 @@ def test_error_statistics() -> None:
 
 
 def test_no_update_no_statistics() -> None:
-    none = Updates(*(np.array([], dtype=kind) for kind in (np.int64, np.int64, np.int64, np.bool_, np.bool_)))
-    held = held_velocity(SPEC, Run(RUN.n_clocks, RUN.ticks, none, RUN.errors))
+    flags = NONE.astype(np.bool_)
+    held = held_velocity(SPEC, replace(RUN, updates=Updates(NONE, NONE, NONE, flags, flags, flags)))
     assert len(held.time) == 0
     assert velocity_error(held, np.sin) is None
 

@@ -131,10 +131,15 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "clock_hz": 48_000_000,
         "tick_cycles": 960,
         "max_ticks": 500,
+        "unit": "count/tick",
         "frac_bits": 16,
+        "velocity_bits": None,
         "max_speed": "400rad/s",
         "position_width": 32,
         "filter_clocks": 0,
+        "index": False,
+        "index_reset": False,
+        "max_tick_cycles": None,
         "cancel": False,
     }
     assert described["counts_per_rev"] == 2000

@@ -2,6 +2,7 @@
 
 import itertools
 from collections import Counter
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -32,18 +33,31 @@ EVENTS = [
     "stalled",
     "position wrapped",
     "glitch swallowed",
+    "index captured",
+    "position reset",
+    "external tick",
+    "external tick too early",
+    "external tick missing",
+    "velocity saturated",
+    "update in every clock",
+    "reciprocal carried",
     *LEGAL,
     *ILLEGAL,
 ]
 
 
-def random_case(seed: int) -> tuple[STachometer, Encoding]:
+def random_case(seed: int) -> tuple[STachometer, Encoding, PinTrace]:
     """A configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
     rng = np.random.default_rng(seed)
-    tick_cycles = int(rng.choice([2, 2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 16]))
+    tick_cycles = int(rng.choice([1, 2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 16]))
     max_ticks = int(rng.choice([2, 3, 5, 10, 20]))
     decoding = int(rng.choice([1, 2, 4, 4]))
     n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks)
+    external = tick_cycles > 1 and bool(rng.random() < 0.3)
+    if external:
+        n_ticks += n_ticks // 4  # fewer may come
+    if tick_cycles == 1 and rng.random() < 0.5:
+        max_ticks, n_ticks = 3000, 15_000  # the reciprocal is carried
     duration = n_ticks * tick_cycles / CLOCK_HZ
     # One step takes at least a clock, and one decoded count takes 4/decoding of them.
     fastest = tick_cycles * decoding / 4
@@ -69,6 +83,7 @@ def random_case(seed: int) -> tuple[STachometer, Encoding]:
         illegal=float(rng.choice([0, 0, 0.02])),
         start_angle_rad=float(rng.uniform(0, 2 * np.pi)),
         seed=seed,
+        index=bool(rng.random() < 0.5),
     )
     max_speed = Speed(Fraction(round(unit * rng.uniform(0.2, 3), 3))) if rng.random() < 0.5 else None
     spec = STachometer(
@@ -79,8 +94,34 @@ def random_case(seed: int) -> tuple[STachometer, Encoding]:
         cancel=bool(rng.random() < 0.75),
         position_width=int(rng.choice([8, 16, 32, 48])),
         filter_clocks=int(rng.choice([0, 0, 0, 1, 2, 5])),
+        index=encoder.index,
+        index_reset=encoder.index and bool(rng.random() < 0.5),
+        max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
     )
-    return spec, encoder.record(parse_motion("+".join(parts[k] for k in order)))
+    spec = random_output(spec, rng)
+    encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
+    trace = encoding.recording.place(CLOCK_HZ)
+    return spec, encoding, random_ticks(trace, tick_cycles, rng) if spec.max_tick_cycles else trace
+
+
+def random_output(spec: STachometer, rng: np.random.Generator) -> STachometer:
+    """Velocity in another unit, with an LSB that it can have, or saturating."""
+    unit = str(rng.choice(["count/tick"] * 4 + ["rad/s", "rev/s", "rpm"]))
+    if unit != "count/tick":
+        coarsest, finest = spec.frac_bits_range(unit)
+        spec = replace(spec, unit=unit, frac_bits=int(rng.integers(max(coarsest, finest - 12), finest + 1)))
+    if rng.random() < 0.3:
+        spec = replace(spec, velocity_bits=max(8, spec.velocity_width - int(rng.integers(-2, 4))))
+    return spec
+
+
+def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator) -> PinTrace:
+    """An external tick about as long as nominal: regular for a while, then not, then missing."""
+    n = trace.n_clocks // tick_cycles + 1
+    gaps = np.full(n, tick_cycles)
+    gaps[n // 2 :] += rng.integers(-tick_cycles // 2, tick_cycles, n - n // 2)
+    gaps[rng.random(n) < 0.02] *= 5
+    return trace.with_tick_in(np.cumsum(np.maximum(gaps, 2)) + int(rng.integers(0, 3)))
 
 
 def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
@@ -98,6 +139,14 @@ def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
             "m_e saturated": np.count_nonzero(run.ticks.overflow),
             "sign change": np.count_nonzero(sign[1:] * sign[:-1] < 0),
             "stalled": np.count_nonzero(updates.stalled),
+            "index captured": len(run.index.clock),
+            "position reset": len(run.index.clock) * spec.index_reset,
+            "external tick": len(run.ticks.clock) * (spec.max_tick_cycles is not None),
+            "external tick too early": np.count_nonzero(~np.isin(run.tick_errors, run.ticks.clock)),
+            "external tick missing": np.count_nonzero(np.isin(run.tick_errors, run.ticks.clock)),
+            "velocity saturated": np.count_nonzero(updates.velocity_overflow),
+            "update in every clock": np.count_nonzero(np.diff(updates.clock) == 1),
+            "reciprocal carried": spec.carried and len(updates.clock),
             "glitch swallowed": run.ticks.swallowed_edges[-1] // 2,
             "position wrapped": np.count_nonzero(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
         }
@@ -109,8 +158,7 @@ def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
 
 def lockstep(seed: int, engine: Engine) -> tuple[list[str], Counter[str]]:
     """Run one random case; what went wrong, and what it covered."""
-    spec, encoding = random_case(seed)
-    trace = encoding.recording.place(CLOCK_HZ)
+    spec, encoding, trace = random_case(seed)
     expected, actual = golden.run(spec, trace), engine.run(spec, trace)
     problems = [f"seed {seed}: {mismatch}" for mismatch in compare(expected, actual)[1]]
     if len(actual.ticks.clock) < MIN_TICKS or len(actual.updates.clock) < MIN_UPDATES:
@@ -124,7 +172,7 @@ def _lost_counts(spec: STachometer, encoding: Encoding, run: Run) -> list[str]:
 
     Jitter makes an edge come early or late, but never twice or not at all.
     """
-    if len(run.errors) or run.ticks.swallowed_edges[-1]:
+    if len(run.errors) or run.ticks.swallowed_edges[-1] or spec.index_reset:
         return []
     sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / CLOCK_HZ
     turned = encoding.true_position(sampled, spec.encoder.decoding)

@@ -1,0 +1,69 @@
+"""The sampling period from outside."""
+
+from amaranth import Const, Module, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+
+class ExternalTick(wiring.Component):
+    """Ends a window when `tick_in` rises, as a PWM carrier or a fieldbus sync does.
+
+    A rise that comes too early for the datapath is ignored: its window goes on. When none has come for `max_cycles`
+    clocks, the window ends all the same, so that nothing freezes and nothing overflows. Both are told.
+
+    Latency: a rise that is sampled at clock edge c makes c + 2 the last clock of its window; `tick_error` is high two
+    clocks after the clock that it tells of, together with `tick` if it tells of a tick that did not come.
+
+    Parameters
+    ----------
+    min_cycles, max_cycles : int
+        Fewest and most clocks in a window.
+
+    Members
+    -------
+    tick_in : In(1)
+        Asynchronous; each level must hold for a clock.
+    last : Out(1)
+        High in the last clock of every window.
+    tick_error : Out(1)
+        A tick came too early, or did not come.
+
+    Raises
+    ------
+    ValueError
+        If `min_cycles` is not in 2 … `max_cycles`.
+    """
+
+    def __init__(self, min_cycles: int, max_cycles: int) -> None:
+        if not 2 <= min_cycles <= max_cycles:
+            raise ValueError(f"min_cycles must be from 2 to {max_cycles}, not {min_cycles}")
+        self._min_cycles = min_cycles
+        self._max_cycles = max_cycles
+        super().__init__({"tick_in": In(1), "last": Out(1), "tick_error": Out(1)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        # High at first: a line that rests there has not risen.
+        level, past = Signal(init=1), Signal(init=1)
+        m.submodules.sync = FFSynchronizer(self.tick_in, level, init=1)
+        m.d.sync += past.eq(level)
+        rises = level & ~past
+
+        # Counts down to −1, as the sampling clock does.
+        start = self._max_cycles - 2
+        left = Signal(signed(start.bit_length() + 1), init=start)
+        late = left[-1]
+        enough = Signal()  # this clock is at least the `min_cycles`-th of the window
+        error = Signal()
+        m.d.comb += self.last.eq((rises & enough) | late)
+        m.d.sync += [
+            left.eq(left - Const(1, left.shape())),
+            error.eq(rises ^ self.last),
+            self.tick_error.eq(error),
+        ]
+        with m.If(left == start - (self._min_cycles - 2)):
+            m.d.sync += enough.eq(1)
+        with m.If(self.last):
+            m.d.sync += [left.eq(start), enough.eq(0)]
+        return m

@@ -1,0 +1,56 @@
+"""The position at the index."""
+
+from amaranth import Module, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class IndexCapture(wiring.Component):
+    """Captures the position when the index line Z rises.
+
+    Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + 2, and `index_position` is Σ s through
+    clock c: what `position` shows in that clock, or would, were it not set to 0.
+
+    Parameters
+    ----------
+    width : int
+        Bits of the position.
+
+    Members
+    -------
+    level_z : In(1)
+    ready : In(1)
+        The level before the present one is real.
+    position : In(signed(width))
+        The position of the next clock.
+    rises : Out(1)
+        High a clock before `index_valid`.
+    index_position : Out(signed(width))
+        Held until the next index.
+    index_valid : Out(1)
+        One clock per index.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__(
+            {
+                "level_z": In(1),
+                "ready": In(1),
+                "position": In(signed(width)),
+                "rises": Out(1),
+                "index_position": Out(signed(width)),
+                "index_valid": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        past_z = Signal()
+        m.d.sync += [
+            past_z.eq(self.level_z),
+            self.rises.eq(self.level_z & ~past_z & self.ready),
+            self.index_valid.eq(self.rises),
+        ]
+        with m.If(self.rises):
+            m.d.sync += self.index_position.eq(self.position)
+        return m

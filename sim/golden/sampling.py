@@ -1,0 +1,60 @@
+"""Golden sampling periods: where the windows end, by the core's own clock or by ticks from outside."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.recording import PinTrace
+from tachometry.spec import TachometerSpec
+from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
+
+
+def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Last clocks of all windows whose `tick`, and clocks of all `tick_error`s that, fall within the trace."""
+    n_clocks = trace.n_clocks - spec.tick_latency
+    if spec.max_tick_cycles is None:
+        cycles = spec.timing.tick_cycles
+        return np.arange(cycles - 1, n_clocks, cycles, dtype=np.int64), np.empty(0, dtype=np.int64)
+    assert trace.tick_in is not None, "an external tick needs its line"
+    # A line that is high at first has not risen.
+    rises = trace.clock[np.flatnonzero(np.diff(trace.tick_in, prepend=1) == 1)] + TICK_IN_TO_WINDOW_END
+    last, error = external_windows(rises, n_clocks, spec.min_tick_cycles, spec.max_tick_cycles)
+    return last, error + spec.tick_latency
+
+
+def external_windows(
+    rises: NDArray[np.int64], n_clocks: int, min_cycles: int, max_cycles: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Windows that end with a rise, none shorter than `min_cycles` and none longer than `max_cycles`.
+
+    Parameters
+    ----------
+    rises : int64 array
+        Clocks in which a rise is seen.
+    n_clocks, min_cycles, max_cycles : int
+
+    Returns
+    -------
+    last, errors : int64 arrays
+        Last clocks of windows; clocks of rises that came too early, and of ends without a rise.
+    """
+    last: list[int] = []
+    errors: list[int] = []
+    before = -1  # the last clock of the window before
+
+    def overdue(clock: int) -> None:
+        """End windows that no rise ends before `clock`."""
+        nonlocal before
+        while before + max_cycles < clock:
+            before += max_cycles
+            last.append(before)
+            errors.append(before)
+
+    for rise in rises[rises < n_clocks].tolist():
+        overdue(rise)
+        if rise - before < min_cycles:
+            errors.append(rise)
+        else:
+            last.append(rise)
+            before = rise
+    overdue(n_clocks)
+    return np.array(last, dtype=np.int64), np.array(errors, dtype=np.int64)

@@ -1,0 +1,114 @@
+"""The velocity in a unit of the outside: rad/s, rev/s or rpm, with an LSB that is a power of two."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tachometry.spec.units import PI
+
+NATIVE = "count/tick"
+# Revolutions per second in one of each unit are 1/size.
+_PER_REV_PER_SECOND = {"rad/s": 2 * PI, "rev/s": Fraction(1), "rpm": Fraction(60)}
+UNITS = (NATIVE, *_PER_REV_PER_SECOND)
+
+
+def parse_lsb(text: str) -> int:
+    """Fraction bits N of an LSB such as `2^-10`, 2^−N; ValueError if it is no power of two."""
+    match = re.fullmatch(r"2\^([+-]?[0-9]{1,3})", text.strip())
+    if match is None:
+        raise ValueError(f"lsb must be a power of two such as 2^-10, not {text!r}")
+    return -int(match[1])
+
+
+def per_count(unit: str, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
+    """One count per tick in `unit`."""
+    return Fraction(1) if unit == NATIVE else _PER_REV_PER_SECOND[unit] / (counts_per_rev * tick_seconds)
+
+
+@dataclass(frozen=True)
+class VelocityOutput:
+    """velocity = ⌊(v·multiplier + 2^(shift−1)) / 2^shift⌋ of the raw native velocity v, held within ±`limit`.
+
+    One LSB of v is at most a quarter of one of the output and correctly rounded: an error of ⅛. The multiplier is
+    rounded where it adds at most 1/16. So the output is off by less than 0.7 LSB.
+
+    Parameters
+    ----------
+    ratio : Fraction
+        LSBs of the output in one LSB of v, at most ¼; or 1, to hold v within fewer bits.
+    max_native : int
+        Largest |v|.
+    width : int or None
+        Bits of the output; None: as many as it can need.
+    """
+
+    ratio: Fraction
+    max_native: int
+    width: int | None
+
+    @property
+    def _constant(self) -> tuple[int, int]:
+        """Multiplier, odd, and shift."""
+        if self.ratio == 1:
+            return 1, 0
+        shift = self.max_native.bit_length() + 3
+        multiplier = round(self.ratio * (1 << shift))
+        zeros = min(shift, (multiplier & -multiplier).bit_length() - 1) if multiplier else shift
+        return multiplier >> zeros, shift - zeros
+
+    @property
+    def multiplier(self) -> int:
+        """The ratio, times 2^shift."""
+        return self._constant[0]
+
+    @property
+    def shift(self) -> int:
+        """Bits of the product that are rounded away."""
+        return self._constant[1]
+
+    @property
+    def half(self) -> int:
+        """What is added before they are."""
+        return 1 << self.shift >> 1
+
+    @property
+    def greatest(self) -> int:
+        """The output for the largest v."""
+        return (self.max_native * self.multiplier + self.half) >> self.shift
+
+    @property
+    def limit(self) -> int:
+        """The greatest magnitude that is shown."""
+        return self.greatest if self.width is None else min(self.greatest, (1 << (self.width - 1)) - 1)
+
+    @property
+    def port_width(self) -> int:
+        """Bits of the output, signed."""
+        return self.greatest.bit_length() + 1 if self.width is None else self.width
+
+    @property
+    def digits(self) -> tuple[tuple[int, int], ...]:
+        """The multiplier as a sum of (place, ±1)·2^place with the fewest terms, the lowest place first."""
+        return tuple(_canonical(self.multiplier))
+
+    @property
+    def serial_latency(self) -> int:
+        """Clocks with one adder: a bit of the multiplier each, and to clear, to round and to hold."""
+        return self.multiplier.bit_length() + 3
+
+    @property
+    def pipelined_latency(self) -> int:
+        """Clocks with an adder for every digit but the first: one each, and to round and to hold."""
+        return len(self.digits) - 1 + (self.shift > 0) + 1
+
+
+def _canonical(number: int) -> Iterator[tuple[int, int]]:
+    place = 0
+    while number:
+        if number & 1:
+            digit = 2 - (number & 3)
+            yield place, digit
+            number -= digit
+        number >>= 1
+        place += 1

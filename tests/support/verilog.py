@@ -1,0 +1,142 @@
+"""The exported Verilog in simulators that share nothing with Amaranth's: Verilator and Icarus."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from support.compiled import verilate
+from tachometry.hdl import export
+from tachometry.sim.recording import PinTrace
+from tachometry.sim.results import STROBES, Run, observed
+from tachometry.spec import Port, TachometerSpec
+
+# Both benches read a line (clock, level of each pin) for every change, and write a row (clock, value of each output)
+# for every clock with a strobe.
+_VERILATOR = """
+#include <cstdio>
+#include <cstdint>
+#include "Vcore.h"
+int64_t get(uint64_t raw, int width, bool is_signed) {
+  return is_signed ? int64_t(raw << (64 - width)) >> (64 - width) : int64_t(raw);
+}
+int main(int argc, char **argv) {
+  Vcore top;
+  FILE *in = fopen(argv[1], "rb"), *out = fopen(argv[2], "wb");
+  int64_t change[1 + @N_PINS@];
+  bool more = fread(change, sizeof change, 1, in) == 1;
+  top.rst = true;
+  for (int k = 0; k < 3; k++) {
+    top.clk = false; top.eval(); top.clk = true; top.eval();
+  }
+  top.rst = false;
+  for (int64_t clock = 0; clock < @N_CLOCKS@; clock++) {
+    if (more && change[0] == clock) {
+      const int64_t *pin = change;
+      @SET_PINS@
+      more = fread(change, sizeof change, 1, in) == 1;
+    }
+    top.clk = false; top.eval();
+    if (@STROBES@) {
+      const int64_t row[] = {clock, @OUTPUTS@};
+      fwrite(row, sizeof row, 1, out);
+    }
+    top.clk = true; top.eval();
+  }
+  return fclose(out);
+}
+"""
+_ICARUS = """
+module bench;
+  reg clk, rst;
+  @DECLARATIONS@
+  tachometer dut (.clk(clk), .rst(rst), @CONNECTIONS@);
+  integer in, out, more, at, clock;
+  initial begin
+    in = $fopen("pins.txt", "r");
+    out = $fopen("rows.txt", "w");
+    more = $fscanf(in, "%d", at);
+    rst = 1;
+    for (clock = 0; clock < 3; clock = clock + 1) begin
+      #1 clk = 0;
+      #1 clk = 1;
+    end
+    #1 rst = 0;
+    for (clock = 0; clock < @N_CLOCKS@; clock = clock + 1) begin
+      if (more == 1 && at == clock) begin
+        more = $fscanf(in, "@FORMAT@", @PINS@);
+        more = $fscanf(in, "%d", at);
+      end
+      #1 clk = 0;
+      #1 if (@STROBES@) $fdisplay(out, "%0d@FORMAT_OUT@", clock, @OUTPUTS@);
+      #1 clk = 1;
+      #1;
+    end
+    $fclose(out);
+    $finish;
+  end
+endmodule
+"""
+
+
+def _ports(spec: TachometerSpec) -> tuple[list[Port], list[Port], list[str]]:
+    """Pins, outputs and strobes."""
+    pins = [port for port in spec.ports if port.direction == "input" and port.name not in ("clk", "rst")]
+    outputs = [port for port in spec.ports if port.direction == "output"]
+    return pins, outputs, [port.name for port in outputs if port.name in STROBES]
+
+
+def _filled(text: str, **parts: str | int) -> str:
+    for name, part in parts.items():
+        text = text.replace(f"@{name}@", str(part))
+    return text
+
+
+def _changes(pins: list[Port], trace: PinTrace) -> np.ndarray:
+    return np.stack([trace.clock, *(trace.lines[pin.name] for pin in pins)], axis=1).astype(np.int64)
+
+
+def run_in_verilator(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
+    """Compile the exported Verilog with -Wall, any warning an error, and play a trace on it."""
+    pins, outputs, strobes = _ports(spec)
+    main = _filled(
+        _VERILATOR,
+        N_PINS=len(pins),
+        N_CLOCKS=trace.n_clocks,
+        SET_PINS=" ".join(f"top.{pin.name} = *++pin;" for pin in pins),
+        STROBES=" || ".join(f"top.{name}" for name in strobes),
+        OUTPUTS=", ".join(f"get(top.{port.name}, {port.width}, {int(port.signed)})" for port in outputs),
+    )
+    (folder / "core.v").write_text(export(spec)["tachometer.v"])
+    program = verilate(folder / "core.v", main)
+    _changes(pins, trace).tofile(folder / "pins")
+    subprocess.run([program, "pins", "rows"], cwd=folder, check=True)
+    return observed(spec, trace.n_clocks, np.fromfile(folder / "rows", dtype=np.int64).reshape(-1, 1 + len(outputs)))
+
+
+def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
+    """Compile the exported Verilog as Verilog-2001 with -Wall, any warning an error, and play a trace on it."""
+    pins, outputs, strobes = _ports(spec)
+    bench = _filled(
+        _ICARUS,
+        N_CLOCKS=trace.n_clocks,
+        DECLARATIONS="\n  ".join(
+            [f"reg {pin.name};" for pin in pins]
+            + [f"wire{' signed' * port.signed} [{port.width - 1}:0] {port.name};" for port in outputs]
+        ),
+        CONNECTIONS=", ".join(f".{port.name}({port.name})" for port in [*pins, *outputs]),
+        FORMAT=" ".join(["%b"] * len(pins)),
+        PINS=", ".join(pin.name for pin in pins),
+        STROBES=" || ".join(strobes),
+        FORMAT_OUT=" %0d" * len(outputs),
+        OUTPUTS=", ".join(port.name for port in outputs),
+    )
+    (folder / "core.v").write_text(export(spec)["tachometer.v"])
+    (folder / "bench.v").write_text(bench)
+    command = ["iverilog", "-g2001", "-Wall", "-s", "bench", "-o", "core.vvp", "core.v", "bench.v"]
+    said = subprocess.run(command, cwd=folder, check=True, stderr=subprocess.PIPE, text=True).stderr
+    assert said == "", f"warnings of Icarus:\n{said}"
+    np.savetxt(folder / "pins.txt", _changes(pins, trace), fmt="%d")
+    subprocess.run(["vvp", "-n", "core.vvp"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    rows = np.loadtxt(folder / "rows.txt", dtype=np.int64, ndmin=2)
+    return observed(spec, trace.n_clocks, rows.reshape(-1, 1 + len(outputs)))
