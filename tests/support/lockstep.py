@@ -56,15 +56,15 @@ def random_case(seed: int) -> tuple[STachometer, Encoding, PinTrace]:
     external = tick_cycles > 1 and bool(rng.random() < 0.3)
     if external:
         n_ticks += n_ticks // 4  # fewer may come
+    band = [0.004, 0.05, 0.3, 1.003, 1.4, 3.25]
     if tick_cycles == 1 and rng.random() < 0.5:
         max_ticks, n_ticks = 3000, 15_000  # the reciprocal is carried
+        band = [0.05, 0.3]
     duration = n_ticks * tick_cycles / CLOCK_HZ
     # One step takes at least a clock, and one decoded count takes 4/decoding of them.
     fastest = tick_cycles * decoding / 4
     unit = 2 * np.pi * CLOCK_HZ / (PULSES_PER_REV * decoding * tick_cycles)
-    speeds = unit * np.minimum(
-        rng.choice([0.004, 0.05, 0.3, 1.003, 1.4, 3.25]) * rng.uniform(0.9, 1.1, size=4), 0.9 * fastest
-    )
+    speeds = unit * np.minimum(rng.choice(band) * rng.uniform(0.9, 1.1, size=4), 0.9 * fastest)
     speeds *= rng.choice([-1, 1], size=4)
     parts = [
         f"constant:{speeds[0]}rad/s:{duration / 4}s",
