@@ -55,6 +55,11 @@ class STachometer(TachometerSpec):
         return isinstance(self.reciprocal, CarriedReciprocal)
 
     @property
+    def memory(self) -> tuple[str, int, int]:
+        """What holds the reciprocal: kind of memory, entries, bits of an entry."""
+        return "block RAM", self.reciprocal.depth, self.reciprocal.width
+
+    @property
     def numerator_width(self) -> int:
         """Bits of N, signed: as many additions does its product take."""
         return signed_width(self.max_numerator)

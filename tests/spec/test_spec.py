@@ -101,6 +101,19 @@ def test_max_speed_in_counts_per_tick(text: str, counts: int) -> None:
     assert spec.max_count == counts
 
 
+@pytest.mark.parametrize("text", ["12.5rad/s", "1.98943678864869rev/s", "119.366207318922rpm"])
+def test_speed_in_rad_per_s(text: str) -> None:
+    assert Speed.parse(text).rad_per_s == pytest.approx(12.5, rel=1e-14)
+
+
+def test_memory_is_the_table() -> None:
+    spec = STachometer(encoder=Encoder(500), timing=TIMING)
+    kind, entries, width = spec.memory
+    assert kind == "block RAM"
+    assert entries == len(spec.reciprocal.table)
+    assert width == max(spec.reciprocal.table).bit_length()
+
+
 def test_widths_hold_what_they_must() -> None:
     spec = STachometer(encoder=Encoder(500), timing=TIMING)
     assert spec.max_count == 960
