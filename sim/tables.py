@@ -79,17 +79,17 @@ def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
         updates.velocity,
         updates.velocity * spec.rad_per_s_per_lsb,
     )
-    _write_csv(path, "clock,tick,interval,forced,velocity_raw,velocity_rad_s", columns)
+    write_csv(path, "clock,tick,interval,forced,velocity_raw,velocity_rad_s", columns)
 
 
 def write_counts(path: Path, run: Run) -> None:
     """Write a CSV with a row per tick: its number, its pulse number m_e and the position at its end."""
     ticks = run.ticks
-    _write_csv(path, "tick,pulse_count,position", (np.arange(len(ticks.clock)), ticks.pulse_count, ticks.position))
+    write_csv(path, "tick,pulse_count,position", (np.arange(len(ticks.clock)), ticks.pulse_count, ticks.position))
 
 
-def _write_csv(path: Path, header: str, columns: Iterable[NDArray[np.generic]]) -> None:
-    """Numbers are the shortest that read back as the same, equal on every machine."""
+def write_csv(path: Path, header: str, columns: Iterable[NDArray[np.generic]]) -> None:
+    """Write a CSV. Numbers are the shortest that read back as the same, equal on every machine."""
     table = list(columns)
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.write(f"{header}\n")
