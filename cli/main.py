@@ -9,6 +9,7 @@ import click
 
 from tachometry.cli.generate import generate
 from tachometry.cli.options import in_terms_of_options
+from tachometry.cli.plan import plan
 from tachometry.cli.simulate import replay, simulate
 
 _INTERRUPTED = 130  # 128 + SIGINT, as shells have it
@@ -19,6 +20,7 @@ _INTERRUPTED = 130  # 128 + SIGINT, as shells have it
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
 Examples:
+  tachometry plan --ppr 500 --max-speed 400rad/s
   tachometry generate --ppr 500 -o build
   tachometry simulate --ppr 500 --clock 200kHz --tick 1ms \\
       --motion ramp:0:40rad/s:500ms --plot ramp.png --save-capture ramp.sr
@@ -37,6 +39,7 @@ def cli() -> None:
     """
 
 
+cli.add_command(plan)
 cli.add_command(generate)
 cli.add_command(simulate)
 cli.add_command(replay)

@@ -49,6 +49,7 @@ _SAME_NAME = (
     "unit",
     "lsb",
     "z",
+    "speeds",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
 
@@ -283,28 +284,29 @@ def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | N
     return check
 
 
-def _output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+    """Decorator for an option that names a file to be written, with one of some suffixes."""
     callback = _suffix(*suffixes) if suffixes else None
     return option(_OUTPUTS, name, type=click.Path(path_type=Path), metavar="FILE", callback=callback, help=help)
 
 
 _OUTPUT_OPTIONS = [
-    _output(
+    output(
         "--vcd",
         suffixes=(".vcd",),
         help="Waveform of pins, ports and inner values, with a GTKWave save file (.gtkw) beside it: open that.",
     ),
-    _output(
+    output(
         "--plot",
         suffixes=(".png", ".pdf"),
         help="Figure of velocity, error, pulse numbers and measurement times; .png or .pdf.",
     ),
-    _output(
+    output(
         "--trace",
         help="CSV with a row per update: clock, tick, interval (ticks), forced, raw velocity, velocity in rad/s.",
     ),
-    _output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts)."),
-    _output(
+    output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts)."),
+    output(
         "--save-capture",
         suffixes=(".sr",),
         help="Encoder lines as the core samples them, as a sigrok capture: open in PulseView or replay it.",

@@ -56,17 +56,26 @@ def print_summary(
     spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int, first: list[Mismatch]
 ) -> None:
     """Print the table and the verdict on stdout."""
-    width = None if sys.stdout.isatty() else _PLAIN_WIDTH
-    console = Console(width=width, highlight=False)
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, value in summary(spec, run, truth, n_mismatches):
-        table.add_row(Text(name), Text(value))
-    console.print(table)
+    print_rows(summary(spec, run, truth, n_mismatches))
+    console = stdout_console()
     for mismatch in first:
         console.print(Text(f"first mismatch in {mismatch}"))
     console.print(_verdict(run, n_mismatches))
+
+
+def stdout_console() -> Console:
+    """Where to print: as wide as the terminal, or the same everywhere if there is none."""
+    return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
+
+
+def print_rows(rows: list[tuple[str, str]]) -> None:
+    """Print a table of names and values on stdout."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(Text(name), Text(value))
+    stdout_console().print(table)
 
 
 def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int) -> list[tuple[str, str]]:

@@ -40,7 +40,7 @@ _METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-_ESTIMATE, _ERROR, _COUNT, _FORCED = "#2a78c8", "#b3261e", "#2e6b3e", "#d9730d"
+ESTIMATE, _ERROR, _COUNT, FORCED = "#2a78c8", "#b3261e", "#2e6b3e", "#d9730d"
 
 # Inches.
 _HEIGHTS = {"velocity": 3.2, "error": 1.7, "count": 1.4, "interval": 1.4}
@@ -65,12 +65,16 @@ def save_plot(path: Path, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
     true_speed : callable or None
         True speed in rad/s at times in seconds; without it there is no error panel.
     """
+    save_figure(path, lambda: _draw(spec, run, true_speed))
+
+
+def save_figure(path: Path, draw: Callable[[], Figure]) -> None:
+    """Write what `draw` returns, in the style of this project; equal figures give equal files."""
     suffix = path.suffix.lower()
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_STYLE)
-        figure = _draw(spec, run, true_speed)
-        figure.savefig(path, format=suffix[1:], dpi=160, metadata=_METADATA[suffix])
+        draw().savefig(path, format=suffix[1:], dpi=160, metadata=_METADATA[suffix])
 
 
 def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = _COLUMNS) -> NDArray[np.int64]:
@@ -90,35 +94,37 @@ def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = _COLUMNS) ->
 def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figure:
     seconds = run.n_clocks / spec.timing.clock_hz
     scale, unit = next(((k, u) for k, u in ((1, "s"), (1e3, "ms")) if seconds * k >= 1), (1e6, "µs"))
-    figure, panels = _panels([name for name in _HEIGHTS if true_speed or name != "error"])
+    heights = {name: height for name, height in _HEIGHTS.items() if true_speed or name != "error"}
+    figure, panels = place_panels(spec, heights)
     _velocity(panels["velocity"], spec, run, true_speed, scale)
     if true_speed:
         _error(panels["error"], spec, run, true_speed, scale)
     _count(panels["count"], spec, run, scale)
     _interval(panels["interval"], spec, run, scale)
-    figure.suptitle(_title(spec), y=1 - 0.1 / figure.get_figheight(), fontsize=10)
     panels["interval"].set_xlabel(f"time ({unit})")
     panels["interval"].set_xlim(0, seconds * scale)
     return figure
 
 
-def _panels(names: list[str]) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with one panel below the other.
+def place_panels(spec: TachometerSpec, heights: dict[str, float]) -> tuple[Figure, dict[str, Axes]]:
+    """A figure, titled with the configuration, with one panel below the other, so many inches high.
 
     They are placed by hand: what Matplotlib's layout engine computes differs from run to run in the last bits.
     """
-    height = _TOP + _BOTTOM + sum(_HEIGHTS[name] for name in names) + _GAP * (len(names) - 1)
+    names = list(heights)
+    height = _TOP + _BOTTOM + sum(heights.values()) + _GAP * (len(names) - 1)
     figure = Figure(figsize=(_WIDTH, height))
     FigureCanvasAgg(figure)
     panels: dict[str, Axes] = {}
     upper = height - _TOP
     for name in names:
-        lower = upper - _HEIGHTS[name]
-        place = (_LEFT / _WIDTH, lower / height, 1 - (_LEFT + _RIGHT) / _WIDTH, _HEIGHTS[name] / height)
+        lower = upper - heights[name]
+        place = (_LEFT / _WIDTH, lower / height, 1 - (_LEFT + _RIGHT) / _WIDTH, heights[name] / height)
         panels[name] = figure.add_axes(place, sharex=panels.get(names[0]))
         panels[name].tick_params(labelbottom=name == names[-1])
         panels[name].yaxis.set_label_coords(-0.065, 0.5)
         upper = lower - _GAP
+    figure.suptitle(_title(spec), y=1 - 0.1 / height, fontsize=10)
     return figure, panels
 
 
@@ -142,7 +148,7 @@ def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
     clock, velocity = _held_to_end(updates.clock, updates.velocity * spec.rad_per_s_per_lsb, run.n_clocks)
     kept = columns(clock, velocity)
     time = clock[kept] / clock_hz * scale
-    axes.plot(time, velocity[kept], color=_ESTIMATE, drawstyle="steps-post", label="estimate (held)")
+    axes.plot(time, velocity[kept], color=ESTIMATE, drawstyle="steps-post", label="estimate (held)")
     if true_speed:
         instants = np.linspace(0, run.n_clocks / clock_hz, max(_TRUE_POINTS, 2 * len(run.ticks.clock)))
         speed = true_speed(instants)
@@ -218,7 +224,7 @@ def _count(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
 
 def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     updates = run.updates
-    for forced, colour, label in ((False, _ESTIMATE, "alteration"), (True, _FORCED, "forced")):
+    for forced, colour, label in ((False, ESTIMATE, "alteration"), (True, FORCED, "forced")):
         chosen = updates.forced == forced
         time = updates.clock[chosen] / spec.timing.clock_hz
         m_s = updates.interval[chosen]
