@@ -11,6 +11,7 @@ import click
 from tachometry.cli.files import Outputs
 from tachometry.cli.options import GroupedCommand, core_options, option, output
 from tachometry.spec import Speed, STachometer
+from tachometry.spec.manifest import manifest
 from tachometry.spec.units import format_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
@@ -19,6 +20,7 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 _ROWS = 12
 _SLOWEST = 1e-9  # counts per tick; keeps every number printable
 _UNITS = ("rad/s", "rev/s", "rpm")
+_WIDE = ("velocity", "pulse_count", "interval", "position")
 
 
 @click.command(
@@ -81,9 +83,7 @@ def _range(spec: STachometer, text: str | None) -> tuple[float, float, str]:
         last = Speed.parse(_with_unit(high, "rad/s"))
         first = Speed.parse(_with_unit(low, last.unit))
     except ValueError as error:
-        raise ValueError(
-            f"speeds must be LO:HI, both greater than 0, in {', '.join(_UNITS[:2])} or {_UNITS[2]}, not {text!r}"
-        ) from error
+        raise ValueError(f"speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not {text!r}") from error
     if last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds) > spec.max_count:
         greatest = spec.max_count * spec.unit_velocity / _rad_per_s(last.unit)
         raise ValueError(
@@ -118,16 +118,8 @@ def _print(spec: STachometer, expected: Plan, unit: str) -> None:
     table = Table(box=None, pad_edge=False, header_style="")
     for head in heads:
         table.add_column(head, justify="left" if head == heads[-1] else "right", no_wrap=True)
-    for row in zip(
-        expected.speed.tolist(),
-        expected.counts_per_tick.tolist(),
-        expected.interval.tolist(),
-        expected.measurement_time.tolist(),
-        expected.resolution.tolist(),
-        expected.forced.tolist(),
-        strict=True,
-    ):
-        speed, counts, m_s, t_m, q_v, forced = row
+    rows = zip(*(column.tolist() for column in vars(expected).values()), strict=True)
+    for speed, counts, m_s, t_m, q_v, forced in rows:
         cells = (
             f"{speed / per_unit:.6g}",
             f"{counts:.6g}",
@@ -156,7 +148,8 @@ def _configuration(spec: STachometer) -> list[tuple[str, str]]:
     equation = "eq. (21), cancels alternate alterations" if spec.cancel else "eq. (17)"
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
     greatest = f"{_speed(spec.max_count * spec.unit_velocity)} ({spec.max_count} counts per tick)"
-    standstill = standstill_ticks(spec)
+    latencies = manifest(spec)["latency_cycles"]
+    rest = standstill_ticks(spec)
     return [
         ("method", f"{spec.method.upper()}, {equation}"),
         ("encoder", counts),
@@ -166,20 +159,14 @@ def _configuration(spec: STachometer) -> list[tuple[str, str]]:
         ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
         ("one LSB of velocity", f"{spec.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to half of it to Q_V"),
-        ("widths", ", ".join(f"{name} {bits}" for name, bits in _widths(spec).items())),
+        ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports if port.name in _WIDE)),
         ("reciprocal", f"{kind}, {entries} x {width} = {entries * width} bits"),
-        *((name, f"{n} clocks ({_time(spec.seconds(n))})") for name, n in _latencies(spec).items()),
-        ("standstill", f"reads 0 at most {_time(standstill * timing.tick_seconds)} ({standstill} ticks) after a count"),
+        *((name, f"{n} clocks ({_time(spec.seconds(n))})") for name, n in latencies.items()),
+        (
+            "standstill",
+            f"reads 0 at most {_time(rest * timing.tick_seconds)} ({rest} ticks) after the last count's tick",
+        ),
     ]
-
-
-def _widths(spec: STachometer) -> dict[str, int]:
-    shown = ("velocity", "pulse_count", "interval", "position")
-    return {port.name: port.width for port in spec.ports if port.name in shown}
-
-
-def _latencies(spec: STachometer) -> dict[str, int]:
-    return {name: getattr(spec, name) for name in ("pin_to_count", "tick_latency", "tick_to_velocity")}
 
 
 def _speed(rad_per_s: float) -> str:

@@ -78,7 +78,7 @@ def plan_at(spec: STachometer, speed: ArrayLike) -> Plan:
 
 
 def standstill_ticks(spec: STachometer) -> int:
-    """Ticks after the last count within which the velocity reads 0: 1.5·max_ticks, rounded up.
+    """Ticks from that of the last count to the one whose update reads 0, at most: 1.5·max_ticks, rounded up.
 
     The count opens a window; the forced update at its end still weights it by one half, the next has it no more.
     """

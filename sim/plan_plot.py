@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import matplotlib.ticker
 from matplotlib.figure import Figure
 
 from tachometry.sim.plan import Plan
@@ -31,20 +30,23 @@ def _draw(spec: STachometer, plan: Plan, unit: str) -> Figure:
     figure, panels = place_panels(spec, _HEIGHTS)
     resolution, time = panels["resolution"], panels["time"]
     per_unit = Speed.parse(f"1{unit}").rad_per_s
-    speed = plan.speed / per_unit
-    forced = plan.forced
+    speed, forced = plan.speed / per_unit, plan.forced
+    left, right = speed[0] / 1.05, speed[-1] * 1.05
+    marks = [("$ω_u$", spec.unit_velocity / per_unit, ":")]
+    if spec.max_speed is not None:
+        marks.append(("max_speed", spec.max_speed.rad_per_s / per_unit, "--"))
     for axes, values in ((resolution, 100 * plan.resolution / plan.speed), (time, plan.measurement_time)):
         axes.loglog(speed, values, color=ESTIMATE, label="alteration")
-        axes.loglog(speed[forced], values[forced], ".", color=FORCED, markersize=2.5, label="forced")
-        axes.axvline(spec.unit_velocity / per_unit, color="0.4", linewidth=0.8, linestyle=(0, (1, 2)), label="$ω_u$")
-        if spec.max_speed is not None:
-            axes.axvline(spec.max_speed.rad_per_s / per_unit, color="0.4", linestyle="--", label="max_speed")
+        if forced.any():
+            axes.loglog(speed[forced], values[forced], ".", color=FORCED, markersize=2.5, label="forced")
+        for label, mark, style in marks:
+            if left <= mark <= right:
+                axes.axvline(mark, color="0.4", linestyle=style, label=label)
     half_lsb = 50 * spec.rad_per_s_per_lsb / plan.speed
     resolution.loglog(speed, half_lsb, color="0.6", linewidth=0.8, label="½ LSB")
     resolution.set_ylabel("$Q_V/V$ (%)")
     resolution.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=5)
-    time.set_ylabel("$T_m$")
-    time.yaxis.set_major_formatter(matplotlib.ticker.EngFormatter("s"))
+    time.set_ylabel("$T_m$ (s)")
     time.set_xlabel(f"speed ({unit})")
-    time.set_xlim(speed[0] / 1.05, speed[-1] * 1.05)
+    time.set_xlim(left, right)
     return figure

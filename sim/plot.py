@@ -121,7 +121,7 @@ def place_panels(spec: TachometerSpec, heights: dict[str, float]) -> tuple[Figur
         lower = upper - heights[name]
         place = (_LEFT / _WIDTH, lower / height, 1 - (_LEFT + _RIGHT) / _WIDTH, heights[name] / height)
         panels[name] = figure.add_axes(place, sharex=panels.get(names[0]))
-        panels[name].tick_params(labelbottom=name == names[-1])
+        panels[name].tick_params(which="both", labelbottom=name == names[-1])
         panels[name].yaxis.set_label_coords(-0.065, 0.5)
         upper = lower - _GAP
     figure.suptitle(_title(spec), y=1 - 0.1 / height, fontsize=10)

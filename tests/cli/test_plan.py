@@ -59,7 +59,7 @@ def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[st
     for name, clocks in described["latency_cycles"].items():
         assert rows[name].startswith(f"{clocks} clocks (")
     assert rows["pin_to_count"] == "5 clocks (104.2ns)"
-    assert rows["standstill"] == "reads 0 at most 15ms (750 ticks) after a count"
+    assert rows["standstill"] == "reads 0 at most 15ms (750 ticks) after the last count's tick"
     assert rows["method"] == "S, eq. (21), cancels alternate alterations"
 
 
