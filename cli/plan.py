@@ -13,6 +13,7 @@ from tachometry.cli.options import GroupedCommand, core_options, option, output
 from tachometry.spec import Speed, STachometer
 from tachometry.spec.manifest import manifest
 from tachometry.spec.units import format_time
+from tachometry.spec.velocity_output import NATIVE
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.plan import Plan
@@ -77,7 +78,8 @@ def _range(spec: STachometer, text: str | None) -> tuple[float, float, str]:
     if text is None:
         from tachometry.sim.plan import default_range
 
-        return *default_range(spec), "rad/s" if spec.max_speed is None else spec.max_speed.unit
+        unit = "rad/s" if spec.max_speed is None else spec.max_speed.unit
+        return *default_range(spec), unit if spec.unit == NATIVE else spec.unit
     low, _, high = (part.strip() for part in text.partition(":"))
     try:
         last = Speed.parse(_with_unit(high, "rad/s"))
@@ -158,9 +160,13 @@ def _configuration(spec: STachometer) -> list[tuple[str, str]]:
         ("maximum time", f"{_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
         ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
-        ("one LSB of velocity", f"{spec.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to half of it to Q_V"),
+        (
+            "one LSB of velocity",
+            f"2^{-spec.frac_bits} {spec.unit} = {spec.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to "
+            f"{'half' if spec.unit == NATIVE else '0.7'} of it to Q_V",
+        ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports if port.name in _WIDE)),
-        ("reciprocal", f"{kind}, {entries} x {width} = {entries * width} bits"),
+        ("reciprocal", f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"),
         *((name, f"{n} clocks ({_time(spec.seconds(n))})") for name, n in latencies.items()),
         (
             "standstill",

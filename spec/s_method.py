@@ -56,8 +56,8 @@ class STachometer(TachometerSpec):
 
     @property
     def memory(self) -> tuple[str, int, int]:
-        """What holds the reciprocal: kind of memory, entries, bits of an entry."""
-        return "block RAM", self.reciprocal.depth, self.reciprocal.width
+        """What holds the reciprocal: what it is, entries, bits of an entry."""
+        return "table and carried on" if self.carried else "table", self.reciprocal.depth, self.reciprocal.width
 
     @property
     def numerator_width(self) -> int:

@@ -79,7 +79,7 @@ class Speed:
     def rad_per_s(self) -> float:
         """The speed in rad/s."""
         size, radians = _SPEED[self.unit]
-        return float(self.value * size * (1 if radians else 2 * _PI))
+        return float(self.value * size * (1 if radians else 2 * PI))
 
     def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
         """⌈speed / ω_u⌉: the most counts that one tick can hold at this speed, ω_u = 2π/(P·T_s)."""

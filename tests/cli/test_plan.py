@@ -55,7 +55,7 @@ def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[st
         name: widths[name] for name in ("velocity", "pulse_count", "interval", "position")
     }
     entries, width = len(spec.reciprocal.table), max(spec.reciprocal.table).bit_length()
-    assert rows["reciprocal"] == f"block RAM, {entries} x {width} = {entries * width} bits"
+    assert rows["reciprocal"] == f"table: {entries} x {width} = {entries * width} bits of block RAM"
     for name, clocks in described["latency_cycles"].items():
         assert rows[name].startswith(f"{clocks} clocks (")
     assert rows["pin_to_count"] == "5 clocks (104.2ns)"

@@ -109,7 +109,7 @@ def test_speed_in_rad_per_s(text: str) -> None:
 def test_memory_is_the_table() -> None:
     spec = STachometer(encoder=Encoder(500), timing=TIMING)
     kind, entries, width = spec.memory
-    assert kind == "block RAM"
+    assert kind == "table"
     assert entries == len(spec.reciprocal.table)
     assert width == max(spec.reciprocal.table).bit_length()
 
