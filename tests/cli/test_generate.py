@@ -1,6 +1,7 @@
 """`tachometry generate`."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -62,6 +63,38 @@ def test_defaults(tmp_path: Path) -> None:
     }
 
 
+def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
+    options = "--ppr 500 --unit rpm --lsb 2^-3 --velocity-width 12 --index --index-reset --filter 4 --external-tick"
+    assert run("generate", *options.split(), "--max-tick-period", "30us", "-o", tmp_path) == 0
+    manifest = json.loads((tmp_path / "tachometer.json").read_text())
+    expected = {
+        "unit": "rpm",
+        "frac_bits": 3,
+        "velocity_bits": 12,
+        "index": True,
+        "index_reset": True,
+        "filter_clocks": 4,
+        "max_tick_cycles": 1440,
+    }
+    assert manifest["parameters"] | expected == manifest["parameters"]
+    assert manifest["velocity"] | {"unit": "rpm", "frac_bits": 3, "width": 12} == manifest["velocity"]
+    assert manifest["velocity"]["rad_per_s_per_lsb"] == pytest.approx(math.pi / 30 / 8)
+    assert manifest["latency_cycles"]["pin_to_count"] == 6
+    assert manifest["latency_cycles"]["tick_in_to_window_end"] == 2
+    assert manifest["external_tick_cycles"] == {"min": manifest["external_tick_cycles"]["min"], "max": 1440}
+    inputs = [port["name"] for port in manifest["ports"] if port["direction"] == "input"]
+    assert inputs == ["clk", "rst", "a", "b", "z", "tick_in"]
+    options_of_output = ["velocity_overflow", "index_valid", "index_position", "tick_error", "swallowed_edges"]
+    assert [port["name"] for port in manifest["ports"]][-5:] == options_of_output
+
+
+def test_lsb_and_fraction_bits_are_two_words_for_one_thing(tmp_path: Path) -> None:
+    for name, words in (("lsb", "--lsb 2^-8"), ("bits", "--frac-bits 8")):
+        assert run("generate", "--ppr", "500", *words.split(), "-o", tmp_path / name) == 0
+    verilog = [(tmp_path / name / "tachometer.v").read_text() for name in ("lsb", "bits")]
+    assert verilog[0] == verilog[1]
+
+
 def test_equal_options_give_equal_files(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "generate", "--ppr", "100"]
     for seed in ("1", "2"):
@@ -97,6 +130,29 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr 9 --name module", "--name must not be a Verilog keyword, which 'module' is"),
         ("--ppr 9 --name 9lives", "--name must be a letter or _ and up to 63 letters, digits or _, not '9lives'"),
         ("--ppr 9 --name ../x", "--name must be a letter or _"),
+        ("--ppr 9 --unit m/s", "'m/s' is not one of 'count/tick', 'rad/s', 'rev/s', 'rpm'."),
+        ("--ppr 9 --lsb 0.5", "--lsb must be a power of two such as 2^-10, not '0.5'"),
+        ("--ppr 9 --lsb 2^-10 --frac-bits 10", "--lsb must not be given together with --frac-bits"),
+        (
+            "--ppr 500 --unit rpm --lsb 2^-30",
+            "--lsb must be from 2^-11 to 2^20 rpm with this encoder and tick, not 2^-30",
+        ),
+        ("--ppr 500 --unit rad/s --frac-bits 40", "--lsb must be from 2^-14 to 2^17 rad/s with this encoder and tick"),
+        ("--ppr 9 --velocity-width 65", "--velocity-width must be from 8 to 64, not 65"),
+        ("--ppr 9 --position-width 7", "--position-width must be from 8 to 48, not 7"),
+        ("--ppr 9 --filter 256", "--filter must be from 0 to 255, not 256"),
+        ("--ppr 9 --index-reset", "--index-reset must be given together with an index"),
+        ("--ppr 9 --max-tick-period 30us", "--max-tick-period must be given together with --external-tick"),
+        (
+            "--ppr 9 --external-tick --max-tick-period 1us",
+            "--max-tick-period, in clocks, must be from 960, one tick, to",
+        ),
+        ("--ppr 9 --external-tick --max-tick-period 1s", "to 1048576, not 48000000"),
+        (
+            "--ppr 9 --external-tick --max-tick-period 33ns",
+            "--max-tick-period must be a whole number of clocks, not 33ns",
+        ),
+        ("--ppr 9 --external-tick --tick 1", "--tick, in clocks, must be at least 2 with an external tick, not 1"),
         ("--ppr 9 --foo", "No such option '--foo'. (see tachometry generate --help)"),
         ("--ppr 9 more", "Got unexpected extra argument (more)"),
     ],

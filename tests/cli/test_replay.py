@@ -83,6 +83,9 @@ def test_samplerate(tmp_path: Path) -> None:
         ("c.csv", "--samplerate 1MHz", "--samplerate must not be given for"),
         ("short.csv", "", "short.csv must last at least 22 clocks of --clock (1.1ms), a tick and its latency, not 1"),
         ("c.sr", "--trace {folder}/c.sr", "--trace must be another file than the input"),
+        ("c.sr", "--index", "--z must be given with --index"),
+        ("c.sr", "--external-tick", "--tick-in must be given with --external-tick"),
+        ("c.sr", "--external-tick --tick-in X", "must be one of A (0), B (1), not 'X'"),
         ("c.sr", "--motion stop:1s", "No such option '--motion'"),
     ],
 )
