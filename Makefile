@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test size lint clean
+.PHONY: help venv demo icarus test size lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -37,7 +37,13 @@ venv: $(VENV)/.test ## the environment in .venv, with all that tests need
 demo: $(VENV)/.run ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
 	BIN=$(BIN) sh docs/demo.sh
 
-test: $(VENV)/.test lint ## lint, types and all tests
+icarus: ## Icarus Verilog, installed with apt-get if it is missing
+	@command -v iverilog >/dev/null || { \
+	  sudo=$$([ $$(id -u) = 0 ] || echo "sudo -n"); \
+	  $$sudo apt-get install -qq -y iverilog >/dev/null || { $$sudo apt-get update -qq && $$sudo apt-get install -qq -y iverilog >/dev/null; }; \
+	} || { echo "make: Icarus Verilog is needed and could not be installed: see https://github.com/steveicarus/iverilog" >&2; exit 1; }
+
+test: $(VENV)/.test lint icarus ## lint, types and all tests
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
