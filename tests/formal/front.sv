@@ -1,0 +1,127 @@
+// Properties of the front end: position, windows, pulse numbers, illegal transitions. The p properties speak of the
+// core's ports and the latencies of its manifest only. `rst` may come at any time.
+// core_* show registers of the core to the lemmas, which make the induction short; prove.py connects them.
+module front #(
+    parameter DECODING = 4,
+    parameter FILTER = 0,
+    parameter T = 4,              // tick_cycles
+    parameter TICK_LATENCY = 2,
+    parameter MAX_COUNT = 4,
+    parameter COUNT_WIDTH = 4,
+    parameter POSITION_WIDTH = 8
+) (
+    input clk, input rst, input a, input b
+);
+  localparam W = $clog2(T) + 2, P = POSITION_WIDTH;
+  wire tick, decode_error, overflow;
+  wire signed [COUNT_WIDTH-1:0] pulse_count;
+  wire signed [P-1:0] position;
+  tachometer core (
+      .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .position(position),
+      .decode_error(decode_error), .overflow(overflow)
+  );
+  localparam READY = FILTER == 0 ? 3 : 4;  // clocks after reset
+  wire [READY-1:0] core_clocks;
+  wire signed [$clog2(T - 1):0] core_left;
+
+  // The conditioned pins: two flip-flops, then a filter that follows when the last FILTER levels all differ from it.
+  // The first real level is that of the first clock after reset.
+  reg [1:0] stage0 = 0, stage1 = 0;
+  reg [2:0] clocks = 0;  // since reset, at most 4
+  always @(posedge clk) begin
+    {stage1, stage0} <= {stage0, {a, b}};
+    clocks <= rst ? 0 : clocks == 4 ? 4 : clocks + 1;
+  end
+  wire [1:0] level;
+  generate
+    if (FILTER == 0) assign level = stage1;
+    else begin
+      reg [1:0] filtered = 0;
+      reg [2*FILTER-1:0] recent = 0;  // the levels before stage1
+      wire [2*FILTER+1:0] levels = {recent, stage1};
+      reg [1:0] held;
+      integer k;
+      always @* begin
+        held = 2'b11;
+        for (k = 0; k < FILTER; k = k + 1) held = held & (levels[2*k+:2] ^ filtered);
+      end
+      always @(posedge clk) begin
+        recent <= levels;
+        filtered <= rst ? 0 : clocks < 3 ? stage1 : filtered ^ held;
+      end
+      assign level = filtered;
+    end
+  endgenerate
+  wire ready = clocks >= READY;
+
+  // Steps by the Gray phase 00, 10, 11, 01 = 0, 1, 2, 3.
+  wire [1:0] phase = {level[0], level[1] ^ level[0]};
+  reg [1:0] past = 0, first = 0;
+  wire [1:0] turned = phase - past;
+  wire illegal = ready && turned == 2;
+  wire counted = DECODING == 4 || ((phase[1] ^ phase[0]) != (past[1] ^ past[0]) && (DECODING == 2 || !level[0]));
+  wire signed [2:0] quarter = !ready ? 0 : turned == 1 ? 1 : turned == 3 ? -1 : 0;
+  wire signed [2:0] step = counted ? quarter : 0;
+
+  // Windows of T clocks from reset on, and all counts by x4, of which x2 and x1 are a half and a quarter.
+  reg [$clog2(T):0] clock = 0;
+  wire last = clock == T - 1;
+  reg signed [W-1:0] open = 0, sum = 0;
+  reg signed [P+1:0] quarters = 0;
+  reg skipped = 0, wrong = 0, overflown = 0;  // illegal transitions: odd number of them, any of them
+  reg signed [P-1:0] total = 0, position_before = 0;
+  wire signed [P-1:0] shown = tick ? total + pulse_count : total;
+  always @(posedge clk) begin
+    past <= rst ? 0 : phase;
+    first <= rst ? 0 : ready ? first : phase;
+    clock <= rst || last ? 0 : clock + 1;
+    open <= rst || last ? 0 : open + step;
+    sum <= rst ? 0 : open + step;
+    quarters <= rst ? 0 : ready ? quarters + quarter : $signed({1'b0, phase});
+    skipped <= rst ? 0 : skipped ^ illegal;
+    wrong <= rst ? 0 : wrong | illegal;
+    overflown <= rst ? 0 : overflown | overflow;
+    total <= rst ? 0 : shown;
+    position_before <= rst ? 0 : position;
+  end
+
+  // As late as the core shows them; registers are one clock late already.
+  wire tick_, skipped_, wrong_, illegal_, ready_;
+  wire signed [W-1:0] open_, sum_;
+  wire [P+1:0] quarters_;
+  wire [1:0] phase_, first_;
+  delay #(3, TICK_LATENCY) delays (clk, rst, {last, illegal, ready}, {tick_, illegal_, ready_});
+  delay #(P + 8 + 2 * W, TICK_LATENCY - 1) delayed_registers (
+      clk, rst, {open, sum, quarters, past, first, skipped, wrong},
+      {open_, sum_, quarters_, phase_, first_, skipped_, wrong_}
+  );
+  // x4 counts from the first phase; x2 and x1 count where that passes a multiple of 2 and 4.
+  localparam SHIFT = DECODING == 4 ? 0 : DECODING == 2 ? 1 : 2;
+  localparam OFFSET = DECODING == 4 ? 0 : DECODING == 2 ? 1 : 3;
+  wire [P+1:0] now = quarters_ + OFFSET, before = first_ + OFFSET;
+  wire [P-1:0] angle = (now >> SHIFT) - (before >> SHIFT);
+  wire signed [W-1:0] saturated = sum_ > MAX_COUNT ? MAX_COUNT : sum_ < -MAX_COUNT ? -MAX_COUNT : sum_;
+
+  // Lemmas: what the induction needs to know of the state.
+  wire signed [W:0] elapsed = $signed({1'b0, clock});
+  wire [READY-1:0] thermometer = (1 << clocks) - 1;
+  always @* begin
+    lemma_clocks: assert (clocks <= 4 && core_clocks == thermometer);
+    lemma_window: assert (clock < T && core_left == T - 2 - elapsed);
+    lemma_open: assert (open <= elapsed && -open <= elapsed);
+    lemma_quarters: assert (quarters[1:0] == past - {skipped, 1'b0});
+    lemma_wrong: assert (wrong || !skipped);
+  end
+  always @* begin
+    if (DECODING == 4) p1_phase: assert (position[1:0] == phase_ - first_ - {skipped_, 1'b0});
+    p1_angle: assert (wrong_ || position == $signed(angle));
+    p2_tick: assert (!tick || overflown || overflow || position == shown);
+    p2_open: assert (overflown || overflow || position == $signed(shown + open_));
+    p3_tick: assert (tick == tick_);
+    p3_count: assert (!tick || pulse_count == saturated);
+    p3_overflow: assert (!tick || overflow == (sum_ != saturated));
+    p6_error: assert (decode_error == illegal);
+    p6_uncounted: assert (!illegal_ || position == position_before);
+    p6_quiet: assert (ready_ || (position == 0 && (ready || !decode_error)));
+  end
+endmodule

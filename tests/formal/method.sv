@@ -1,0 +1,120 @@
+// Properties of the S method: from the ticks at the ports to the updates at the ports. The reference keeps the pulse
+// numbers of a whole window and adds them up as the paper does; it has neither b nor d0, d1.
+module method #(
+    parameter T = 4,              // tick_cycles
+    parameter MAX_TICKS = 8,
+    parameter MAX_COUNT = 4,
+    parameter COUNT_WIDTH = 4,
+    parameter INTERVAL_WIDTH = 4,
+    parameter FRAC_BITS = 4,
+    parameter CANCEL = 1,
+    parameter TICK_TO_VELOCITY = 9
+) (
+    input clk, input rst, input a, input b
+);
+  localparam V = COUNT_WIDTH + FRAC_BITS, I = INTERVAL_WIDTH, S = COUNT_WIDTH + INTERVAL_WIDTH + 2, KEPT = MAX_TICKS / 2;
+  wire tick, velocity_valid, forced, stalled;
+  wire signed [COUNT_WIDTH-1:0] pulse_count;
+  wire signed [V-1:0] velocity;
+  wire [I-1:0] interval;
+  tachometer core (
+      .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
+      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
+  );
+
+  // m_e(i-1) ... m_e(i-max_ticks); zeros before reset. m_s = i - a, by the rules of the alteration.
+  reg [COUNT_WIDTH*MAX_TICKS-1:0] past = 0;
+  reg signed [COUNT_WIDTH-1:0] offset = 0;
+  reg [I-1:0] m_s = 1;
+  wire [COUNT_WIDTH*(MAX_TICKS+1)-1:0] m_e = {past, pulse_count};
+  wire signed [COUNT_WIDTH-1:0] previous = past[0+:COUNT_WIDTH];
+  wire alteration = pulse_count != previous && pulse_count != offset;
+  wire full = m_s == MAX_TICKS;
+  wire update = tick && (alteration || full);
+  always @(posedge clk)
+    if (rst) begin
+      past <= 0;
+      offset <= 0;
+      m_s <= 1;
+    end else if (tick) begin
+      past <= m_e;
+      if (!alteration) offset <= pulse_count;
+      m_s <= alteration ? 1 : full ? KEPT + 1 : m_s + 1;
+    end
+
+  // Twice the sum of eq. (21), where the ends count half, or of eq. (17), without the opening tick.
+  reg signed [S-1:0] sum;
+  reg alike, empty;  // all numbers inside the window are the same; all are 0, its opening included
+  reg signed [COUNT_WIDTH-1:0] m_e_j, opening;
+  integer j;
+  always @* begin
+    sum = 0;
+    alike = 1;
+    empty = 1;
+    opening = 0;
+    for (j = 0; j <= MAX_TICKS; j = j + 1) begin
+      m_e_j = m_e[COUNT_WIDTH*j+:COUNT_WIDTH];
+      if (j == 0) sum = sum + (CANCEL ? m_e_j : 2 * m_e_j);
+      else if (j < m_s) sum = sum + 2 * m_e_j;
+      else if (j == m_s && CANCEL) sum = sum + m_e_j;
+      if (j == m_s) opening = m_e_j;
+      if (j > 0 && j < m_s && m_e_j != previous) alike = 0;
+      if (j <= m_s && m_e_j != 0) empty = 0;
+    end
+  end
+  wire signed [S-1:0] reduced = 2 * $signed({1'b0, m_s}) * previous
+      + (CANCEL ? opening - previous + (pulse_count - previous) : 2 * (pulse_count - previous));
+
+  // Ticks since the last update, and what that was: once here, and once from the ports.
+  reg [I-1:0] since = 0, since_update = 0;
+  reg after_forced = 0, after_stalled = 0, was_forced = 0, was_stalled = 0;
+  always @(posedge clk)
+    if (rst) {since, after_forced, after_stalled} <= 0;
+    else if (tick) begin
+      since <= update ? 0 : since + 1;
+      if (update) {after_forced, after_stalled} <= {!alteration, !alteration && empty};
+    end
+
+  // As late as the core shows them.
+  wire tick_, update_, forced_, empty_, after_forced_, after_stalled_;
+  wire [I-1:0] m_s_, since_;
+  wire signed [S-1:0] sum_;
+  wire signed [COUNT_WIDTH-1:0] pulse_count_;
+  delay #(6 + 2 * I + S + COUNT_WIDTH, TICK_TO_VELOCITY) delays (
+      clk, rst,
+      {tick, update, !alteration, empty, after_forced, after_stalled, m_s, since, sum, pulse_count},
+      {tick_, update_, forced_, empty_, after_forced_, after_stalled_, m_s_, since_, sum_, pulse_count_}
+  );
+  reg [V+I+1:0] held = 0;
+  wire [V+I+1:0] outputs = {velocity, interval, forced, stalled};
+  always @(posedge clk)
+    if (rst) {since_update, was_forced, was_stalled, held} <= 0;
+    else begin
+      if (tick_) since_update <= since_update + 1;
+      if (velocity_valid) {since_update, was_forced, was_stalled} <= {{I{1'b0}}, forced, stalled};
+      held <= outputs;
+    end
+
+  // 2^f x + 1/2 = (2^f sum + m_s) / (2 m_s), rounded down.
+  wire signed [S+FRAC_BITS:0] wanted = (sum_ <<< FRAC_BITS) + $signed({1'b0, m_s_});
+  wire signed [S+FRAC_BITS:0] have = 2 * $signed({1'b0, m_s_}) * velocity;
+  wire signed [I+1:0] divisor = $signed({1'b0, m_s_, 1'b0});
+
+  always @* begin
+    lemma_m_s: assert (m_s >= 1 && m_s <= MAX_TICKS && m_s == since + 1 + (after_forced ? KEPT : 0));
+    lemma_offset: assert (m_s == 1 || offset == previous);
+    lemma_empty: assert (!full || alteration || empty == (opening == 0 && previous == 0));
+    lemma_stalled: assert (!after_stalled || (previous == 0 && offset == 0));
+    lemma_since: assert ({since_update, was_forced, was_stalled} == {since_, after_forced_, after_stalled_});
+    p4_update: assert (velocity_valid == update_);
+    p4_interval: assert (!velocity_valid || (interval == m_s_ && forced == forced_));
+    p4_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_TICKS));
+    p4_latest: assert (since_update < MAX_TICKS - (was_forced ? KEPT : 0));
+    p4_held: assert (velocity_valid || outputs == held);
+    p5_alike: assert (alike);
+    p5_reduced: assert (sum == reduced);
+    p5_velocity: assert (!velocity_valid || (have <= wanted && wanted < have + divisor));
+    p6_stalled: assert (!velocity_valid || stalled == (forced && empty_));
+    p6_falls: assert (!(was_stalled && tick_ && pulse_count_ != 0) || (velocity_valid && !stalled));
+  end
+endmodule
