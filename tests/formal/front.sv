@@ -23,6 +23,7 @@ module front #(
   localparam READY = FILTER == 0 ? 3 : 4;  // clocks after reset
   wire [READY-1:0] core_clocks;
   wire signed [$clog2(T - 1):0] core_left;
+  wire signed [$clog2(T + 1):0] core_count;
 
   // The conditioned pins: two flip-flops, then a filter that follows when the last FILTER levels all differ from it.
   // The first real level is that of the first clock after reset.
@@ -35,15 +36,25 @@ module front #(
   wire [1:0] level;
   generate
     if (FILTER == 0) assign level = stage1;
-    else begin
+    else begin : glitch
       reg [1:0] filtered = 0;
       reg [2*FILTER-1:0] recent = 0;  // the levels before stage1
       wire [2*FILTER+1:0] levels = {recent, stage1};
-      reg [1:0] held;
+      wire [$clog2(FILTER < 2 ? 2 : FILTER)-1:0] core_held_a, core_held_b;
+      reg [1:0] held, run;
+      reg [7:0] held_a, held_b;  // for how many clocks before this one the level has differed
       integer k;
       always @* begin
         held = 2'b11;
-        for (k = 0; k < FILTER; k = k + 1) held = held & (levels[2*k+:2] ^ filtered);
+        run = clocks < 3 ? 0 : 2'b11;
+        {held_a, held_b} = 0;
+        for (k = 0; k < FILTER; k = k + 1) begin
+          held = held & (levels[2*k+:2] ^ filtered);
+          run = run & (recent[2*k+:2] ^ filtered);
+          held_a = held_a + run[1];
+          held_b = held_b + run[0];
+        end
+        lemma_held: assert (held_a == core_held_a && held_b == core_held_b);
       end
       always @(posedge clk) begin
         recent <= levels;
@@ -109,6 +120,7 @@ module front #(
     lemma_clocks: assert (clocks <= 4 && core_clocks == thermometer);
     lemma_window: assert (clock < T && core_left == T - 2 - elapsed);
     lemma_open: assert (open <= elapsed && -open <= elapsed);
+    lemma_count: assert (core_count == (clock == 0 ? sum : open));
     lemma_quarters: assert (quarters[1:0] == past - {skipped, 1'b0});
     lemma_wrong: assert (wrong || !skipped);
   end
