@@ -1,11 +1,13 @@
 // Properties of the S method: from the ticks at the ports to the updates at the ports. The reference keeps the pulse
-// numbers of a whole window and adds them up as the paper does; it has neither b nor d0, d1.
+// numbers of a whole window and adds them up as the paper does; it has neither d0 nor d1. `rst` may come at any time.
+// core_* show signals of the core to the lemmas, and to p5_numerator what enters the scaler; prove.py connects them.
 module method #(
     parameter T = 4,              // tick_cycles
     parameter MAX_TICKS = 8,
     parameter MAX_COUNT = 4,
     parameter COUNT_WIDTH = 4,
     parameter INTERVAL_WIDTH = 4,
+    parameter NUMERATOR_WIDTH = 6,
     parameter FRAC_BITS = 4,
     parameter CANCEL = 1,
     parameter TICK_TO_VELOCITY = 9
@@ -21,6 +23,12 @@ module method #(
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
+  wire [I-1:0] core_m_s;
+  wire core_longest;
+  wire signed [COUNT_WIDTH-1:0] core_opening, core_previous, core_offset;
+  wire signed [NUMERATOR_WIDTH-1:0] core_numerator;
+  wire signed [$clog2(T - 1):0] core_left;
+  wire signed [$clog2(T + 1):0] core_count;
 
   // m_e(i-1) ... m_e(i-max_ticks); zeros before reset. m_s = i - a, by the rules of the alteration.
   reg [COUNT_WIDTH*MAX_TICKS-1:0] past = 0;
@@ -45,12 +53,14 @@ module method #(
   // Twice the sum of eq. (21), where the ends count half, or of eq. (17), without the opening tick.
   reg signed [S-1:0] sum;
   reg alike, empty;  // all numbers inside the window are the same; all are 0, its opening included
+  reg bounded;
   reg signed [COUNT_WIDTH-1:0] m_e_j, opening;
   integer j;
   always @* begin
     sum = 0;
     alike = 1;
     empty = 1;
+    bounded = 1;
     opening = 0;
     for (j = 0; j <= MAX_TICKS; j = j + 1) begin
       m_e_j = m_e[COUNT_WIDTH*j+:COUNT_WIDTH];
@@ -60,10 +70,11 @@ module method #(
       if (j == m_s) opening = m_e_j;
       if (j > 0 && j < m_s && m_e_j != previous) alike = 0;
       if (j <= m_s && m_e_j != 0) empty = 0;
+      if (m_e_j > MAX_COUNT || m_e_j < -MAX_COUNT) bounded = 0;
     end
   end
-  wire signed [S-1:0] reduced = 2 * $signed({1'b0, m_s}) * previous
-      + (CANCEL ? opening - previous + (pulse_count - previous) : 2 * (pulse_count - previous));
+  wire signed [S-1:0] reduced = 2 * $signed({1'b0, core_m_s}) * core_previous
+      + (CANCEL ? core_numerator : 2 * core_numerator);
 
   // Ticks since the last update, and what that was: once here, and once from the ports.
   reg [I-1:0] since = 0, since_update = 0;
@@ -100,19 +111,29 @@ module method #(
   wire signed [S+FRAC_BITS:0] have = 2 * $signed({1'b0, m_s_}) * velocity;
   wire signed [I+1:0] divisor = $signed({1'b0, m_s_, 1'b0});
 
+  // Lemmas: what the induction needs to know of the state.
+  reg [$clog2(T):0] clock = 0;
+  always @(posedge clk) clock <= rst || clock == T - 1 ? 0 : clock + 1;
+  wire signed [$clog2(T)+1:0] elapsed = $signed({1'b0, clock}), most = clock == 0 ? T : elapsed;
   always @* begin
+    lemma_window: assert (clock < T && core_left == T - 2 - elapsed);
+    lemma_count: assert (core_count <= most && -core_count <= most);
+    lemma_bounded: assert (bounded && offset <= MAX_COUNT && -offset <= MAX_COUNT);
+    lemma_core: assert (core_m_s == m_s && core_longest == full && core_previous == previous && core_offset == offset);
+    lemma_opening: assert (core_opening == opening);
     lemma_m_s: assert (m_s >= 1 && m_s <= MAX_TICKS && m_s == since + 1 + (after_forced ? KEPT : 0));
     lemma_offset: assert (m_s == 1 || offset == previous);
-    lemma_empty: assert (!full || alteration || empty == (opening == 0 && previous == 0));
     lemma_stalled: assert (!after_stalled || (previous == 0 && offset == 0));
     lemma_since: assert ({since_update, was_forced, was_stalled} == {since_, after_forced_, after_stalled_});
+  end
+  always @* begin
     p4_update: assert (velocity_valid == update_);
     p4_interval: assert (!velocity_valid || (interval == m_s_ && forced == forced_));
     p4_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_TICKS));
     p4_latest: assert (since_update < MAX_TICKS - (was_forced ? KEPT : 0));
     p4_held: assert (velocity_valid || outputs == held);
     p5_alike: assert (alike);
-    p5_reduced: assert (sum == reduced);
+    p5_numerator: assert (sum == reduced);
     p5_velocity: assert (!velocity_valid || (have <= wanted && wanted < have + divisor));
     p6_stalled: assert (!velocity_valid || stalled == (forced && empty_));
     p6_falls: assert (!(was_stalled && tick_ && pulse_count_ != 0) || (velocity_valid && !stalled));
