@@ -1,0 +1,139 @@
+"""What is proven of which core, and what each proof refutes."""
+
+from dataclasses import dataclass
+from typing import Any
+from unittest.mock import patch
+
+from formal.prove import Proof
+
+from tachometry.hdl.alteration import AlterationDetector
+from tachometry.hdl.carried_reciprocal import CarriedReciprocal
+from tachometry.hdl.conditioner import InputConditioner
+from tachometry.hdl.decoder import QuadratureDecoder
+from tachometry.hdl.glitch_filter import GlitchFilter
+from tachometry.hdl.interval import IntervalAccumulator
+from tachometry.hdl.position_counter import PositionCounter
+from tachometry.hdl.pulse_counter import PulseCounter
+from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.sampling_clock import SamplingClock
+from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+
+
+def core(
+    tick_cycles: int, max_ticks: int = 4, max_count: int | None = None, decoding: int = 4, **options: Any
+) -> STachometer:
+    """A spec by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each."""
+    # One revolution a tick is as many counts as the encoder has, and one revolution a second a count a tick.
+    return STachometer(
+        encoder=Encoder(1, decoding),
+        timing=Timing(decoding * tick_cycles, tick_cycles, max_ticks),
+        max_speed=None if max_count is None else Speed.parse(f"{max_count}rev/s"),
+        **options,
+    )
+
+
+_FRONT_PROBES = {
+    "core_clocks": "conditioner.clocks_since_reset",
+    "core_left": "sampling_clock.left",
+    "core_count": "pulse_counter.count",
+}
+_FILTER_PROBES = {"core_held_a": "conditioner.filter_a.held", "core_held_b": "conditioner.filter_b.held"}
+_METHOD_PROBES = {
+    "core_left": "sampling_clock.left",
+    "core_count": "pulse_counter.count",
+    "core_m_s": "datapath.interval.m_s",
+    "core_longest": "datapath.interval.longest",
+    "core_opening": "datapath.interval.opening",
+    "core_numerator": "datapath.interval.numerator",
+    "core_previous": "datapath.alteration.previous",
+    "core_offset": "datapath.alteration.offset",
+}
+_RECIPROCAL_PROBES = {
+    "core_m_s": "datapath.interval.m_s",
+    "core_longest": "datapath.interval.longest",
+    "core_carried": "datapath.reciprocal.carried",
+    "core_q": "datapath.scaler.q",
+    "core_r": "datapath.scaler.r",
+}
+
+
+def front(name: str, spec: STachometer) -> Proof:
+    """P1, P2, P3, P6: the front end."""
+    parameters = {
+        "DECODING": spec.encoder.decoding,
+        "FILTER": spec.filter_clocks,
+        "T": spec.timing.tick_cycles,
+        "TICK_LATENCY": spec.tick_latency,
+        "MAX_COUNT": spec.max_count,
+        "COUNT_WIDTH": spec.count_width,
+        "POSITION_WIDTH": spec.position_width,
+    }
+    held = {f"glitch.{wire}": path for wire, path in _FILTER_PROBES.items() if spec.filter_clocks}
+    return Proof(name, spec, "front", parameters, _FRONT_PROBES | held, depth=5)
+
+
+def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_table: int | None = None) -> Proof:
+    """P4, P5 and standstill: the S method, from ticks to updates."""
+    with patch("tachometry.spec.s_method.MAX_TABLE", max_table or 2048):
+        latency = spec.tick_to_velocity
+    parameters = {
+        "T": spec.timing.tick_cycles,
+        "MAX_TICKS": spec.timing.max_ticks,
+        "MAX_COUNT": spec.max_count,
+        "COUNT_WIDTH": spec.count_width,
+        "INTERVAL_WIDTH": spec.interval_width,
+        "NUMERATOR_WIDTH": spec.numerator_width,
+        "FRAC_BITS": spec.frac_bits,
+        "CANCEL": int(spec.cancel),
+        "TICK_TO_VELOCITY": latency,
+    }
+    return Proof(name, spec, "method", parameters, _METHOD_PROBES, depth or latency + 2, without, max_table)
+
+
+def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Proof:
+    """The carried reciprocal."""
+    with patch("tachometry.spec.s_method.MAX_TABLE", max_table or 2048):
+        carried = spec.reciprocal
+    parameters = {
+        "MAX_TICKS": spec.timing.max_ticks,
+        "INTERVAL_WIDTH": spec.interval_width,
+        "QUOTIENT_WIDTH": carried.quotient_width,
+        "C": 1 << (spec.frac_bits - int(spec.cancel)),
+        "DEPTH": carried.depth,
+    }
+    return Proof(name, spec, "reciprocal", parameters, _RECIPROCAL_PROBES, depth=2, max_table=max_table)
+
+
+def small(**options: Any) -> STachometer:
+    """A core whose whole S method is within reach of a SAT solver."""
+    return core(**{"tick_cycles": 2, "max_count": 1, "frac_bits": 4, "position_width": 8} | options)
+
+
+PROOFS = [
+    front("x4, 960 clocks", core(960, max_count=20)),
+    front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
+    front("x4, 2 clocks", core(2)),
+    front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
+    front("x1, filter 1", core(7, max_count=2, decoding=1, filter_clocks=1)),
+    method("eq. (21)", small()),
+    method("eq. (17)", small(cancel=False)),
+    method("eq. (21), 5 ticks", small(tick_cycles=3, max_ticks=5, max_count=3)),
+    method("serial", small(tick_cycles=7), depth=14),
+    method("sums", core(40, 16, max_count=20), depth=2, without="p4_* */p5_velocity */p6_* */lemma_since"),
+    method("carried", small(max_ticks=6), max_table=4),
+    method("serial, carried", small(tick_cycles=12, max_ticks=6), depth=24, max_table=4),
+    reciprocal("2049 ticks", core(5, 2049, max_count=1)),
+]
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """`right` in the source of `box` made `wrong`, which violates `refuted` within `steps` clocks of the proof's core."""
+
+    proof: str
+    refuted: str
+    box: Any
+    right: str
+    wrong: str
+    steps: int = 24
