@@ -18,6 +18,7 @@ from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRema
 from tachometry.hdl.sampling_clock import SamplingClock
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.carried_reciprocal import CarriedReciprocal as CarriedSpec
 
 
 def core(
@@ -49,13 +50,18 @@ _METHOD_PROBES = {
     "core_previous": "datapath.alteration.previous",
     "core_offset": "datapath.alteration.offset",
 }
-_RECIPROCAL_PROBES = {
-    "core_m_s": "datapath.interval.m_s",
-    "core_longest": "datapath.interval.longest",
+_SERIAL_PROBES = {"core_running": "datapath.scaler.running", "core_step": "datapath.scaler.step"}
+_CARRIED_PROBES = {
     "core_carried": "datapath.reciprocal.carried",
     "core_q": "datapath.scaler.q",
     "core_r": "datapath.scaler.r",
 }
+_RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
+
+
+def within(block: str, probes: dict[str, str]) -> dict[str, str]:
+    """Probes to wires of a generate block."""
+    return {f"{block}.{wire}": path for wire, path in probes.items()}
 
 
 def front(name: str, spec: STachometer) -> Proof:
@@ -69,14 +75,17 @@ def front(name: str, spec: STachometer) -> Proof:
         "COUNT_WIDTH": spec.count_width,
         "POSITION_WIDTH": spec.position_width,
     }
-    held = {f"glitch.{wire}": path for wire, path in _FILTER_PROBES.items() if spec.filter_clocks}
-    return Proof(name, spec, "front", parameters, _FRONT_PROBES | held, depth=5)
+    probes = _FRONT_PROBES | (within("glitch", _FILTER_PROBES) if spec.filter_clocks else {})
+    return Proof(name, spec, "front", parameters, probes, depth=5)
 
 
 def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_table: int | None = None) -> Proof:
     """P4, P5 and standstill: the S method, from ticks to updates."""
     with patch("tachometry.spec.s_method.MAX_TABLE", max_table or 2048):
-        latency = spec.tick_to_velocity
+        latency, serial, used = spec.tick_to_velocity, spec.serial, spec.reciprocal
+    carried = {}
+    if isinstance(used, CarriedSpec):
+        carried = {"CARRIED": used.depth, "C": used.scale, "SERIAL": int(serial)}
     parameters = {
         "T": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
@@ -88,7 +97,9 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         "CANCEL": int(spec.cancel),
         "TICK_TO_VELOCITY": latency,
     }
-    return Proof(name, spec, "method", parameters, _METHOD_PROBES, depth or latency + 2, without, max_table)
+    probes = _METHOD_PROBES | (within("serial", _SERIAL_PROBES) if serial and carried else {})
+    probes |= within("carried", _CARRIED_PROBES) if carried else {}
+    return Proof(name, spec, "method", parameters | carried, probes, depth or latency + 2, without, max_table)
 
 
 def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Proof:
@@ -98,9 +109,8 @@ def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Pr
     parameters = {
         "MAX_TICKS": spec.timing.max_ticks,
         "INTERVAL_WIDTH": spec.interval_width,
-        "QUOTIENT_WIDTH": carried.quotient_width,
-        "C": 1 << (spec.frac_bits - int(spec.cancel)),
-        "DEPTH": carried.depth,
+        "C": carried.scale,
+        "CARRIED": carried.depth,
     }
     return Proof(name, spec, "reciprocal", parameters, _RECIPROCAL_PROBES, depth=2, max_table=max_table)
 
@@ -120,9 +130,9 @@ PROOFS = [
     method("eq. (17)", small(cancel=False)),
     method("eq. (21), 5 ticks", small(tick_cycles=3, max_ticks=5, max_count=3)),
     method("serial", small(tick_cycles=7), depth=14),
-    method("sums", core(40, 16, max_count=20), depth=2, without="p4_* */p5_velocity */p6_* */lemma_since"),
+    method("sums", core(40, 8, max_count=7), depth=2, without="p4_* */p5_velocity */p6_* */lemma_since"),
     method("carried", small(max_ticks=6), max_table=4),
-    method("serial, carried", small(tick_cycles=12, max_ticks=6), depth=24, max_table=4),
+    method("serial, carried", small(tick_cycles=12, max_ticks=6), max_table=4),
     reciprocal("2049 ticks", core(5, 2049, max_count=1)),
 ]
 

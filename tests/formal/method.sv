@@ -10,7 +10,10 @@ module method #(
     parameter NUMERATOR_WIDTH = 6,
     parameter FRAC_BITS = 4,
     parameter CANCEL = 1,
-    parameter TICK_TO_VELOCITY = 9
+    parameter TICK_TO_VELOCITY = 9,
+    parameter CARRIED = 0,        // the table of the carried reciprocal has that many entries; 0: all looked up
+    parameter C = 8,              // what it divides
+    parameter SERIAL = 0          // carried, and its scaler does a step a clock
 ) (
     input clk, input rst, input a, input b
 );
@@ -126,6 +129,27 @@ module method #(
     lemma_stalled: assert (!after_stalled || (previous == 0 && offset == 0));
     lemma_since: assert ({since_update, was_forced, was_stalled} == {since_, after_forced_, after_stalled_});
   end
+  generate
+    if (SERIAL) begin : serial
+      localparam LAST = 2 * NUMERATOR_WIDTH + 2;
+      wire core_running;
+      wire [$clog2(LAST + 2)-1:0] core_step;
+      always @* lemma_running: assert (!core_running || core_step <= LAST);
+    end
+    if (CARRIED) begin : carried
+      wire core_carried;
+      wire [$clog2(C):0] core_q;
+      wire [I-1:0] core_r;
+      reg [I-1:0] m = 0;  // at the last tick
+      wire [I+$clog2(C):0] product = core_q * m;
+      always @(posedge clk) m <= rst ? 0 : tick ? m_s : m;
+      always @* begin
+        lemma_next: assert (m_s == 1 || (m != 0 && m_s == (m == MAX_TICKS ? KEPT : m) + 1));
+        lemma_carried: assert (core_carried == (m >= CARRIED));
+        lemma_reciprocal: assert (m == 0 || (core_r < m && product + core_r == C));
+      end
+    end
+  endgenerate
   always @* begin
     p4_update: assert (velocity_valid == update_);
     p4_interval: assert (!velocity_valid || (interval == m_s_ && forced == forced_));

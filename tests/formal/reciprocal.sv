@@ -3,9 +3,8 @@
 module reciprocal #(
     parameter MAX_TICKS = 16,
     parameter INTERVAL_WIDTH = 5,
-    parameter QUOTIENT_WIDTH = 4,
     parameter C = 8,
-    parameter DEPTH = 4  // of the table
+    parameter CARRIED = 4  // entries of the table; beyond it, Q and R are carried
 ) (
     input clk, input rst, input a, input b
 );
@@ -13,18 +12,18 @@ module reciprocal #(
   wire tick;
   tachometer core (.clk(clk), .rst(rst), .a(a), .b(b), .tick(tick));
   wire [I-1:0] core_m_s, core_r;
-  wire [QUOTIENT_WIDTH-1:0] core_q;
+  wire [$clog2(C):0] core_q;
   wire core_longest, core_carried;
 
   reg [I-1:0] m = 0;  // 0 before the first tick
   always @(posedge clk) m <= rst ? 0 : tick ? core_m_s : m;
-  wire [I+QUOTIENT_WIDTH-1:0] product = core_q * m;
+  wire [I+$clog2(C):0] product = core_q * m;
 
   always @* begin
     lemma_longest: assert (core_longest == (core_m_s == MAX_TICKS));
     lemma_m_s: assert (core_m_s >= 1 && core_m_s <= MAX_TICKS);
     lemma_next: assert (core_m_s == 1 || (m != 0 && core_m_s == (m == MAX_TICKS ? KEPT : m) + 1));
-    lemma_carried: assert (core_carried == (m >= DEPTH));
+    lemma_carried: assert (core_carried == (m >= CARRIED));
     p5_reciprocal: assert (m == 0 || (core_r < m && product + core_r == C));
   end
 endmodule
