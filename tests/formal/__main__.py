@@ -1,20 +1,73 @@
-"""Proves every property of the exported core, and that no proof holds for its mutants: `make formal`."""
+"""Proves every property of the exported core, and that no proof holds for its mutants: `make formal`.
+
+Names of proofs as arguments choose those and their mutants.
+"""
 
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from formal.cases import PROOFS
-from formal.prove import prepare, solve
+from formal.cases import MUTANTS, PROOFS, Mutant
+from formal.prove import Proof, Result, prepare, solve
+from support.mutant import mutant
 
-def main() -> int:
-    folder = Path("build/formal/run")
-    prepare(folder)
-    pick = sys.argv[1:]
-    jobs = [(f"proof{n}", p) for n, p in enumerate(PROOFS) if not pick or any(x in p.name for x in pick)]
-    with ThreadPoolExecutor(2) as pool:
-        for job, r in zip(jobs, pool.map(lambda j: solve(j[1], j[1].exported(), folder, j[0]), jobs)):
-            print(job[0], job[1].name, r, flush=True)
-    return 0
-sys.exit(main())
+_FOLDER = Path("build/formal")
+
+
+def _row(*cells: object) -> None:
+    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
+
+
+def _exported(proof: Proof, wrong: Mutant | None = None) -> str:
+    if wrong is None:
+        return proof.exported()
+    with mutant(wrong.box, wrong.right, wrong.wrong):
+        return proof.exported()
+
+
+def _properties(result: Result) -> str:
+    return ", ".join(f"`{name}`" for name in result.names if name.startswith("p"))
+
+
+def main(chosen: list[str]) -> bool:
+    """Whether all was as it should be; prints the tables."""
+    prepare(_FOLDER)
+    proofs = {proof.name: proof for proof in PROOFS if not chosen or proof.name in chosen}
+    mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs]
+    # Mutants exist one at a time, so they are exported before anything runs.
+    wrong_texts = [_exported(proofs[wrong.proof], wrong) for wrong in mutants]
+    fine = True
+    proven: set[str] = set()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        right = [
+            pool.submit(solve, proof, _exported(proof), _FOLDER, f"proof{number}")
+            for number, proof in enumerate(proofs.values())
+        ]
+        refuted = [
+            pool.submit(solve, proofs[wrong.proof], text, _FOLDER, f"mutant{number}", wrong.refuted, wrong.steps)
+            for number, (wrong, text) in enumerate(zip(mutants, wrong_texts, strict=True))
+        ]
+        _row("core", "properties", "induction", "seconds", "verdict")
+        _row(*["---"] * 5)
+        for proof, future in zip(proofs.values(), right, strict=True):
+            result = future.result()
+            fine &= result.verdict == "proven"
+            proven.update(name for name in result.names if name.startswith("p"))
+            _row(proof.name, _properties(result), f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
+        print()
+        _row("core", "property", "mutant", "refuted in", "seconds", "verdict")
+        _row(*["---"] * 6)
+        for wrong, future in zip(mutants, refuted, strict=True):
+            result = future.result()
+            fine &= result.verdict == "refuted"
+            change = f"{wrong.box.__name__}: `{wrong.right.strip()}` → `{wrong.wrong.strip()}`"
+            _row(wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
+    without = proven - {wrong.refuted for wrong in mutants}
+    if without:
+        print(f"\nwithout a mutant: {', '.join(sorted(without))}")
+    return fine and not without
+
+
+if __name__ == "__main__":
+    sys.exit(not main(sys.argv[1:]))

@@ -130,10 +130,11 @@ PROOFS = [
     method("eq. (17)", small(cancel=False)),
     method("eq. (21), 5 ticks", small(tick_cycles=3, max_ticks=5, max_count=3)),
     method("serial", small(tick_cycles=7), depth=14),
-    method("sums", core(40, 8, max_count=7), depth=2, without="p4_* */p5_velocity */p6_* */lemma_since"),
+    method("sums", core(40, 8, max_count=7), depth=2, without="p4_* */p5_velocity */p7_* */lemma_since"),
     method("carried", small(max_ticks=6), max_table=4),
     method("serial, carried", small(tick_cycles=12, max_ticks=6), max_table=4),
     reciprocal("2049 ticks", core(5, 2049, max_count=1)),
+    reciprocal("6 ticks", small(max_ticks=6), max_table=4),
 ]
 
 
@@ -147,3 +148,34 @@ class Mutant:
     right: str
     wrong: str
     steps: int = 24
+
+
+MUTANTS = [
+    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
+    Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
+    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~self.level_b", "~change_b & self.level_b"),
+    Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
+    Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
+    Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
+    Mutant("x2, 7 clocks", "p3_overflow", PulseCounter, "above.eq(value > ", "above.eq(value >= "),
+    Mutant("eq. (21)", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
+    Mutant("eq. (21)", "p4_interval", IntervalAccumulator, "self._kept_ticks + 1, self.m_s", "self._kept_ticks, self.m_s"),
+    Mutant("eq. (21)", "p4_range", IntervalAccumulator, "self.m_s == self._max_ticks - 1", "self.m_s == self._max_ticks"),
+    Mutant("eq. (21)", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
+    Mutant("eq. (21)", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
+    Mutant("eq. (21)", "p5_numerator", IntervalAccumulator, "opening - self.previous + d1", "opening - self.previous"),
+    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
+    Mutant("eq. (21)", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
+    Mutant("eq. (17)", "p5_velocity", PipelinedScaler, "= reciprocal.rounding", "= reciprocal.rounding >> 1"),
+    Mutant("serial", "p5_velocity", SerialScaler, "sign & bits[0]", "0"),
+    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "up = ~_reduce", "up = _reduce"),
+    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "signed(), ~remainder", "signed(), remainder", 32),
+    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
+    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
+    Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
+    Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "clocks_since_reset[-1]", "clocks_since_reset[-2]"),
+    Mutant("eq. (21)", "p7_stalled", IntervalAccumulator, "~(opening | self.previous).any()", "~self.previous.any()"),
+    Mutant("eq. (21)", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
+]

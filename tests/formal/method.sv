@@ -125,6 +125,7 @@ module method #(
     lemma_core: assert (core_m_s == m_s && core_longest == full && core_previous == previous && core_offset == offset);
     lemma_opening: assert (core_opening == opening);
     lemma_m_s: assert (m_s >= 1 && m_s <= MAX_TICKS && m_s == since + 1 + (after_forced ? KEPT : 0));
+    lemma_alike: assert (alike);
     lemma_offset: assert (m_s == 1 || offset == previous);
     lemma_stalled: assert (!after_stalled || (previous == 0 && offset == 0));
     lemma_since: assert ({since_update, was_forced, was_stalled} == {since_, after_forced_, after_stalled_});
@@ -156,10 +157,9 @@ module method #(
     p4_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_TICKS));
     p4_latest: assert (since_update < MAX_TICKS - (was_forced ? KEPT : 0));
     p4_held: assert (velocity_valid || outputs == held);
-    p5_alike: assert (alike);
     p5_numerator: assert (sum == reduced);
     p5_velocity: assert (!velocity_valid || (have <= wanted && wanted < have + divisor));
-    p6_stalled: assert (!velocity_valid || stalled == (forced && empty_));
-    p6_falls: assert (!(was_stalled && tick_ && pulse_count_ != 0) || (velocity_valid && !stalled));
+    p7_stalled: assert (!velocity_valid || stalled == (forced && empty_));
+    p7_falls: assert (!(was_stalled && tick_ && pulse_count_ != 0) || (velocity_valid && !stalled));
   end
 endmodule
