@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo icarus test size lint clean
+.PHONY: help venv demo icarus test formal size lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -32,6 +32,10 @@ $(VENV)/.size: $(VENV)/.run
 	$(BIN)/pip install -q --disable-pip-version-check -e '.[size]'
 	@touch $@
 
+$(VENV)/.formal: $(VENV)/.test
+	$(BIN)/pip install -q --disable-pip-version-check -e '.[formal]'
+	@touch $@
+
 venv: $(VENV)/.test ## the environment in .venv, with all that tests need
 
 demo: $(VENV)/.run ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
@@ -45,6 +49,9 @@ icarus: ## Icarus Verilog, installed with apt-get if it is missing
 
 test: $(VENV)/.test lint icarus ## lint, types and all tests
 	$(BIN)/pytest -q -n auto --dist worksteal
+
+formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
+	PYTHONPATH=tests $(BIN)/python -m formal
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
 	$(BIN)/python bench/size.py -o docs/size.md

@@ -16,7 +16,7 @@ _FOLDER = Path("build/formal")
 
 
 def _row(*cells: object) -> None:
-    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
+    print("| " + " | ".join(str(cell).replace("|", r"\|") for cell in cells) + " |", flush=True)
 
 
 def _exported(proof: Proof, wrong: Mutant | None = None) -> str:
@@ -63,7 +63,7 @@ def main(chosen: list[str]) -> bool:
             fine &= result.verdict == "refuted"
             change = f"{wrong.box.__name__}: `{wrong.right.strip()}` → `{wrong.wrong.strip()}`"
             _row(wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
-    without = proven - {wrong.refuted for wrong in mutants}
+    without = set() if chosen else proven - {wrong.refuted for wrong in mutants}
     if without:
         print(f"\nwithout a mutant: {', '.join(sorted(without))}")
     return fine and not without

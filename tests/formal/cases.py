@@ -36,12 +36,11 @@ def core(
 
 _FRONT_PROBES = {
     "core_clocks": "conditioner.clocks_since_reset",
-    "core_left": "sampling_clock.left",
     "core_count": "pulse_counter.count",
 }
+_WINDOW_PROBES = {"core_left": "sampling_clock.left"}
 _FILTER_PROBES = {"core_held_a": "conditioner.filter_a.held", "core_held_b": "conditioner.filter_b.held"}
 _METHOD_PROBES = {
-    "core_left": "sampling_clock.left",
     "core_count": "pulse_counter.count",
     "core_m_s": "datapath.interval.m_s",
     "core_longest": "datapath.interval.longest",
@@ -59,9 +58,9 @@ _CARRIED_PROBES = {
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
 
 
-def within(block: str, probes: dict[str, str]) -> dict[str, str]:
-    """Probes to wires of a generate block."""
-    return {f"{block}.{wire}": path for wire, path in probes.items()}
+def within(block: str, probes: dict[str, str], there: bool) -> dict[str, str]:
+    """Probes to wires of a generate block, if it is there."""
+    return {f"{block}.{wire}": path for wire, path in probes.items() if there}
 
 
 def front(name: str, spec: STachometer) -> Proof:
@@ -75,7 +74,8 @@ def front(name: str, spec: STachometer) -> Proof:
         "COUNT_WIDTH": spec.count_width,
         "POSITION_WIDTH": spec.position_width,
     }
-    probes = _FRONT_PROBES | (within("glitch", _FILTER_PROBES) if spec.filter_clocks else {})
+    probes = _FRONT_PROBES | within("glitch", _FILTER_PROBES, spec.filter_clocks > 0)
+    probes |= within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
     return Proof(name, spec, "front", parameters, probes, depth=5)
 
 
@@ -97,8 +97,9 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         "CANCEL": int(spec.cancel),
         "TICK_TO_VELOCITY": latency,
     }
-    probes = _METHOD_PROBES | (within("serial", _SERIAL_PROBES) if serial and carried else {})
-    probes |= within("carried", _CARRIED_PROBES) if carried else {}
+    probes = _METHOD_PROBES | within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
+    probes |= within("carried", _CARRIED_PROBES, bool(carried))
+    probes |= within("serial", _SERIAL_PROBES, bool(carried) and serial)
     return Proof(name, spec, "method", parameters | carried, probes, depth or latency + 2, without, max_table)
 
 
@@ -124,13 +125,22 @@ PROOFS = [
     front("x4, 960 clocks", core(960, max_count=20)),
     front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
     front("x4, 2 clocks", core(2)),
+    front("x4, 1 clock", core(1)),
     front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
     front("x1, filter 1", core(7, max_count=2, decoding=1, filter_clocks=1)),
     method("eq. (21)", small()),
     method("eq. (17)", small(cancel=False)),
     method("eq. (21), 5 ticks", small(tick_cycles=3, max_ticks=5, max_count=3)),
+    method("eq. (21), 1 clock", small(tick_cycles=1)),
+    method("eq. (21), 8 ticks", small(max_ticks=8, max_count=2, frac_bits=6)),
     method("serial", small(tick_cycles=7), depth=14),
     method("sums", core(40, 8, max_count=7), depth=2, without="p4_* */p5_velocity */p7_* */lemma_since"),
+    method(
+        "sums of eq. (17)",
+        core(40, 8, max_count=7, cancel=False),
+        depth=2,
+        without="p4_* */p5_velocity */p7_* */lemma_since",
+    ),
     method("carried", small(max_ticks=6), max_table=4),
     method("serial, carried", small(tick_cycles=12, max_ticks=6), max_table=4),
     reciprocal("2049 ticks", core(5, 2049, max_count=1)),
@@ -140,7 +150,7 @@ PROOFS = [
 
 @dataclass(frozen=True)
 class Mutant:
-    """`right` in the source of `box` made `wrong`, which violates `refuted` within `steps` clocks of the proof's core."""
+    """`right` in the source of `box` made `wrong`: violates `refuted` within `steps` clocks in the proof's core."""
 
     proof: str
     refuted: str
@@ -161,15 +171,21 @@ MUTANTS = [
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
     Mutant("x2, 7 clocks", "p3_overflow", PulseCounter, "above.eq(value > ", "above.eq(value >= "),
     Mutant("eq. (21)", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
-    Mutant("eq. (21)", "p4_interval", IntervalAccumulator, "self._kept_ticks + 1, self.m_s", "self._kept_ticks, self.m_s"),
-    Mutant("eq. (21)", "p4_range", IntervalAccumulator, "self.m_s == self._max_ticks - 1", "self.m_s == self._max_ticks"),
+    Mutant(
+        "eq. (21)", "p4_interval", IntervalAccumulator, "self._kept_ticks + 1, self.m_s", "self._kept_ticks, self.m_s"
+    ),
+    Mutant(
+        "eq. (21)", "p4_range", IntervalAccumulator, "self.m_s == self._max_ticks - 1", "self.m_s == self._max_ticks"
+    ),
     Mutant("eq. (21)", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
     Mutant("eq. (21)", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
     Mutant("eq. (21)", "p5_numerator", IntervalAccumulator, "opening - self.previous + d1", "opening - self.previous"),
     Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
     Mutant("eq. (21)", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
     Mutant("eq. (17)", "p5_velocity", PipelinedScaler, "= reciprocal.rounding", "= reciprocal.rounding >> 1"),
-    Mutant("serial", "p5_velocity", SerialScaler, "sign & bits[0]", "0"),
+    Mutant(
+        "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
+    ),
     Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "up = ~_reduce", "up = _reduce"),
     Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "signed(), ~remainder", "signed(), remainder", 32),
     Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),

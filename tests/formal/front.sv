@@ -22,7 +22,6 @@ module front #(
   );
   localparam READY = FILTER == 0 ? 3 : 4;  // clocks after reset
   wire [READY-1:0] core_clocks;
-  wire signed [$clog2(T - 1):0] core_left;
   wire signed [$clog2(T + 1):0] core_count;
 
   // The conditioned pins: two flip-flops, then a filter that follows when the last FILTER levels all differ from it.
@@ -115,10 +114,16 @@ module front #(
 
   // Lemmas: what the induction needs to know of the state.
   wire signed [W:0] elapsed = $signed({1'b0, clock});
+  generate
+    if (T > 1) begin : window
+      wire signed [$clog2(T - 1):0] core_left;
+      always @* lemma_window: assert (core_left == T - 2 - elapsed);
+    end
+  endgenerate
   wire [READY-1:0] thermometer = (1 << clocks) - 1;
   always @* begin
     lemma_clocks: assert (clocks <= 4 && core_clocks == thermometer);
-    lemma_window: assert (clock < T && core_left == T - 2 - elapsed);
+    lemma_clock: assert (clock < T);
     lemma_open: assert (open <= elapsed && -open <= elapsed);
     lemma_count: assert (core_count == (clock == 0 ? sum : open));
     lemma_quarters: assert (quarters[1:0] == past - {skipped, 1'b0});

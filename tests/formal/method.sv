@@ -30,7 +30,6 @@ module method #(
   wire core_longest;
   wire signed [COUNT_WIDTH-1:0] core_opening, core_previous, core_offset;
   wire signed [NUMERATOR_WIDTH-1:0] core_numerator;
-  wire signed [$clog2(T - 1):0] core_left;
   wire signed [$clog2(T + 1):0] core_count;
 
   // m_e(i-1) ... m_e(i-max_ticks); zeros before reset. m_s = i - a, by the rules of the alteration.
@@ -118,8 +117,14 @@ module method #(
   reg [$clog2(T):0] clock = 0;
   always @(posedge clk) clock <= rst || clock == T - 1 ? 0 : clock + 1;
   wire signed [$clog2(T)+1:0] elapsed = $signed({1'b0, clock}), most = clock == 0 ? T : elapsed;
+  generate
+    if (T > 1) begin : window
+      wire signed [$clog2(T - 1):0] core_left;
+      always @* lemma_window: assert (core_left == T - 2 - elapsed);
+    end
+  endgenerate
   always @* begin
-    lemma_window: assert (clock < T && core_left == T - 2 - elapsed);
+    lemma_clock: assert (clock < T);
     lemma_count: assert (core_count <= most && -core_count <= most);
     lemma_bounded: assert (bounded && offset <= MAX_COUNT && -offset <= MAX_COUNT);
     lemma_core: assert (core_m_s == m_s && core_longest == full && core_previous == previous && core_offset == offset);
