@@ -130,7 +130,7 @@ PROOFS = [
     front("x1, filter 1", core(7, max_count=2, decoding=1, filter_clocks=1)),
     method("eq. (21)", small()),
     method("eq. (17)", small(cancel=False)),
-    method("eq. (21), 5 ticks", small(tick_cycles=3, max_ticks=5, max_count=3)),
+    method("eq. (21), 5 ticks", small(max_ticks=5)),
     method("eq. (21), 1 clock", small(tick_cycles=1)),
     method("eq. (21), 8 ticks", small(max_ticks=8, max_count=2, frac_bits=6)),
     method("serial", small(tick_cycles=7), depth=14),
