@@ -132,8 +132,8 @@ PROOFS = [
     method("eq. (17)", small(cancel=False)),
     method("eq. (21), 5 ticks", small(max_ticks=5)),
     method("eq. (21), 1 clock", small(tick_cycles=1)),
-    method("eq. (21), 8 ticks", small(max_ticks=8, max_count=2, frac_bits=6)),
-    method("serial", small(tick_cycles=7), depth=14),
+    method("eq. (21), 16 ticks", small(max_ticks=16)),
+    method("serial", small(tick_cycles=7, max_ticks=16), depth=14),
     method("sums", core(40, 8, max_count=7), depth=2, without="p4_* */p5_velocity */p7_* */lemma_since"),
     method(
         "sums of eq. (17)",
@@ -171,9 +171,7 @@ MUTANTS = [
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
     Mutant("x2, 7 clocks", "p3_overflow", PulseCounter, "above.eq(value > ", "above.eq(value >= "),
     Mutant("eq. (21)", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
-    Mutant(
-        "eq. (21)", "p4_interval", IntervalAccumulator, "self._kept_ticks + 1, self.m_s", "self._kept_ticks, self.m_s"
-    ),
+    Mutant("eq. (21)", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
     Mutant(
         "eq. (21)", "p4_range", IntervalAccumulator, "self.m_s == self._max_ticks - 1", "self.m_s == self._max_ticks"
     ),
