@@ -107,6 +107,7 @@ def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Pr
     """The carried reciprocal."""
     with patch("tachometry.spec.s_method.MAX_TABLE", max_table or 2048):
         carried = spec.reciprocal
+    assert isinstance(carried, CarriedSpec)
     parameters = {
         "MAX_TICKS": spec.timing.max_ticks,
         "INTERVAL_WIDTH": spec.interval_width,
@@ -128,7 +129,6 @@ PROOFS = [
     front("x4, 1 clock", core(1)),
     front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
     front("x1, filter 1", core(7, max_count=2, decoding=1, filter_clocks=1)),
-    method("eq. (21)", small()),
     method("eq. (17)", small(cancel=False)),
     method("eq. (21), 5 ticks", small(max_ticks=5)),
     method("eq. (21), 1 clock", small(tick_cycles=1)),
@@ -170,16 +170,26 @@ MUTANTS = [
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
     Mutant("x2, 7 clocks", "p3_overflow", PulseCounter, "above.eq(value > ", "above.eq(value >= "),
-    Mutant("eq. (21)", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
-    Mutant("eq. (21)", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
+    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
+    Mutant("eq. (21), 1 clock", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
     Mutant(
-        "eq. (21)", "p4_range", IntervalAccumulator, "self.m_s == self._max_ticks - 1", "self.m_s == self._max_ticks"
+        "eq. (21), 1 clock",
+        "p4_range",
+        IntervalAccumulator,
+        "self.m_s == self._max_ticks - 1",
+        "self.m_s == self._max_ticks",
     ),
-    Mutant("eq. (21)", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
-    Mutant("eq. (21)", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
-    Mutant("eq. (21)", "p5_numerator", IntervalAccumulator, "opening - self.previous + d1", "opening - self.previous"),
+    Mutant("eq. (21), 1 clock", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
+    Mutant("eq. (21), 1 clock", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p5_numerator",
+        IntervalAccumulator,
+        "opening - self.previous + d1",
+        "opening - self.previous",
+    ),
     Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
-    Mutant("eq. (21)", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
+    Mutant("eq. (21), 1 clock", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
     Mutant("eq. (17)", "p5_velocity", PipelinedScaler, "= reciprocal.rounding", "= reciprocal.rounding >> 1"),
     Mutant(
         "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
@@ -190,6 +200,12 @@ MUTANTS = [
     Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
     Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "clocks_since_reset[-1]", "clocks_since_reset[-2]"),
-    Mutant("eq. (21)", "p7_stalled", IntervalAccumulator, "~(opening | self.previous).any()", "~self.previous.any()"),
-    Mutant("eq. (21)", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p7_stalled",
+        IntervalAccumulator,
+        "~(opening | self.previous).any()",
+        "~self.previous.any()",
+    ),
+    Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
 ]
