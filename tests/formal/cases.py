@@ -129,7 +129,7 @@ PROOFS = [
     front("x4, 1 clock", core(1)),
     front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
     front("x1, filter 1", core(7, max_count=2, decoding=1, filter_clocks=1)),
-    method("eq. (17)", small(max_ticks=32, cancel=False)),
+    method("eq. (17)", small(cancel=False)),
     method("eq. (21), 5 ticks", small(max_ticks=5)),
     method("eq. (21), 1 clock", small(tick_cycles=1)),
     method("eq. (21), 16 ticks", small(tick_cycles=1, max_ticks=16)),
