@@ -3,12 +3,14 @@
 import functools
 import re
 from collections.abc import Callable
+from dataclasses import Field
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import METHODS, Encoder, Speed, Timing
+from tachometry.spec.option import options_of
 from tachometry.spec.timing import whole_clocks
 from tachometry.spec.velocity_output import NATIVE, UNITS, parse_lsb
 
@@ -52,11 +54,12 @@ _SAME_NAME = (
     "speeds",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
+_OPTIONS |= {item.name: f"--{item.name.replace('_', '-')}" for spec in METHODS.values() for item in options_of(spec)}
 
 
 def in_terms_of_options(message: str) -> str:
     """A message about a parameter, such as `max_ticks must be …`, as one about its option."""
-    return re.sub(r"^\w+(?= (?:\w+ )?must )", lambda match: _OPTIONS.get(match[0], match[0]), message)
+    return re.sub(r"^[\w-]+(?= (?:\w+ )?must )", lambda match: _OPTIONS.get(match[0], match[0]), message)
 
 
 class Option(click.Option):
@@ -154,9 +157,10 @@ _CORE_OPTIONS = [
     option(
         _CORE,
         "--method",
-        type=click.Choice(["s"]),
+        type=click.Choice(list(METHODS)),
         default="s",
-        help="How velocity is measured: s averages in step with the alterations of the pulse number (Tsuji 2009).",
+        help="How velocity is measured: s averages in step with the alterations of the pulse number, m counts the "
+        "pulses of a tick or some (Tsuji 2009).",
     ),
     option(
         _CORE,
@@ -183,12 +187,6 @@ _CORE_OPTIONS = [
         metavar="N",
         help="Bits of the velocity, 8 to 64; what does not fit saturates, and velocity_overflow is flagged. "
         "[default: as many as it can need]",
-    ),
-    option(
-        _CORE,
-        "--cancel/--no-cancel",
-        default=True,
-        help="Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).",
     ),
     option(
         _CORE,
@@ -233,13 +231,50 @@ def _max_tick_cycles(timing: Timing, external: bool, period: str | None) -> int 
     return 2 * timing.tick_cycles if period is None else whole_clocks("max_tick_period", period, timing.clock_hz)
 
 
+def _method_options() -> dict[str, dict[str, Field[Any]]]:
+    """Fields that are options of methods: by the option, then by the method."""
+    found: dict[str, dict[str, Field[Any]]] = {}
+    for method, spec in METHODS.items():
+        for item in options_of(spec):
+            found.setdefault(item.metadata["option"]["name"] or item.name.replace("_", "-"), {})[method] = item
+    return found
+
+
+def _method_option(name: str, items: dict[str, Field[Any]]) -> Callable[[Any], Any]:
+    """The option of one or several methods; without a default, so that it is seen where it does not belong."""
+    item = next(iter(items.values()))
+    about = item.metadata["option"]
+    default = item.default
+    shown = (name if default else f"no-{name}") if isinstance(default, bool) else default
+    help_ = f"{about['help']} [default: {shown}]" if default is not None else about["help"]
+    kind: Any = click.Choice(about["choices"]) if about["choices"] else int if type(default) is int else str
+    words = [f"--{name}/--no-{name}"] if isinstance(default, bool) else [f"--{name}"]
+    more = {} if isinstance(default, bool) else {"type": kind, "metavar": about["metavar"]}
+    group = f"Method {' and '.join(items)}"
+    return option(group, *words, f"method_{name.replace('-', '_')}", default=None, help=help_, **more)
+
+
+def _method_values(method: str, timing: Timing, given: dict[str, Any]) -> dict[str, Any]:
+    """Values of the method's fields; what is taken out of `given`."""
+    values = {}
+    for name, items in _method_options().items():
+        value = given.pop(f"method_{name.replace('-', '_')}")
+        if value is None:
+            continue
+        if method not in items:
+            raise ValueError(f"{name} must not be given with --method {method}: it is for {' and '.join(items)}")
+        parse = items[method].metadata["option"]["parse"]
+        values[items[method].name] = parse(value, timing) if parse else value
+    return values
+
+
 def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator: the options of the core, handed to the command as one argument `spec`."""
 
     @functools.wraps(command)
     def build(
         *,
-        method: str,  # there is only one to choose
+        method: str,
         ppr: int,
         decoding: int,
         clock: str,
@@ -248,7 +283,6 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
         unit: str,
         frac_bits: int | None,
         lsb: str | None,
-        cancel: bool,
         max_speed: str | None,
         external_tick: bool,
         max_tick_period: str | None,
@@ -259,19 +293,20 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
             frac_bits = (16 if unit == NATIVE else 10) if lsb is None else parse_lsb(lsb)
         elif lsb is not None:
             raise ValueError("lsb must not be given together with --frac-bits")
-        spec = STachometer(
+        values = _method_values(method, timing, others)
+        spec = METHODS[method](
             encoder=Encoder(ppr, decoding),
             timing=timing,
             unit=unit,
             frac_bits=frac_bits,
             max_speed=None if max_speed is None else Speed.parse(max_speed),
-            cancel=cancel,
             max_tick_cycles=_max_tick_cycles(timing, external_tick, max_tick_period),
             **{name: others.pop(name) for name in _PASSED},
+            **values,
         )
         return command(spec=spec, **others)
 
-    return _with(_CORE_OPTIONS, build)
+    return _with([*_CORE_OPTIONS, *(_method_option(*item) for item in _method_options().items())], build)
 
 
 def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:

@@ -52,6 +52,8 @@ def plan(spec: STachometer, speeds: str | None, plot: Path | None, csv: Path | N
 
     Equal options give equal files.
     """
+    if not isinstance(spec, STachometer):
+        raise ValueError(f"method must be s for a plan, not {spec.method}")
     targets = {what: path for what, path in (("--plot", plot), ("--csv", csv)) if path is not None}
     outputs = Outputs(targets)
     low, high, unit = _range(spec, speeds)

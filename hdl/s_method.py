@@ -15,7 +15,7 @@ from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec import STachometer, carried_reciprocal
 
 
-class SMethod(wiring.Component):
+class Datapath(wiring.Component):
     """S-method datapath, eqs. (17) and (21) of Tsuji 2009: from pulse numbers to velocity without a divider.
 
     Latency: `velocity_valid` is high `spec.tick_to_velocity` clocks after `tick`. The velocity is correctly rounded:

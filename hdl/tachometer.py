@@ -1,8 +1,9 @@
 """The whole core."""
 
+from importlib import import_module
 from typing import Any
 
-from amaranth import Cat, Module, signed
+from amaranth import Cat, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -12,12 +13,14 @@ from tachometry.hdl.external_tick import ExternalTick
 from tachometry.hdl.index_capture import IndexCapture
 from tachometry.hdl.position_counter import PositionCounter
 from tachometry.hdl.pulse_counter import PulseCounter
-from tachometry.hdl.s_method import SMethod
 from tachometry.hdl.sampling_clock import SamplingClock
 from tachometry.hdl.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.spec import TachometerSpec
 
-DATAPATHS: dict[str, Any] = {"s": SMethod}
+
+def datapath(spec: TachometerSpec) -> Any:
+    """The datapath of the spec's method."""
+    return import_module(f"tachometry.hdl.{spec.module}").Datapath(spec)
 
 
 class Tachometer(wiring.Component):
@@ -49,19 +52,22 @@ class Tachometer(wiring.Component):
         )
         self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
-        self.sampling_clock: Any = (
-            ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles)
-            if spec.max_tick_cycles
-            else SamplingClock(spec.timing.tick_cycles)
-        )
         self.pulse_counter = PulseCounter(spec.longest_tick, spec.max_count)
         self.position_counter = PositionCounter(spec.position_width)
         self.index_capture = IndexCapture(spec.position_width) if spec.index else None
-        self.datapath = DATAPATHS[spec.method](spec)
+        self.datapath = datapath(spec)
+        self.sampling_clock: Any = (
+            self.datapath
+            if spec.own_ticks
+            else ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles)
+            if spec.max_tick_cycles
+            else SamplingClock(spec.timing.tick_cycles)
+        )
         self.velocity_output: Any = None
         if spec.output is not None:
             box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
-            self.velocity_output = box(spec.output, native_width=spec.native_width, tag_width=spec.interval_width + 2)
+            tags = spec.interval_width + 2 + sum(port.width for port in spec.method_ports)
+            self.velocity_output = box(spec.output, native_width=spec.native_width, tag_width=tags)
 
     @property
     def spec(self) -> TachometerSpec:
@@ -72,10 +78,12 @@ class Tachometer(wiring.Component):
         m = Module()
         m.submodules.conditioner = conditioner = self.conditioner
         m.submodules.decoder = decoder = self.decoder
-        m.submodules.sampling_clock = sampling_clock = self.sampling_clock
         m.submodules.pulse_counter = pulse_counter = self.pulse_counter
         m.submodules.position_counter = position_counter = self.position_counter
         m.submodules.datapath = datapath = self.datapath
+        sampling_clock = self.sampling_clock
+        if not self._spec.own_ticks:
+            m.submodules.sampling_clock = sampling_clock
         m.d.comb += [
             conditioner.a.eq(self.a),
             conditioner.b.eq(self.b),
@@ -93,20 +101,26 @@ class Tachometer(wiring.Component):
             datapath.tick.eq(self.tick),
             datapath.pulse_count.eq(self.pulse_count),
         ]
-        tags = [self.interval, self.forced, self.stalled]
-        found = Cat(datapath.interval, datapath.forced, datapath.stalled)
+        names = ["interval", "forced", "stalled", *(port.name for port in self._spec.method_ports)]
+        tags, found = ([getattr(side, name) for name in names] for side in (self, datapath))
+        if self._spec.own_ticks:
+            m.d.comb += datapath.step_now.eq(decoder.step)
+        if "step" in datapath.signature.members:
+            # As late as `tick`: with it, all steps of the window have come.
+            late = Signal.like(decoder.step)
+            m.d.sync += [late.eq(decoder.step), datapath.step.eq(late)]
         if self.velocity_output is None:
             m.d.comb += [
                 self.velocity.eq(datapath.velocity),
                 self.velocity_valid.eq(datapath.velocity_valid),
-                Cat(tags).eq(found),
+                Cat(tags).eq(Cat(found)),
             ]
         else:
             m.submodules.velocity_output = output = self.velocity_output
             m.d.comb += [
                 output.start.eq(datapath.velocity_valid),
                 output.native.eq(datapath.velocity),
-                output.tag.eq(found),
+                output.tag.eq(Cat(found)),
                 self.velocity.eq(output.velocity),
                 self.velocity_valid.eq(output.done),
                 self.velocity_overflow.eq(output.velocity_overflow),

@@ -1,7 +1,7 @@
 """What a core shows at its ports, as arrays: the common language of engines and golden models."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,8 @@ class Updates:
     forced, stalled : bool arrays, shape (n,)
     velocity_overflow : bool array, shape (n,)
         The velocity was saturated; never where it is as wide as it can need.
+    more : dict of str to array, shape (n,)
+        Outputs of the method.
     """
 
     clock: NDArray[np.int64]
@@ -54,6 +56,7 @@ class Updates:
     forced: NDArray[np.bool_]
     stalled: NDArray[np.bool_]
     velocity_overflow: NDArray[np.bool_]
+    more: dict[str, NDArray[Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -118,12 +121,13 @@ def observed(spec: TachometerSpec, n_clocks: int, rows: NDArray[np.int64]) -> Ru
         return [columns.get(name, absent)[high] for name in names]
 
     def group(strobe: str, kind: type[Any]) -> Any:
-        return kind(*at(strobe, (field.name for field in fields(kind))))
+        return kind(*at(strobe, (item.name for item in fields(kind) if item.name != "more")))
 
+    more = [port.name for port in spec.method_ports]
     return Run(
         n_clocks,
         group("tick", Ticks),
-        group("velocity_valid", Updates),
+        replace(group("velocity_valid", Updates), more=dict(zip(more, at("velocity_valid", more), strict=True))),
         group("index_valid", Index),
         *at("decode_error", ["clock"]),
         *at("tick_error", ["clock"]),
@@ -157,7 +161,8 @@ def compare(expected: Run, actual: Run) -> tuple[int, list[Mismatch]]:
     pairs = [(name, getattr(expected, name), getattr(actual, name)) for name in ("errors", "tick_errors")]
     for group in ("ticks", "updates", "index"):
         left, right = getattr(expected, group), getattr(actual, group)
-        pairs += [(f"{group}.{f.name}", getattr(left, f.name), getattr(right, f.name)) for f in fields(left)]
+        rows = [{**vars(side), **vars(side).get("more", {})} for side in (left, right)]
+        pairs += [(f"{group}.{name}", rows[0][name], rows[1][name]) for name in rows[0] if name != "more"]
     for signal, left, right in pairs:
         common = min(len(left), len(right))
         differ = np.flatnonzero(left[:common] != right[:common])

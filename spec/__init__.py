@@ -1,9 +1,13 @@
 """What is to be built: frozen objects that hardware, golden models, manifest and documents all read."""
 
 from tachometry.spec.encoder import Encoder
+from tachometry.spec.m_method import MTachometer
 from tachometry.spec.s_method import STachometer
 from tachometry.spec.tachometer import Port, TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed
 
-__all__ = ["Encoder", "Port", "STachometer", "Speed", "TachometerSpec", "Timing"]
+# Every method by its name. The spec names the module that holds `Datapath` in hdl/ and `Model` in sim/golden/.
+METHODS: dict[str, type[TachometerSpec]] = {spec.method: spec for spec in (STachometer, MTachometer)}
+
+__all__ = ["METHODS", "Encoder", "MTachometer", "Port", "STachometer", "Speed", "TachometerSpec", "Timing"]

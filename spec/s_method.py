@@ -1,9 +1,9 @@
 """The S method of Tsuji 2009, Sec. V."""
 
 from dataclasses import dataclass
-from typing import Any
 
 from tachometry.spec.carried_reciprocal import CarriedReciprocal
+from tachometry.spec.option import option
 from tachometry.spec.reciprocal import Reciprocal
 from tachometry.spec.tachometer import TachometerSpec, signed_width
 
@@ -28,9 +28,10 @@ class STachometer(TachometerSpec):
         If a parameter is out of range.
     """
 
-    cancel: bool = True
+    cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).")
 
     method = "s"
+    module = "s_method"
 
     @property
     def kept_ticks(self) -> int:
@@ -84,7 +85,3 @@ class STachometer(TachometerSpec):
         reciprocal = self.reciprocal
         digits = reciprocal.digits if isinstance(reciprocal, CarriedReciprocal) else 0
         return self.numerator_width + digits + 3
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        return super().parameters | {"cancel": self.cancel}

@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from tachometry.spec.encoder import Encoder
+from tachometry.spec.option import options_of
 from tachometry.spec.timing import MAX_TICK_CYCLES, Timing
 from tachometry.spec.units import Speed
 from tachometry.spec.velocity_output import NATIVE, UNITS, VelocityOutput, per_count
@@ -82,7 +83,11 @@ class TachometerSpec:
     index_reset: bool = False
     max_tick_cycles: int | None = None
 
+    # Name of the method, and of the modules that hold its datapath (in hdl/) and its golden model (in sim/golden/).
     method: ClassVar[str]
+    module: ClassVar[str]
+    # Whether the method ends the ticks itself, by what it counts.
+    own_ticks: ClassVar[bool] = False
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
 
@@ -94,6 +99,8 @@ class TachometerSpec:
             raise ValueError(f"filter_clocks must be from 0 to 255, not {self.filter_clocks}")
         if self.index_reset and not self.index:
             raise ValueError("index_reset must be given together with an index")
+        if self.own_ticks and self.max_tick_cycles is not None:
+            raise ValueError(f"method must be another than {self.method} for an external tick: it makes its own")
         if self.max_tick_cycles is not None:
             shortest = self.timing.tick_cycles
             if shortest < 2:
@@ -240,6 +247,11 @@ class TachometerSpec:
         return self.datapath_latency + self.output_latency
 
     @property
+    def method_ports(self) -> tuple[Port, ...]:
+        """Outputs of the method that change only with `velocity_valid`."""
+        return ()
+
+    @property
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order; method-specific ones come last."""
         return (
@@ -260,6 +272,7 @@ class TachometerSpec:
             Port("overflow", "output"),
             Port("stalled", "output"),
             *([Port("velocity_overflow", "output")] if self.output else []),
+            *self.method_ports,
             *([Port("index_valid", "output")] if self.index else []),
             *([Port("index_position", "output", self.position_width, signed=True)] if self.index else []),
             *([Port("tick_error", "output")] if self.max_tick_cycles else []),
@@ -269,7 +282,7 @@ class TachometerSpec:
     @property
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults included."""
-        return {
+        common = {
             "method": self.method,
             "pulses_per_rev": self.encoder.pulses_per_rev,
             "decoding": self.encoder.decoding,
@@ -286,6 +299,7 @@ class TachometerSpec:
             "index_reset": self.index_reset,
             "max_tick_cycles": self.max_tick_cycles,
         }
+        return common | {item.name: getattr(self, item.name) for item in options_of(type(self))}
 
     def seconds(self, clocks: int) -> Fraction:
         """A number of clocks in seconds, exactly."""

@@ -6,23 +6,26 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
+import pytest
 from support.lockstep import EVENTS, lockstep
 
 from tachometry.sim.pysim import PySim
+from tachometry.spec import METHODS
 
-SEEDS = range(200)
-TABLE = Path(__file__).parent.parent / "build" / "lockstep_coverage.txt"
+SEEDS = {"s": range(200)} | {method: range(100) for method in METHODS if method != "s"}
+TABLES = Path(__file__).parent.parent / "build"
 
 
-def test_random_motions() -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_random_motions(method: str) -> None:
     problems: list[str] = []
     coverage: Counter[str] = Counter()
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        for wrong, found in pool.map(partial(lockstep, engine=PySim()), SEEDS):
+        for wrong, found in pool.map(partial(lockstep, method=method, engine=PySim()), SEEDS[method]):
             problems += wrong
             coverage += found
-    table = "\n".join(f"{event:<26}{coverage[event]:>9}" for event in EVENTS)
-    TABLE.parent.mkdir(exist_ok=True)
-    TABLE.write_text(f"{table}\n")
+    table = "\n".join(f"{event:<26}{coverage[event]:>9}" for event in EVENTS[method])
+    TABLES.mkdir(exist_ok=True)
+    (TABLES / f"lockstep_coverage_{method}.txt").write_text(f"{table}\n")
     assert not problems, "\n".join(problems[:20])
-    assert all(coverage[event] for event in EVENTS), table
+    assert all(coverage[event] for event in EVENTS[method]), table

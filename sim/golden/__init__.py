@@ -1,21 +1,32 @@
 """Golden models: exact integers over whole recordings, from the papers and the spec alone."""
 
+from importlib import import_module
 from typing import Any
 
-from tachometry.sim.golden.front_end import count
+import numpy as np
+
+from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.golden.output import in_unit
-from tachometry.sim.golden.s_method import SModel
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.recording import PinTrace
 from tachometry.sim.results import Run
 from tachometry.spec import TachometerSpec
 
-MODELS: dict[str, Any] = {"s": SModel}
+
+def model(spec: TachometerSpec) -> Any:
+    """The golden model of the spec's method."""
+    return import_module(f"tachometry.sim.golden.{spec.module}").Model(spec)
 
 
 def run(spec: TachometerSpec, trace: PinTrace) -> Run:
     """What the core of `spec` must show at its ports for these pins."""
-    last, tick_errors = windows(spec, trace)
-    ticks, index, errors = count(spec, trace, last)
-    updates = MODELS[spec.method](spec).updates(ticks, trace.n_clocks)
-    return Run(trace.n_clocks, ticks, in_unit(spec, updates), index, errors, tick_errors)
+    steps = decoded(spec, trace)
+    golden = model(spec)
+    last, tick_errors = (
+        (golden.windows(steps, trace.n_clocks - spec.tick_latency), np.empty(0, dtype=np.int64))
+        if spec.own_ticks
+        else windows(spec, trace)
+    )
+    ticks, index = count(spec, steps, last, trace.n_clocks)
+    updates = golden.updates(ticks, steps, trace.n_clocks)
+    return Run(trace.n_clocks, ticks, in_unit(spec, updates), index, steps.errors, tick_errors)

@@ -1,6 +1,7 @@
 """Golden front end: from sampled levels to steps, pulse numbers and positions."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,36 +78,63 @@ def filter_lines(trace: PinTrace, names: Sequence[str], clocks: int) -> tuple[Pi
     return PinTrace(common, n_clocks=trace.n_clocks, **lines), returned
 
 
-def count(spec: TachometerSpec, trace: PinTrace, last: NDArray[np.int64]) -> tuple[Ticks, Index, NDArray[np.int64]]:
-    """Pulse numbers and positions of all ticks, and positions at the index.
+@dataclass(frozen=True)
+class Steps:
+    """What the decoder sees, on the core's clock.
 
     Parameters
     ----------
-    spec : TachometerSpec
-    trace : PinTrace
-    last : int64 array
-        Last clock of each window.
-
-    Returns
-    -------
-    ticks : Ticks
-    index : Index
+    clock : int64 array, shape (n,)
+        Clocks, increasing, with a step or where a line changes without one.
+    step : int64 array, shape (n,)
+        −1, 0 or +1.
     errors : int64 array
         Clocks in which `decode_error` is high.
+    index : int64 array
+        Clocks in which Z rises; none without an index.
+    swallowed : int64 array
+        Clocks in which the glitch filter has counted a glitch.
     """
+
+    clock: NDArray[np.int64]
+    step: NDArray[np.int64]
+    errors: NDArray[np.int64]
+    index: NDArray[np.int64]
+    swallowed: NDArray[np.int64]
+
+
+def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
+    """Conditioned and decoded lines."""
     returned = np.empty(0, dtype=np.int64)
     if spec.filter_clocks:
         trace, returned = filter_lines(trace, ("a", "b", "z") if spec.index else ("a", "b"), spec.filter_clocks)
     step, illegal = decode(trace.a, trace.b, spec.encoder.decoding)
     at = trace.clock[1:] + spec.pin_to_count
-    total = np.concatenate([[0], np.cumsum(step)])  # total[k] = sum of the first k steps
+    errors = at[illegal]
+    rises = at[:0] if trace.z is None or not spec.index else at[(trace.z[1:] == 1) & (trace.z[:-1] == 0)]
+    # Two clocks for the synchroniser, one for the counter of glitches.
+    return Steps(at, step, errors[errors < trace.n_clocks], rises, returned + 3)
+
+
+def count(spec: TachometerSpec, steps: Steps, last: NDArray[np.int64], n_clocks: int) -> tuple[Ticks, Index]:
+    """Pulse numbers and positions of all ticks, and positions at the index.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    steps : Steps
+    last : int64 array
+        Last clock of each window.
+    n_clocks : int
+    """
+    total = np.concatenate([[0], np.cumsum(steps.step)])  # total[k] = sum of the first k steps
 
     def steps_through(clock: NDArray[np.int64]) -> NDArray[np.int64]:
-        return total[np.searchsorted(at, clock, side="right")]
+        return total[np.searchsorted(steps.clock, clock, side="right")]
 
     reached = steps_through(last)
     sums = np.diff(reached, prepend=0)
-    rises = at[:0] if trace.z is None or not spec.index else at[(trace.z[1:] == 1) & (trace.z[:-1] == 0)]
+    rises = steps.index
     captured = steps_through(rises)
     # What is taken off the position: before any index, and after each.
     origin = np.append(0, captured) if spec.index_reset else np.zeros(len(rises) + 1, dtype=np.int64)
@@ -116,8 +144,7 @@ def count(spec: TachometerSpec, trace: PinTrace, last: NDArray[np.int64]) -> tup
         return (position + half) % (2 * half) - half
 
     strobe = last + spec.tick_latency
-    # Two clocks for the synchroniser, one for the counter.
-    glitches = np.searchsorted(returned + 3, strobe, side="right")
+    glitches = np.searchsorted(steps.swallowed, strobe, side="right")
     ticks = Ticks(
         clock=strobe,
         pulse_count=np.clip(sums, -spec.max_count, spec.max_count),
@@ -125,7 +152,5 @@ def count(spec: TachometerSpec, trace: PinTrace, last: NDArray[np.int64]) -> tup
         overflow=np.abs(sums) > spec.max_count,
         swallowed_edges=2 * np.minimum(glitches, (1 << 15) - 1),
     )
-    seen = rises + spec.tick_latency < trace.n_clocks
-    index = Index((rises + spec.tick_latency)[seen], wrapped(captured - origin[:-1])[seen])
-    errors = at[illegal]
-    return ticks, index, errors[errors < trace.n_clocks]
+    seen = rises + spec.tick_latency < n_clocks
+    return ticks, Index((rises + spec.tick_latency)[seen], wrapped(captured - origin[:-1])[seen])

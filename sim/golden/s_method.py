@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import STachometer
 
@@ -76,7 +77,7 @@ def round_quotient(numerator: NDArray[np.int64], denominator: NDArray[np.int64],
     return (whole << frac_bits) + ((rest << (frac_bits + 1)) + denominator) // (2 * denominator)
 
 
-class SModel:
+class Model:
     """Golden model of the S method.
 
     Parameters
@@ -87,7 +88,7 @@ class SModel:
     def __init__(self, spec: STachometer) -> None:
         self._spec = spec
 
-    def updates(self, ticks: Ticks, n_clocks: int) -> Updates:
+    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
         """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
         spec, m_e = self._spec, ticks.pulse_count
         i, m_s, forced = windows(alterations(m_e), spec.timing.max_ticks)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tachometry.sim.golden.s_method import SModel
+from tachometry.sim.golden.s_method import Model
 from tachometry.sim.plan import Plan, default_range, dense_speeds, plan_at, standstill_ticks, write_plan
 from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import Encoder, Speed, STachometer, Timing
@@ -25,7 +25,7 @@ def updates_of(spec: STachometer, m_e: NDArray[np.int64]) -> Updates:
     """What the golden model makes of pulse numbers; `clock` is the tick that caused the update."""
     none = np.zeros(len(m_e), dtype=np.int64)
     ticks = Ticks(np.arange(len(m_e)), m_e, none, none.astype(np.bool_), none)
-    updates = SModel(spec).updates(ticks, len(m_e) + spec.tick_to_velocity)
+    updates = Model(spec).updates(ticks, None, len(m_e) + spec.tick_to_velocity)
     return replace(updates, clock=updates.clock - spec.tick_to_velocity)
 
 

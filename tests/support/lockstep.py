@@ -4,6 +4,7 @@ import itertools
 from collections import Counter
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from tachometry.sim.golden.s_method import alterations
 from tachometry.sim.motion import Vibration, parse_motion
 from tachometry.sim.recording import PinTrace
 from tachometry.sim.results import Run, compare
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import METHODS, Encoder, MTachometer, Speed, STachometer, TachometerSpec, Timing
 
 PULSES_PER_REV = 100
 CLOCK_HZ = 1_000_000
@@ -23,11 +24,7 @@ MIN_TICKS, MIN_UPDATES = 2000, 200
 STATES = ("00", "10", "11", "01")
 LEGAL = [f"{STATES[k]}->{STATES[(k + d) % 4]}" for k in range(4) for d in (1, -1)]
 ILLEGAL = [f"{STATES[k]}->{STATES[(k + 2) % 4]}" for k in range(4)]
-EVENTS = [
-    "suppressed return",
-    "alteration at max_ticks",
-    "forced, then alteration",
-    "m_s = 1",
+COMMON = [
     "m_e saturated",
     "sign change",
     "stalled",
@@ -40,24 +37,34 @@ EVENTS = [
     "external tick missing",
     "velocity saturated",
     "update in every clock",
-    "reciprocal carried",
     *LEGAL,
     *ILLEGAL,
 ]
+EVENTS = {
+    "s": [
+        "suppressed return",
+        "alteration at max_ticks",
+        "forced, then alteration",
+        "m_s = 1",
+        "reciprocal carried",
+        *COMMON,
+    ],
+    "m": ["one tick", "a power of two", "another number", *COMMON],
+}
 
 
-def random_case(seed: int) -> tuple[STachometer, Encoding, PinTrace]:
+def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding, PinTrace]:
     """A configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
     rng = np.random.default_rng(seed)
     tick_cycles = int(rng.choice([1, 2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 16]))
     max_ticks = int(rng.choice([2, 3, 5, 10, 20]))
     decoding = int(rng.choice([1, 2, 4, 4]))
-    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks)
+    n_ticks = MIN_TICKS + 20 if method == "m" else max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks)
     external = tick_cycles > 1 and bool(rng.random() < 0.3)
     if external:
         n_ticks += n_ticks // 4  # fewer may come
     band = [0.004, 0.05, 0.3, 1.003, 1.4, 3.25]
-    if tick_cycles == 1 and rng.random() < 0.5:
+    if method == "s" and tick_cycles == 1 and rng.random() < 0.5:
         max_ticks, n_ticks = 3000, 15_000  # the reciprocal is carried
         band = [0.05, 0.3]
     duration = n_ticks * tick_cycles / CLOCK_HZ
@@ -86,12 +93,12 @@ def random_case(seed: int) -> tuple[STachometer, Encoding, PinTrace]:
         index=bool(rng.random() < 0.5),
     )
     max_speed = Speed(Fraction(round(unit * rng.uniform(0.2, 3), 3))) if rng.random() < 0.5 else None
-    spec = STachometer(
+    spec = METHODS[method](
         encoder=Encoder(PULSES_PER_REV, decoding),
         timing=Timing(CLOCK_HZ, tick_cycles, max_ticks),
         frac_bits=int(rng.integers(4, 25)),
         max_speed=max_speed,
-        cancel=bool(rng.random() < 0.75),
+        **random_options(method, rng),
         position_width=int(rng.choice([8, 16, 32, 48])),
         filter_clocks=int(rng.choice([0, 0, 0, 1, 2, 5])),
         index=encoder.index,
@@ -104,7 +111,14 @@ def random_case(seed: int) -> tuple[STachometer, Encoding, PinTrace]:
     return spec, encoding, random_ticks(trace, tick_cycles, rng) if spec.max_tick_cycles else trace
 
 
-def random_output(spec: STachometer, rng: np.random.Generator) -> STachometer:
+def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
+    """Options of the method."""
+    if method == "s":
+        return {"cancel": bool(rng.random() < 0.75)}
+    return {"average": int(rng.choice([1, 2, 3, 4, 7, 8, 16, 33, 100]))}
+
+
+def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     """Velocity in another unit, with an LSB that it can have, or saturating."""
     unit = str(rng.choice(["count/tick"] * 4 + ["rad/s", "rev/s", "rpm"]))
     if unit != "count/tick":
@@ -124,18 +138,32 @@ def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator) ->
     return trace.with_tick_in(np.cumsum(np.maximum(gaps, 2)) + int(rng.integers(0, 3)))
 
 
-def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
-    """How often each event of the coverage table happened."""
+def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
+    """How often each event that only the method knows happened."""
     m_e, updates = run.ticks.pulse_count, run.updates
+    if isinstance(spec, MTachometer):
+        n = spec.average
+        kind = "one tick" if n == 1 else "a power of two" if spec.shift is not None else "another number"
+        return {kind: len(updates.clock)}
+    assert isinstance(spec, STachometer)
     changed = np.diff(m_e, prepend=0) != 0
     by_count = ~updates.forced
+    return {
+        "suppressed return": np.count_nonzero(changed & ~alterations(m_e)),
+        "alteration at max_ticks": np.count_nonzero(by_count & (updates.interval == spec.timing.max_ticks)),
+        "forced, then alteration": np.count_nonzero(updates.forced[:-1] & by_count[1:]),
+        "m_s = 1": np.count_nonzero(updates.interval == 1),
+        "reciprocal carried": spec.carried and len(updates.clock),
+    }
+
+
+def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
+    """How often each event of the coverage table happened."""
+    updates = run.updates
     sign = np.sign(updates.velocity)
     found = Counter(
-        {
-            "suppressed return": np.count_nonzero(changed & ~alterations(m_e)),
-            "alteration at max_ticks": np.count_nonzero(by_count & (updates.interval == spec.timing.max_ticks)),
-            "forced, then alteration": np.count_nonzero(updates.forced[:-1] & by_count[1:]),
-            "m_s = 1": np.count_nonzero(updates.interval == 1),
+        covered_by_method(spec, run)
+        | {
             "m_e saturated": np.count_nonzero(run.ticks.overflow),
             "sign change": np.count_nonzero(sign[1:] * sign[:-1] < 0),
             "stalled": np.count_nonzero(updates.stalled),
@@ -146,7 +174,6 @@ def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
             "external tick missing": np.count_nonzero(np.isin(run.tick_errors, run.ticks.clock)),
             "velocity saturated": np.count_nonzero(updates.velocity_overflow),
             "update in every clock": np.count_nonzero(np.diff(updates.clock) == 1),
-            "reciprocal carried": spec.carried and len(updates.clock),
             "glitch swallowed": run.ticks.swallowed_edges[-1] // 2,
             "position wrapped": np.count_nonzero(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
         }
@@ -156,18 +183,18 @@ def covered(spec: STachometer, trace: PinTrace, run: Run) -> Counter[str]:
     return found
 
 
-def lockstep(seed: int, engine: Engine) -> tuple[list[str], Counter[str]]:
+def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter[str]]:
     """Run one random case; what went wrong, and what it covered."""
-    spec, encoding, trace = random_case(seed)
+    spec, encoding, trace = random_case(seed, method)
     expected, actual = golden.run(spec, trace), engine.run(spec, trace)
-    problems = [f"seed {seed}: {mismatch}" for mismatch in compare(expected, actual)[1]]
+    problems = [f"{method}, seed {seed}: {mismatch}" for mismatch in compare(expected, actual)[1]]
     if len(actual.ticks.clock) < MIN_TICKS or len(actual.updates.clock) < MIN_UPDATES:
-        problems.append(f"seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
-    problems += [f"seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
+        problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
+    problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
     return problems, covered(spec, trace, actual)
 
 
-def _lost_counts(spec: STachometer, encoding: Encoding, run: Run) -> list[str]:
+def _lost_counts(spec: TachometerSpec, encoding: Encoding, run: Run) -> list[str]:
     """Hold the position against the shaft's angle, tick by tick, unless an illegal transition was reported.
 
     Jitter makes an edge come early or late, but never twice or not at all.

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from support.sequences import MAX_TICKS, PAPER, rounded
 
-from tachometry.sim.golden.s_method import SModel, round_quotient
+from tachometry.sim.golden.s_method import Model, round_quotient
 from tachometry.sim.results import Ticks
 from tachometry.spec import Encoder, STachometer, Timing
 
 
-def model(max_ticks: int, *, cancel: bool = True, frac_bits: int = 16) -> SModel:
+def model(max_ticks: int, *, cancel: bool = True, frac_bits: int = 16) -> Model:
     timing = Timing(clock_hz=1_000_000, tick_cycles=16, max_ticks=max_ticks)
-    return SModel(STachometer(encoder=Encoder(25), timing=timing, frac_bits=frac_bits, cancel=cancel))
+    return Model(STachometer(encoder=Encoder(25), timing=timing, frac_bits=frac_bits, cancel=cancel))
 
 
 def as_ticks(m_e: list[int]) -> Ticks:

@@ -1,0 +1,170 @@
+"""The M method."""
+
+from typing import Any
+
+from amaranth import Cat, Module, Mux, Signal, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
+from tachometry.spec import MTachometer
+
+
+class MovingSum(wiring.Component):
+    """Sum of the last n pulse numbers, the present one included.
+
+    Latency: none. What was counted before the first tick after reset is 0, whatever the memory still holds.
+
+    Parameters
+    ----------
+    length : int
+        n.
+    count_width, sum_width : int
+        Bits of a pulse number and of the sum, both signed.
+
+    Members
+    -------
+    tick : In(1)
+    m_e : In(signed(count_width))
+        Valid with `tick`.
+    total : Out(signed(sum_width))
+        Valid with `tick`.
+    empty : Out(1)
+        None of the n ticks counted anything; valid with `tick`.
+    """
+
+    def __init__(self, length: int, *, count_width: int, sum_width: int) -> None:
+        self._length = length
+        super().__init__(
+            {
+                "tick": In(1),
+                "m_e": In(signed(count_width)),
+                "total": Out(signed(sum_width)),
+                "empty": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        if self._length == 1:
+            m.d.comb += [self.total.eq(self.m_e), self.empty.eq(~self.m_e.any())]
+            return m
+        # The sum without the tick that will be the oldest when the next one comes.
+        kept = Signal.like(self.total)
+        last = self._length - 1
+        quiet = Signal(range(self._length), init=last)
+        m.d.comb += [self.total.eq(kept + self.m_e), self.empty.eq(~self.m_e.any() & (quiet == last))]
+        oldest = self._oldest(m, last)
+        with m.If(self.tick):
+            m.d.sync += kept.eq(self.total - oldest)
+            with m.If(self.m_e.any()):
+                m.d.sync += quiet.eq(0)
+            with m.Elif(quiet != last):
+                m.d.sync += quiet.eq(quiet + 1)
+        return m
+
+    def _oldest(self, m: Module, last: int) -> Value:
+        """m_e(i − last), valid with `tick`."""
+        if last == 1:
+            past = Signal.like(self.m_e)
+            with m.If(self.tick):
+                m.d.sync += past.eq(self.m_e)
+            return past
+        m.submodules.past = memory = Memory(shape=signed(len(self.m_e)), depth=last, init=[])
+        write, read = memory.write_port(), memory.read_port()
+        place, following, full = Signal(range(last)), Signal(range(last)), Signal()
+        wrap = place == last - 1
+        m.d.comb += [
+            following.eq(Mux(self.tick, Mux(wrap, 0, place + 1), place)),
+            read.addr.eq(following),
+            write.addr.eq(place),
+            write.data.eq(self.m_e),
+            write.en.eq(self.tick),
+        ]
+        m.d.sync += [place.eq(following), full.eq(full | (self.tick & wrap))]
+        return Mux(full, read.data, 0)
+
+
+class Datapath(wiring.Component):
+    """M-method datapath, eq. (6) of Tsuji 2009: the mean of the last n pulse numbers, every tick.
+
+    A mean over a power of two is a shift; otherwise the sum is multiplied by a constant, step by step, as in the
+    S method's scaler, and correctly rounded like there.
+
+    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after `tick`.
+
+    Parameters
+    ----------
+    spec : MTachometer
+
+    Members
+    -------
+    tick : In(1)
+    pulse_count : In(signed)
+        m_e, valid with `tick`.
+    velocity : Out(signed)
+        In counts per tick with `native_frac_bits` fraction bits; this and all below are held until the next update.
+    velocity_valid : Out(1)
+    interval : Out
+        n.
+    forced : Out(1)
+        Never.
+    stalled : Out(1)
+        None of the n ticks counted anything.
+    """
+
+    def __init__(self, spec: MTachometer) -> None:
+        super().__init__(
+            {
+                "tick": In(1),
+                "pulse_count": In(signed(spec.count_width)),
+                "velocity": Out(signed(spec.native_width)),
+                "velocity_valid": Out(1),
+                "interval": Out(spec.interval_width),
+                "forced": Out(1),
+                "stalled": Out(1),
+            }
+        )
+        self._spec = spec
+        self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
+        self.scaler: Any = None
+        if spec.shift is None:
+            scaler = SerialScaler if spec.serial else PipelinedScaler
+            self.scaler = scaler(
+                spec.reciprocal, base_width=spec.count_width, numerator_width=spec.sum_width, tag_width=1
+            )
+
+    @property
+    def probes(self) -> dict[str, Value]:
+        """What a waveform should show of the inside."""
+        return {"sum": self.moving_sum.total}
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec = self._spec
+        m.submodules.moving_sum = moving_sum = self.moving_sum
+        m.d.comb += [
+            moving_sum.tick.eq(self.tick),
+            moving_sum.m_e.eq(self.pulse_count),
+            self.interval.eq(spec.average),
+        ]
+        if self.scaler is None:
+            m.d.sync += self.velocity_valid.eq(self.tick)
+            with m.If(self.tick):
+                m.d.sync += [self.velocity.eq(moving_sum.total << spec.shift), self.stalled.eq(moving_sum.empty)]
+            return m
+        m.submodules.scaler = scaler = self.scaler
+        # The sum has a clock of its own, then the scaler begins.
+        start, total, empty = Signal(), Signal.like(moving_sum.total), Signal()
+        m.d.sync += [start.eq(self.tick), total.eq(moving_sum.total), empty.eq(moving_sum.empty)]
+        m.d.comb += [
+            Cat(scaler.load, scaler.start).eq(start.replicate(2)),
+            scaler.numerator.eq(total),
+            scaler.tag.eq(empty),
+            scaler.q.eq(spec.reciprocal.value(spec.average)),
+            self.velocity.eq(scaler.velocity),
+            self.velocity_valid.eq(scaler.done),
+            self.stalled.eq(scaler.tag_out),
+        ]
+        return m
