@@ -85,19 +85,19 @@ class Estimate:
 
 class _Readings(NamedTuple):
     time: FloatArray
-    count: IntArray
+    counts: IntArray
     changed_at: FloatArray  # time of the latest step, 0 before the first
 
     @property
     def difference(self) -> IntArray:
-        return np.diff(self.count, prepend=0)
+        return np.diff(self.counts, prepend=0)
 
 
 def _read(steps: Steps, period_s: float) -> _Readings:
     if not period_s > 0:
         raise ValueError(f"control period must be more than 0 s, not {period_s} s")
     n_periods = math.floor(steps.duration / period_s * (1 + 1e-12))
-    time = period_s * np.arange(1, n_periods + 1)
+    time = period_s * np.arange(1, n_periods + 1, dtype=np.float64)
     seen = np.searchsorted(steps.time, time, side="right")
     count = np.append(0, np.cumsum(steps.step))
     return _Readings(time, count[seen], np.append(0.0, steps.time)[seen])
@@ -116,12 +116,13 @@ def _held(value: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
     return np.append(0.0, value)[latest]
 
 
-def low_pass(value: FloatArray, period_s: float, filter_s: float) -> FloatArray:
+def low_pass(value: ArrayLike, period_s: float, filter_s: float) -> FloatArray:
     """First-order low-pass filter y = a y + (1 - a) x with a = filter_s / (filter_s + period_s), from y = 0."""
     if filter_s < 0:
         raise ValueError(f"time constant of the filter must be at least 0 s, not {filter_s} s")
     a = filter_s / (filter_s + period_s)
-    return np.array(list(accumulate(((1 - a) * value).tolist(), lambda y, x: a * y + x)), dtype=np.float64)
+    added = (1 - a) * np.asarray(value, dtype=np.float64)
+    return np.array(list(accumulate(added.tolist(), lambda y, x: a * y + x)), dtype=np.float64)
 
 
 def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> Estimate:
@@ -213,7 +214,8 @@ def tracking_loop(
 ) -> Estimate:
     """A critically damped second-order loop that follows the count: kp = 2 bandwidth, ki = kp^2 / 4.
 
-    Its speed lags that of a constant acceleration by 2 acceleration / bandwidth.
+    At constant acceleration it shows the speed of 2 / bandwidth - period / 2 ago. moteus also limits the speed to an
+    eighth of a revolution per period, which is left out.
 
     Parameters
     ----------
@@ -239,7 +241,7 @@ def tracking_loop(
     least = 0.5 * period_s * ki if whole_counts else 0.0
     position = speed = 0.0  # counts, counts/s
     speeds = []
-    for count in readings.count.tolist():
+    for count in readings.counts.tolist():
         position += period_s * speed
         error = count - (math.floor(position) if whole_counts else position)
         position += period_s * kp * error
@@ -268,10 +270,11 @@ def delay_seconds(time: FloatArray, velocity: FloatArray, true_speed: FloatArray
     ValueError
         If the times are not so, or no shift within `max_delay_s` is closer than those beside it.
     """
-    period = (time[-1] - time[0]) / (len(time) - 1)
+    even = len(time) > 1 and np.allclose(np.diff(time), time[1] - time[0], rtol=1e-6, atol=0)
+    period = (time[-1] - time[0]) / (len(time) - 1) if even else math.inf
     reach = math.ceil(max_delay_s / period)
     n_compared = len(time) - 2 * reach
-    if n_compared < 1 or not np.allclose(np.diff(time), period, rtol=1e-6, atol=0):
+    if not even or n_compared < 1:
         raise ValueError(f"times must be evenly spaced and more than {2 * max_delay_s} s long")
     mean = np.mean(true_speed)
     truth, measured = true_speed - mean, velocity[reach : reach + n_compared] - mean
