@@ -3,6 +3,23 @@
 Both papers number their equations from (1); names say which is meant.
 """
 
+from tachometry.sim.theory.rairan import (
+    rairan_eq01_update_time,
+    rairan_eq02_error,
+    rairan_eq03_error,
+    rairan_eq04_max_error,
+    rairan_eq05_n2,
+    rairan_eq06_n2,
+    rairan_eq07_error,
+    rairan_eq08_sup_error,
+    rairan_eq09_left_error,
+    rairan_eq10_right_error,
+    rairan_eq11_n3,
+    rairan_eq12_max_error,
+    rairan_eq13_max_error,
+    rairan_eq14_max_acceleration,
+    rairan_speed_limit,
+)
 from tachometry.sim.theory.tsuji import (
     tsuji_eq03_velocity,
     tsuji_eq04_resolution,
@@ -28,6 +45,21 @@ from tachometry.sim.theory.tsuji import (
 )
 
 __all__ = [
+    "rairan_eq01_update_time",
+    "rairan_eq02_error",
+    "rairan_eq03_error",
+    "rairan_eq04_max_error",
+    "rairan_eq05_n2",
+    "rairan_eq06_n2",
+    "rairan_eq07_error",
+    "rairan_eq08_sup_error",
+    "rairan_eq09_left_error",
+    "rairan_eq10_right_error",
+    "rairan_eq11_n3",
+    "rairan_eq12_max_error",
+    "rairan_eq13_max_error",
+    "rairan_eq14_max_acceleration",
+    "rairan_speed_limit",
     "tsuji_eq03_velocity",
     "tsuji_eq04_resolution",
     "tsuji_eq05_measurement_time",
