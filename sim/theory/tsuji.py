@@ -1,0 +1,256 @@
+"""Equations (3) to (22) of Tsuji 2009: the M, T, M/T and S methods and the low-pass filter.
+
+Every function is vectorised: arguments are broadcast against each other, and the result has their shape, float64.
+Throughout, `counts_per_rev` is P and `tick_seconds` is T_s in seconds, both greater than 0; velocities and resolutions
+are in rad/s, measurement times in seconds, m_s and n in ticks, at least 1, whole or mean. What is out of range raises
+ValueError.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tachometry.sim.theory.checks import Floats, at_least, positive
+
+
+def unit_velocity(counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """ω_u = 2π/(P·T_s) in rad/s: one count per sampling period (Tsuji 2009, Sec. V-A)."""
+    return 2 * math.pi / (positive("counts_per_rev", counts_per_rev) * positive("tick_seconds", tick_seconds))
+
+
+def _mean_velocity(counts: ArrayLike, ticks: Floats, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    return np.asarray(counts) / ticks * unit_velocity(counts_per_rev, tick_seconds)
+
+
+def _interval_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    m_s = at_least("m_s", m_s, 1)
+    with np.errstate(divide="ignore"):
+        return unit_velocity(counts_per_rev, tick_seconds) / (m_s * (m_s - 1))
+
+
+def _duration(what: str, ticks: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    return at_least(what, ticks, 1) * positive("tick_seconds", tick_seconds)
+
+
+def tsuji_eq03_velocity(m_e: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (3) of Tsuji 2009: velocity of the M method, m_e·ω_u, from the counts m_e of one tick."""
+    return np.asarray(m_e) * unit_velocity(counts_per_rev, tick_seconds)
+
+
+def tsuji_eq04_resolution(counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (4) of Tsuji 2009: resolution Q_V = ω_u of the M method. Errors are less; it is their supremum."""
+    return unit_velocity(counts_per_rev, tick_seconds)
+
+
+def tsuji_eq05_measurement_time(tick_seconds: ArrayLike) -> Floats:
+    """Eq. (5) of Tsuji 2009: measurement time T_m = T_s of the M method."""
+    return positive("tick_seconds", tick_seconds)
+
+
+def tsuji_eq06_velocity(
+    pulse_sum: ArrayLike, n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
+) -> Floats:
+    """Eq. (6) of Tsuji 2009: velocity of the M method with averaging.
+
+    Parameters
+    ----------
+    pulse_sum : counts, Σ_{j=0}^{n−1} m_e(i−j)
+    n : ticks
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    return _mean_velocity(pulse_sum, at_least("n", n, 1), counts_per_rev, tick_seconds)
+
+
+def tsuji_eq07_resolution(n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (7) of Tsuji 2009: resolution Q_V = ω_u/n of the M method with averaging. The supremum of the errors."""
+    return unit_velocity(counts_per_rev, tick_seconds) / at_least("n", n, 1)
+
+
+def tsuji_eq08_measurement_time(n: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (8) of Tsuji 2009: measurement time T_m = n·T_s of the M method with averaging."""
+    return _duration("n", n, tick_seconds)
+
+
+def tsuji_eq09_velocity(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (9) of Tsuji 2009: velocity ω_u/m_s of the T method, m_s ticks from count to count. It has no sign."""
+    return _mean_velocity(1, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
+
+
+def tsuji_eq10_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (10) of Tsuji 2009: resolution Q_V = ω_u/(m_s·(m_s − 1)) of the T method; infinite for m_s = 1.
+
+    It is the step from the velocity of m_s ticks to that of m_s − 1, and the supremum of the errors.
+    """
+    return _interval_resolution(m_s, counts_per_rev, tick_seconds)
+
+
+def tsuji_eq11_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (11) of Tsuji 2009: measurement time T_m = m_s·T_s of the T method."""
+    return _duration("m_s", m_s, tick_seconds)
+
+
+def tsuji_eq12_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (12) of Tsuji 2009: mean m_s = ω_u/|ω| of the T method in ticks; infinite at standstill.
+
+    A single m_s is one of the two integers beside it. Above ω_u it is less than 1, and the method fails.
+
+    Parameters
+    ----------
+    speed : ω in rad/s, of either sign; the printed form is for ω > 0
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    with np.errstate(divide="ignore"):
+        return unit_velocity(counts_per_rev, tick_seconds) / np.abs(np.asarray(speed, dtype=np.float64))
+
+
+def tsuji_eq13_velocity(
+    pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
+) -> Floats:
+    """Eq. (13) of Tsuji 2009: velocity of the M/T method, whose windows begin and end at ticks with a count.
+
+    Parameters
+    ----------
+    pulse_sum : counts, Σ_{j=0}^{m_s−1} m_e(i−j)
+    m_s : ticks
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    return _mean_velocity(pulse_sum, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
+
+
+def tsuji_eq14_resolution(
+    pulse_sum: ArrayLike, m_s: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
+) -> Floats:
+    """Eq. (14) of Tsuji 2009: resolution Q_V = min(|Σ m_e|·ω_u/(m_s·(m_s − 1)), ω_u/m_c) of the M/T method.
+
+    Errors are less. The first term is the supremum for the time, uncertain by less than a tick at either end; the
+    second is that for the counts when m_s = m_c, and more than it in longer windows.
+
+    Parameters
+    ----------
+    pulse_sum : counts of one direction, |Σ m_e| ≥ 1
+    m_s : ticks
+    m_c : ticks, T_c/T_s
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    counts = at_least("|pulse_sum|", np.abs(pulse_sum), 1)
+    by_time = counts * _interval_resolution(m_s, counts_per_rev, tick_seconds)
+    by_count = unit_velocity(counts_per_rev, tick_seconds) / at_least("m_c", m_c, 1)
+    return np.minimum(by_time, by_count)
+
+
+def tsuji_eq15_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (15) of Tsuji 2009: measurement time T_m = m_s·T_s of the M/T method."""
+    return _duration("m_s", m_s, tick_seconds)
+
+
+def tsuji_eq16_interval(speed: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (16) of Tsuji 2009: mean m_s = m_c·(⌊x⌋ + 1)/x of the M/T method in ticks, x = |ω|/ω_u·m_c.
+
+    x counts come in T_c; the window ends with the first one later than that. The printed form lacks the factor m_c: it
+    is the time in units of T_c. Infinite at standstill.
+
+    Parameters
+    ----------
+    speed : ω in rad/s, of either sign
+    m_c : ticks, T_c/T_s
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    m_c = at_least("m_c", m_c, 1)
+    speed = np.abs(np.asarray(speed, dtype=np.float64))
+    in_minimum_time = speed / unit_velocity(counts_per_rev, tick_seconds) * m_c
+    with np.errstate(divide="ignore"):
+        return m_c * (np.floor(in_minimum_time) + 1) / in_minimum_time
+
+
+def tsuji_eq17_velocity(
+    pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
+) -> Floats:
+    """Eq. (17) of Tsuji 2009: velocity of the S method, whose windows end at pulse alterations.
+
+    Parameters
+    ----------
+    pulse_sum : counts, Σ_{j=0}^{m_s−1} m_e(i−j)
+    m_s : ticks
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    return _mean_velocity(pulse_sum, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
+
+
+def tsuji_eq18_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (18) of Tsuji 2009: resolution Q_V = ω_u/(m_s·(m_s − 1)) of the S method; infinite for m_s = 1.
+
+    The supremum of the errors of windows from alteration to alteration at constant speed; not of forced updates.
+    """
+    return _interval_resolution(m_s, counts_per_rev, tick_seconds)
+
+
+def tsuji_eq19_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (19) of Tsuji 2009: measurement time T_m = m_s·T_s of the S method."""
+    return _duration("m_s", m_s, tick_seconds)
+
+
+def tsuji_eq20_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
+    """Eq. (20) of Tsuji 2009: mean m_s = 1/|ω/ω_u − ⌊ω/ω_u + ½⌋| in ticks; infinite at multiples of ω_u.
+
+    Parameters
+    ----------
+    speed : ω in rad/s, of either sign
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    units = np.asarray(speed, dtype=np.float64) / unit_velocity(counts_per_rev, tick_seconds)
+    with np.errstate(divide="ignore"):
+        return 1 / np.abs(units - np.floor(units + 0.5))
+
+
+def tsuji_eq21_velocity(
+    pulse_sum: ArrayLike,
+    opening: ArrayLike,
+    closing: ArrayLike,
+    m_s: ArrayLike,
+    counts_per_rev: ArrayLike,
+    tick_seconds: ArrayLike,
+) -> Floats:
+    """Eq. (21) of Tsuji 2009: velocity of the S method with alternate alterations cancelled.
+
+    The pulse numbers at both ends of the window count by one half: eq. (17)'s sum, half the opening more, half the
+    closing less.
+
+    Parameters
+    ----------
+    pulse_sum : counts, Σ_{j=0}^{m_s−1} m_e(i−j), as in eq. (17): with the closing tick, without the opening one
+    opening : counts, m_e(i−m_s)
+    closing : counts, m_e(i)
+    m_s : ticks
+    counts_per_rev : P
+    tick_seconds : T_s in seconds
+    """
+    counts = np.asarray(pulse_sum) + (np.asarray(opening) - np.asarray(closing)) / 2
+    return _mean_velocity(counts, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
+
+
+def tsuji_eq22_low_pass(
+    u: ArrayLike, y_0: ArrayLike, m_s: ArrayLike, cutoff: ArrayLike, tick_seconds: ArrayLike
+) -> Floats:
+    """Eq. (22) of Tsuji 2009: output y = y_0 + (1 − e^(−G·m_s·T_s))·(u − y_0) of the LPF after m_s ticks.
+
+    Exact for an input that is constant meanwhile.
+
+    Parameters
+    ----------
+    u : input, in any unit
+    y_0 : output before, in the unit of `u`
+    m_s : ticks
+    cutoff : G in rad/s, greater than 0
+    tick_seconds : T_s in seconds
+    """
+    exponent = positive("cutoff", cutoff) * _duration("m_s", m_s, tick_seconds)
+    y_0 = np.asarray(y_0, dtype=np.float64)
+    return y_0 - np.expm1(-exponent) * (np.asarray(u) - y_0)
