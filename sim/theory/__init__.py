@@ -18,7 +18,9 @@ from tachometry.sim.theory.rairan import (
     rairan_eq12_max_error,
     rairan_eq13_max_error,
     rairan_eq14_max_acceleration,
+    rairan_max_acceleration,
     rairan_speed_limit,
+    rairan_update_time,
 )
 from tachometry.sim.theory.tsuji import (
     tsuji_eq03_velocity,
@@ -59,7 +61,9 @@ __all__ = [
     "rairan_eq12_max_error",
     "rairan_eq13_max_error",
     "rairan_eq14_max_acceleration",
+    "rairan_max_acceleration",
     "rairan_speed_limit",
+    "rairan_update_time",
     "tsuji_eq03_velocity",
     "tsuji_eq04_resolution",
     "tsuji_eq05_measurement_time",

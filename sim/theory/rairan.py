@@ -32,12 +32,28 @@ def rairan_speed_limit(pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
 
 
 def rairan_eq01_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayLike) -> Floats:
-    """Eq. (1) of Rairán 2013: time dt_a = (⌊r⌋ + 1)/r·dt between updates, r = ω/ω_lim; in the unit of dt.
+    """Eq. (1) of Rairán 2013: time dt_a = (−r/⌊r⌋ + 2 + 1/⌊r⌋)·dt between updates, r = ω/ω_lim; in the unit of dt.
+
+    Below ω_lim it is the time between two pulses. It joins the values of `rairan_update_time` at the multiples of ω_lim
+    by straight lines.
+
+    Parameters
+    ----------
+    speed : ω > 0, in the unit of `speed_limit`
+    speed_limit : ω_lim
+    dt : in any unit
+    """
+    ratio = positive("speed", speed) / positive("speed_limit", speed_limit)
+    whole = np.maximum(np.floor(ratio), 1)
+    return np.where(ratio < 1, 1 / ratio, 2 + (1 - ratio) / whole) * positive("dt", dt)
+
+
+def rairan_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayLike) -> Floats:
+    """Time (⌊r⌋ + 1)/r·dt between updates of Table 1 of Rairán 2013, r = ω/ω_lim; in the unit of dt.
 
     A window begins with a pulse and takes dt; the first pulse later than that begins the next. Below ω_lim, where
-    ⌊r⌋ = 0, it is the time between two pulses. The printed form joins its values at the multiples of ω_lim by straight
-    lines, which are too long in between. There a pulse that comes with the end of dt belongs to no window; where it is
-    taken into the next one, dt_a is dt.
+    ⌊r⌋ = 0, it is the time between two pulses. At the multiples of ω_lim a pulse that comes with the end of dt belongs
+    to no window; where it is taken into the next one, the time is dt.
 
     Parameters
     ----------
@@ -136,11 +152,27 @@ def rairan_eq13_max_error(n1: ArrayLike) -> Floats:
 
 
 def rairan_eq14_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
-    """Eq. (14) of Rairán 2013: acceleration a_max, rev/s², that changes the speed by n1 − n2 in a window.
+    """Eq. (14) of Rairán 2013: a_max = ω_lim/(2·dt), at low speeds over Ndt1·(Ndt1 + 1), Ndt1 = 1/n1; in rev/s².
 
-    In the longest window, that is: ω_lim/(2·dt) at high speeds, where windows are shorter than 2·dt; at low ones, where
-    they take up to (Ndt1 + 1)·dt, ω_lim/(dt·Ndt1·(Ndt1 + 1)²), Ndt1 = 1/n1. The printed form has 2·dt there too: the
-    same for Ndt1 = 1, and (Ndt1 + 1)/2 times too much for less speed.
+    At low speeds it is (Ndt1 + 1)/2 times what `rairan_max_acceleration` finds by the same argument.
+
+    Parameters
+    ----------
+    n1 : upper estimate
+    pulses_per_rev : pul
+    dt : in seconds
+    """
+    n1 = _regime_n1(n1)
+    n_dt1 = 1 / n1
+    dt = positive("dt", dt)
+    return rairan_speed_limit(pulses_per_rev, dt) / (2 * dt * np.where(n1 < 1.5, n_dt1 * (n_dt1 + 1), 1))
+
+
+def rairan_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
+    """Acceleration, rev/s², that changes the speed by n1 − n2 in the longest window.
+
+    ω_lim/(2·dt) at high speeds, where windows are shorter than 2·dt, as eq. (14) of Rairán 2013; at low ones, where
+    they take up to (Ndt1 + 1)·dt, ω_lim/(dt·Ndt1·(Ndt1 + 1)²), Ndt1 = 1/n1.
 
     Parameters
     ----------

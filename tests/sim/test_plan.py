@@ -34,7 +34,7 @@ def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Updates
     position = (np.arange(n_ticks + 1) * units.numerator + units.denominator // 3) // units.denominator
     updates = updates_of(spec, np.diff(position))
     settled = updates.clock > 200  # more than two windows, and two equal pulse numbers
-    updates = Updates(*(row[settled] for row in vars(updates).values()))
+    updates = Updates(*(row[settled] for row in vars(updates).values() if isinstance(row, np.ndarray)))
     return updates, np.abs(updates.velocity / 2.0**spec.frac_bits - float(units))
 
 

@@ -63,7 +63,7 @@ def test_output_of_table_1_is_constant_and_does_not_depend_on_the_phase(period: 
 
 def test_update_time_is_that_of_table_1_and_the_printed_line_is_above_it() -> None:
     m = measured()
-    time = theory.rairan_eq01_update_time(m.speed, 1, DT)
+    time = theory.rairan_update_time(m.speed, 1, DT)
     # The double of a speed at a multiple of ω_lim is that multiple, for all that DT can be divided by.
     np.testing.assert_allclose(m.update_time, time, rtol=1e-9)
 
@@ -83,7 +83,7 @@ def test_update_time_is_the_measurement_time_of_mt() -> None:
     speed = np.geomspace(0.01, 50, 999)
     unit = theory.unit_velocity(500, 1e-3)
     np.testing.assert_allclose(
-        theory.rairan_eq01_update_time(speed, 1, 1), theory.tsuji_eq16_interval(speed * unit, 1, 500, 1e-3), rtol=1e-9
+        theory.rairan_update_time(speed, 1, 1), theory.tsuji_eq16_interval(speed * unit, 1, 500, 1e-3), rtol=1e-9
     )
 
 
@@ -190,9 +190,9 @@ def test_doubling_dt_never_helps_low_speeds_nor_harms_high_ones() -> None:
         target = 0.02
         least = np.flatnonzero(high & (bound <= target))[0]
         assert n1[least] >= (1 + 1 / target) / 2 > n1[least - 1]
-        time = theory.rairan_eq01_update_time(speed, 1, 2.0 ** doublings[high])
+        time = theory.rairan_update_time(speed, 1, 2.0 ** doublings[high])
         assert np.all(np.diff(time) > 0)
-        slow = theory.rairan_eq01_update_time(speed, 1 / 2.0 ** doublings[~high], 2.0 ** doublings[~high])
+        slow = theory.rairan_update_time(speed, 1 / 2.0 ** doublings[~high], 2.0 ** doublings[~high])
         np.testing.assert_allclose(slow, 1 / speed)
 
 
@@ -207,7 +207,7 @@ def change_in_windows(acceleration: float, n_dt1: int) -> Floats:
 @pytest.mark.parametrize("n_dt1", [1, 2, 5, 40])
 def test_acceleration_limit_at_low_speeds(n_dt1: int) -> None:
     width = 1 / n_dt1 - theory.rairan_eq05_n2(1 / n_dt1)
-    limit = float(theory.rairan_eq14_max_acceleration(1 / n_dt1, 1, 1))
+    limit = float(theory.rairan_max_acceleration(1 / n_dt1, 1, 1))
     for acceleration in (-limit, limit):
         assert change_in_windows(acceleration, n_dt1).max() == pytest.approx(width)
     printed = 1 / (2 * n_dt1 * (n_dt1 + 1))
@@ -217,7 +217,7 @@ def test_acceleration_limit_at_low_speeds(n_dt1: int) -> None:
 def test_acceleration_limit_at_high_speeds() -> None:
     """Windows from a pulse to the first one after dt, before 2·dt; with that many pulses, at least two, in dt."""
     speed = np.linspace(0.5, 12, 100_001)
-    limit = float(theory.rairan_eq14_max_acceleration(2, 1, 1))
+    limit = float(theory.rairan_max_acceleration(2, 1, 1))
     for acceleration, greatest in ((limit, 0.851), (-limit, 1.0), (-1.05 * limit, 1.05)):
         n_ep1 = np.floor(speed + acceleration / 2) + 1
         square = speed**2 + 2 * acceleration * n_ep1
@@ -249,8 +249,8 @@ def test_claims_on_acceleration() -> None:
     pulses, dt = 10_000, 1e-3
     limit = float(theory.rairan_speed_limit(pulses, dt))
     assert limit == pytest.approx(0.1)
-    assert theory.rairan_eq14_max_acceleration([2, 3, 100], pulses, dt).tolist() == pytest.approx([50] * 3)
-    assert theory.rairan_eq14_max_acceleration([1, 1 / 2], pulses, dt).tolist() == pytest.approx([25, 5.56], abs=5e-3)
+    assert theory.rairan_max_acceleration([2, 3, 100], pulses, dt).tolist() == pytest.approx([50] * 3)
+    assert theory.rairan_max_acceleration([1, 1 / 2], pulses, dt).tolist() == pytest.approx([25, 5.56], abs=5e-3)
     # 8.33 rev/s² is what the printed form allows for Ndt1 = 2; in the 3 dt of such a window it is 1.5 intervals.
     printed = limit / (2 * dt) / 6
     assert printed == pytest.approx(8.33, abs=5e-3)
@@ -259,10 +259,10 @@ def test_claims_on_acceleration() -> None:
 
 def test_arguments_are_broadcast_and_ranges_kept() -> None:
     assert theory.rairan_eq03_error(np.array([2, 3]), np.full((4, 1), 1.5), 1).shape == (4, 2)
-    assert theory.rairan_eq14_max_acceleration(np.array([0.5, 3]), np.full((4, 1), 160), 1).shape == (4, 2)
+    assert theory.rairan_max_acceleration(np.array([0.5, 3]), np.full((4, 1), 160), 1).shape == (4, 2)
     for call in (
         lambda: theory.rairan_speed_limit(160, 0),
-        lambda: theory.rairan_eq01_update_time([1, 0], 1, 1),
+        lambda: theory.rairan_update_time([1, 0], 1, 1),
         lambda: theory.rairan_eq02_error(1, -1),
         lambda: theory.rairan_eq04_max_error([1, 1.5]),
         lambda: theory.rairan_eq05_n2(0),
@@ -274,3 +274,17 @@ def test_arguments_are_broadcast_and_ranges_kept() -> None:
     ):
         with pytest.raises(ValueError, match="must be"):
             call()
+
+
+def test_printed_forms_of_1_and_14_against_what_table_1_does() -> None:
+    ratio = np.linspace(0.05, 7, 700)
+    printed, exact = (f(ratio, 1, 1) for f in (theory.rairan_eq01_update_time, theory.rairan_update_time))
+    assert np.all(printed >= exact - 1e-12)
+    assert (printed / exact).max() == pytest.approx(1.125, abs=1e-3)  # at 1.5
+    whole = np.arange(1, 9)
+    np.testing.assert_allclose(theory.rairan_eq01_update_time(whole, 1, 1), (whole + 1) / whole)
+    n_dt1 = np.arange(1, 30)
+    ratio = theory.rairan_eq14_max_acceleration(1 / n_dt1, 500, 1) / theory.rairan_max_acceleration(1 / n_dt1, 500, 1)
+    np.testing.assert_allclose(ratio, (n_dt1 + 1) / 2)
+    assert theory.rairan_eq14_max_acceleration([2, 3, 100], 10_000, 1e-3).tolist() == pytest.approx([50] * 3)
+    assert theory.rairan_eq14_max_acceleration(0.5, 10_000, 1e-3) == pytest.approx(8.33, abs=5e-3)
