@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from tachometry.spec import METHODS, Encoder, Speed, Timing
+from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.option import options_of
 from tachometry.spec.timing import whole_clocks
 from tachometry.spec.velocity_output import NATIVE, UNITS, parse_lsb
@@ -95,7 +95,8 @@ def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Co
     return click.option(*names, cls=Option, group=group, show_default=True, **attributes)
 
 
-def _with(options: list[Callable[[Any], Any]], command: Callable[..., Any]) -> Callable[..., Any]:
+def all_of(options: list[Callable[[Any], Any]], command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command with all of these options, in order."""
     for decorate in reversed(options):
         command = decorate(command)
     return command
@@ -156,14 +157,6 @@ _CORE_OPTIONS = [
     ),
     option(
         _CORE,
-        "--method",
-        type=click.Choice(list(METHODS)),
-        default="s",
-        help="How velocity is measured: s averages in step with the alterations of the pulse number, m counts the "
-        "pulses of a tick or some (Tsuji 2009).",
-    ),
-    option(
-        _CORE,
         "--unit",
         type=click.Choice(UNITS),
         default=NATIVE,
@@ -219,6 +212,15 @@ _CORE_OPTIONS = [
 ]
 
 
+_METHOD = option(
+    _CORE,
+    "--method",
+    type=click.Choice(list(METHODS)),
+    default="s",
+    help="How velocity is measured: s averages in step with the alterations of the pulse number, m counts the "
+    "pulses of a tick or some (Tsuji 2009).",
+)
+
 # Options that are parameters of the core by the same name.
 _PASSED = ("velocity_bits", "position_width", "filter_clocks", "index", "index_reset")
 
@@ -251,30 +253,40 @@ def _method_option(name: str, items: dict[str, Field[Any]]) -> Callable[[Any], A
     words = [f"--{name}/--no-{name}"] if isinstance(default, bool) else [f"--{name}"]
     more = {} if isinstance(default, bool) else {"type": kind, "metavar": about["metavar"]}
     group = f"Method {' and '.join(items)}"
-    return option(group, *words, f"method_{name.replace('-', '_')}", default=None, help=help_, **more)
+    return option(group, *words, _argument(name), default=None, help=help_, **more)
 
 
-def _method_values(method: str, timing: Timing, given: dict[str, Any]) -> dict[str, Any]:
-    """Values of the method's fields; what is taken out of `given`."""
+def _argument(name: str) -> str:
+    """What click calls the value of a method's option."""
+    return f"method_{name.replace('-', '_')}"
+
+
+_METHOD_OPTIONS = _method_options()
+
+
+def method_values(method: str, timing: Timing, given: dict[str, Any]) -> dict[str, Any]:
+    """Values of the method's fields, of what was given of options, by their names; None stands for what was not."""
     values = {}
-    for name, items in _method_options().items():
-        value = given.pop(f"method_{name.replace('-', '_')}")
+    for name, value in given.items():
         if value is None:
             continue
+        items = _METHOD_OPTIONS[name]
         if method not in items:
-            raise ValueError(f"{name} must not be given with --method {method}: it is for {' and '.join(items)}")
+            raise ValueError(f"{name} must not be given with method {method}: it is for {' and '.join(items)}")
         parse = items[method].metadata["option"]["parse"]
         values[items[method].name] = parse(value, timing) if parse else value
     return values
 
 
-def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the options of the core, handed to the command as one argument `spec`."""
+def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: what all methods share, handed to the command as `make`, which makes a spec of a method.
+
+    `make` takes the method's name and what was given of its options, by their names.
+    """
 
     @functools.wraps(command)
     def build(
         *,
-        method: str,
         ppr: int,
         decoding: int,
         clock: str,
@@ -293,20 +305,35 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
             frac_bits = (16 if unit == NATIVE else 10) if lsb is None else parse_lsb(lsb)
         elif lsb is not None:
             raise ValueError("lsb must not be given together with --frac-bits")
-        values = _method_values(method, timing, others)
-        spec = METHODS[method](
-            encoder=Encoder(ppr, decoding),
-            timing=timing,
-            unit=unit,
-            frac_bits=frac_bits,
-            max_speed=None if max_speed is None else Speed.parse(max_speed),
-            max_tick_cycles=_max_tick_cycles(timing, external_tick, max_tick_period),
-            **{name: others.pop(name) for name in _PASSED},
-            **values,
-        )
-        return command(spec=spec, **others)
+        passed = {name: others.pop(name) for name in _PASSED}
 
-    return _with([*_CORE_OPTIONS, *(_method_option(*item) for item in _method_options().items())], build)
+        def make(method: str, given: dict[str, Any]) -> TachometerSpec:
+            return METHODS[method](
+                encoder=Encoder(ppr, decoding),
+                timing=timing,
+                unit=unit,
+                frac_bits=frac_bits,
+                max_speed=None if max_speed is None else Speed.parse(max_speed),
+                max_tick_cycles=_max_tick_cycles(timing, external_tick, max_tick_period),
+                **passed,
+                **method_values(method, timing, given),
+            )
+
+        return command(make=make, **others)
+
+    return all_of(_CORE_OPTIONS, build)
+
+
+def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the options of the core, handed to the command as one argument `spec`."""
+
+    @functools.wraps(command)
+    def build(*, make: Callable[..., TachometerSpec], method: str, **others: Any) -> Any:
+        given = {name: others.pop(_argument(name)) for name in _METHOD_OPTIONS}
+        return command(spec=make(method, given), **others)
+
+    options = [_METHOD, *(_method_option(*item) for item in _METHOD_OPTIONS.items())]
+    return common_options(all_of(options, build))
 
 
 def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
@@ -375,4 +402,4 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
         }
         return command(targets={what: path for what, path in given.items() if path is not None}, **others)
 
-    return _with(_OUTPUT_OPTIONS, collect)
+    return all_of(_OUTPUT_OPTIONS, collect)

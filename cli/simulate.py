@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from tachometry.cli.files import Outputs
+from tachometry.cli.motion_options import FORMS, motion_options
 from tachometry.cli.options import GroupedCommand, core_options, option, output_options
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import format_time, parse_frequency
@@ -17,21 +19,13 @@ if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs nei
     from tachometry.sim.recording import PinTrace, Recording
     from tachometry.sim.results import Run
 
-_MOTION, _FAULTS, _CAPTURE = "Motion", "Encoder faults", "Capture"
+_CAPTURE = "Capture"
 
 
 @click.command(
     cls=GroupedCommand,
     short_help="Run a core on a virtual encoder, against the golden model and the truth.",
-    epilog="""\b
-Motions, joined by + into one:
-  constant:SPEED:TIME
-  ramp:FROM:TO:TIME
-  sine:AMPLITUDE:FREQUENCY:TIME
-  trapezoid:SPEED:ACCEL_TIME:HOLD_TIME
-  stop:TIME
-  csv:FILE    alone: a table with the header time,angle_rad in s and rad
-Units: rad/s (default), rev/s, rpm; s (default), ms, us; Hz (default), kHz.
+    epilog=f"""{FORMS}
 
 \b
 Examples:
@@ -47,88 +41,12 @@ The simulator runs some 10,000 clocks a second: choose a --clock that is a few
 times the edge rate.""",
 )
 @core_options
-@option(
-    _MOTION,
-    "--motion",
-    required=True,
-    metavar="MOTION",
-    help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below.",
-)
-@option(
-    _MOTION,
-    "--vibration",
-    metavar="AMPL:FREQ",
-    help="Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz or kHz); part of the truth.",
-)
-@option(
-    _FAULTS,
-    "--jitter",
-    type=float,
-    default=0,
-    metavar="FRACTION",
-    help="Gaussian jitter of each edge in time: standard deviation over the gap to the nearer neighbour, below 0.5.",
-)
-@option(
-    _FAULTS,
-    "--nonuniformity",
-    type=float,
-    default=0,
-    metavar="FRACTION",
-    help="Edges of the disc are off by up to this many edge pitches, below 0.5, the same in every turn.",
-)
-@option(
-    _FAULTS,
-    "--phase-error",
-    type=float,
-    default=0,
-    metavar="DEGREES",
-    help="B's pulse comes this many electrical degrees later than 90 after A's, between -90 and 90.",
-)
-@option(
-    _FAULTS,
-    "--duty-error",
-    type=float,
-    default=0,
-    metavar="DEGREES",
-    help="Pulses of A and B are this many electrical degrees wider than 180, between -90 and 90.",
-)
-@option(
-    _FAULTS,
-    "--bounce",
-    metavar="COUNT:TIME",
-    help="Contact bounce, such as 3:500us (s, ms or us): after an edge the line falls back COUNT times within TIME, "
-    "or within half the way to the next edge.",
-)
-@option(
-    _FAULTS,
-    "--lost",
-    type=float,
-    default=0,
-    metavar="PROBABILITY",
-    help="Probability that a line misses a pulse: it stays low, and two edges are lost.",
-)
-@option(
-    _FAULTS,
-    "--illegal",
-    type=float,
-    default=0,
-    metavar="PROBABILITY",
-    help="Probability that an edge comes together with the next one: both lines change at once.",
-)
-@option(_FAULTS, "--seed", type=int, default=0, metavar="N", help="Of all random numbers; equal seeds, equal files.")
+@motion_options
 @output_options
 def simulate(
     spec: TachometerSpec,
-    motion: str,
-    vibration: str | None,
-    jitter: float,
-    nonuniformity: float,
-    phase_error: float,
-    duty_error: float,
-    bounce: str | None,
-    lost: float,
-    illegal: float,
-    seed: int,
+    record: Callable[[TachometerSpec], Encoding],
+    tables: list[Path],
     targets: dict[str, Path],
 ) -> int:
     """Run a core on a virtual encoder, against the golden model and the truth.
@@ -138,26 +56,8 @@ def simulate(
 
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """
-    from tachometry.sim.encoder import VirtualEncoder
-    from tachometry.sim.imperfections import Bounce
-    from tachometry.sim.motion import Vibration, parse_motion
-
-    kind, _, table = motion.strip().partition(":")
-    outputs = Outputs(targets, inputs=[Path(table)] if kind == "csv" else [])
-    encoder = VirtualEncoder(
-        spec.encoder.pulses_per_rev,
-        vibration=None if vibration is None else Vibration.parse(vibration),
-        jitter=jitter,
-        nonuniformity=nonuniformity,
-        illegal=illegal,
-        seed=seed,
-        phase_error_deg=phase_error,
-        duty_error_deg=duty_error,
-        bounce=None if bounce is None else Bounce.parse(bounce),
-        lost=lost,
-        index=spec.index,
-    )
-    truth = encoder.record(parse_motion(motion))
+    outputs = Outputs(targets, inputs=tables)
+    truth = record(spec)
     return _run_and_report(spec, "--motion", truth.recording, truth, outputs)
 
 
