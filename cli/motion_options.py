@@ -45,7 +45,8 @@ _OPTIONS = [
         type=float,
         default=0,
         metavar="FRACTION",
-        help="Gaussian jitter of each edge in time: standard deviation over the gap to the nearer neighbour, below 0.5.",
+        help="Gaussian jitter of each edge in time: standard deviation over the gap to the nearer neighbour, below "
+        "0.5.",
     ),
     option(
         _FAULTS,
@@ -75,8 +76,8 @@ _OPTIONS = [
         _FAULTS,
         "--bounce",
         metavar="COUNT:TIME",
-        help="Contact bounce, such as 3:500us (s, ms or us): after an edge the line falls back COUNT times within TIME, "
-        "or within half the way to the next edge.",
+        help="Contact bounce, such as 3:500us (s, ms or us): after an edge the line falls back COUNT times within "
+        "TIME, or within half the way to the next edge.",
     ),
     option(
         _FAULTS,

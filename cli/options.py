@@ -3,7 +3,7 @@
 import functools
 import re
 from collections.abc import Callable
-from dataclasses import Field
+from dataclasses import Field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +11,7 @@ import click
 
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.option import options_of
-from tachometry.spec.timing import whole_clocks
+from tachometry.spec.timing import MAX_TICK_CYCLES, whole_clocks
 from tachometry.spec.velocity_output import NATIVE, UNITS, parse_lsb
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -30,7 +30,6 @@ _PARAMETERS = {
     "index_reset": "--index-reset",
     "max_tick_cycles": "--max-tick-period, in clocks,",
     "max_tick_period": "--max-tick-period",
-    "tick_in": "--tick-in",
     "phase_error_deg": "--phase-error",
     "duty_error_deg": "--duty-error",
 }
@@ -50,7 +49,6 @@ _SAME_NAME = (
     "motion",
     "unit",
     "lsb",
-    "z",
     "speeds",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
@@ -169,7 +167,7 @@ _CORE_OPTIONS = [
         type=int,
         metavar="N",
         help="Fraction bits of the velocity: its LSB is 2^-N of the unit. In count/tick 4 to 24. "
-        "[default: 16 in count/tick, else 10]",
+        "[default: 16 in count/tick, else 10 or as many as there can be]",
     ),
     option(_CORE, "--lsb", metavar="2^-N", help="The same in other words."),
     option(
@@ -186,7 +184,8 @@ _CORE_OPTIONS = [
         "--max-speed",
         metavar="SPEED",
         help="Greatest speed to be measured, in rad/s, rev/s or rpm: makes the core smaller; "
-        "beyond it the velocity saturates and overflow is flagged, the position stays exact. "
+        "beyond it (with an external tick: in the longest) the velocity saturates and overflow is flagged, the "
+        "position stays exact. "
         "[default: one count per clock]",
     ),
     option(
@@ -222,7 +221,7 @@ _METHOD = option(
 )
 
 # Options that are parameters of the core by the same name.
-_PASSED = ("velocity_bits", "position_width", "filter_clocks", "index", "index_reset")
+_PASSED = ("position_width", "filter_clocks", "index", "index_reset")
 
 
 def _max_tick_cycles(timing: Timing, external: bool, period: str | None) -> int | None:
@@ -230,7 +229,11 @@ def _max_tick_cycles(timing: Timing, external: bool, period: str | None) -> int 
         if period is not None:
             raise ValueError("max_tick_period must be given together with --external-tick")
         return None
-    return 2 * timing.tick_cycles if period is None else whole_clocks("max_tick_period", period, timing.clock_hz)
+    return (
+        min(2 * timing.tick_cycles, MAX_TICK_CYCLES)
+        if period is None
+        else whole_clocks("max_tick_period", period, timing.clock_hz)
+    )
 
 
 def _method_options() -> dict[str, dict[str, Field[Any]]]:
@@ -298,26 +301,27 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         max_speed: str | None,
         external_tick: bool,
         max_tick_period: str | None,
+        velocity_bits: int | None,
         **others: Any,
     ) -> Any:
         timing = Timing.parse(clock, tick, max_time)
-        if frac_bits is None:
-            frac_bits = (16 if unit == NATIVE else 10) if lsb is None else parse_lsb(lsb)
-        elif lsb is not None:
+        if frac_bits is not None and lsb is not None:
             raise ValueError("lsb must not be given together with --frac-bits")
+        bits = frac_bits if lsb is None else parse_lsb(lsb)
         passed = {name: others.pop(name) for name in _PASSED}
 
         def make(method: str, given: dict[str, Any]) -> TachometerSpec:
-            return METHODS[method](
+            spec = METHODS[method](
                 encoder=Encoder(ppr, decoding),
                 timing=timing,
-                unit=unit,
-                frac_bits=frac_bits,
                 max_speed=None if max_speed is None else Speed.parse(max_speed),
                 max_tick_cycles=_max_tick_cycles(timing, external_tick, max_tick_period),
                 **passed,
                 **method_values(method, timing, given),
             )
+            coarsest, finest = spec.frac_bits_range(unit)
+            default = 16 if unit == NATIVE else max(coarsest, min(10, finest))
+            return replace(spec, unit=unit, frac_bits=default if bits is None else bits, velocity_bits=velocity_bits)
 
         return command(make=make, **others)
 

@@ -88,10 +88,12 @@ def _range(spec: STachometer, text: str | None) -> tuple[float, float, str]:
         first = Speed.parse(_with_unit(low, last.unit))
     except ValueError as error:
         raise ValueError(f"speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not {text!r}") from error
-    if last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds) > spec.max_count:
-        greatest = spec.max_count * spec.unit_velocity / _rad_per_s(last.unit)
+    counts = last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
+    if counts > spec.max_count or last.rad_per_s > spec.greatest_speed * (1 + 1e-12):
+        greatest = spec.greatest_speed / _rad_per_s(last.unit)
         raise ValueError(
-            f"speeds must be at most {spec.max_count} counts per tick ({greatest:.6g}{last.unit}), "
+            f"speeds must be at most {spec.greatest_speed / spec.unit_velocity:.6g} counts per tick "
+            f"({greatest:.6g}{last.unit}), "
             f"the most that this core measures, not {text!r}"
         )
     if first.rad_per_s < _SLOWEST * spec.unit_velocity:
@@ -118,7 +120,7 @@ def _print(spec: STachometer, expected: Plan, unit: str) -> None:
 
     print_rows(_configuration(spec))
     per_unit = _rad_per_s(unit)
-    heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "Q_V/V (%)", "update by")
+    heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
     table = Table(box=None, pad_edge=False, header_style="")
     for head in heads:
         table.add_column(head, justify="left" if head == heads[-1] else "right", no_wrap=True)
@@ -130,7 +132,7 @@ def _print(spec: STachometer, expected: Plan, unit: str) -> None:
             f"{m_s:.4g}",
             _time(t_m),
             f"{q_v / per_unit:.4g}",
-            f"{100 * q_v / speed:.3g}",
+            f"{100 * (q_v + spec.rounding_lsb * spec.rad_per_s_per_lsb) / speed:.3g}",
             "maximum time (forced)" if forced else "alteration",
         )
         table.add_row(*map(Text, cells))
@@ -139,7 +141,9 @@ def _print(spec: STachometer, expected: Plan, unit: str) -> None:
     console.print(table)
     console.print(
         "\nAt a multiple of the unit velocity m_s would be infinite. At one, and nearer to it than "
-        f"1/{spec.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error.",
+        f"1/{spec.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error. "
+        "error/V is Q_V and the rounding together."
+        + ("\nTimes are those of the nominal tick; an external one may be longer." if spec.max_tick_cycles else ""),
         soft_wrap=True,
     )
 
@@ -151,30 +155,34 @@ def _configuration(spec: STachometer) -> list[tuple[str, str]]:
     kind, entries, width = spec.memory
     equation = "eq. (21), cancels alternate alterations" if spec.cancel else "eq. (17)"
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
-    greatest = f"{_speed(spec.max_count * spec.unit_velocity)} ({spec.max_count} counts per tick)"
+    greatest = f"{_speed(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
     latencies = manifest(spec)["latency_cycles"]
     rest = standstill_ticks(spec)
     return [
         ("method", f"{spec.method.upper()}, {equation}"),
         ("encoder", counts),
         ("clock", f"{timing.clock_hz:,} Hz"),
-        ("tick", f"{_time(timing.tick_seconds)} ({timing.tick_cycles} clocks)"),
+        ("tick", f"{_time(timing.tick_seconds)} ({_plural(timing.tick_cycles, 'clock')})"),
         ("maximum time", f"{_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
         ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
         (
             "one LSB of velocity",
             f"2^{-spec.frac_bits} {spec.unit} = {spec.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to "
-            f"{'half' if spec.unit == NATIVE else '0.7'} of it to Q_V",
+            f"{spec.rounding_lsb} of it",
         ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports if port.name in _WIDE)),
         ("reciprocal", f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"),
-        *((name, f"{n} clocks ({_time(spec.seconds(n))})") for name, n in latencies.items()),
+        *((name, f"{_plural(n, 'clock')} ({_time(spec.seconds(n))})") for name, n in latencies.items()),
         (
             "standstill",
             f"reads 0 at most {_time(rest * timing.tick_seconds)} ({rest} ticks) after the last count's tick",
         ),
     ]
+
+
+def _plural(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def _speed(rad_per_s: float) -> str:

@@ -137,8 +137,10 @@ def _counts(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tupl
 
 
 def _flagged(run: Run, truth: Encoding | None) -> str:
-    made = "" if truth is None else f" (the encoder made {truth.n_illegal} illegal transitions)"
-    return f"{len(run.errors)}{made}"
+    if truth is None:
+        return str(len(run.errors))
+    hint = "; the others are edges within one clock" if len(run.errors) > truth.n_illegal else ""
+    return f"{len(run.errors)} (the encoder made {truth.n_illegal} illegal transitions{hint})"
 
 
 def _errors(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tuple[str, str]]:

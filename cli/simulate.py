@@ -82,8 +82,8 @@ times the edge rate. Edges closer than a clock are flagged as errors or lost."""
     metavar="CHANNEL",
     help="Line B. Without both options: the channels named A and B, else the first two.",
 )
-@option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index, for --index.")
-@option(_CAPTURE, "--tick-in", metavar="CHANNEL", help="The external tick, for --external-tick.")
+@option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index. With --index: z, if it is not given.")
+@option(_CAPTURE, "--tick-in", metavar="CHANNEL", help="The external tick. With --external-tick: tick_in.")
 @option(
     _CAPTURE,
     "--samplerate",
@@ -111,9 +111,8 @@ def replay(
     """
     from tachometry.sim.capture import read_capture
 
-    for wanted, line, channel in ((spec.index, "z", z), (spec.max_tick_cycles, "tick_in", tick_in)):
-        if wanted and channel is None:
-            raise ValueError(f"{line} must be given with {'--index' if line == 'z' else '--external-tick'}")
+    z = "z" if z is None and spec.index else z
+    tick_in = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
     outputs = Outputs(targets, inputs=[capture])
     recording = read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), z, tick_in)
     return _run_and_report(spec, str(capture), recording, None, outputs)

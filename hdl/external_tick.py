@@ -44,11 +44,12 @@ class ExternalTick(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        # High at first: a line that rests there has not risen.
-        level, past = Signal(init=1), Signal(init=1)
-        m.submodules.sync = FFSynchronizer(self.tick_in, level, init=1)
-        m.d.sync += past.eq(level)
-        rises = level & ~past
+        level, past = Signal(), Signal()
+        m.submodules.sync = FFSynchronizer(self.tick_in, level)
+        # Two clocks for the synchroniser, which has no reset, one for the level before.
+        clocks_since_reset = Signal(3)
+        m.d.sync += [past.eq(level), clocks_since_reset.eq((clocks_since_reset << 1) | 1)]
+        rises = level & ~past & clocks_since_reset[-1]
 
         # Counts down to −1, as the sampling clock does.
         start = self._max_cycles - 2

@@ -57,8 +57,8 @@ def choose_channels(
     channels : mapping from number to name
         Channels that the capture holds, in order; numbers count from 0, as sigrok's D0 to D7 do.
     a, b : str, int or None
-        Name of the channel (in this spelling, else in any case), else its number. When not given: the channels named
-        A and B if there are both, else the first two.
+        Name of the channel (in this spelling, else in any case, else without its scopes), else its number. When not
+        given: the channels named A and B if there are both, else the first two.
     others : mapping of str to str or int
         Likewise, of further lines by their names.
 
@@ -76,8 +76,9 @@ def choose_channels(
             return wanted if wanted in channels else None
         exact = [number for number, name in channels.items() if name == wanted]
         alike = [number for number, name in channels.items() if name.casefold() == wanted.casefold()]
-        if exact or alike:
-            return (exact or alike)[0]
+        last = [number for number, name in channels.items() if name.rpartition(".")[2].casefold() == wanted.casefold()]
+        if exact or alike or len(last) == 1:
+            return (exact or alike or last)[0]
         return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
 
     default_a, default_b = find("A"), find("B")

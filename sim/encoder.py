@@ -131,8 +131,8 @@ class VirtualEncoder:
         errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * self.nonuniformity
         if not errors < 90:
             raise ValueError(
-                "phase error, duty error and twice the nonuniformity together must be less than 90 electrical degrees, "
-                f"not {errors:.6g}"
+                "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical "
+                f"degrees, not {errors:.6g}"
             )
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")

@@ -36,7 +36,7 @@ class Plan:
     measurement_time : float64 array, shape (n,), seconds
         T_m.
     resolution : float64 array, shape (n,), rad/s
-        Q_V. No error is greater, but for half an LSB of rounding.
+        Q_V. No error is greater, but for the rounding, once two successive ticks have counted alike.
     forced : bool array, shape (n,)
         Alterations are farther apart than the maximum time.
     """
@@ -93,7 +93,7 @@ def default_range(spec: STachometer) -> tuple[float, float]:
     """
     unit = spec.unit_velocity
     high = _UNITS * unit if spec.max_speed is None else spec.max_speed.rad_per_s
-    high = min(high, spec.max_count * unit)
+    high = min(high, spec.greatest_speed)
     return min(unit / spec.timing.max_ticks, high / 10), high
 
 

@@ -42,8 +42,8 @@ def _draw(spec: STachometer, plan: Plan, unit: str) -> Figure:
         for label, mark, style in marks:
             if left <= mark <= right:
                 axes.axvline(mark, color="0.4", linestyle=style, label=label)
-    half_lsb = 50 * spec.rad_per_s_per_lsb / plan.speed
-    resolution.loglog(speed, half_lsb, color="0.6", linewidth=0.8, label="½ LSB")
+    rounding = 100 * spec.rounding_lsb * spec.rad_per_s_per_lsb / plan.speed
+    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"{spec.rounding_lsb} LSB")
     resolution.set_ylabel("$Q_V/V$ (%)")
     resolution.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=5)
     time.set_ylabel("$T_m$ (s)")

@@ -89,7 +89,14 @@ class Recording(_Lines):
         """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one.
 
         A change within rounding of an edge, such as a decimal time on the clock's grid, is seen at that edge.
+
+        Raises
+        ------
+        ValueError
+            If there are too many clocks to be told apart.
         """
+        if self.duration * clock_hz >= 1 << 53:
+            raise ValueError(f"a recording must last less than 2^53 clocks, not {self.duration:.6g} s")
         edges = self.time * clock_hz
         clock = np.ceil(edges - 2 * np.spacing(edges)).astype(np.int64)
         n_clocks = int(np.floor(self.duration * clock_hz))

@@ -24,7 +24,7 @@ from tachometry.sim.recording import PinTrace, Recording
 from tachometry.sim.run_zip import RunZip
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
-_CHANNELS = {"a": "A", "b": "B", "z": "Z", "tick_in": "TICK"}
+_CHANNELS = {"a": "A", "b": "B", "z": "Z", "tick_in": "TICK_IN"}
 UNIT_HZ = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 # What zipfile raises for a damaged file: besides its own error, those of the layers below, by what is damaged.
 ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError)
@@ -77,7 +77,7 @@ def read_sr(
 
 
 def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
-    """Write a trace as a sigrok session of version 2, channels A, B, and Z and TICK if there are, one sample a clock.
+    """Write a trace as a sigrok session of version 2, channels A, B and the others that there are, one sample a clock.
 
     Equal traces give equal files, byte for byte on any machine, whatever its zlib (see `run_zip`). Read back and placed
     on the same clock, the file gives the same trace.

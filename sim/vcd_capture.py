@@ -114,6 +114,10 @@ def _changes(path: Path, tokens: Iterator[Token], lines: dict[str, str], scale: 
     for token in tokens:
         if token.kind is TokenKind.CHANGE_TIME:
             note()
+            if int(token.data) < now:
+                raise CaptureError(
+                    f"{path} line {token.span.start.line}: time must be at least {now}, not {token.data}"
+                )
             now = int(token.data)
         elif token.kind is TokenKind.CHANGE_SCALAR:
             change = token.scalar_change

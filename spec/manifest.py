@@ -43,6 +43,8 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
     ValueError
         If `name` cannot be the name of a module.
     """
+    if name in {port.name for port in spec.ports}:
+        raise ValueError(f"name must not be that of a port, which {name!r} is")
     return {
         "module": check_module_name(name),
         "method": spec.method,

@@ -160,6 +160,17 @@ class TachometerSpec:
         return count * Fraction(2) ** self.frac_bits
 
     @property
+    def greatest_speed(self) -> float:
+        """Greatest speed, in rad/s, that `velocity` can show; ticks are as long as nominal."""
+        counted = self.max_count * self.unit_velocity
+        return counted if self.output is None else min(counted, self.output.limit * self.rad_per_s_per_lsb)
+
+    @property
+    def rounding_lsb(self) -> float:
+        """Most that rounding takes from `velocity` or adds to it, in its LSB."""
+        return 0.5 if self.unit == NATIVE else 0.7
+
+    @property
     def longest_tick(self) -> int:
         """Most clocks in a tick."""
         return self.timing.tick_cycles if self.max_tick_cycles is None else self.max_tick_cycles

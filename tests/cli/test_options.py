@@ -29,9 +29,8 @@ def test_a_capture_keeps_index_and_tick(tmp_path: Path, capsys: pytest.CaptureFi
     assert " counts in 96 counts out 96 " in told
     assert " tick errors 0 (external tick too early or missing) " in told
     assert " velocity overflow " in told  # 600 rpm are 4800 LSB, and twelve bits hold 2047
-    for reading, channels in ((captured, "--z Z --tick-in TICK"), (tmp_path / "x.vcd", "--z z --tick-in tick_in")):
-        scope = "tachometer." if reading.suffix == ".vcd" else ""
-        words = [scope + word if not word.startswith("--") else word for word in channels.split()]
+    named = "--z tachometer.z --tick-in tachometer.tick_in".split()
+    for reading, words in ((captured, []), (tmp_path / "x.vcd", []), (tmp_path / "x.vcd", named)):
         assert run("replay", reading, *CORE, *LINES, *unit, *words, "--trace", tmp_path / "2.csv") == 0
         assert (tmp_path / "1.csv").read_text() == (tmp_path / "2.csv").read_text()
 

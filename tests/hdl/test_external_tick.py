@@ -1,7 +1,11 @@
 """Ticks from outside: windows between rises, neither too short nor too long."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from amaranth import Module, ResetInserter, Signal
+from amaranth.sim import Simulator
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
@@ -72,3 +76,24 @@ MUTANTS = {
 def test_mutants_are_caught(name: str) -> None:
     with mutant(ExternalTick, *MUTANTS[name]), caught():
         check_all()
+
+
+def test_a_rise_before_reset_is_released_is_none() -> None:
+    """The synchroniser has no reset: what it holds then is not a level of this run."""
+    dut = ResetInserter(reset := Signal())(ExternalTick(2, 1000))
+    seen: list[int] = []
+
+    async def bench(ctx: Any) -> None:
+        for clock in range(60):
+            ctx.set(reset, clock < 30)
+            ctx.set(dut.tick_in, clock in (20, 27, 28, 29, 40))
+            seen.append(int(ctx.get(dut.last)))
+            await ctx.tick()
+
+    top = Module()
+    top.submodules.dut = dut
+    simulator = Simulator(top)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert [clock for clock, last in enumerate(seen) if last and clock >= 30] == [42]

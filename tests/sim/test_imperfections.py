@@ -350,7 +350,7 @@ def test_new_imperfections_leave_the_old_as_they_were() -> None:
         ({"duty_error_deg": -90.0}, "duty_error_deg must be more than -90 and less than 90, not -90.0"),
         (
             {"phase_error_deg": -50.0, "duty_error_deg": 31.0, "nonuniformity": 0.05},
-            "phase error, duty error and twice the nonuniformity together must be less than 90 electrical degrees, "
+            "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical degrees, "
             "not 90",
         ),
         ({"lost": 1.5}, "lost must be from 0 to 1, not 1.5"),

@@ -81,3 +81,9 @@ def test_what_is_wrong_is_said_in_a_line(tmp_path: Path, text: str, channels: tu
 def test_no_samplerate(tmp_path: Path) -> None:
     with pytest.raises(CaptureError, match="samplerate must not be given"):
         read_capture(write(tmp_path / "w.vcd", HEAD + BODY), samplerate_hz=1e6)
+
+
+def test_time_that_runs_backwards(tmp_path: Path) -> None:
+    path = write(tmp_path / "w.vcd", HEAD + BODY + "#1\n")
+    with pytest.raises(CaptureError, match=r"w.vcd line \d+: time must be at least \d+, not 1$"):
+        read_capture(path)

@@ -31,7 +31,7 @@ ERRORS = [
     (lambda: Encoder(0), "pulses_per_rev must be from 1 to 4194304 with x4 decoding, not 0"),
     (lambda: Encoder(1 << 24, 2), "pulses_per_rev must be from 1 to 8388608 with x2 decoding, not 16777216"),
     (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, not 3"),
-    (lambda: Timing(0, 2, 2), "clock_hz must be at least 1, not 0"),
+    (lambda: Timing(0, 2, 2), "clock must be from 1 Hz to 100 GHz, not 0 Hz"),
     (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, not 0"),
     (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 1048576, not 1"),
     (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, not 1048577"),
