@@ -4,8 +4,9 @@ from pathlib import Path
 
 import click
 
+from tachometry.cli.core_options import core_options
 from tachometry.cli.files import Outputs
-from tachometry.cli.options import GroupedCommand, core_options, option
+from tachometry.cli.options import GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tachometry.cli.core_options import core_options
 from tachometry.cli.files import Outputs
-from tachometry.cli.options import GroupedCommand, core_options, option, output
+from tachometry.cli.options import GroupedCommand, option, output
 from tachometry.spec import Speed, STachometer
 from tachometry.spec.manifest import manifest
 from tachometry.spec.units import format_time

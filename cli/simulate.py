@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tachometry.cli.core_options import core_options
 from tachometry.cli.files import Outputs
 from tachometry.cli.motion_options import FORMS, motion_options
-from tachometry.cli.options import GroupedCommand, core_options, option, output_options
+from tachometry.cli.options import GroupedCommand, option, output_options
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import format_time, parse_frequency
 
