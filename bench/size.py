@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.progress import track
 
 from tachometry.hdl import export
-from tachometry.spec import Encoder, Speed, STachometer, TachometerSpec, Timing
+from tachometry.spec import Encoder, MTachometer, Speed, STachometer, TachometerSpec, Timing
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "size"
@@ -113,17 +113,15 @@ class Configuration:
     targets: tuple[str, ...] = tuple(TARGETS)
 
 
-REFERENCE = STachometer(
-    encoder=Encoder(500, 4),
-    timing=Timing.parse("48MHz", "20us", "10ms"),
-    max_speed=Speed.parse("1000rad/s"),
-    frac_bits=16,
-)
+# What methods are compared with: the defaults, and no max_speed.
+COMMON: Any = {"encoder": Encoder(500, 4), "timing": Timing.parse("48MHz", "20us", "10ms")}
+REFERENCE = STachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), frac_bits=16)
 BARS = {
     "ECP5": {"COMB": 330, "FF": 300, "DP16KD": 1, "MULT": 0, "Fmax": 130, "latency": 12},
     "HX8K": {"LC": 400, "RAM": 4, "Fmax": 115},
     "UP5K": {"Fmax": 48},
 }
+M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
 EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
@@ -161,6 +159,8 @@ CONFIGURATIONS = (
         STachometer(encoder=Encoder(500, 4), timing=Timing(48_000_000, 1, 1 << 16), unit="rad/s", frac_bits=-10),
         is_option=False,
     ),
+    Configuration("m", "M method", MTachometer(**COMMON), M_BARS, is_option=False),
+    Configuration("m-10", "M method, mean of 10 ticks", MTachometer(**COMMON, average=10), M_BARS, is_option=False),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )
 
