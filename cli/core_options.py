@@ -158,6 +158,13 @@ def _method_options() -> dict[str, dict[str, Field[Any]]]:
     return found
 
 
+def _kind(item: Field[Any]) -> click.ParamType:
+    """What texts the option of a field takes."""
+    if choices := item.metadata["option"]["choices"]:
+        return click.Choice(choices)
+    return click.BOOL if isinstance(item.default, bool) else click.INT if type(item.default) is int else click.STRING
+
+
 def _method_option(name: str, items: dict[str, Field[Any]]) -> Callable[[Any], Any]:
     """The option of one or several methods; without a default, so that it is seen where it does not belong."""
     item = next(iter(items.values()))
@@ -165,9 +172,8 @@ def _method_option(name: str, items: dict[str, Field[Any]]) -> Callable[[Any], A
     default = item.default
     shown = (name if default else f"no-{name}") if isinstance(default, bool) else default
     help_ = f"{about['help']} [default: {shown}]" if default is not None else about["help"]
-    kind: Any = click.Choice(about["choices"]) if about["choices"] else int if type(default) is int else str
     words = [f"--{name}/--no-{name}"] if isinstance(default, bool) else [f"--{name}"]
-    more = {} if isinstance(default, bool) else {"type": kind, "metavar": about["metavar"]}
+    more = {} if isinstance(default, bool) else {"type": _kind(item), "metavar": about["metavar"]}
     group = f"Method {' and '.join(items)}"
     return option(group, *words, _argument(name), default=None, help=help_, **more)
 
@@ -192,6 +198,23 @@ def method_values(method: str, timing: Timing, given: dict[str, Any]) -> dict[st
         parse = items[method].metadata["option"]["parse"]
         values[items[method].name] = parse(value, timing) if parse else value
     return values
+
+
+def method_options_of_text(method: str, words: list[str]) -> dict[str, Any]:
+    """Options of a method from words such as `average=8` or `cancel=no`, by their names."""
+    given: dict[str, Any] = {}
+    for word in words:
+        name, _, text = word.partition("=")
+        item = _METHOD_OPTIONS.get(name, {}).get(method)
+        if item is None:
+            own = ", ".join(name for name, items in _METHOD_OPTIONS.items() if method in items) or "none"
+            raise ValueError(f"options of method {method} must be of {own}, not {name!r}")
+        kind = _kind(item)
+        try:
+            given[name] = kind.convert(text, None, None)
+        except click.BadParameter as error:
+            raise ValueError(f"{name} of method {method} must be a value of its kind: {error.message}") from None
+    return given
 
 
 def common_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -7,6 +7,7 @@ from typing import NoReturn
 
 import click
 
+from tachometry.cli.compare import compare
 from tachometry.cli.generate import generate
 from tachometry.cli.options import in_terms_of_options
 from tachometry.cli.plan import plan
@@ -43,6 +44,7 @@ cli.add_command(plan)
 cli.add_command(generate)
 cli.add_command(simulate)
 cli.add_command(replay)
+cli.add_command(compare)
 
 
 def main(args: Sequence[str] | None = None) -> NoReturn:

@@ -46,6 +46,8 @@ _SAME_NAME = (
     "motion",
     "unit",
     "lsb",
+    "method",
+    "methods",
     "speeds",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}

@@ -106,10 +106,13 @@ def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figur
     return figure
 
 
-def place_panels(spec: TachometerSpec, heights: dict[str, float]) -> tuple[Figure, dict[str, Axes]]:
+def place_panels(
+    spec: TachometerSpec, heights: dict[str, float], what: str | None = None
+) -> tuple[Figure, dict[str, Axes]]:
     """A figure, titled with the configuration, with one panel below the other, so many inches high.
 
-    They are placed by hand: what Matplotlib's layout engine computes differs from run to run in the last bits.
+    The title begins with `what`, or with the method. Panels are placed by hand: what
+    Matplotlib's layout engine computes differs from run to run in the last bits.
     """
     names = list(heights)
     height = _TOP + _BOTTOM + sum(heights.values()) + _GAP * (len(names) - 1)
@@ -124,15 +127,16 @@ def place_panels(spec: TachometerSpec, heights: dict[str, float]) -> tuple[Figur
         panels[name].tick_params(which="both", labelbottom=name == names[-1])
         panels[name].yaxis.set_label_coords(-0.065, 0.5)
         upper = lower - _GAP
-    figure.suptitle(_title(spec), y=1 - 0.1 / height, fontsize=10)
+    figure.suptitle(_title(spec, what), y=1 - 0.1 / height, fontsize=10)
     return figure, panels
 
 
-def _title(spec: TachometerSpec) -> str:
+def _title(spec: TachometerSpec, what: str | None) -> str:
     timing = spec.timing
     equation = f", eq. ({21 if spec.parameters['cancel'] else 17})" if "cancel" in spec.parameters else ""
     return (
-        f"{spec.method.upper()} method{equation}: {spec.encoder.pulses_per_rev} PPR ×{spec.encoder.decoding}, "
+        f"{what or f'{spec.method.upper()} method{equation}'}: "
+        f"{spec.encoder.pulses_per_rev} PPR ×{spec.encoder.decoding}, "
         f"$T_s$ = {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
         f"clock {_frequency(timing.clock_hz)}, $ω_u$ = {spec.unit_velocity:.5g} rad/s"
     )
