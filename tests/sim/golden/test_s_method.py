@@ -25,7 +25,7 @@ def as_ticks(m_e: list[int]) -> Ticks:
 def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
     """(tick, m_s, forced, stalled, raw velocity) of every update."""
     s_model = model(max_ticks, **options)
-    found = s_model.updates(as_ticks(m_e), n_clocks=1 << 40)
+    found = s_model.updates(as_ticks(m_e), None, 1 << 40)
     latency = s_model._spec.tick_to_velocity
     return [
         (int(clock - latency) // 16, int(m_s), bool(forced), bool(stalled), int(raw))
