@@ -121,6 +121,14 @@ _CORE_OPTIONS = [
     ),
     option(_CORE, "--index", is_flag=True, help="Line z: its rising edge captures the position in index_position."),
     option(_CORE, "--index-reset", is_flag=True, help="And sets the position to 0."),
+    option(_CORE, "--age", is_flag=True, help="Output age: ticks since the update."),
+    option(
+        _CORE,
+        "--bounds",
+        is_flag=True,
+        help="Outputs velocity_lower and velocity_upper, which enclose the true mean speed over the measured window, "
+        "and bounds_valid.",
+    ),
 ]
 
 
@@ -134,7 +142,7 @@ _METHOD = option(
 )
 
 # Options that are parameters of the core by the same name.
-_PASSED = ("position_width", "filter_clocks", "index", "index_reset")
+_PASSED = ("position_width", "filter_clocks", "index", "index_reset", "age", "bounds")
 
 
 def _max_tick_cycles(timing: Timing, external: bool, period: str | None) -> int | None:

@@ -7,8 +7,10 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec import MTachometer
+from tachometry.spec.tachometer import BOUNDS
 
 
 class MovingSum(wiring.Component):
@@ -112,6 +114,8 @@ class Datapath(wiring.Component):
         Never.
     stalled : Out(1)
         None of the n ticks counted anything.
+    velocity_lower, velocity_upper, bounds_valid : Out
+        With `spec.bounds`: one count more and less in n ticks, rounded outward; valid when none of them is the first.
     """
 
     def __init__(self, spec: MTachometer) -> None:
@@ -124,16 +128,23 @@ class Datapath(wiring.Component):
                 "interval": Out(spec.interval_width),
                 "forced": Out(1),
                 "stalled": Out(1),
+                **bound_members(spec),
             }
         )
         self._spec = spec
         self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
         self.scaler: Any = None
+        self.bound_scalers: dict[str, Any] = {}
         if spec.shift is None:
             scaler = SerialScaler if spec.serial else PipelinedScaler
-            self.scaler = scaler(
-                spec.reciprocal, base_width=spec.count_width, numerator_width=spec.sum_width, tag_width=1
-            )
+            shape = {"numerator_width": spec.numerator_width, "tag_width": 1 + spec.bounds}
+            self.scaler = scaler(spec.reciprocal, base_width=spec.count_width, **shape)
+            if spec.bounds:
+                base_width = spec.bound_width - spec.native_frac_bits
+                self.bound_scalers = {
+                    name: scaler(spec.reciprocal, base_width=base_width, towards=towards, **shape)
+                    for name, towards in BOUNDS.items()
+                }
 
     @property
     def probes(self) -> dict[str, Value]:
@@ -149,22 +160,34 @@ class Datapath(wiring.Component):
             moving_sum.m_e.eq(self.pulse_count),
             self.interval.eq(spec.average),
         ]
+        known, tags = [moving_sum.empty], [self.stalled]
+        if spec.bounds:
+            # Of the first tick not all was seen.
+            seen = Signal(range(spec.average + 1))
+            with m.If(self.tick & (seen != spec.average)):
+                m.d.sync += seen.eq(seen + 1)
+            known.append(seen == spec.average)
+            tags.append(self.bounds_valid)
+        bounds = BOUNDS if spec.bounds else {}
         if self.scaler is None:
             m.d.sync += self.velocity_valid.eq(self.tick)
             with m.If(self.tick):
-                m.d.sync += [self.velocity.eq(moving_sum.total << spec.shift), self.stalled.eq(moving_sum.empty)]
+                m.d.sync += [self.velocity.eq(moving_sum.total << spec.shift), Cat(tags).eq(Cat(known))]
+                m.d.sync += [
+                    getattr(self, name).eq((moving_sum.total + one) << spec.shift) for name, one in bounds.items()
+                ]
             return m
-        m.submodules.scaler = scaler = self.scaler
-        # The sum has a clock of its own, then the scaler begins.
-        start, total, empty = Signal(), Signal.like(moving_sum.total), Signal()
-        m.d.sync += [start.eq(self.tick), total.eq(moving_sum.total), empty.eq(moving_sum.empty)]
-        m.d.comb += [
-            Cat(scaler.load, scaler.start).eq(start.replicate(2)),
-            scaler.numerator.eq(total),
-            scaler.tag.eq(empty),
-            scaler.q.eq(spec.reciprocal.value(spec.average)),
-            self.velocity.eq(scaler.velocity),
-            self.velocity_valid.eq(scaler.done),
-            self.stalled.eq(scaler.tag_out),
-        ]
+        # The sum has a clock of its own, then the scalers begin.
+        start, total, tag = Signal(), Signal.like(moving_sum.total), Signal(len(known))
+        m.d.sync += [start.eq(self.tick), total.eq(moving_sum.total), tag.eq(Cat(known))]
+        for name, box in {"velocity": self.scaler, **self.bound_scalers}.items():
+            m.submodules[name if name in bounds else "scaler"] = box
+            m.d.comb += [
+                Cat(box.load, box.start).eq(start.replicate(2)),
+                box.numerator.eq(total + bounds.get(name, 0)),
+                box.tag.eq(tag),
+                box.q.eq(spec.reciprocal.value(spec.average)),
+                getattr(self, name).eq(box.velocity),
+            ]
+        m.d.comb += [self.velocity_valid.eq(self.scaler.done), Cat(tags).eq(self.scaler.tag_out)]
         return m

@@ -1,12 +1,12 @@
 """base + N·(Q + R/m), rounded: the arithmetic for a reciprocal that comes as quotient and remainder.
 
-Both scalers form base·2^f + N·Q + ⌊N·R/m + ½⌋ exactly. The products grow by a bit of N at a time, the least significant
-first, its sign bit negative. N·R/m is a small number, of no more bits than N: it is found by as many subtractions of m,
-which leave a remainder of either sign (non-restoring), and one more rounds it. The one scaler does a step a clock on
-one pair of adders, the other all steps at once for any update rate.
+Both scalers form base·2^f + N·Q + ⌊N·R/m + ½⌋ exactly, or with the floor or the ceiling of N·R/m. The products grow by
+a bit of N at a time, the least significant first, its sign bit negative. N·R/m is a small number, of no more bits than
+N: it is found by as many subtractions of m, which leave a remainder of either sign (non-restoring), and one more rounds
+it. The one scaler does a step a clock on one pair of adders, the other all steps at once for any update rate.
 """
 
-from amaranth import Cat, Module, Mux, Signal, Value, signed
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -35,6 +35,8 @@ class _RemainderScaler(wiring.Component):
         Bits of `base` and `numerator`, both signed.
     tag_width : int
         Bits that travel along with a value; m comes first.
+    towards : int
+        Round to the nearest (0), down (−1) or up (1).
 
     Members
     -------
@@ -50,7 +52,10 @@ class _RemainderScaler(wiring.Component):
         Valid with `done`, and held until the next.
     """
 
-    def __init__(self, reciprocal: CarriedReciprocal, *, base_width: int, numerator_width: int, tag_width: int) -> None:
+    def __init__(
+        self, reciprocal: CarriedReciprocal, *, base_width: int, numerator_width: int, tag_width: int, towards: int = 0
+    ) -> None:
+        self._towards = towards
         self._frac_bits = reciprocal.frac_bits
         self._m_width = reciprocal.remainder_width
         self._steps = numerator_width
@@ -69,6 +74,11 @@ class _RemainderScaler(wiring.Component):
                 "tag_out": Out(tag_width),
             }
         )
+
+    def _up(self, doubled: Value, m: Value) -> Value:
+        """Whether ⌊N·R/m⌋ is to be one more, where twice what it leaves, less m, is `doubled`."""
+        nearest = ~doubled[-1]
+        return (nearest, doubled + m != 0, Const(0))[self._towards]
 
 
 class PipelinedRemainderScaler(_RemainderScaler):
@@ -109,7 +119,7 @@ class PipelinedRemainderScaler(_RemainderScaler):
                 valid, tag, total, quotient, _reduce(remainder, divisor)[: len(r) + place + 1].as_signed()
             )
             quotient = Cat(~remainder[-1], quotient)
-        up = ~_reduce(remainder << 1, tag[: len(r)])[-1]
+        up = self._up(_reduce(remainder << 1, tag[: len(r)]), tag[: len(r)])
         valid, tag, total, quotient, up = later(valid, tag, total, quotient, up)
         m.d.sync += self.done.eq(valid)
         with m.If(valid):
@@ -168,12 +178,13 @@ class SerialRemainderScaler(_RemainderScaler):
                 Cat(total_low, total).eq(Cat(total_low[1:], sum_q)),
             ]
 
+        up = self._up(remainder, tag[: len(self.r)])
         last = running & (step == 2 * self._steps + 2)
         m.d.sync += self.done.eq(last)
         with m.If(last):
             m.d.sync += [
                 running.eq(0),
-                self.velocity.eq(_rounded(Cat(total_low, total).as_signed(), low.as_signed(), ~remainder[-1])),
+                self.velocity.eq(_rounded(Cat(total_low, total).as_signed(), low.as_signed(), up)),
                 self.tag_out.eq(tag),
             ]
         with m.If(self.load):

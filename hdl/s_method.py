@@ -2,17 +2,19 @@
 
 from typing import Any
 
-from amaranth import Cat, Module, Value, signed
+from amaranth import Cat, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.alteration import AlterationDetector
+from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.interval import IntervalAccumulator
 from tachometry.hdl.reciprocal import Reciprocal
 from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec import STachometer, carried_reciprocal
+from tachometry.spec.tachometer import BOUNDS
 
 
 class Datapath(wiring.Component):
@@ -37,6 +39,8 @@ class Datapath(wiring.Component):
     interval : Out
         m_s in ticks.
     forced, stalled : Out(1)
+    velocity_lower, velocity_upper, bounds_valid : Out
+        With `spec.bounds`: one count more and less in the window, rounded outward; not valid for the first window.
     """
 
     def __init__(self, spec: STachometer) -> None:
@@ -49,8 +53,10 @@ class Datapath(wiring.Component):
                 "interval": Out(spec.interval_width),
                 "forced": Out(1),
                 "stalled": Out(1),
+                **bound_members(spec),
             }
         )
+        self._spec = spec
         self.alteration = AlterationDetector(spec.count_width)
         self.interval_accumulator = IntervalAccumulator(
             max_ticks=spec.timing.max_ticks,
@@ -66,12 +72,13 @@ class Datapath(wiring.Component):
         else:
             self.reciprocal = Reciprocal(spec.reciprocal)
             scaler = SerialScaler if spec.serial else PipelinedScaler
-        self.scaler = scaler(
-            spec.reciprocal,
-            base_width=spec.count_width,
-            numerator_width=spec.numerator_width,
-            tag_width=spec.interval_width + 2,
-        )
+        shape = {"numerator_width": spec.numerator_width, "tag_width": spec.interval_width + 2 + spec.bounds}
+        self.scaler = scaler(spec.reciprocal, base_width=spec.count_width, **shape)
+        self.bound_scalers = {
+            name: scaler(spec.reciprocal, base_width=spec.bound_width - spec.native_frac_bits, towards=towards, **shape)
+            for name, towards in BOUNDS.items()
+            if spec.bounds
+        }
 
     @property
     def probes(self) -> dict[str, Value]:
@@ -88,6 +95,15 @@ class Datapath(wiring.Component):
         m.submodules.interval = interval = self.interval_accumulator
         m.submodules.reciprocal = reciprocal = self.reciprocal
         m.submodules.scaler = scaler = self.scaler
+        known = [interval.m_s, interval.forced, interval.stalled]
+        tags = [self.interval, self.forced, self.stalled]
+        if self._spec.bounds:
+            # The first window has begun before there was anything to be seen.
+            later = Signal()
+            with m.If(interval.update):
+                m.d.sync += later.eq(1)
+            known.append(later)
+            tags.append(self.bounds_valid)
         m.d.comb += [
             alteration.tick.eq(self.tick),
             alteration.m_e.eq(self.pulse_count),
@@ -97,15 +113,25 @@ class Datapath(wiring.Component):
             interval.alteration.eq(alteration.alteration),
             reciprocal.m.eq(interval.m_s),
             reciprocal.enable.eq(self.tick),
-            scaler.load.eq(self.tick),
-            scaler.start.eq(interval.update),
-            scaler.base.eq(alteration.previous),
-            scaler.numerator.eq(interval.numerator),
-            scaler.tag.eq(Cat(interval.m_s, interval.forced, interval.stalled)),
-            scaler.q.eq(reciprocal.q),
-            *([scaler.r.eq(reciprocal.r)] if self._carried else []),
             self.velocity.eq(scaler.velocity),
             self.velocity_valid.eq(scaler.done),
-            Cat(self.interval, self.forced, self.stalled).eq(scaler.tag_out),
+            Cat(tags).eq(scaler.tag_out),
         ]
+
+        def feed(scaler: Any, numerator: Value) -> None:
+            m.d.comb += [
+                scaler.load.eq(self.tick),
+                scaler.start.eq(interval.update),
+                scaler.base.eq(alteration.previous),
+                scaler.numerator.eq(numerator),
+                scaler.tag.eq(Cat(known)),
+                scaler.q.eq(reciprocal.q),
+                *([scaler.r.eq(reciprocal.r)] if self._carried else []),
+            ]
+
+        feed(scaler, interval.numerator)
+        for name, box in self.bound_scalers.items():
+            m.submodules[name] = box
+            feed(box, interval.numerator + BOUNDS[name] * self._spec.whole)
+            m.d.comb += getattr(self, name).eq(box.velocity)
         return m

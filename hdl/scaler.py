@@ -25,6 +25,8 @@ class _Scaler(wiring.Component):
         Bits of `base` and `numerator`, both signed.
     tag_width : int
         Bits that travel along with a value.
+    towards : int
+        Round to the nearest (0), down (−1) or up (1).
 
     Members
     -------
@@ -40,9 +42,11 @@ class _Scaler(wiring.Component):
         Valid with `done`, and held until the next.
     """
 
-    def __init__(self, reciprocal: Reciprocal, *, base_width: int, numerator_width: int, tag_width: int) -> None:
+    def __init__(
+        self, reciprocal: Reciprocal, *, base_width: int, numerator_width: int, tag_width: int, towards: int = 0
+    ) -> None:
         self._steps = numerator_width
-        self._rounding = reciprocal.rounding
+        self._rounding = reciprocal.rounding(towards)
         self._frac_bits = reciprocal.frac_bits
         # What is left to drop when all bits of N are done.
         self._surplus = reciprocal.scale_bits - numerator_width

@@ -14,8 +14,10 @@ from tachometry.hdl.index_capture import IndexCapture
 from tachometry.hdl.position_counter import PositionCounter
 from tachometry.hdl.pulse_counter import PulseCounter
 from tachometry.hdl.sampling_clock import SamplingClock
+from tachometry.hdl.update_age import UpdateAge
 from tachometry.hdl.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.spec import TachometerSpec
+from tachometry.spec.tachometer import BOUNDS
 
 
 def datapath(spec: TachometerSpec) -> Any:
@@ -64,10 +66,16 @@ class Tachometer(wiring.Component):
             else SamplingClock(spec.timing.tick_cycles)
         )
         self.velocity_output: Any = None
+        self.bound_outputs: dict[str, Any] = {}
         if spec.output is not None:
             box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
-            tags = spec.interval_width + 2 + sum(port.width for port in spec.method_ports)
+            tags = spec.interval_width + 2 + sum(port.width for port in spec.method_ports) + spec.bounds
             self.velocity_output = box(spec.output, native_width=spec.native_width, tag_width=tags)
+            if spec.bounds:
+                self.bound_outputs = {
+                    name: box(spec.output, native_width=spec.bound_width, tag_width=1, towards=towards)
+                    for name, towards in BOUNDS.items()
+                }
 
     @property
     def spec(self) -> TachometerSpec:
@@ -101,31 +109,16 @@ class Tachometer(wiring.Component):
             datapath.tick.eq(self.tick),
             datapath.pulse_count.eq(self.pulse_count),
         ]
-        names = ["interval", "forced", "stalled", *(port.name for port in self._spec.method_ports)]
-        tags, found = ([getattr(side, name) for name in names] for side in (self, datapath))
         if self._spec.own_ticks:
             m.d.comb += datapath.step_now.eq(decoder.step)
         if "step" in datapath.signature.members:
             # As late as `tick`: with it, all steps of the window have come.
             late = Signal.like(decoder.step)
             m.d.sync += [late.eq(decoder.step), datapath.step.eq(late)]
-        if self.velocity_output is None:
-            m.d.comb += [
-                self.velocity.eq(datapath.velocity),
-                self.velocity_valid.eq(datapath.velocity_valid),
-                Cat(tags).eq(Cat(found)),
-            ]
-        else:
-            m.submodules.velocity_output = output = self.velocity_output
-            m.d.comb += [
-                output.start.eq(datapath.velocity_valid),
-                output.native.eq(datapath.velocity),
-                output.tag.eq(Cat(found)),
-                self.velocity.eq(output.velocity),
-                self.velocity_valid.eq(output.done),
-                self.velocity_overflow.eq(output.velocity_overflow),
-                Cat(tags).eq(output.tag_out),
-            ]
+        self._output(m)
+        if self._spec.age:
+            m.submodules.age = age = UpdateAge(self._spec.timing.max_ticks)
+            m.d.comb += [age.tick.eq(self.tick), age.update.eq(self.velocity_valid), self.age.eq(age.age)]
         if self.index_capture is not None:
             m.submodules.index_capture = index = self.index_capture
             m.d.comb += [
@@ -142,3 +135,30 @@ class Tachometer(wiring.Component):
         if self._spec.filter_clocks:
             m.d.comb += self.swallowed_edges.eq(conditioner.swallowed_edges)
         return m
+
+    def _output(self, m: Module) -> None:
+        """From the datapath to the ports, by way of the unit if there is one."""
+        spec, datapath = self._spec, self.datapath
+        names = ["interval", "forced", "stalled", *(port.name for port in spec.method_ports)]
+        names += ["bounds_valid"] * spec.bounds
+        tags, found = (Cat(getattr(side, name) for name in names) for side in (self, datapath))
+        if self.velocity_output is None:
+            for name in ("velocity", *(BOUNDS if spec.bounds else ())):
+                m.d.comb += getattr(self, name).eq(getattr(datapath, name))
+            m.d.comb += [self.velocity_valid.eq(datapath.velocity_valid), tags.eq(found)]
+            return
+        m.submodules.velocity_output = output = self.velocity_output
+        m.d.comb += [
+            output.tag.eq(found),
+            tags.eq(output.tag_out),
+            self.velocity_valid.eq(output.done),
+            self.velocity_overflow.eq(output.velocity_overflow),
+        ]
+        for name, box in {"velocity": output, **self.bound_outputs}.items():
+            if box is not output:
+                m.submodules[name] = box
+            m.d.comb += [
+                box.start.eq(datapath.velocity_valid),
+                box.native.eq(getattr(datapath, name)),
+                getattr(self, name).eq(box.velocity),
+            ]

@@ -24,6 +24,8 @@ class _VelocityOutput(wiring.Component):
         Bits of v.
     tag_width : int
         Bits that travel along with a value.
+    towards : int
+        Round to the nearest (0), down (−1) or up (1).
 
     Members
     -------
@@ -35,8 +37,11 @@ class _VelocityOutput(wiring.Component):
         Valid with `done`, and held until the next.
     """
 
-    def __init__(self, output: velocity_output.VelocityOutput, *, native_width: int, tag_width: int) -> None:
+    def __init__(
+        self, output: velocity_output.VelocityOutput, *, native_width: int, tag_width: int, towards: int = 0
+    ) -> None:
         self._output = output
+        self._rounding = output.rounding(towards)
         super().__init__(
             {
                 "start": In(1),
@@ -75,9 +80,11 @@ class SerialVelocityOutput(_VelocityOutput):
         running, rounding, complete = Signal(), Signal(), Signal()
         step = Signal(range(bits + 1), reset_less=True)
         bit = Signal(reset_less=True)
-        total = Signal(signed(len(self.native) + 1), reset_less=True)
+        total = Signal(signed(max(len(self.native), bits) + 1), reset_less=True)
+        # The low bits of what rounds are there from the start, as bits of the product are dropped on the way.
+        high, low = self._rounding >> bits, self._rounding & ((1 << bits) - 1)
         addend = Signal.like(self.native)
-        m.d.comb += addend.eq(Mux(rounding, output.half >> bits, Mux(bit, self.native, 0)))
+        m.d.comb += addend.eq(Mux(rounding, high, Mux(bit, self.native, 0)))
         m.d.sync += [
             step.eq(step + 1),
             bit.eq(Const(output.multiplier >> 1, bits + 1).bit_select(step, 1)),
@@ -88,7 +95,7 @@ class SerialVelocityOutput(_VelocityOutput):
         with m.If(rounding):
             m.d.sync += running.eq(0)
         with m.If(self.start):
-            m.d.sync += [running.eq(1), step.eq(0), bit.eq(output.multiplier & 1), total.eq(0)]
+            m.d.sync += [running.eq(1), step.eq(0), bit.eq(output.multiplier & 1), total.eq(low)]
         self._hold(m, complete, total >> (output.shift - bits - 1), self.tag)
         return m
 
@@ -110,14 +117,16 @@ class PipelinedVelocityOutput(_VelocityOutput):
 
         valid, native, tag = self.start, self.native, self.tag
         (place, sign), *others = self._output.digits
-        total: Value = native if sign > 0 else -native
+        low = self._rounding & ((1 << self._output.digits[-1][0]) - 1)
+        width = max(len(native), low.bit_length()) + 2
+        total: Value = (native if sign > 0 else -native) + low
         for next_place, digit in others:
             gap = next_place - place
             sum_ = total + (native << gap) if digit > 0 else total - (native << gap)
-            valid, native, tag, total = later(valid, native, tag, (sum_ >> gap)[: len(native) + 2].as_signed())
+            valid, native, tag, total = later(valid, native, tag, (sum_ >> gap)[:width].as_signed())
             place = next_place
         left = self._output.shift - place
         if left:
-            valid, tag, total = later(valid, tag, ((total + (1 << (left - 1))) >> left).as_signed())
+            valid, tag, total = later(valid, tag, ((total + (self._rounding >> place)) >> left).as_signed())
         self._hold(m, valid, total, tag)
         return m

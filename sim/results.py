@@ -22,6 +22,8 @@ class Ticks:
     overflow : bool array, shape (n,)
     swallowed_edges : int64 array, shape (n,)
         All zero without a filter.
+    age : int64 array, shape (n,), ticks
+        Of the velocity; all zero without an age.
     """
 
     clock: NDArray[np.int64]
@@ -29,6 +31,7 @@ class Ticks:
     position: NDArray[np.int64]
     overflow: NDArray[np.bool_]
     swallowed_edges: NDArray[np.int64]
+    age: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class Updates:
     velocity_overflow : bool array, shape (n,)
         The velocity was saturated; never where it is as wide as it can need.
     more : dict of str to array, shape (n,)
-        Outputs of the method.
+        Bounds, and outputs of the method.
     """
 
     clock: NDArray[np.int64]
@@ -123,7 +126,7 @@ def observed(spec: TachometerSpec, n_clocks: int, rows: NDArray[np.int64]) -> Ru
     def group(strobe: str, kind: type[Any]) -> Any:
         return kind(*at(strobe, (item.name for item in fields(kind) if item.name != "more")))
 
-    more = [port.name for port in spec.method_ports]
+    more = spec.held_ports
     return Run(
         n_clocks,
         group("tick", Ticks),

@@ -56,7 +56,12 @@ class MTachometer(TachometerSpec):
     @property
     def reciprocal(self) -> Reciprocal:
         """What stands for 1/n where a shift does not do."""
-        return Reciprocal(self.average, self.max_sum, self.native_frac_bits, 0)
+        return Reciprocal(self.average, self.max_sum + self.bounds, self.native_frac_bits, 0)
+
+    @property
+    def numerator_width(self) -> int:
+        """Bits of what is multiplied by it, signed."""
+        return signed_width(self.max_sum + self.bounds)
 
     @property
     def interval_width(self) -> int:
@@ -64,9 +69,9 @@ class MTachometer(TachometerSpec):
 
     @property
     def serial(self) -> bool:
-        return self.shift is None and self.has_room(self.sum_width + 3)
+        return self.shift is None and self.has_room(self.numerator_width + 3)
 
     @property
     def datapath_latency(self) -> int:
         # A clock for the sum, and what the scaler takes.
-        return 1 if self.shift is not None else self.sum_width + 4
+        return 1 if self.shift is not None else self.numerator_width + 4

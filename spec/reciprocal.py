@@ -11,7 +11,8 @@ which is ⌊2^f·x + ½⌋ for the exact x, ties included, because
 - 2^f·N/(2^s·m) + ½ is a multiple of 1/(2^max(s,1)·m), so anything that is added and is less than that, which is
   2^(k−max(s,1))/m in units of 2^−k, cannot reach the next integer.
 
-Hence 2^(g+s−max(s,1)) ≥ 2·E·max_m is enough.
+Hence 2^(g+s−max(s,1)) ≥ 2·E·max_m is enough. By the same two facts the floor of 2^f·x comes of E instead of
+E + 2^(k−1), and its ceiling of 2^k − E.
 """
 
 from dataclasses import dataclass
@@ -53,10 +54,11 @@ class Reciprocal:
         """Bits of q(m), unsigned; q(1) = 2^(f+g) is the largest."""
         return self.frac_bits + self.guard_bits + 1
 
-    @property
-    def rounding(self) -> int:
-        """2^(k−1) + E, what is added before the k bits are dropped."""
-        return (1 << (self.scale_bits - 1)) + self.max_numerator
+    def rounding(self, towards: int = 0) -> int:
+        """What is added before the k bits are dropped: to round to the nearest (0), down (−1) or up (1)."""
+        if towards > 0:
+            return (1 << self.scale_bits) - self.max_numerator
+        return self.max_numerator + (0 if towards else 1 << (self.scale_bits - 1))
 
     @property
     def depth(self) -> int:

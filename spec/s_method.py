@@ -41,7 +41,12 @@ class STachometer(TachometerSpec):
     @property
     def max_numerator(self) -> int:
         """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
-        return (4 if self.cancel else 2) * self.max_count
+        return (2 * self.max_count + self.bounds) * self.whole
+
+    @property
+    def whole(self) -> int:
+        """What of N is one count."""
+        return 2 if self.cancel else 1
 
     @property
     def reciprocal(self) -> Reciprocal | CarriedReciprocal:

@@ -13,6 +13,8 @@ from tachometry.spec.velocity_output import NATIVE, UNITS, VelocityOutput, per_c
 
 MAX_NATIVE_FRAC_BITS = 24
 TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
+# The ends of what encloses the true speed, and which way each is rounded: outward.
+BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 
 def signed_width(limit: int) -> int:
@@ -64,6 +66,11 @@ class TachometerSpec:
     max_tick_cycles : int or None
         Ticks come from outside, this many clocks apart at most; the tick of `timing` is their nominal period. None: the
         core makes the ticks.
+    age : bool
+        Output `age`: ticks since the update.
+    bounds : bool
+        Outputs `velocity_lower` and `velocity_upper`, which enclose the true mean speed over the measured window, and
+        `bounds_valid`.
 
     Raises
     ------
@@ -82,6 +89,8 @@ class TachometerSpec:
     index: bool = False
     index_reset: bool = False
     max_tick_cycles: int | None = None
+    age: bool = False
+    bounds: bool = False
 
     # Name of the method, and of the modules that hold its datapath (in hdl/) and its golden model (in sim/golden/).
     method: ClassVar[str]
@@ -152,7 +161,33 @@ class TachometerSpec:
         if self.unit == NATIVE and self.velocity_bits is None:
             return None
         native = 1 << self.native_frac_bits
-        return VelocityOutput(self._lsb_per_count / native, self.max_count * native, self.velocity_bits)
+        largest = self.bound_limit if self.bounds else self.max_count * native
+        return VelocityOutput(self._lsb_per_count / native, largest, self.velocity_bits, self.bounds)
+
+    @property
+    def max_bound(self) -> int:
+        """Largest bound in counts per tick, rounded up: a window may have missed a count at its ends."""
+        return self.max_count + 1
+
+    @property
+    def bound_width(self) -> int:
+        """Bits of a bound in counts per tick."""
+        return signed_width(self.max_bound) + self.native_frac_bits
+
+    @property
+    def bound_limit(self) -> int:
+        """Magnitude of a bound in counts per tick that there is none."""
+        return (1 << (self.bound_width - 1)) - 1
+
+    @property
+    def shown_bound_limit(self) -> int:
+        """The same at the ports: `velocity_lower` of −limit and `velocity_upper` of limit are none."""
+        return self.bound_limit if self.output is None else self.output.limit
+
+    @property
+    def update_spacing(self) -> int:
+        """Fewest clocks between two updates."""
+        return self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
 
     @property
     def _lsb_per_count(self) -> Fraction:
@@ -263,6 +298,20 @@ class TachometerSpec:
         return ()
 
     @property
+    def bound_ports(self) -> tuple[Port, ...]:
+        """What encloses the true speed."""
+        if not self.bounds:
+            return ()
+        width = self.bound_width if self.output is None else self.output.port_width
+        ends = (Port(name, "output", width, signed=True) for name in BOUNDS)
+        return (*ends, Port("bounds_valid", "output"))
+
+    @property
+    def held_ports(self) -> list[str]:
+        """Names of the outputs beside the velocity's own that change only with `velocity_valid`."""
+        return [port.name for port in (*self.bound_ports, *self.method_ports)]
+
+    @property
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order; method-specific ones come last."""
         return (
@@ -283,6 +332,8 @@ class TachometerSpec:
             Port("overflow", "output"),
             Port("stalled", "output"),
             *([Port("velocity_overflow", "output")] if self.output else []),
+            *([Port("age", "output", self.timing.max_ticks.bit_length())] if self.age else []),
+            *self.bound_ports,
             *self.method_ports,
             *([Port("index_valid", "output")] if self.index else []),
             *([Port("index_position", "output", self.position_width, signed=True)] if self.index else []),
@@ -309,6 +360,8 @@ class TachometerSpec:
             "index": self.index,
             "index_reset": self.index_reset,
             "max_tick_cycles": self.max_tick_cycles,
+            "age": self.age,
+            "bounds": self.bounds,
         }
         return common | {item.name: getattr(self, item.name) for item in options_of(type(self))}
 

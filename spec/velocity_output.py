@@ -41,11 +41,14 @@ class VelocityOutput:
         Largest |v|.
     width : int or None
         Bits of the output; None: as many as it can need.
+    bounds : bool
+        Whether v may be a bound.
     """
 
     ratio: Fraction
     max_native: int
     width: int | None
+    bounds: bool = False
 
     @property
     def _constant(self) -> tuple[int, int]:
@@ -67,15 +70,21 @@ class VelocityOutput:
         """Bits of the product that are rounded away."""
         return self._constant[1]
 
-    @property
-    def half(self) -> int:
-        """What is added before they are."""
-        return 1 << self.shift >> 1
+    def rounding(self, towards: int = 0) -> int:
+        """What is added before they are: to round to the nearest (0), down (−1) or up (1).
+
+        Down and up count in what the rounding of the multiplier may have changed: the result is a bound.
+        """
+        if not towards:
+            return 1 << self.shift >> 1
+        exact = self.ratio * (1 << self.shift) == self.multiplier
+        slack = 0 if exact else 1 << max(self.shift - 4, 0)
+        return -slack if towards < 0 else (1 << self.shift) - 1 + slack
 
     @property
     def greatest(self) -> int:
-        """The output for the largest v."""
-        return (self.max_native * self.multiplier + self.half) >> self.shift
+        """The greatest output, which may be that of an upper bound."""
+        return (self.max_native * self.multiplier + self.rounding(int(self.bounds))) >> self.shift
 
     @property
     def limit(self) -> int:

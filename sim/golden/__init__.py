@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tachometry.sim.golden.front_end import count, decoded
-from tachometry.sim.golden.output import in_unit
+from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.recording import PinTrace
 from tachometry.sim.results import Run
@@ -29,4 +29,4 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
     )
     ticks, index = count(spec, steps, last, trace.n_clocks)
     updates = golden.updates(ticks, steps, trace.n_clocks)
-    return Run(trace.n_clocks, ticks, in_unit(spec, updates), index, steps.errors, tick_errors)
+    return Run(trace.n_clocks, with_age(spec, ticks, updates), in_unit(spec, updates), index, steps.errors, tick_errors)

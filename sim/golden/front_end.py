@@ -151,6 +151,7 @@ def count(spec: TachometerSpec, steps: Steps, last: NDArray[np.int64], n_clocks:
         position=wrapped(reached - origin[np.searchsorted(rises, last, side="right")]),
         overflow=np.abs(sums) > spec.max_count,
         swallowed_edges=2 * np.minimum(glitches, (1 << 15) - 1),
+        age=np.zeros(len(last), dtype=np.int64),
     )
     seen = rises + spec.tick_latency < n_clocks
     return ticks, Index((rises + spec.tick_latency)[seen], wrapped(captured - origin[:-1])[seen])

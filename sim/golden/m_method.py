@@ -3,9 +3,10 @@
 import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.s_method import round_quotient
+from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import MTachometer
+from tachometry.spec.tachometer import BOUNDS
 
 
 class Model:
@@ -30,12 +31,19 @@ class Model:
         clock = ticks.clock + self._spec.tick_to_velocity
         seen = clock < n_clocks
         m_e = ticks.pulse_count[seen]
+        total, length = moving(m_e), np.full(len(m_e), n)
+
+        def quotient(counts: int, towards: int) -> np.ndarray:
+            return round_quotient(total + counts, length, self._spec.native_frac_bits, towards)
+
+        more = {name: quotient(one, one) for name, one in BOUNDS.items() if self._spec.bounds}
         never = np.zeros(len(m_e), dtype=np.bool_)
         return Updates(
             clock=clock[seen],
-            velocity=round_quotient(moving(m_e), np.full(len(m_e), n), self._spec.native_frac_bits),
-            interval=np.full(len(m_e), n),
+            velocity=quotient(0, 0),
+            interval=length,
             forced=never,
             stalled=moving(m_e != 0) == 0,
             velocity_overflow=never,
+            more=more | ({"bounds_valid": np.arange(len(m_e)) >= n} if self._spec.bounds else {}),
         )

@@ -3,20 +3,36 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tachometry.sim.results import Updates
+from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import TachometerSpec
+from tachometry.spec.tachometer import BOUNDS
 
 
 def in_unit(spec: TachometerSpec, updates: Updates) -> Updates:
-    """Updates whose velocity is the native one, with that of the output instead.
+    """Updates whose velocity and bounds are native, with those of the output instead.
 
     Python's integers carry the products: they have up to 90 bits.
     """
     output = spec.output
     if output is None:
         return updates
-    native = updates.velocity.astype(object)
-    scaled = (native * output.multiplier + output.half) >> output.shift
-    velocity = np.clip(scaled, -output.limit, output.limit)
-    return replace(updates, velocity=velocity.astype(np.int64), velocity_overflow=(velocity != scaled).astype(bool))
+
+    def scaled(native: NDArray[np.int64], towards: int = 0) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        wide = (native.astype(object) * output.multiplier + output.rounding(towards)) >> output.shift
+        held = np.clip(wide, -output.limit, output.limit)
+        return held.astype(np.int64), (held != wide).astype(bool)
+
+    velocity, overflow = scaled(updates.velocity)
+    bounds = {name: scaled(updates.more[name], towards)[0] for name, towards in BOUNDS.items() if spec.bounds}
+    return replace(updates, velocity=velocity, velocity_overflow=overflow, more=updates.more | bounds)
+
+
+def with_age(spec: TachometerSpec, ticks: Ticks, updates: Updates) -> Ticks:
+    """Ticks with the age of the velocity: how many there were from the clock of its update, or from reset, on."""
+    if not spec.age:
+        return ticks
+    begun = np.append(0, updates.clock)[np.searchsorted(updates.clock, ticks.clock, side="right")]
+    age = np.arange(len(ticks.clock)) - np.searchsorted(ticks.clock, begun, side="left")
+    return replace(ticks, age=np.minimum(age, spec.timing.max_ticks))

@@ -4,8 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import STachometer
+from tachometry.spec.tachometer import BOUNDS
 
 
 def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -68,15 +70,6 @@ def windows(
     return closing[order], m_s[order], forced[order]
 
 
-def round_quotient(numerator: NDArray[np.int64], denominator: NDArray[np.int64], frac_bits: int) -> NDArray[np.int64]:
-    """⌊2^frac_bits · numerator/denominator + ½⌋ in exact integers; the denominators are positive.
-
-    The integer part is taken off first, so that nothing overflows while denominators are below 2^(62−frac_bits).
-    """
-    whole, rest = numerator // denominator, numerator % denominator
-    return (whole << frac_bits) + ((rest << (frac_bits + 1)) + denominator) // (2 * denominator)
-
-
 class Model:
     """Golden model of the S method.
 
@@ -98,18 +91,26 @@ class Model:
         if spec.cancel:
             # Eq. (21), doubled: m_e(i−m_s) + 2·Σ_{j=1}^{m_s−1} m_e(i−j) + m_e(i), over 2·m_s.
             numerator = numbers[at - m_s] + 2 * (total[at] - total[at - m_s + 1]) + numbers[at]
-            velocity = round_quotient(numerator, 2 * m_s, spec.native_frac_bits)
         else:
             # Eq. (17): Σ_{j=0}^{m_s−1} m_e(i−j), over m_s.
-            velocity = round_quotient(total[at + 1] - total[at - m_s + 1], m_s, spec.native_frac_bits)
+            numerator = total[at + 1] - total[at - m_s + 1]
         moving = np.concatenate([[0], np.cumsum(numbers != 0)])
         clock = ticks.clock[i] + spec.tick_to_velocity
         seen = clock < n_clocks
+
+        def quotient(counts: int, towards: int) -> NDArray[np.int64]:
+            whole = 2 if spec.cancel else 1
+            return round_quotient(
+                (numerator + whole * counts)[seen], (whole * m_s)[seen], spec.native_frac_bits, towards
+            )
+
+        more = {name: quotient(one, one) for name, one in BOUNDS.items() if spec.bounds}
         return Updates(
             clock=clock[seen],
-            velocity=velocity[seen],
+            velocity=quotient(0, 0),
             interval=m_s[seen],
             forced=forced[seen],
             stalled=(forced & (moving[at + 1] == moving[at - m_s]))[seen],
             velocity_overflow=np.zeros(np.count_nonzero(seen), dtype=np.bool_),
+            more=more | ({"bounds_valid": np.arange(len(i))[seen] > 0} if spec.bounds else {}),
         )

@@ -59,6 +59,8 @@ def test_defaults(tmp_path: Path) -> None:
         "index": False,
         "index_reset": False,
         "max_tick_cycles": None,
+        "age": False,
+        "bounds": False,
         "cancel": True,
     }
 

@@ -190,7 +190,13 @@ MUTANTS = [
     ),
     Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
     Mutant("eq. (21), 1 clock", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
-    Mutant("eq. (17)", "p5_velocity", PipelinedScaler, "= reciprocal.rounding", "= reciprocal.rounding >> 1"),
+    Mutant(
+        "eq. (17)",
+        "p5_velocity",
+        PipelinedScaler,
+        "= reciprocal.rounding(towards)",
+        "= reciprocal.rounding(towards) >> 1",
+    ),
     Mutant(
         "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
     ),

@@ -9,7 +9,7 @@ from support.quotient import Quotient, every_quotient
 from support.simulate import clock_by_clock
 
 from tachometry.hdl import carried_reciprocal, remainder_scaler
-from tachometry.sim.golden.s_method import round_quotient
+from tachometry.sim.golden.quotient import round_quotient
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.timing import MAX_TICKS
 
@@ -21,8 +21,8 @@ def long_spec(max_ticks: int, frac_bits: int, *, tick_cycles: int = 1, cancel: b
     return spec
 
 
-def wanted(spec: STachometer, base: np.ndarray, n: np.ndarray, m: np.ndarray) -> np.ndarray:
-    return (base << spec.frac_bits) + round_quotient(n, m << spec.reciprocal.halvings, spec.frac_bits)
+def wanted(spec: STachometer, base: np.ndarray, n: np.ndarray, m: np.ndarray, towards: int = 0) -> np.ndarray:
+    return (base << spec.frac_bits) + round_quotient(n, m << spec.reciprocal.halvings, spec.frac_bits, towards)
 
 
 @pytest.mark.parametrize(("frac_bits", "cancel"), [(16, True), (24, True), (4, True), (16, False)])
@@ -44,6 +44,17 @@ def test_every_interval_and_the_extreme_numerators(tmp_path: Path, tick_cycles: 
         spec, [-extreme, extreme] if spec.serial else [-extreme, -1, 1, extreme], distance, tmp_path
     )
     assert np.array_equal(got, wanted(spec, *operands))
+
+
+@pytest.mark.parametrize("tick_cycles", [2, 40])
+@pytest.mark.parametrize("towards", [-1, 1])
+def test_every_bound(tmp_path: Path, tick_cycles: int, towards: int) -> None:
+    """Rounded down and up, pipelined and serial; with 6 fraction bits many quotients need no rounding at all."""
+    spec = long_spec(4096, 6, tick_cycles=tick_cycles)
+    assert spec.serial == (tick_cycles == 40)
+    distance = spec.tick_to_velocity if spec.serial else 1
+    *operands, got = every_quotient(spec, range(-8, 9), distance, tmp_path, towards)
+    assert np.array_equal(got, wanted(spec, *operands, towards))
 
 
 # With few fraction bits there are ties; with many the quotient is not yet 0 where the kept half begins.
@@ -92,7 +103,7 @@ MUTANTS = {
         "self.m[address_bits:].any()",
         "self.m[address_bits + 1:].any()",
     ),
-    "serial, half down": (SERIAL, "low.as_signed(), ~remainder[-1])", "low.as_signed(), 0)"),
+    "serial, half down": (SERIAL, "low.as_signed(), up)", "low.as_signed(), 0)"),
     "serial, the sign bit counts positive": (SERIAL, "borrow.eq(sign & low[0])", "borrow.eq(0)"),
     "pipelined, the sign bit counts positive": (PIPELINED, "total - (step_q << step)", "total + (step_q << step)"),
     "pipelined, half down": (

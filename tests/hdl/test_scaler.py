@@ -11,7 +11,7 @@ from support.sequences import rounded
 from support.simulate import clock_by_clock
 
 from tachometry.hdl import scaler
-from tachometry.sim.golden.s_method import round_quotient
+from tachometry.sim.golden.quotient import round_quotient
 from tachometry.spec import Encoder, STachometer, Timing
 
 
@@ -33,6 +33,17 @@ def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bo
     assert len(got) == len(wanted)
     assert np.count_nonzero(got != wanted) == 0
     assert frac_bits != 4 or np.count_nonzero(ties) > 1000
+
+
+@pytest.mark.parametrize("serial", [True, False])
+@pytest.mark.parametrize("towards", [-1, 1])
+def test_every_bound(tmp_path: Path, serial: bool, towards: int) -> None:
+    """Rounded down and up: at 4 fraction bits many quotients need no rounding at all."""
+    spec = default_spec(4)
+    numerators = range(-spec.max_numerator, spec.max_numerator + 1)
+    base, n, m, got = every_quotient(spec, numerators, spec.tick_to_velocity if serial else 1, tmp_path, towards)
+    assert np.count_nonzero(got != (base << 4) + round_quotient(n, 2 * m, 4, towards)) == 0
+    assert len(got) == len(n)
 
 
 def base(n: int) -> int:

@@ -17,8 +17,8 @@ WIDTH = 12
 RATIOS = [Fraction(2, 13), Fraction(11, 64), Fraction(1, 4), Fraction(3, 16), Fraction(1, 700), Fraction(1)]
 
 
-def check(serial: bool, ratio: Fraction, width: int | None = None, n: int = 150) -> None:
-    output = VelocityOutput(ratio, MAX_NATIVE, width)
+def check(serial: bool, ratio: Fraction, width: int | None = None, n: int = 150, towards: int = 0) -> None:
+    output = VelocityOutput(ratio, MAX_NATIVE, width, bounds=towards != 0)
     latency = output.serial_latency if serial else output.pipelined_latency
     rng = np.random.default_rng(4)
     values = [MAX_NATIVE, -MAX_NATIVE, 1, -1, 0, *rng.integers(-MAX_NATIVE, MAX_NATIVE + 1, n).tolist()]
@@ -27,16 +27,18 @@ def check(serial: bool, ratio: Fraction, width: int | None = None, n: int = 150)
     rows: list[dict[str, int]] = []
     for k, (value, gap) in enumerate(zip(values, gaps.tolist(), strict=True)):
         rows += [{"start": 1, "native": value, "tag": k % 8}, *[{"start": 0}] * (gap - 1)]
-    box = (SERIAL if serial else PIPELINED)(output, native_width=WIDTH, tag_width=3)
+    box = (SERIAL if serial else PIPELINED)(output, native_width=WIDTH, tag_width=3, towards=towards)
     names = ["done", "velocity", "velocity_overflow", "tag_out"]
     seen = clock_by_clock(box, [*rows, *[{"start": 0}] * (latency + 1)], names)
     starts = np.cumsum(gaps) - gaps
     got = [(k, *list(row.values())[1:]) for k, row in enumerate(seen) if row["done"]]
     wanted = []
     for k, (value, start) in enumerate(zip(values, starts.tolist(), strict=True)):
-        scaled = (value * output.multiplier + output.half) >> output.shift
+        scaled = (value * output.multiplier + output.rounding(towards)) >> output.shift
         held = max(-output.limit, min(output.limit, scaled))
         wanted.append((start + latency, held, int(held != scaled), k % 8))
+        assert towards * (scaled - value * ratio) >= 0
+        assert abs(scaled - value * ratio) < (Fraction(9, 8) if towards else Fraction(9, 16))
     assert got == wanted
     assert any(over for _, _, over, _ in wanted) == (output.limit < output.greatest)
 
@@ -53,10 +55,18 @@ def test_serial(ratio: Fraction, width: int | None) -> None:
     check(True, ratio, width)
 
 
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("towards", [-1, 1])
+@pytest.mark.parametrize("serial", [False, True])
+def test_bounds_are_rounded_outward(ratio: Fraction, towards: int, serial: bool) -> None:
+    if len(VelocityOutput(ratio, MAX_NATIVE, None).digits) > 2 or not serial:
+        check(serial, ratio, 8, towards=towards)
+
+
 MUTANTS = {
-    "serial, not rounded": (SERIAL, "Mux(rounding, output.half >> bits, ", "Mux(rounding, 0, "),
+    "serial, not rounded": (SERIAL, "Mux(rounding, high, ", "Mux(rounding, 0, "),
     "serial, a bit late": (SERIAL, "Const(output.multiplier >> 1, bits + 1)", "Const(output.multiplier, bits + 1)"),
-    "pipelined, not rounded": (PIPELINED, "(1 << (left - 1))", "0"),
+    "pipelined, not rounded": (PIPELINED, "(self._rounding >> place)", "0"),
     "pipelined, digits all positive": (PIPELINED, "else total - (native << gap)", "else total + (native << gap)"),
     "pipelined, no flag": (
         PIPELINED,

@@ -24,7 +24,7 @@ def with_max_ticks(max_ticks: int, *, cancel: bool = True) -> STachometer:
 def updates_of(spec: STachometer, m_e: NDArray[np.int64]) -> Updates:
     """What the golden model makes of pulse numbers; `clock` is the tick that caused the update."""
     none = np.zeros(len(m_e), dtype=np.int64)
-    ticks = Ticks(np.arange(len(m_e)), m_e, none, none.astype(np.bool_), none)
+    ticks = Ticks(np.arange(len(m_e)), m_e, none, none.astype(np.bool_), none, none)
     updates = Model(spec).updates(ticks, None, len(m_e) + spec.tick_to_velocity)
     return replace(updates, clock=updates.clock - spec.tick_to_velocity)
 

@@ -23,7 +23,7 @@ RUN = Run(
         np.array([0, 1, 1, -2, -2]),
         np.array([0, 1, 2, 0, -2]),
         np.zeros(5, dtype=np.bool_),
-        np.zeros(5, np.int64),
+        *np.zeros((2, 5), np.int64),
     ),
     updates=Updates(
         TICK[[1, 3]] + AFTER,

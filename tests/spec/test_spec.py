@@ -153,6 +153,8 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "index": False,
         "index_reset": False,
         "max_tick_cycles": None,
+        "age": False,
+        "bounds": False,
         "cancel": False,
     }
     assert described["counts_per_rev"] == 2000

@@ -37,6 +37,8 @@ COMMON = [
     "external tick missing",
     "velocity saturated",
     "update in every clock",
+    "bounds",
+    "aged",
     *LEGAL,
     *ILLEGAL,
 ]
@@ -104,6 +106,8 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         index=encoder.index,
         index_reset=encoder.index and bool(rng.random() < 0.5),
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
+        age=bool(rng.random() < 0.5),
+        bounds=bool(rng.random() < 0.5),
     )
     spec = random_output(spec, rng)
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
@@ -173,6 +177,8 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
             "external tick too early": np.count_nonzero(~np.isin(run.tick_errors, run.ticks.clock)),
             "external tick missing": np.count_nonzero(np.isin(run.tick_errors, run.ticks.clock)),
             "velocity saturated": np.count_nonzero(updates.velocity_overflow),
+            "bounds": np.count_nonzero(updates.more.get("bounds_valid", 0)),
+            "aged": np.count_nonzero(run.ticks.age),
             "update in every clock": np.count_nonzero(np.diff(updates.clock) == 1),
             "glitch swallowed": run.ticks.swallowed_edges[-1] // 2,
             "position wrapped": np.count_nonzero(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),

@@ -24,6 +24,8 @@ FACTORS: dict[str, list[Any]] = {
     "cancel": [True, False],
     "external": [False, True],
     "position_width": [8, 32, 48],
+    "age": [False, True],
+    "bounds": [False, True],
 }
 
 
@@ -54,6 +56,8 @@ def spec_of(row: dict[str, Any]) -> STachometer:
         "index": row["index"] != "none",
         "index_reset": row["index"] == "reset",
         "max_tick_cycles": 2 * cycles if row["external"] else None,
+        "age": row["age"],
+        "bounds": row["bounds"],
     }
     fewest, most = STachometer(**fixed).frac_bits_range(row["unit"])
     frac_bits = {"fewest": max(fewest, most - 20), "16": min(most, 16), "most": most}[row["frac_bits"]]
@@ -90,6 +94,6 @@ def motion(spec: STachometer, seed: int) -> PinTrace:
     if spec.max_tick_cycles is None:
         return trace
     gap = np.full(trace.n_clocks // cycles + 1, cycles)
-    gap[1000:1500] += rng.integers(-cycles // 2, cycles, len(gap[1000:1500]))
-    gap[1200:1210] *= 4
+    gap[500:1000] += rng.integers(-cycles // 2, cycles, len(gap[500:1000]))
+    gap[700:710] *= 4
     return trace.with_tick_in(np.cumsum(np.maximum(gap, 2)))

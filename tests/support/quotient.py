@@ -22,7 +22,7 @@ from tachometry.spec import STachometer
 class Quotient(wiring.Component):
     """base + N/(2^s·m): the reciprocal takes `m` with `enable`, the scaler its operands with `load` and `start`."""
 
-    def __init__(self, spec: STachometer, *, serial: bool) -> None:
+    def __init__(self, spec: STachometer, *, serial: bool, towards: int = 0) -> None:
         self._carried = spec.carried
         if spec.carried:
             self.reciprocal: Any = CarriedReciprocal(spec.reciprocal)
@@ -35,6 +35,7 @@ class Quotient(wiring.Component):
             base_width=spec.count_width,
             numerator_width=spec.numerator_width,
             tag_width=spec.interval_width,
+            towards=towards,
         )
         inputs = ("load", "start", "base", "numerator")
         outputs = ("done", "velocity", "tag_out")
@@ -98,7 +99,7 @@ int main(int, char **argv) {{
 
 
 def every_quotient(
-    spec: STachometer, numerators: Sequence[int], distance: int, folder: Path
+    spec: STachometer, numerators: Sequence[int], distance: int, folder: Path, towards: int = 0
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """(base, N, m, velocity) for m = 1, 2 … max_ticks with every N each, `distance` clocks apart.
 
@@ -115,6 +116,6 @@ def every_quotient(
         distance=distance,
     )
     answers = folder / "answers"
-    subprocess.run([build(Quotient(spec, serial=distance > 1), main, folder), answers], check=True)
+    subprocess.run([build(Quotient(spec, serial=distance > 1, towards=towards), main, folder), answers], check=True)
     m, n = np.meshgrid(np.arange(1, spec.timing.max_ticks + 1), np.array(numerators), indexing="ij")
     return -(n.ravel() >> shift), n.ravel(), m.ravel(), np.fromfile(answers, dtype=np.int64)

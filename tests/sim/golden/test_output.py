@@ -1,12 +1,13 @@
 """A velocity in another unit is faithful: less than one LSB from the exact speed."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from tachometry.sim.golden.output import in_unit
-from tachometry.sim.golden.s_method import round_quotient
+from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.results import Updates
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.units import PI
@@ -39,6 +40,27 @@ def test_less_than_one_lsb_from_the_exact_speed(unit: str, ppr: int, tick_cycles
         errors = [abs(Fraction(count, ticks) * per_tick / lsb - raw) for count, ticks, raw in rows]
         assert max(errors) < Fraction(11, 16)
         assert abs(out).max() < 1 << (spec.velocity_width - 1)
+
+
+@pytest.mark.parametrize("unit", REV_PER_UNIT)
+@pytest.mark.parametrize("ppr", [1, 500, 4_194_304])
+def test_bounds_stay_bounds(unit: str, ppr: int) -> None:
+    """Of a native bound comes one that is no narrower, and wider by less than an LSB and an eighth."""
+    spec = STachometer(encoder=Encoder(ppr), timing=Timing(48_000_000, 960, 500), bounds=True)
+    spec = replace(spec, unit=unit, frac_bits=spec.frac_bits_range(unit)[1])
+    native = np.random.default_rng(ppr).integers(-spec.bound_limit, spec.bound_limit + 1, 1000)
+    native[:2] = spec.bound_limit, -spec.bound_limit
+    bounds = {"velocity_lower": native, "velocity_upper": native, "bounds_valid": native > 0}
+    done = in_unit(spec, replace(updates_of(native), more=bounds))
+    per_tick = 1 / (spec.encoder.counts_per_rev * spec.timing.tick_seconds * REV_PER_UNIT[unit])
+    scale = per_tick * Fraction(2) ** (spec.frac_bits - spec.native_frac_bits)
+    rows = zip(
+        native.tolist(), *(done.more[name].tolist() for name in ("velocity_lower", "velocity_upper")), strict=True
+    )
+    for raw, lower, upper in rows:
+        assert 0 <= raw * scale - lower < Fraction(9, 8)
+        assert 0 <= upper - raw * scale < Fraction(9, 8)
+    assert done.more["velocity_upper"][0] == -done.more["velocity_lower"][1] == spec.shown_bound_limit
 
 
 def test_what_does_not_fit_saturates_and_is_flagged() -> None:

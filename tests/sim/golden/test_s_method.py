@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from support.sequences import MAX_TICKS, PAPER, rounded
 
-from tachometry.sim.golden.s_method import Model, round_quotient
+from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.golden.s_method import Model
 from tachometry.sim.results import Ticks
 from tachometry.spec import Encoder, STachometer, Timing
 
@@ -19,7 +20,7 @@ def model(max_ticks: int, *, cancel: bool = True, frac_bits: int = 16) -> Model:
 def as_ticks(m_e: list[int]) -> Ticks:
     clock = 16 * np.arange(len(m_e), dtype=np.int64)
     numbers = np.array(m_e, dtype=np.int64)
-    return Ticks(clock, numbers, np.cumsum(numbers), np.zeros(len(m_e), dtype=bool), np.zeros(len(m_e), np.int64))
+    return Ticks(clock, numbers, np.cumsum(numbers), np.zeros(len(m_e), dtype=bool), *np.zeros((2, len(m_e)), np.int64))
 
 
 def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
