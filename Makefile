@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo icarus test formal size lint clean
+.PHONY: help venv demo figures icarus test formal size lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -40,6 +40,9 @@ venv: $(VENV)/.test ## the environment in .venv, with all that tests need
 
 demo: $(VENV)/.run ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
 	BIN=$(BIN) sh docs/demo.sh
+
+figures: $(VENV)/.run ## the papers' figures anew in build/figures, held against what the papers say, see docs/figures.md
+	$(BIN)/tachometry figures -o build/figures
 
 icarus: ## Icarus Verilog, installed with apt-get if it is missing
 	@command -v iverilog >/dev/null || { \

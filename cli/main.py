@@ -8,6 +8,7 @@ from typing import NoReturn
 import click
 
 from tachometry.cli.compare import compare
+from tachometry.cli.figures import figures
 from tachometry.cli.generate import generate
 from tachometry.cli.options import in_terms_of_options
 from tachometry.cli.plan import plan
@@ -45,6 +46,7 @@ cli.add_command(generate)
 cli.add_command(simulate)
 cli.add_command(replay)
 cli.add_command(compare)
+cli.add_command(figures)
 
 
 def main(args: Sequence[str] | None = None) -> NoReturn:

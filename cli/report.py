@@ -4,11 +4,11 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -23,8 +23,8 @@ _PLAIN_WIDTH = 100  # columns where there is no terminal
 
 
 @contextmanager
-def clocks_progress(n_clocks: int) -> Iterator[Callable[[int], None] | None]:
-    """A function to be called with the number of clocks done.
+def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[Callable[[float], None] | None]:
+    """A function to be called with how much of `total` is done.
 
     It shows a bar on stderr as soon as the work is seen to take more than two seconds; None if stderr is no terminal.
     """
@@ -34,22 +34,26 @@ def clocks_progress(n_clocks: int) -> Iterator[Callable[[int], None] | None]:
     begun = time.monotonic()
     with ExitStack() as stack:
         bar = Progress(
-            TextColumn("simulating"),
+            TextColumn(verb),
             BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("clocks"),
+            *columns,
             TimeRemainingColumn(),
             console=Console(stderr=True),
             transient=True,
         )
-        task = bar.add_task("simulating", total=n_clocks)
+        task = bar.add_task(verb, total=total)
 
-        def update(done: int) -> None:
-            if not bar.live.is_started and (time.monotonic() - begun) * n_clocks > _PATIENCE * done:
+        def update(done: float) -> None:
+            if not bar.live.is_started and (time.monotonic() - begun) * total > _PATIENCE * done:
                 stack.enter_context(bar)
             bar.update(task, completed=done)
 
         yield update
+
+
+def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
+    """The same, of clocks that are simulated."""
+    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"))
 
 
 def print_summary(

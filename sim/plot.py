@@ -22,6 +22,7 @@ TrueSpeed = Callable[[FloatArray], FloatArray]
 
 # Nothing of the user's settings, of the day or of a version gets into a figure.
 _STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "tachometry",  # names of what is drawn twice, else random
     "pdf.compression": 0,  # zlib promises what its output unpacks to, not which bytes it is
     "font.size": 9,
     "axes.titlesize": 10,
@@ -38,6 +39,7 @@ _STYLE: dict[Any, Any] = {
 }
 _METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
+    ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 ESTIMATE, _ERROR, _COUNT, FORCED = "#2a78c8", "#b3261e", "#2e6b3e", "#d9730d"

@@ -1,0 +1,27 @@
+"""The papers' figures, computed anew: what is drawn, what the paper says of it, and what came out.
+
+`FIGURES` has one function for each; `tachometry figures` draws them all.
+"""
+
+from tachometry.sim.figures.lab import Lab
+from tachometry.sim.figures.rairan_algorithm import fig2, fig3
+from tachometry.sim.figures.result import Claim, Curve, Entry, Panel, Result
+from tachometry.sim.figures.tsuji_methods import fig06, fig07, fig08
+from tachometry.sim.figures.tsuji_runs import fig05, fig09, fig12
+
+# In the order of the papers. The seconds are about what each takes: they divide the progress bar.
+FIGURES: dict[str, Entry] = {
+    entry.name: entry
+    for entry in (
+        Entry("tsuji5", fig05, 1),
+        Entry("tsuji6", fig06, 2),
+        Entry("tsuji7", fig07, 2),
+        Entry("tsuji8", fig08, 1),
+        Entry("tsuji9", fig09, 1),
+        Entry("tsuji12", fig12, 20),
+        Entry("rairan2", fig2, 1),
+        Entry("rairan3", fig3, 1),
+    )
+}
+
+__all__ = ["FIGURES", "Claim", "Curve", "Entry", "Lab", "Panel", "Result"]

@@ -1,0 +1,82 @@
+"""Where figures are measured: a virtual encoder, golden models, and the hardware beside them."""
+
+from collections.abc import Callable
+
+from tachometry.sim import golden
+from tachometry.sim.encoder import Encoding, VirtualEncoder
+from tachometry.sim.motion import Motion, Vibration, parse_motion
+from tachometry.sim.pysim import PySim
+from tachometry.sim.results import Mismatch, Run, compare
+from tachometry.spec import TachometerSpec
+
+
+class Lab:
+    """Runs cores for a figure.
+
+    Parameters
+    ----------
+    hdl : bool
+        Whether the hardware is simulated where a figure asks for it; else its golden model alone.
+    progress : callable or None
+        Called with the share of the figure that is done.
+
+    Attributes
+    ----------
+    mismatches : int
+        Values in which hardware and golden model differed.
+    first : list of str
+        The first of them in each signal.
+    locked : int
+        Clocks over which the hardware was compared.
+    """
+
+    def __init__(self, hdl: bool = True, progress: Callable[[float], None] | None = None) -> None:
+        self._hdl = hdl
+        self._progress = progress
+        self.mismatches = 0
+        self.first: list[str] = []
+        self.locked = 0
+
+    def turn(
+        self,
+        spec: TachometerSpec,
+        motion: str | Motion,
+        *,
+        vibration: str | None = None,
+        nonuniformity: float = 0.0,
+        jitter: float = 0.0,
+        start_angle_rad: float = 0.0,
+        seed: int = 1,
+    ) -> Encoding:
+        """What the virtual encoder of a spec records."""
+        encoder = VirtualEncoder(
+            spec.encoder.pulses_per_rev,
+            vibration=None if vibration is None else Vibration.parse(vibration),
+            nonuniformity=nonuniformity,
+            jitter=jitter,
+            start_angle_rad=start_angle_rad,
+            seed=seed,
+        )
+        return encoder.record(parse_motion(motion) if isinstance(motion, str) else motion)
+
+    def golden(self, spec: TachometerSpec, encoding: Encoding) -> Run:
+        """What the core shows, by its golden model."""
+        return golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
+
+    def lockstep(self, spec: TachometerSpec, encoding: Encoding, begin: float = 0.0, end: float = 1.0) -> Run:
+        """The same, and the hardware in Amaranth's simulator held against it.
+
+        It takes the figure from the share `begin` of its work to the share `end`.
+        """
+        trace = encoding.recording.place(spec.timing.clock_hz)
+        expected = golden.run(spec, trace)
+        if self._hdl:
+            report = self._progress
+            progress = None if report is None else (lambda done: report(begin + (end - begin) * done / trace.n_clocks))
+            self._note(spec, *compare(expected, PySim().run(spec, trace, progress=progress)))
+            self.locked += trace.n_clocks
+        return expected
+
+    def _note(self, spec: TachometerSpec, count: int, first: list[Mismatch]) -> None:
+        self.mismatches += count
+        self.first += [f"{spec.method} method: {mismatch}" for mismatch in first]

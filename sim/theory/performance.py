@@ -1,0 +1,105 @@
+"""What the methods of Tsuji 2009 measure at a constant speed: Q_V and T_m, by eqs. (4) to (20).
+
+All are vectorised over the speeds, in rad/s and greater than 0. `max_ticks` is the maximum measurement time, after
+which a value is given by force (Sec. V-B); None: there is none.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.theory import tsuji
+from tachometry.sim.theory.checks import Floats
+
+# An interval of just `max_ticks` is to be no longer for the rounding of a double.
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """Of a method, at each speed.
+
+    Parameters
+    ----------
+    resolution : float64 array, shape (n,), rad/s
+        Q_V. NaN where the method cannot measure.
+    time : float64 array, shape (n,), seconds
+        T_m, mean.
+    forced : bool array, shape (n,)
+        The maximum time ends the measurement.
+    """
+
+    resolution: Floats
+    time: Floats
+    forced: NDArray[np.bool_]
+
+
+def m_performance(speed: Floats, n: int, counts_per_rev: int, tick_seconds: float) -> Performance:
+    """M method, mean of n ticks: eqs. (7) and (8)."""
+    like = np.ones_like(speed)
+    return Performance(
+        tsuji.tsuji_eq07_resolution(n, counts_per_rev, tick_seconds) * like,
+        tsuji.tsuji_eq08_measurement_time(n, tick_seconds) * like,
+        np.zeros(len(speed), dtype=np.bool_),
+    )
+
+
+def t_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None) -> Performance:
+    """T method: eqs. (10) to (12); above one count per tick it cannot measure."""
+    m_s = tsuji.tsuji_eq12_interval(speed, counts_per_rev, tick_seconds)
+    measured = m_s >= 1
+    m_s, forced = _limited(np.where(measured, m_s, 1), max_ticks)
+    resolution = tsuji.tsuji_eq10_resolution(m_s, counts_per_rev, tick_seconds)
+    time = tsuji.tsuji_eq11_measurement_time(m_s, tick_seconds)
+    return Performance(
+        np.where(measured, _or_forced(resolution, forced, max_ticks, counts_per_rev, tick_seconds), math.nan),
+        np.where(measured, time, math.nan),
+        forced,
+    )
+
+
+def mt_performance(
+    speed: Floats, m_c: int, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None
+) -> Performance:
+    """M/T method with the minimum time of m_c ticks: eqs. (14) to (16)."""
+    m_s = tsuji.tsuji_eq16_interval(speed, m_c, counts_per_rev, tick_seconds)
+    counted = np.rint(speed / tsuji.unit_velocity(counts_per_rev, tick_seconds) * m_s)
+    m_s, forced = _limited(m_s, max_ticks)
+    resolution = tsuji.tsuji_eq14_resolution(counted, m_s, m_c, counts_per_rev, tick_seconds)
+    return Performance(
+        _or_forced(resolution, forced, max_ticks, counts_per_rev, tick_seconds),
+        tsuji.tsuji_eq15_measurement_time(m_s, tick_seconds),
+        forced,
+    )
+
+
+def s_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None) -> Performance:
+    """S method with eq. (21): eqs. (18) to (20); where it is forced the error is at most ω_u/max_ticks."""
+    m_s, forced = _limited(tsuji.tsuji_eq20_interval(speed, counts_per_rev, tick_seconds), max_ticks)
+    return Performance(
+        _or_forced(
+            tsuji.tsuji_eq18_resolution(m_s, counts_per_rev, tick_seconds),
+            forced,
+            max_ticks,
+            counts_per_rev,
+            tick_seconds,
+        ),
+        tsuji.tsuji_eq19_measurement_time(m_s, tick_seconds),
+        forced,
+    )
+
+
+def _limited(m_s: Floats, max_ticks: int | None) -> tuple[Floats, NDArray[np.bool_]]:
+    if max_ticks is None:
+        return m_s, np.zeros(m_s.shape, dtype=np.bool_)
+    return np.minimum(m_s, max_ticks), m_s > max_ticks * (1 + _SLACK)
+
+
+def _or_forced(
+    resolution: Floats, forced: NDArray[np.bool_], max_ticks: int | None, counts_per_rev: int, tick_seconds: float
+) -> Floats:
+    if max_ticks is None:
+        return resolution
+    return np.where(forced, tsuji.unit_velocity(counts_per_rev, tick_seconds) / max_ticks, resolution)
