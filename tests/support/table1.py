@@ -1,7 +1,9 @@
-"""Table 1 of Rairán 2013, line by line, on pulses of constant period."""
+"""Table 1 of Rairán 2013 on pulses of constant period."""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import count, pairwise
+
+from tachometry.sim.theory.table1 import table1_rows
 
 WINDOWS = 4  # to get in step, and then to be looked at
 
@@ -21,26 +23,10 @@ class Steady:
 
 
 def table1(period: int, dt: int, first_pulse: int) -> Steady:
-    """Pulses at `first_pulse` and every `period` after it, all in ts. Visits the times at which something happens."""
-    c_ep = c_dt = n_ep1 = start = 0
-    n_dt1 = 1
-    pulse = first_pulse
-    updates: list[int] = []
-    outputs = set()
-    while len(updates) < 2 * WINDOWS:
-        time = min(pulse, start + dt)
-        lep = time == pulse
-        if lep and c_dt != 0:
-            n_dt1, start = c_dt, time
-            updates.append(time)
-        if time == start + dt and c_ep != 0:
-            n_ep1 = c_ep
-        if lep:
-            c_ep, c_dt = c_ep + 1, 0
-            pulse += period
-        if time == start + dt:
-            c_dt, c_ep, start = c_dt + 1, 0, time
-        if len(updates) > WINDOWS:
-            outputs.add((n_ep1, n_dt1))
-    settled = updates[WINDOWS:]
-    return Steady(outputs, {after - before for before, after in pairwise(settled)})
+    """Pulses at `first_pulse` and every `period` after it, all in ts."""
+    duration = first_pulse + 2 * WINDOWS * (period + 2 * dt)
+    rows = table1_rows(count(first_pulse, period), dt, duration)
+    updates = [k for k, row in enumerate(rows) if row.new_n_dt1]
+    settled = rows[updates[WINDOWS] : updates[2 * WINDOWS - 1] + 1]
+    times = [row.time for row in settled if row.new_n_dt1]
+    return Steady({(row.n_ep1, row.n_dt1) for row in settled}, {after - before for before, after in pairwise(times)})

@@ -1,0 +1,67 @@
+"""Table 1 of Rairán 2013: the lines themselves, at every ts, against `table1_rows`, and the flaw that they have."""
+
+import math
+from collections.abc import Collection
+
+import numpy as np
+import pytest
+
+from tachometry.sim import theory
+from tachometry.sim.theory.table1 import table1_rows
+
+
+def printed(pulses: Collection[int], dt: int, duration: int) -> list[tuple[int, int, int, int]]:
+    """(Cep, Cdt, Nep1, Ndt1) after every ts from the first on, line by line."""
+    cep, cdt, nep1, ndt1 = 0, 0, 0, 1  # 1
+    clock = 0  # 2
+    after = []
+    for now in range(1, duration + 1):  # 3
+        lep = now in pulses
+        clock = clock + 1  # 4
+        if lep and cdt != 0:  # 5
+            ndt1 = cdt  # 6
+            clock = 0  # 7
+        if clock == dt and cep != 0:  # 8
+            nep1 = cep  # 9
+        if lep:  # 10
+            cep, cdt = cep + 1, 0  # 11
+        if clock == dt:  # 12
+            cdt, cep = cdt + 1, 0  # 13
+            clock = 0  # 14
+        after.append((cep, cdt, nep1, ndt1))  # 15
+    return after
+
+
+@pytest.mark.parametrize("dt", [1, 2, 7, 20])
+@pytest.mark.parametrize("rate", [0.02, 0.2, 0.7])
+def test_events_are_the_lines_of_the_table(dt: int, rate: float) -> None:
+    duration = 2000
+    pulses = (np.flatnonzero(np.random.default_rng(dt).random(duration) < rate) + 1).tolist()
+    lines = printed(set(pulses), dt, duration)
+    rows = table1_rows(pulses, dt, duration)
+    held = {row.time: (row.c_ep, row.c_dt, row.n_ep1, row.n_dt1) for row in rows}
+    now = held[0]
+    for time, line in enumerate(lines, 1):
+        now = held.get(time, now)
+        assert now == line, time
+    assert {row.time for row in rows if row.pulse} == set(pulses)
+    for before, row in zip(rows, rows[1:], strict=False):
+        assert row.new_n_dt1 or row.n_dt1 == before.n_dt1
+        assert row.new_n_ep1 or row.n_ep1 == before.n_ep1
+
+
+@pytest.mark.parametrize("first", [1, 300, 999, 1000, 1001, 1500])
+def test_to_the_letter_it_locks_just_below_the_speed_limit(first: int) -> None:
+    """dt = 1000 ts and a pulse every 1000.5: n1 = ½ for ever, half of 0.9995, though eq. (4) allows no estimate below."""
+    dt, n_pulses = 1000, 4000
+    pulses = [first + math.ceil(1000.5 * k) for k in range(n_pulses)]
+    rows = table1_rows(pulses, dt, pulses[-1])
+    late = [row for row in rows if row.time > pulses[-1] // 2]
+    assert {row.n1 for row in late} == {0.5}
+    ratio = dt / 1000.5
+    assert ratio == pytest.approx(0.9995, abs=1e-6)
+    # The estimate is never below the speed, and n2 never above: here n1 is.
+    assert 0.5 < ratio
+    error = theory.rairan_eq02_error(0.5, ratio)
+    assert error > theory.rairan_eq13_max_error(0.5)
+    assert error == pytest.approx(0.49975, abs=1e-5)
