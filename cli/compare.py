@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tachometry.cli.core_options import common_options, method_options_of_text
+from tachometry.cli.core_options import common_options
 from tachometry.cli.files import Outputs
+from tachometry.cli.methods import Methods, named_methods
 from tachometry.cli.motion_options import FORMS, motion_options
 from tachometry.cli.options import GroupedCommand, option, output
-from tachometry.spec import METHODS, TachometerSpec
+from tachometry.spec import Encoder, TachometerSpec
 from tachometry.spec.units import format_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
@@ -59,12 +60,13 @@ def compare(
     settings that their projects come with. Errors are those of the held velocity against the shaft's, from when every
     method has given its first value; the delay is the shift of the true speed that comes closest.
     """
-    from tachometry.sim.compare import common_instants, score
+    from tachometry.sim.compare import RIVALS, common_instants, score
 
     given = {"--plot": plot, "--csv": csv}
     outputs = Outputs({name: path for name, path in given.items() if path is not None}, inputs=tables)
-    chosen = _chosen(methods, make)
+    named = named_methods(methods, make, RIVALS)
     spec = make("s", {})
+    chosen = _chosen(named, spec.encoder)
     with outputs:
         truth = record(spec)
         duration = truth.recording.duration
@@ -79,7 +81,7 @@ def compare(
             from tachometry.sim.compare_plot import save_comparison
 
             save_comparison(path, spec, curves, scores, instants, truth.true_speed)
-    _print(scores)
+    _print(scores, named.left_out)
     return 0
 
 
@@ -90,34 +92,23 @@ def _time(seconds: float) -> str:
     return format_time(Fraction(f"{seconds:.4g}"))
 
 
-def _chosen(methods: str, make: Callable[[str, dict[str, Any]], TachometerSpec]) -> list[Callable[[Encoding], Curve]]:
+def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Encoding], Curve]]:
     """What is to be compared, each from what the encoder gave."""
-    from tachometry.sim.compare import RIVALS, core_curve, rival_curve
+    from tachometry.sim.compare import core_curve, rival_curve
 
     def core(name: str, spec: TachometerSpec) -> Callable[[Encoding], Curve]:
         return lambda truth: core_curve(name, spec, truth.recording.place(spec.timing.clock_hz))
 
     def rival(name: str) -> Callable[[Encoding], Curve]:
-        encoder = make("s", {}).encoder
         return lambda truth: rival_curve(name, truth.recording, encoder.counts_per_rev, encoder.decoding)
 
-    names = [*METHODS, *RIVALS] if methods.strip() == "all" else [name.strip() for name in methods.split(",")]
-    chosen = []
-    for name in names:
-        method, *words = name.split(":")
-        if method in METHODS:
-            chosen.append(core(name, make(method, method_options_of_text(method, words))))
-        elif name in RIVALS:
-            chosen.append(rival(name))
-        else:
-            raise ValueError(f"methods must be of {', '.join([*METHODS, *RIVALS])}, or all, not {name!r}")
-    return chosen
+    return [rival(name) if spec is None else core(name, spec) for name, spec in named.specs.items()]
 
 
 _HEADS = ("method", "updates/s", "T_m mean", "T_m worst", "RMS (rad/s)", "max (rad/s)", "delay")
 
 
-def _print(scores: list[Score]) -> None:
+def _print(scores: list[Score], left_out: dict[str, str]) -> None:
     from rich.table import Table
     from rich.text import Text
 
@@ -145,6 +136,8 @@ def _print(scores: list[Score]) -> None:
     console.print()
     for row in scores:
         console.print(Text(f"{row.name}: {row.what}"))
+    for name, reason in left_out.items():
+        console.print(Text(f"{name}: left out: {reason}"))
 
 
 def _write(path: Path, scores: list[Score]) -> None:

@@ -276,9 +276,19 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator: the options of the core, handed to the command as one argument `spec`."""
 
     @functools.wraps(command)
+    def build(*, make: Callable[..., TachometerSpec], **others: Any) -> Any:
+        return command(**others)
+
+    return core_and_make_options(build)
+
+
+def core_and_make_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the same, and what makes a spec of another method as `make`, see `common_options`."""
+
+    @functools.wraps(command)
     def build(*, make: Callable[..., TachometerSpec], method: str, **others: Any) -> Any:
         given = {name: others.pop(_argument(name)) for name in _METHOD_OPTIONS}
-        return command(spec=make(method, given), **others)
+        return command(spec=make(method, given), make=make, **others)
 
     options = [_METHOD, *(_method_option(*item) for item in _METHOD_OPTIONS.items())]
     return common_options(all_of(options, build))

@@ -7,10 +7,8 @@ from matplotlib.figure import Figure
 
 from tachometry.sim.compare import Curve, Score, TrueSpeed
 from tachometry.sim.motion import FloatArray
-from tachometry.sim.plot import columns, place_panels, save_figure
+from tachometry.sim.plot import COLOURS, columns, place_panels, save_figure
 from tachometry.spec import TachometerSpec
-
-_COLOURS = ("#2a78c8", "#2e6b3e", "#7b3fa0", "#00838f", "#5d4037", "#d9730d", "#b3261e", "#c2185b", "#827717", "0.45")
 
 
 def save_comparison(
@@ -35,7 +33,7 @@ def _draw(
     heights = {"velocity": 3.2} | ({curve.name: 0.8 for curve in curves} if true_speed else {})
     figure, panels = place_panels(spec, heights, "Comparison")
     truth = true_speed(instants) if true_speed else None
-    for place, (curve, result, colour) in enumerate(zip(curves, scores, _COLOURS * len(curves), strict=False)):
+    for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
         held = curve.estimate.at(instants)
         kept = columns(instants, held)
         panels["velocity"].plot(

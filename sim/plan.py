@@ -1,22 +1,25 @@
-"""What the S method promises at each speed, from the equations alone."""
+"""What the methods promise at each speed, from the equations alone."""
 
-from dataclasses import dataclass
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.tables import write_csv
-from tachometry.sim.theory import (
-    tsuji_eq18_resolution,
-    tsuji_eq19_measurement_time,
-    tsuji_eq20_interval,
-    unit_velocity,
+from tachometry.sim.theory import unit_velocity
+from tachometry.sim.theory.performance import (
+    Performance,
+    m_performance,
+    mt_performance,
+    rairan_performance,
+    s_performance,
+    t_performance,
 )
-from tachometry.spec import STachometer
-
-# An interval of just `max_ticks`, at one count in the maximum time, is to be no longer for the rounding of a double.
-_SLACK = 1e-9
+from tachometry.spec import MTachometer, STachometer, TachometerSpec
 
 _UNITS = 10  # of the default range
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
@@ -36,9 +39,10 @@ class Plan:
     measurement_time : float64 array, shape (n,), seconds
         T_m.
     resolution : float64 array, shape (n,), rad/s
-        Q_V. No error is greater, but for the rounding, once two successive ticks have counted alike.
+        Q_V. No error is greater, but for the rounding, once the method has settled (the S method: once two successive
+        ticks have counted alike). NaN, as the times, where the method cannot measure.
     forced : bool array, shape (n,)
-        Alterations are farther apart than the maximum time.
+        The maximum time ends the measurement.
     """
 
     speed: NDArray[np.float64]
@@ -48,33 +52,54 @@ class Plan:
     resolution: NDArray[np.float64]
     forced: NDArray[np.bool_]
 
+    @property
+    def relative(self) -> NDArray[np.float64]:
+        """Q_V/V."""
+        return self.resolution / self.speed
 
-def plan_at(spec: STachometer, speed: ArrayLike) -> Plan:
-    """What to expect at speeds in rad/s: Tsuji 2009, eqs. (18) to (20).
+    @property
+    def product(self) -> NDArray[np.float64]:
+        """Q_V·T_m in rad: what is paid in time for resolution (Tsuji 2009, Sec. V-C)."""
+        return self.resolution * self.measurement_time
 
-    Nearer to a multiple of ω_u than ω_u/max_ticks, updates are forced, and eq. (18) does not hold. With m_s ≥ kept + 1
-    in the window after a forced one, in which eq. (21) weights the only alteration by one half and eq. (17) by one, the
-    error is at most ω_u/max_ticks with eq. (21), ω_u/(kept + 1) with eq. (17).
+
+def plan_at(spec: TachometerSpec, speed: ArrayLike) -> Plan:
+    """What to expect of a core at speeds in rad/s, from the equations of its method, see `sim.theory.performance`.
+
+    The S method nearer to a multiple of ω_u than ω_u/max_ticks: updates are forced, and eq. (18) does not hold. With
+    m_s ≥ kept + 1 in the window after a forced one, in which eq. (21) weights the only alteration by one half and
+    eq. (17) by one, the error is at most ω_u/max_ticks with eq. (21), ω_u/(kept + 1) with eq. (17).
     """
-    max_ticks, counts_per_rev = spec.timing.max_ticks, spec.encoder.counts_per_rev
+    speed = np.atleast_1d(np.asarray(speed, dtype=np.float64))
     tick_seconds = float(spec.timing.tick_seconds)
-    speed = np.asarray(speed, dtype=np.float64)
-    m_s = tsuji_eq20_interval(speed, counts_per_rev, tick_seconds)
-    forced = m_s > max_ticks * (1 + _SLACK)
-    m_s = np.minimum(m_s, max_ticks)
-    unit = unit_velocity(counts_per_rev, tick_seconds)
+    found = _performance(spec, speed, tick_seconds)
     return Plan(
         speed=speed,
-        counts_per_tick=speed / unit,
-        interval=m_s,
-        measurement_time=tsuji_eq19_measurement_time(m_s, tick_seconds),
-        resolution=np.where(
-            forced,
-            unit / (max_ticks if spec.cancel else spec.kept_ticks + 1),
-            tsuji_eq18_resolution(m_s, counts_per_rev, tick_seconds),
-        ),
-        forced=forced,
+        counts_per_tick=speed / unit_velocity(spec.encoder.counts_per_rev, tick_seconds),
+        interval=found.time / tick_seconds,
+        measurement_time=found.time,
+        resolution=found.resolution,
+        forced=found.forced,
     )
+
+
+def _performance(spec: TachometerSpec, speed: NDArray[np.float64], tick_seconds: float) -> Performance:
+    counts, longest = spec.encoder.counts_per_rev, spec.timing.max_ticks
+    if isinstance(spec, STachometer):
+        found = s_performance(speed, counts, tick_seconds, longest)
+        if spec.cancel:
+            return found
+        worst = unit_velocity(counts, tick_seconds) / (spec.kept_ticks + 1)
+        return replace(found, resolution=np.where(found.forced, worst, found.resolution))
+    if isinstance(spec, MTachometer):
+        return m_performance(speed, spec.average, counts, tick_seconds)
+    if spec.method == "rairan":
+        return rairan_performance(speed, spec.parameters["estimate"], counts, tick_seconds, longest)
+    periods = 1 if spec.parameters["timer"] == "tick" else spec.timing.tick_cycles
+    timer_seconds, longest = tick_seconds / periods, longest * periods
+    if spec.method == "t":
+        return t_performance(speed, counts, timer_seconds, longest)
+    return mt_performance(speed, spec.parameters["min_ticks"] * periods, counts, timer_seconds, longest)
 
 
 def standstill_ticks(spec: STachometer) -> int:
@@ -85,7 +110,14 @@ def standstill_ticks(spec: STachometer) -> int:
     return 2 * spec.timing.max_ticks - spec.kept_ticks
 
 
-def default_range(spec: STachometer) -> tuple[float, float]:
+def standstill(spec: TachometerSpec) -> int:
+    """Ticks from that of the last count to the update that reads 0, at most."""
+    if isinstance(spec, STachometer):
+        return standstill_ticks(spec)
+    return spec.average if isinstance(spec, MTachometer) else spec.timing.max_ticks
+
+
+def default_range(spec: TachometerSpec) -> tuple[float, float]:
     """Least and greatest speed, in rad/s, that a plan is of interest for.
 
     From one count in the maximum time to `max_speed`; without it, as everything recurs in each multiple of ω_u, to ten
@@ -97,7 +129,7 @@ def default_range(spec: STachometer) -> tuple[float, float]:
     return min(unit / spec.timing.max_ticks, high / 10), high
 
 
-def dense_speeds(spec: STachometer, low: float, high: float) -> NDArray[np.float64]:
+def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.float64]:
     """Speeds from `low` to `high`, rad/s, that show all a line can: both ends, and where it goes at multiples of ω_u.
 
     Evenly spaced logarithms, and around every multiple of ω_u, or as many as a figure can tell apart, evenly spaced
@@ -115,16 +147,28 @@ def dense_speeds(spec: STachometer, low: float, high: float) -> NDArray[np.float
 
 def write_plan(path: Path, plan: Plan) -> None:
     """Write a CSV with a row per speed."""
-    write_csv(
-        path,
-        "speed_rad_s,counts_per_tick,interval_ticks,measurement_time_s,resolution_rad_s,relative_resolution,forced",
-        (
-            plan.speed,
-            plan.counts_per_tick,
-            plan.interval,
-            plan.measurement_time,
-            plan.resolution,
-            plan.resolution / plan.speed,
-            plan.forced.astype(np.int64),
-        ),
-    )
+    write_csv(path, ",".join(_columns(plan)), _columns(plan).values())
+
+
+def write_plans(path: Path, plans: Mapping[str, Plan]) -> None:
+    """Write a CSV with a row per method and speed."""
+    columns = [_columns(plan) | {"product_rad": plan.product} for plan in plans.values()]
+    names = np.repeat(list(plans), [len(plan.speed) for plan in plans.values()])
+    joined = {head: np.concatenate([one[head] for one in columns]) for head in columns[0]}
+    rows = zip(names.tolist(), *(column.tolist() for column in joined.values()), strict=True)
+    with path.open("w", encoding="ascii", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["method", *joined])
+        writer.writerows([name, *map(repr, row)] for name, *row in rows)
+
+
+def _columns(plan: Plan) -> dict[str, NDArray[Any]]:
+    return {
+        "speed_rad_s": plan.speed,
+        "counts_per_tick": plan.counts_per_tick,
+        "interval_ticks": plan.interval,
+        "measurement_time_s": plan.measurement_time,
+        "resolution_rad_s": plan.resolution,
+        "relative_resolution": plan.relative,
+        "forced": plan.forced.astype(np.int64),
+    }

@@ -1,23 +1,24 @@
 """The figure of a plan: resolution and measurement time over speed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from tachometry.sim.plan import Plan
-from tachometry.sim.plot import ESTIMATE, FORCED, place_panels, save_figure
-from tachometry.spec import Speed, STachometer
+from tachometry.sim.plot import COLOURS, ESTIMATE, FORCED, place_panels, save_figure
+from tachometry.spec import Speed, TachometerSpec
 
 _HEIGHTS = {"resolution": 3.4, "time": 2.4}  # inches
 
 
-def save_plan_plot(path: Path, spec: STachometer, plan: Plan, unit: str) -> None:
+def save_plan_plot(path: Path, spec: TachometerSpec, plan: Plan, unit: str) -> None:
     """Draw a plan into a file whose kind its suffix tells: `.png` or `.pdf`.
 
     Parameters
     ----------
     path : Path
-    spec : STachometer
+    spec : TachometerSpec
     plan : Plan
         At speeds that increase.
     unit : str
@@ -26,7 +27,29 @@ def save_plan_plot(path: Path, spec: STachometer, plan: Plan, unit: str) -> None
     save_figure(path, lambda: _draw(spec, plan, unit))
 
 
-def _draw(spec: STachometer, plan: Plan, unit: str) -> Figure:
+def save_plans_plot(path: Path, spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> None:
+    """The same of several methods at the same speeds: Q_V, Q_V/V, T_m and Q_V·T_m, a line for each."""
+    save_figure(path, lambda: _draw_all(spec, plans, unit))
+
+
+def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Figure:
+    figure, panels = place_panels(spec, dict.fromkeys(("resolution", "relative", "time", "product"), 2.2), "Methods")
+    per_unit = Speed.parse(f"1{unit}").rad_per_s
+    for (name, plan), colour in zip(plans.items(), COLOURS * len(plans), strict=False):
+        values = (plan.resolution / per_unit, 100 * plan.relative, plan.measurement_time, plan.product)
+        for axes, value in zip(panels.values(), values, strict=True):
+            axes.loglog(plan.speed / per_unit, value, color=colour, label=name)
+    labels = (f"$Q_V$ ({unit})", "$Q_V/V$ (%)", "$T_m$ (s)", "$Q_V T_m$ (rad)")
+    for axes, label in zip(panels.values(), labels, strict=True):
+        axes.axvline(spec.unit_velocity / per_unit, color="0.4", linestyle=":")
+        axes.set_ylabel(label)
+    panels["resolution"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=10)
+    panels["product"].set_xlabel(f"speed ({unit})")
+    panels["product"].set_xlim(plan.speed[0] / per_unit / 1.05, plan.speed[-1] / per_unit * 1.05)
+    return figure
+
+
+def _draw(spec: TachometerSpec, plan: Plan, unit: str) -> Figure:
     figure, panels = place_panels(spec, _HEIGHTS)
     resolution, time = panels["resolution"], panels["time"]
     per_unit = Speed.parse(f"1{unit}").rad_per_s

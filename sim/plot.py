@@ -42,6 +42,8 @@ _METADATA: dict[str, dict[str, None]] = {
     ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
+# Of lines that are compared, and of what a run has.
+COLOURS = ("#2a78c8", "#2e6b3e", "#7b3fa0", "#00838f", "#5d4037", "#d9730d", "#b3261e", "#c2185b", "#827717", "0.45")
 ESTIMATE, _ERROR, _COUNT, FORCED = "#2a78c8", "#b3261e", "#2e6b3e", "#d9730d"
 
 # Inches.

@@ -1,4 +1,4 @@
-"""What the methods of Tsuji 2009 measure at a constant speed: Q_V and T_m, by eqs. (4) to (20).
+"""What the methods of Tsuji 2009 and Rairán 2013 measure at a constant speed: resolution Q_V and time T_m.
 
 All are vectorised over the speeds, in rad/s and greater than 0. `max_ticks` is the maximum measurement time, after
 which a value is given by force (Sec. V-B); None: there is none.
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.theory import tsuji
+from tachometry.sim.theory import rairan, tsuji
 from tachometry.sim.theory.checks import Floats
 
 # An interval of just `max_ticks` is to be no longer for the rounding of a double.
@@ -88,6 +88,25 @@ def s_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_t
         ),
         tsuji.tsuji_eq19_measurement_time(m_s, tick_seconds),
         forced,
+    )
+
+
+def rairan_performance(
+    speed: Floats, estimate: str, counts_per_rev: int, dt_seconds: float, max_dt: int | None = None
+) -> Performance:
+    """Rairán 2013: Q_V is the greatest error of the estimate n1, n2 or n3 in its interval, T_m the time of Table 1.
+
+    The interval is [n2, n1], eq. (5); n3, eq. (11), is nearer to n2. Where the maximum time ends the measurement, the
+    speed is less than Q_V.
+    """
+    limit = tsuji.unit_velocity(counts_per_rev, dt_seconds)
+    ratio = speed / limit
+    n1 = np.where(ratio > 1, np.ceil(ratio), 1 / np.maximum(np.ceil(1 / ratio) - 1, 1))
+    n2 = rairan.rairan_eq05_n2(n1)
+    other = rairan.rairan_eq11_n3(n1, n2) if estimate == "n3" else n2
+    dt, forced = _limited(rairan.rairan_update_time(ratio, 1, 1), max_dt)
+    return Performance(
+        _or_forced((n1 - other) * limit, forced, max_dt, counts_per_rev, dt_seconds), dt * dt_seconds, forced
     )
 
 
