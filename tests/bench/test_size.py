@@ -6,6 +6,7 @@ import pytest
 from support.compiled import lint
 from support.script import load
 
+from tachometry.cli import synthesis
 from tachometry.hdl import export
 from tachometry.spec import Encoder, STachometer, Timing
 
@@ -66,17 +67,17 @@ def results(**changed: float) -> dict[tuple[str, str], Any]:
 
 
 def test_area_and_fmax_of_a_report() -> None:
-    assert size.area(REPORT, size.TARGETS["ECP5"].cells) == {"COMB": 325, "FF": 215, "DP16KD": 1, "MULT": 0}
-    assert size.achieved(REPORT) == 133.25
+    assert synthesis.area(REPORT, size.TARGETS["ECP5"].cells) == {"COMB": 325, "FF": 215, "DP16KD": 1, "MULT": 0}
+    assert synthesis.achieved(REPORT) == 133.25
 
 
 def test_a_cell_that_a_report_lacks_is_an_error() -> None:
     with pytest.raises(KeyError, match="ICESTORM_LC"):
-        size.area(REPORT, size.TARGETS["HX8K"].cells)
+        synthesis.area(REPORT, size.TARGETS["HX8K"].cells)
 
 
 def test_critical_path_is_between_clocks() -> None:
-    assert size.critical_path(REPORT) == RAM_PATH
+    assert synthesis.critical_path(REPORT) == RAM_PATH
 
 
 @pytest.mark.parametrize(
@@ -87,7 +88,7 @@ def test_critical_path_is_between_clocks() -> None:
     ],
 )
 def test_what_limits_fmax(path: list[dict[str, Any]], phrase: str) -> None:
-    assert size.limit(path) == phrase
+    assert synthesis.limit(path) == phrase
 
 
 @pytest.mark.parametrize(
@@ -99,7 +100,7 @@ def test_what_limits_fmax(path: list[dict[str, Any]], phrase: str) -> None:
     ],
 )
 def test_signal_of_a_cell(cell: str, signal: str) -> None:
-    assert size.signal_name(cell) == signal
+    assert synthesis.signal_name(cell) == signal
 
 
 @pytest.mark.parametrize(
@@ -132,7 +133,7 @@ def test_boxes_are_counted_and_sorted() -> None:
 
 
 def test_wrapper_connects_every_port_to_bits_of_its_own() -> None:
-    text = size.wrapper(SPEC)
+    text = synthesis.wrapper(SPEC)
     found = re.findall(r"\.(\w+)\((\w+)(?:\[(\d+) \+: (\d+)\])?\)", text)
     assert [name for name, *_ in found] == [port.name for port in SPEC.ports]
     assert [int(width or 1) for *_, width in found] == [port.width for port in SPEC.ports]
@@ -150,25 +151,25 @@ def test_wrapper_connects_every_port_to_bits_of_its_own() -> None:
 
 
 def test_wrapper_elaborates(tmp_path: Path) -> None:
-    (tmp_path / "core.v").write_text(export(SPEC, size.CORE)[f"{size.CORE}.v"])
-    (tmp_path / "wrapper.v").write_text(size.wrapper(SPEC))
+    (tmp_path / "core.v").write_text(export(SPEC, synthesis.CORE)[f"{synthesis.CORE}.v"])
+    (tmp_path / "wrapper.v").write_text(synthesis.wrapper(SPEC))
     lint(["wrapper.v", "core.v"], "wrapper", tmp_path)
 
 
 def test_cache_key_depends_on_all_that_figures_depend_on() -> None:
     same = ({"core.v": "module"}, [["yosys", "a"]], {"yosys": "0.70"})
-    key = size.cache_key(*same)
-    assert key == size.cache_key({"core.v": "module"}, [["yosys", "a"]], {"yosys": "0.70"})
+    key = synthesis.cache_key(*same)
+    assert key == synthesis.cache_key({"core.v": "module"}, [["yosys", "a"]], {"yosys": "0.70"})
     others = ({"core.v": "module "}, [["yosys", "b"]], {"yosys": "0.71"})
     for i, other in enumerate(others):
-        assert size.cache_key(*same[:i], other, *same[i + 1 :]) != key
+        assert synthesis.cache_key(*same[:i], other, *same[i + 1 :]) != key
 
 
 def test_commands_run_once_until_something_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    monkeypatch.setattr(size, "call", lambda folder, command: calls.append(command))
+    monkeypatch.setattr(synthesis, "call", lambda folder, command: calls.append(command))
     for text in ("one", "one", "two", "one"):
-        size.run_cached(tmp_path / "new", {"core.v": text}, [["tool"]], {})
+        synthesis.run_cached(tmp_path / "new", {"core.v": text}, [["tool"]], {})
     assert len(calls) == 3
     assert (tmp_path / "new" / "core.v").read_text() == "one"
 
@@ -177,13 +178,13 @@ def test_a_failure_is_not_cached(tmp_path: Path) -> None:
     failing = [["python", "-c", "import sys; print('no such cell'); sys.exit(3)"]]
     for _ in range(2):
         with pytest.raises(RuntimeError, match=r"failed in .*\nno such cell"):
-            size.run_cached(tmp_path, {}, failing, {})
+            synthesis.run_cached(tmp_path, {}, failing, {})
 
 
 def test_missing_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(size, "PACKAGES", ("amaranth", "yowasp-nothing"))
+    monkeypatch.setattr(synthesis, "PACKAGES", ("amaranth", "yowasp-nothing"))
     with pytest.raises(RuntimeError, match=r"yowasp-nothing is not installed: pip install '\.\[size\]'"):
-        size.versions()
+        synthesis.versions()
 
 
 def test_target_table_has_units_and_a_row_per_configuration() -> None:
