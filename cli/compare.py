@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from tachometry.cli.capture_options import capture_options
 from tachometry.cli.core_options import common_options
 from tachometry.cli.files import Outputs
 from tachometry.cli.methods import Methods, named_methods
-from tachometry.cli.motion_options import FORMS, motion_options
+from tachometry.cli.motion_options import FORMS, optional_motion_options
 from tachometry.cli.options import GroupedCommand, option, output
 from tachometry.spec import Encoder, TachometerSpec
 from tachometry.spec.units import format_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.compare import Curve, Score
+    from tachometry.cli.synthesis import Measurement
+    from tachometry.sim.compare import Curve, Score, TrueSpeed
     from tachometry.sim.encoder import Encoding
+    from tachometry.sim.recording import Recording
 
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Compare methods on the same edges of a virtual encoder.",
+    short_help="Compare methods on the same edges.",
     epilog=f"""{FORMS}
 
 \b
@@ -32,7 +37,8 @@ Examples:
       --motion "ramp:0:100rad/s:200ms+stop:50ms" --jitter 0.05 --plot all.png
   tachometry compare --ppr 500 --clock 10MHz --tick 100us \\
       --methods "s,s:cancel=no,m:average=10,hostmot2" \\
-      --motion "sine:50rad/s:5Hz:1s" """,
+      --motion "sine:50rad/s:5Hz:1s" --size
+  tachometry compare --ppr 500 --clock 200kHz --tick 1ms --replay ramp.sr""",
 )
 @common_options
 @option(
@@ -43,46 +49,126 @@ Examples:
     help="Names with commas between: methods of cores, with options as in m:average=10 or s:cancel=no, and difference, "
     "hostmot2, simplefoc, odrive, moteus: float models of what is in use.",
 )
-@motion_options
+@optional_motion_options
+@option(
+    "Capture",
+    "--replay",
+    "capture",
+    metavar="CAPTURE",
+    type=click.Path(path_type=Path),
+    help="Captured lines instead of a --motion: .sr, .csv or .vcd, as `tachometry replay` takes them.",
+)
+@capture_options
+@option(
+    "Methods",
+    "--size",
+    is_flag=True,
+    help="Also measure the cores on an ECP5: COMB, FF, Fmax. Takes half a minute a core, and the extra `size`.",
+)
 @output("--plot", suffixes=(".png", ".pdf"), help="Figure of all velocities and of the error of each; .png or .pdf.")
 @output("--csv", help="CSV with a row per method: the table.")
 def compare(
     make: Callable[[str, dict[str, Any]], TachometerSpec],
     methods: str,
-    record: Callable[[TachometerSpec], Encoding],
+    record: Callable[[TachometerSpec], Encoding] | None,
     tables: list[Path],
+    capture: Path | None,
+    read: Callable[[Path, TachometerSpec], Recording],
+    size: bool,
     plot: Path | None,
     csv: Path | None,
 ) -> int:
-    """Compare methods on the same edges of a virtual encoder.
+    """Compare methods on the same edges, of a virtual encoder or a capture.
 
     Cores are run by their golden models, which the hardware equals bit for bit; the others are float models with the
     settings that their projects come with. Errors are those of the held velocity against the shaft's, from when every
-    method has given its first value; the delay is the shift of the true speed that comes closest.
+    method has given its first value; the delay is the shift of the true speed that comes closest. A capture does not
+    tell the true speed, so there are no errors.
     """
     from tachometry.sim.compare import RIVALS, common_instants, score
 
     given = {"--plot": plot, "--csv": csv}
-    outputs = Outputs({name: path for name, path in given.items() if path is not None}, inputs=tables)
+    inputs = tables if capture is None else [capture]
+    outputs = Outputs({name: path for name, path in given.items() if path is not None}, inputs=inputs)
     named = named_methods(methods, make, RIVALS)
     spec = make("s", {})
-    chosen = _chosen(named, spec.encoder)
+    source = _source(record, capture, read, spec)
+    tools = _tools() if size else {}
     with outputs:
-        truth = record(spec)
-        duration = truth.recording.duration
-        curves = [curve(truth) for curve in chosen]
+        duration = source.recording.duration
+        curves = [curve(source.recording) for curve in _chosen(named, spec.encoder)]
         instants = common_instants(curves, duration, float(spec.timing.tick_seconds))
         if len(instants) < 2:
-            raise ValueError(f"motion must last until every method has a value, longer than {_time(duration)}")
-        scores = [score(curve, duration, instants, truth.true_speed) for curve in curves]
+            raise ValueError(f"{source.name} must last until every method has a value, longer than {_time(duration)}")
+        scores = [score(curve, duration, instants, source.true_speed) for curve in curves]
+        sizes = _sizes(named, tools) if size else {}
         if path := outputs.get("--csv"):
-            _write(path, scores)
+            _write(path, scores, sizes)
         if path := outputs.get("--plot"):
             from tachometry.sim.compare_plot import save_comparison
 
-            save_comparison(path, spec, curves, scores, instants, truth.true_speed)
-    _print(scores, named.left_out)
+            save_comparison(path, spec, curves, scores, instants, source.true_speed)
+    _print(scores, sizes, named.left_out)
     return 0
+
+
+@dataclass(frozen=True)
+class _Source:
+    """Where the edges come from; a capture does not tell the true speed."""
+
+    name: str
+    recording: Recording
+    true_speed: TrueSpeed | None
+
+
+def _source(
+    record: Callable[[TachometerSpec], Encoding] | None,
+    capture: Path | None,
+    read: Callable[[Path, TachometerSpec], Recording],
+    spec: TachometerSpec,
+) -> _Source:
+    if (record is None) == (capture is None):
+        raise ValueError("motion must be given, or --replay, and not both")
+    if capture is not None:
+        return _Source(str(capture), read(capture, spec), None)
+    assert record is not None
+    truth = record(spec)
+    return _Source("motion", truth.recording, truth.true_speed)
+
+
+def _tools() -> dict[str, str]:
+    """Versions of what measures sizes."""
+    from tachometry.cli.synthesis import versions
+
+    try:
+        return versions()
+    except RuntimeError as error:
+        raise click.ClickException(f"--size needs the extra `size`: {error}") from error
+
+
+def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
+    """COMB, FF and Fmax of the cores on an ECP5, by name."""
+    from rich.progress import MofNCompleteColumn, TextColumn
+
+    from tachometry.cli.report import progress_bar
+    from tachometry.cli.synthesis import CORE, TARGETS, measure_core
+    from tachometry.hdl import export
+
+    specs = {name: spec for name, spec in named.specs.items() if spec is not None}
+    sizes = {}
+    with (
+        TemporaryDirectory(prefix="tachometry-") as folder,
+        progress_bar("measuring sizes", len(specs), MofNCompleteColumn(), TextColumn("cores")) as report,
+    ):
+        for done, (name, spec) in enumerate(specs.items(), 1):
+            verilog = export(spec, CORE)[f"{CORE}.v"]
+            try:
+                sizes[name] = measure_core(spec, TARGETS["ECP5"], verilog, Path(folder) / str(done), tools)
+            except RuntimeError as error:
+                raise click.ClickException(str(error)) from error
+            if report is not None:
+                report(done)
+    return sizes
 
 
 def _time(seconds: float) -> str:
@@ -92,23 +178,24 @@ def _time(seconds: float) -> str:
     return format_time(Fraction(f"{seconds:.4g}"))
 
 
-def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Encoding], Curve]]:
+def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Recording], Curve]]:
     """What is to be compared, each from what the encoder gave."""
     from tachometry.sim.compare import core_curve, rival_curve
 
-    def core(name: str, spec: TachometerSpec) -> Callable[[Encoding], Curve]:
-        return lambda truth: core_curve(name, spec, truth.recording.place(spec.timing.clock_hz))
+    def core(name: str, spec: TachometerSpec) -> Callable[[Recording], Curve]:
+        return lambda recording: core_curve(name, spec, recording.place(spec.timing.clock_hz))
 
-    def rival(name: str) -> Callable[[Encoding], Curve]:
-        return lambda truth: rival_curve(name, truth.recording, encoder.counts_per_rev, encoder.decoding)
+    def rival(name: str) -> Callable[[Recording], Curve]:
+        return lambda recording: rival_curve(name, recording, encoder.counts_per_rev, encoder.decoding)
 
     return [rival(name) if spec is None else core(name, spec) for name, spec in named.specs.items()]
 
 
 _HEADS = ("method", "updates/s", "T_m mean", "T_m worst", "RMS (rad/s)", "max (rad/s)", "delay")
+_SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
 
 
-def _print(scores: list[Score], left_out: dict[str, str]) -> None:
+def _print(scores: list[Score], sizes: dict[str, Measurement], left_out: dict[str, str]) -> None:
     from rich.table import Table
     from rich.text import Text
 
@@ -118,7 +205,7 @@ def _print(scores: list[Score], left_out: dict[str, str]) -> None:
         return "-" if seconds is None else ("-" if seconds < 0 else "") + _time(abs(seconds))
 
     table = Table(box=None, pad_edge=False, header_style="")
-    for head in _HEADS:
+    for head in (*_HEADS, *(_SIZE if sizes else ())):
         table.add_column(head, justify="left" if head == _HEADS[0] else "right", no_wrap=True)
     for row in scores:
         cells = (
@@ -129,6 +216,7 @@ def _print(scores: list[Score], left_out: dict[str, str]) -> None:
             "-" if row.rms is None else f"{row.rms:.4g}",
             "-" if row.max is None else f"{row.max:.4g}",
             time(row.delay),
+            *(_size_cells(sizes.get(row.name)) if sizes else ()),
         )
         table.add_row(*map(Text, cells))
     console = stdout_console()
@@ -136,15 +224,26 @@ def _print(scores: list[Score], left_out: dict[str, str]) -> None:
     console.print()
     for row in scores:
         console.print(Text(f"{row.name}: {row.what}"))
+    if sizes:
+        console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/size.md")
     for name, reason in left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
 
 
-def _write(path: Path, scores: list[Score]) -> None:
+def _size_cells(size: Measurement | None) -> list[str]:
+    return ["-" if size is None else form.format(size.figures[figure]) for figure, form in _SIZE.items()]
+
+
+def _write(path: Path, scores: list[Score], sizes: dict[str, Measurement]) -> None:
     import csv
 
     names = [name for name in vars(scores[0]) if name != "what"]
+    figures = list(_SIZE) if sizes else []
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows([["" if (value := getattr(row, name)) is None else value for name in names] for row in scores])
+        writer.writerow([*names, *figures])
+        for row in scores:
+            cells = [getattr(row, name) for name in names]
+            size = sizes.get(row.name)
+            cells += [None if size is None else size.figures[figure] for figure in figures]
+            writer.writerow(["" if cell is None else cell for cell in cells])

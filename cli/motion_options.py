@@ -25,14 +25,18 @@ Motions, joined by + into one:
   csv:FILE    alone: a table with the header time,angle_rad in s and rad
 Units: rad/s (default), rev/s, rpm; s (default), ms, us; Hz (default), kHz."""
 
-_OPTIONS = [
-    option(
+
+def _motion(required: bool) -> Callable[[Any], Any]:
+    return option(
         _MOTION,
         "--motion",
-        required=True,
+        required=required,
         metavar="MOTION",
         help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below.",
-    ),
+    )
+
+
+_OPTIONS = [
     option(
         _MOTION,
         "--vibration",
@@ -106,11 +110,20 @@ def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     `record` gives what the encoder of a spec records of the motion; `tables` are the files that it reads.
     """
+    return all_of([_motion(required=True), *_OPTIONS], _recording(command))
+
+
+def optional_motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the same, but without a motion `record` is None."""
+    return all_of([_motion(required=False), *_OPTIONS], _recording(command))
+
+
+def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def build(
         *,
-        motion: str,
+        motion: str | None,
         vibration: str | None,
         jitter: float,
         nonuniformity: float,
@@ -140,9 +153,12 @@ def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
                 lost=lost,
                 index=spec.index,
             )
+            assert motion is not None
             return encoder.record(parse_motion(motion))
 
+        if motion is None:
+            return command(record=None, tables=[], **others)
         kind, _, table = motion.strip().partition(":")
         return command(record=record, tables=[Path(table)] if kind == "csv" else [], **others)
 
-    return all_of(_OPTIONS, build)
+    return build

@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tachometry.cli.capture_options import capture_options
 from tachometry.cli.core_options import core_options
 from tachometry.cli.files import Outputs
 from tachometry.cli.motion_options import FORMS, motion_options
-from tachometry.cli.options import GroupedCommand, option, output_options
+from tachometry.cli.options import GroupedCommand, output_options
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import format_time, parse_frequency
+from tachometry.spec.units import format_time
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.sim.encoder import Encoding
     from tachometry.sim.recording import PinTrace, Recording
     from tachometry.sim.results import Run
-
-_CAPTURE = "Capture"
 
 
 @click.command(
@@ -76,30 +75,12 @@ times the edge rate. Edges closer than a clock are flagged as errors or lost."""
 )
 @click.argument("capture", type=click.Path(path_type=Path))
 @core_options
-@option(_CAPTURE, "--a", metavar="CHANNEL", help="Line A: name of the channel, or its number from 0.")
-@option(
-    _CAPTURE,
-    "--b",
-    metavar="CHANNEL",
-    help="Line B. Without both options: the channels named A and B, else the first two.",
-)
-@option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index. With --index: z, if it is not given.")
-@option(_CAPTURE, "--tick-in", metavar="CHANNEL", help="The external tick. With --external-tick: tick_in.")
-@option(
-    _CAPTURE,
-    "--samplerate",
-    metavar="FREQUENCY",
-    help="Samplerate, in Hz (plain number), kHz, MHz or GHz, of a .sr file that does not tell it.",
-)
+@capture_options
 @output_options
 def replay(
     spec: TachometerSpec,
     capture: Path,
-    a: str | None,
-    b: str | None,
-    z: str | None,
-    tick_in: str | None,
-    samplerate: str | None,
+    read: Callable[[Path, TachometerSpec], Recording],
     targets: dict[str, Path],
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
@@ -110,17 +91,8 @@ def replay(
 
     Equal options and captures give equal files. Exit status 1 if hardware and golden model differ.
     """
-    from tachometry.sim.capture import read_capture
-
-    z = "z" if z is None and spec.index else z
-    tick_in = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
     outputs = Outputs(targets, inputs=[capture])
-    recording = read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), z, tick_in)
-    return _run_and_report(spec, str(capture), recording, None, outputs)
-
-
-def _samplerate(text: str) -> float:
-    return float(parse_frequency("samplerate", int(text) if text.isdecimal() else text))
+    return _run_and_report(spec, str(capture), read(capture, spec), None, outputs)
 
 
 def _run_and_report(

@@ -9,7 +9,7 @@ import numpy as np
 
 from tachometry.sim import golden, rivals
 from tachometry.sim.motion import FloatArray
-from tachometry.sim.recording import PinTrace, Recording
+from tachometry.sim.recording import PinTrace, Recording, nominal_ticks
 from tachometry.spec import TachometerSpec
 
 TrueSpeed = Callable[[FloatArray], FloatArray]
@@ -88,6 +88,8 @@ class Score:
 
 def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
     """What a core shows, by its golden model, which the hardware equals bit for bit."""
+    if spec.max_tick_cycles and trace.tick_in is None:
+        trace = trace.with_tick_in(nominal_ticks(spec, trace.n_clocks))
     updates = golden.run(spec, trace).updates
     clock_hz = spec.timing.clock_hz
     velocity = updates.velocity.astype(np.float64) * spec.rad_per_s_per_lsb
