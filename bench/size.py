@@ -32,7 +32,7 @@ from tachometry.cli.synthesis import (
     versions,
 )
 from tachometry.hdl import export
-from tachometry.spec import Encoder, MTachometer, Speed, STachometer, TachometerSpec, Timing
+from tachometry.spec import Encoder, MTachometer, RairanTachometer, Speed, STachometer, TachometerSpec, Timing
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "size"
@@ -73,6 +73,7 @@ BARS = {
     "UP5K": {"Fmax": 48},
 }
 M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
+RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
 EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
@@ -112,6 +113,13 @@ CONFIGURATIONS = (
     ),
     Configuration("m", "M method", MTachometer(**COMMON), M_BARS, is_option=False),
     Configuration("m-10", "M method, mean of 10 ticks", MTachometer(**COMMON, average=10), M_BARS, is_option=False),
+    Configuration("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS, is_option=False),
+    Configuration(
+        "rairan-exact",
+        "Table 1 to the letter, n3",
+        RairanTachometer(**COMMON, paper_exact=True),
+        is_option=False,
+    ),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )
 

@@ -15,6 +15,8 @@ from tachometry.spec.velocity_output import NATIVE, UNITS, parse_lsb
 
 _ENCODER, _TIMING, _CORE = "Encoder", "Timing", "Core"
 
+_TICK = "20us"
+
 _CORE_OPTIONS = [
     option(
         _ENCODER,
@@ -42,10 +44,11 @@ _CORE_OPTIONS = [
     option(
         _TIMING,
         "--tick",
-        default="20us",
         metavar="TIME",
-        help="Sampling period Ts, in s, ms, us or ns, a whole number of clocks; a plain number is clocks.",
+        help="Sampling period Ts, in s, ms, us or ns, a whole number of clocks; a plain number is clocks. "
+        f"[default: {_TICK}]",
     ),
+    option(_TIMING, "--dt", metavar="TIME", help="The same with method rairan, whose tick is dt."),
     option(
         _TIMING,
         "--max-time",
@@ -138,7 +141,7 @@ _METHOD = option(
     type=click.Choice(list(METHODS)),
     default="s",
     help="How velocity is measured: s averages in step with the alterations of the pulse number, m counts the "
-    "pulses of a tick or some (Tsuji 2009).",
+    "pulses of a tick or some (Tsuji 2009); rairan begins its ticks with a count (Rairán 2013).",
 )
 
 # Options that are parameters of the core by the same name.
@@ -237,7 +240,8 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         ppr: int,
         decoding: int,
         clock: str,
-        tick: str,
+        tick: str | None,
+        dt: str | None,
         max_time: str,
         unit: str,
         frac_bits: int | None,
@@ -248,13 +252,17 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         velocity_bits: int | None,
         **others: Any,
     ) -> Any:
-        timing = Timing.parse(clock, tick, max_time)
+        if dt is not None and tick is not None:
+            raise ValueError("dt must not be given together with --tick")
+        timing = Timing.parse(clock, dt or tick or _TICK, max_time)
         if frac_bits is not None and lsb is not None:
             raise ValueError("lsb must not be given together with --frac-bits")
         bits = frac_bits if lsb is None else parse_lsb(lsb)
         passed = {name: others.pop(name) for name in _PASSED}
 
         def make(method: str, given: dict[str, Any]) -> TachometerSpec:
+            if dt is not None and not METHODS[method].own_ticks:
+                raise ValueError(f"dt must not be given with method {method}, but tick")
             spec = METHODS[method](
                 encoder=Encoder(ppr, decoding),
                 timing=timing,

@@ -33,6 +33,7 @@ _PARAMETERS = {
 _SAME_NAME = (
     "clock",
     "tick",
+    "dt",
     "decoding",
     "name",
     "vibration",

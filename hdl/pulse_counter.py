@@ -1,6 +1,6 @@
 """m_e, the pulse number of a tick."""
 
-from amaranth import Const, Module, Mux, Signal, signed
+from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -31,12 +31,17 @@ class PulseCounter(wiring.Component):
         Most steps in a window.
     max_count : int
         Bound of |m_e|; beyond it m_e saturates.
+    stretched : bool
+        Windows may be longer, and hold any number of steps: once their sum has left ±`max_count`, m_e is saturated,
+        whatever comes after.
 
     Members
     -------
     step : In(signed(2))
     last : In(1)
         High in the last clock of a window.
+    beyond : In(1)
+        Only if stretched: `overflow` is to be raised for this window anyway; valid with `last`.
     tick : Out(1)
         One clock, when `pulse_count` is new.
     pulse_count : Out(signed)
@@ -50,15 +55,17 @@ class PulseCounter(wiring.Component):
         If `max_count` is not in 1 … `tick_cycles`.
     """
 
-    def __init__(self, tick_cycles: int, max_count: int) -> None:
+    def __init__(self, tick_cycles: int, max_count: int, *, stretched: bool = False) -> None:
         if not 1 <= max_count <= tick_cycles:
             raise ValueError(f"max_count must be from 1 to {tick_cycles}, not {max_count}")
         self._tick_cycles = tick_cycles
         self._max_count = max_count
+        self._stretched = stretched
         super().__init__(
             {
                 "step": In(signed(2)),
                 "last": In(1),
+                **({"beyond": In(1)} if stretched else {}),
                 "tick": Out(1),
                 "pulse_count": Out(signed(max_count.bit_length() + 1)),
                 "overflow": Out(1),
@@ -67,17 +74,25 @@ class PulseCounter(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        count = Signal(signed(self._tick_cycles.bit_length() + 1))
+        most = self._max_count + 1 if self._stretched else self._tick_cycles
+        count = Signal(signed(most.bit_length() + 1))
         step = Signal.like(count)
         complete = Signal()
         m.d.comb += step.eq(self.step)
         m.d.sync += [complete.eq(self.last), self.tick.eq(complete), count.eq(count + step)]
-        with m.If(complete):
-            m.d.sync += count.eq(step)
-        if self._max_count == self._tick_cycles:
-            held, overflow = count, 0
-        else:
+        held: Value = count
+        overflow: Value = Const(0)
+        if self._stretched:
+            # Beyond its bound the sum stays where it is.
+            left, beyond = Signal(), Signal()
+            m.d.comb += left.eq((count == most) | (count == -most))
+            m.d.sync += beyond.eq(self.beyond)
+            with m.If(left):
+                m.d.sync += count.eq(count)
+            held, overflow = Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond
+        elif self._max_count < self._tick_cycles:
             held, overflow = saturate(m, count, self._max_count)
         with m.If(complete):
+            m.d.sync += count.eq(step)
             m.d.sync += [self.pulse_count.eq(held), self.overflow.eq(overflow)]
         return m

@@ -54,7 +54,7 @@ class Tachometer(wiring.Component):
         )
         self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
-        self.pulse_counter = PulseCounter(spec.longest_tick, spec.max_count)
+        self.pulse_counter = PulseCounter(spec.longest_tick, spec.max_count, stretched=spec.own_ticks)
         self.position_counter = PositionCounter(spec.position_width)
         self.index_capture = IndexCapture(spec.position_width) if spec.index else None
         self.datapath = datapath(spec)
@@ -110,7 +110,7 @@ class Tachometer(wiring.Component):
             datapath.pulse_count.eq(self.pulse_count),
         ]
         if self._spec.own_ticks:
-            m.d.comb += datapath.step_now.eq(decoder.step)
+            m.d.comb += [datapath.step_now.eq(decoder.step), pulse_counter.beyond.eq(datapath.beyond)]
         if "step" in datapath.signature.members:
             # As late as `tick`: with it, all steps of the window have come.
             late = Signal.like(decoder.step)

@@ -2,12 +2,23 @@
 
 from tachometry.spec.encoder import Encoder
 from tachometry.spec.m_method import MTachometer
+from tachometry.spec.rairan import RairanTachometer
 from tachometry.spec.s_method import STachometer
 from tachometry.spec.tachometer import Port, TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed
 
 # Every method by its name. The spec names the module that holds `Datapath` in hdl/ and `Model` in sim/golden/.
-METHODS: dict[str, type[TachometerSpec]] = {spec.method: spec for spec in (STachometer, MTachometer)}
+METHODS: dict[str, type[TachometerSpec]] = {spec.method: spec for spec in (STachometer, MTachometer, RairanTachometer)}
 
-__all__ = ["METHODS", "Encoder", "MTachometer", "Port", "STachometer", "Speed", "TachometerSpec", "Timing"]
+__all__ = [
+    "METHODS",
+    "Encoder",
+    "MTachometer",
+    "Port",
+    "RairanTachometer",
+    "STachometer",
+    "Speed",
+    "TachometerSpec",
+    "Timing",
+]

@@ -22,11 +22,12 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
     """What the core of `spec` must show at its ports for these pins."""
     steps = decoded(spec, trace)
     golden = model(spec)
-    last, tick_errors = (
-        (golden.windows(steps, trace.n_clocks - spec.tick_latency), np.empty(0, dtype=np.int64))
-        if spec.own_ticks
-        else windows(spec, trace)
-    )
-    ticks, index = count(spec, steps, last, trace.n_clocks)
+    if spec.own_ticks:
+        last, beyond = golden.windows(steps, trace.n_clocks - spec.tick_latency)
+        tick_errors = np.empty(0, dtype=np.int64)
+    else:
+        last, tick_errors = windows(spec, trace)
+        beyond = None
+    ticks, index = count(spec, steps, last, trace.n_clocks, beyond)
     updates = golden.updates(ticks, steps, trace.n_clocks)
     return Run(trace.n_clocks, with_age(spec, ticks, updates), in_unit(spec, updates), index, steps.errors, tick_errors)

@@ -116,7 +116,25 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     return Steps(at, step, errors[errors < trace.n_clocks], rises, returned + 3)
 
 
-def count(spec: TachometerSpec, steps: Steps, last: NDArray[np.int64], n_clocks: int) -> tuple[Ticks, Index]:
+def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:
+    """Direction in which the sum of steps first left ±`limit` in each window; 0 where it did not."""
+    found = np.zeros(len(last) + 1, dtype=np.int64)
+    window = np.searchsorted(last, steps.clock, side="left")
+    total = np.cumsum(steps.step)
+    before = np.append(0, total)[np.searchsorted(steps.clock, last, side="right")]
+    partial = total - np.append(0, before)[window]
+    beyond = np.flatnonzero(np.abs(partial) > limit)[::-1]
+    found[window[beyond]] = np.sign(partial[beyond])  # the first is written last
+    return found[:-1]
+
+
+def count(
+    spec: TachometerSpec,
+    steps: Steps,
+    last: NDArray[np.int64],
+    n_clocks: int,
+    beyond: NDArray[np.bool_] | None = None,
+) -> tuple[Ticks, Index]:
     """Pulse numbers and positions of all ticks, and positions at the index.
 
     Parameters
@@ -126,6 +144,9 @@ def count(spec: TachometerSpec, steps: Steps, last: NDArray[np.int64], n_clocks:
     last : int64 array
         Last clock of each window.
     n_clocks : int
+    beyond : bool array or None
+        Windows that may be longer than nominal: whether the method raises `overflow`. A sum that has left
+        ±max_count is saturated, whatever comes after.
     """
     total = np.concatenate([[0], np.cumsum(steps.step)])  # total[k] = sum of the first k steps
 
@@ -134,6 +155,11 @@ def count(spec: TachometerSpec, steps: Steps, last: NDArray[np.int64], n_clocks:
 
     reached = steps_through(last)
     sums = np.diff(reached, prepend=0)
+    overflow = np.abs(sums) > spec.max_count
+    if beyond is not None:
+        left = first_beyond(steps, last, spec.max_count)
+        sums = np.where(left != 0, left * spec.max_count, sums)
+        overflow = (left != 0) | beyond
     rises = steps.index
     captured = steps_through(rises)
     # What is taken off the position: before any index, and after each.
@@ -149,7 +175,7 @@ def count(spec: TachometerSpec, steps: Steps, last: NDArray[np.int64], n_clocks:
         clock=strobe,
         pulse_count=np.clip(sums, -spec.max_count, spec.max_count),
         position=wrapped(reached - origin[np.searchsorted(rises, last, side="right")]),
-        overflow=np.abs(sums) > spec.max_count,
+        overflow=overflow,
         swallowed_edges=2 * np.minimum(glitches, (1 << 15) - 1),
         age=np.zeros(len(last), dtype=np.int64),
     )

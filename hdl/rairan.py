@@ -1,0 +1,287 @@
+"""The method of Rairán 2013."""
+
+from typing import Any
+
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from tachometry.spec import RairanTachometer
+
+
+def _ports(spec: RairanTachometer) -> dict[str, Any]:
+    """Nep1 and Ndt1, with the values that they have before anything has come."""
+    return {port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in spec.method_ports}
+
+
+class Counters(wiring.Component):
+    """Table 1 of Rairán 2013 at every clock: Cep, Cdt, the clock of dt, and what they make of Nep1 and Ndt1.
+
+    Latency: `update` is high in the clock after the count, or the end of dt, that causes it.
+
+    Parameters
+    ----------
+    spec : RairanTachometer
+
+    Members
+    -------
+    step : In(signed(2))
+    last : Out(1)
+        High in the clock in which dt ends; without latency.
+    beyond : Out(1)
+        There were more counts in this dt than Cep can hold; valid with `last`.
+    update : Out(1)
+        A new estimate, or an old one found too large.
+    n : Out
+        Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. This and all below are held until the next update.
+    high, backward : Out(1)
+        The regime, and the direction.
+    forced, stalled : Out(1)
+        Of the last update: it came without a count; and it is that of the maximum time.
+    n_ep1, n_dt1 : Out
+        Only with `paper_exact`: as in Table 1.
+    """
+
+    def __init__(self, spec: RairanTachometer) -> None:
+        self._spec = spec
+        super().__init__(
+            {
+                "step": In(signed(2)),
+                "last": Out(1),
+                "beyond": Out(1),
+                "update": Out(1),
+                "n": Out(range(max(spec.max_count, spec.timing.max_ticks) + 1)),
+                "high": Out(1),
+                "backward": Out(1),
+                "forced": Out(1),
+                "stalled": Out(1),
+                **(_ports(spec) if spec.paper_exact else {}),
+            }
+        )
+        # Cep − 1, and whether there is any.
+        self.c_more, self.any = Signal(range(spec.max_count)), Signal()
+        self.c_dt = Signal(range(spec.timing.max_ticks + 1))
+        self.rest = Signal()  # it has come to its end
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        pulse, opens, late = Signal(), Signal(), Signal()  # late: dt has ended since the last count, Cdt ≠ 0
+        due = self._clock(m, opens)
+        m.d.comb += pulse.eq(self.step.any())
+        self._count(m, pulse, opens)
+        if self._spec.paper_exact:
+            # A count at the end of dt is in neither window.
+            m.d.comb += [opens.eq(pulse & late), self.last.eq(due & ~opens)]
+            with m.If(self.last):
+                m.d.sync += late.eq(1)
+            with m.Elif(pulse):
+                m.d.sync += late.eq(0)
+            self._update_to_the_letter(m, opens)
+            return m
+        moved, turns = Signal(), Signal()
+        m.d.comb += [
+            turns.eq(pulse & moved & (self.step[1] ^ self.backward)),
+            self.last.eq(due & ~(pulse & late) & ~turns),
+            opens.eq(pulse & (late | due) | turns),
+        ]
+        with m.If(pulse):
+            m.d.sync += [moved.eq(1), self.backward.eq(self.step[1]), late.eq(0)]
+        with m.Elif(self.last):
+            m.d.sync += late.eq(1)
+        self._update(m, pulse=pulse, opens=opens, turns=turns)
+        return m
+
+    def _clock(self, m: Module, opens: Signal) -> Value:
+        """Count dt from where a window opens, and on; whether it is over."""
+        cycles = self._spec.timing.tick_cycles
+        if cycles == 1:
+            return Const(1)
+        # Counts down to −1, as the sampling clock does.
+        start = cycles - 2
+        left = Signal(signed(start.bit_length() + 1), init=start)
+        m.d.sync += left.eq(left - Const(1, left.shape()))
+        with m.If(left[-1] | opens):
+            m.d.sync += left.eq(start)
+        return left[-1]
+
+    def _count(self, m: Module, pulse: Signal, opens: Signal) -> None:
+        """Cep, which a window that a count opens begins with that count, and Cdt since the last count."""
+        c_more, c_dt, most = self.c_more, self.c_dt, self._spec.max_count
+        full = self.any & (c_more == most - 1) if most < self._spec.timing.tick_cycles else Const(0)
+        with m.If(pulse):
+            m.d.sync += self.any.eq(1)
+            with m.If(full):
+                m.d.sync += self.beyond.eq(1)
+            with m.Else():
+                m.d.sync += c_more.eq(c_more + self.any)
+        with m.If(self.last):
+            m.d.sync += [c_more.eq(0), self.any.eq(0), self.beyond.eq(0)]
+            with m.If(~self.rest):
+                m.d.sync += [c_dt.eq(c_dt + 1), self.rest.eq(self.c_dt == self._spec.timing.max_ticks - 1)]
+        with m.If(opens):
+            m.d.sync += [c_more.eq(0), self.any.eq(1), self.beyond.eq(0)]
+        with m.If(pulse & ~self.last if self._spec.paper_exact else pulse):
+            m.d.sync += [c_dt.eq(0), self.rest.eq(0)]
+
+    def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal) -> None:
+        """What a count or the end of dt makes of the estimate."""
+        spec = self._spec
+        several, one = self.c_more.any(), self.any
+        # The last count opened its window; dt ends without a count.
+        in_step, waits = Signal(), Signal()
+        with m.If(pulse):
+            m.d.sync += in_step.eq(opens)
+        waited = self.c_dt + in_step
+        m.d.comb += waits.eq(self.last & ~pulse)
+
+        def set_(n: Value | int, *, high: int = 0, forced: int = 0, stalled: int = 0) -> None:
+            m.d.sync += [
+                self.update.eq(1),
+                self.n.eq(n),
+                self.high.eq(high),
+                self.forced.eq(forced),
+                self.stalled.eq(stalled),
+            ]
+
+        m.d.sync += self.update.eq(0)
+        with m.If(turns):
+            set_(0)
+        with m.Elif(self.last & several):
+            set_(self.c_more, high=1)
+        with m.Elif(self.last & (pulse | (one & self.high))):
+            # Ndt1 ← 1 by a count just at the end of dt, or Nep1 ← 1.
+            set_(1)
+        with m.Elif(opens & ((self.c_dt != 1) | ~self.high)):
+            set_(self.c_dt)
+        with m.Elif(waits & ~self.rest & (self.c_dt == spec.timing.max_ticks - 1)):
+            set_(0, forced=1, stalled=1)
+        if spec.bound_decay:
+            with m.Elif(waits & Mux(self.high, waited != 0, (waited > self.n) & self.n.any())):
+                set_(waited, forced=1)
+
+    def _update_to_the_letter(self, m: Module, opens: Signal) -> None:
+        """Lines 5 to 9 of Table 1."""
+        m.d.sync += self.update.eq(opens | (self.last & self.any))
+        with m.If(opens):
+            m.d.sync += self.n_dt1.eq(self.c_dt)
+            with m.If((self.c_dt != 1) | ~self.high):
+                m.d.sync += [self.n.eq(self.c_dt), self.high.eq(0)]
+        with m.Elif(self.last & self.any):
+            m.d.sync += self.n_ep1.eq(self.c_more + 1)
+            with m.If(self.c_more.any()):
+                m.d.sync += [self.n.eq(self.c_more), self.high.eq(1)]
+            with m.Elif(self.high | ~self.n.any()):
+                m.d.sync += [self.n.eq(1), self.high.eq(0)]
+
+
+class Datapath(wiring.Component):
+    """Datapath of Rairán 2013: from steps to velocity with a table, without a divider and without a multiplier.
+
+    Latency: `velocity_valid` is high four clocks after the count or the end of dt that causes it, and that is
+    `spec.datapath_latency` clocks after `tick` if it comes with one. There may be an update in every clock. The
+    velocity is correctly rounded: within half an LSB of the exact quotient, ties towards +∞.
+
+    Parameters
+    ----------
+    spec : RairanTachometer
+
+    Members
+    -------
+    step_now : In(signed(2))
+    last : Out(1)
+        The present clock is the last of dt, and so of a tick.
+    beyond : Out(1)
+        And Nep1 is saturated.
+    tick, pulse_count : In
+        Not used.
+    velocity : Out(signed)
+        In counts per tick with `native_frac_bits` fraction bits; this and all below are held until the next update.
+    velocity_valid : Out(1)
+    interval : Out
+        Ndt1 at low speeds, else 1.
+    forced, stalled : Out(1)
+    n_ep1, n_dt1 : Out
+        n1 = Nep1/Ndt1 of the velocity; 0 and 1 for the velocity 0. With `paper_exact` as in Table 1.
+    """
+
+    def __init__(self, spec: RairanTachometer) -> None:
+        super().__init__(
+            {
+                "step_now": In(signed(2)),
+                "last": Out(1),
+                "beyond": Out(1),
+                "tick": In(1),
+                "pulse_count": In(signed(spec.count_width)),
+                "velocity": Out(signed(spec.native_width)),
+                "velocity_valid": Out(1),
+                "interval": Out(spec.interval_width),
+                "forced": Out(1),
+                "stalled": Out(1),
+                **_ports(spec),
+            }
+        )
+        self._spec = spec
+        self.counters = Counters(spec)
+
+    @property
+    def probes(self) -> dict[str, Value]:
+        """What a waveform should show of the inside."""
+        return {"c_ep": self.counters.c_more + self.counters.any, "c_dt": self.counters.c_dt}
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec = self._spec
+        m.submodules.counters = counters = self.counters
+        m.submodules.table = memory = Memory(shape=spec.table_width, depth=spec.depth, init=spec.table)
+        read = memory.read_port()
+        tag = [counters.n, counters.high, counters.backward, counters.forced, counters.stalled]
+        if spec.paper_exact:
+            tag += [counters.n_ep1, counters.n_dt1]
+        update, n, high, backward, forced, stalled, *letter = self._later(m, 2, counters.update, *tag)
+        entry = Signal(spec.table_width)
+        m.d.sync += entry.eq(read.data)
+        m.d.comb += [
+            counters.step.eq(self.step_now),
+            self.last.eq(counters.last),
+            self.beyond.eq(counters.beyond),
+            read.addr.eq(counters.n[: len(read.addr)]),
+        ]
+        m.d.sync += self.velocity_valid.eq(update)
+        low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())[: len(self.n_ep1)]
+        with m.If(update):
+            m.d.sync += [
+                self.velocity.eq(self._velocity(n, high, backward, entry)),
+                self.interval.eq(low),
+                self.forced.eq(forced),
+                self.stalled.eq(stalled),
+                Cat(self.n_ep1, self.n_dt1).eq(Cat(*letter) if letter else Cat(counts, low[: spec.interval_width])),
+            ]
+        return m
+
+    @staticmethod
+    def _later(m: Module, clocks: int, *values: Signal) -> list[Signal]:
+        """Registers that follow the values so many clocks later."""
+        for _ in range(clocks):
+            registers = [Signal.like(value, name=value.name) for value in values]
+            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
+            values = tuple(registers)
+        return list(values)
+
+    def _velocity(self, n: Signal, high: Signal, backward: Signal, entry: Value) -> Value:
+        """The estimate with its sign: the complement and a carry are −v, so one adder rounds and negates."""
+        spec = self._spec
+        f = spec.native_frac_bits
+        whole = (n + 1 if spec.estimate == "n1" else n) & high.replicate(len(n) + 1)
+        carry: Value = Const(0)
+        if spec.estimate == "n3":
+            # Low: ⌊(h + 1)/2⌋. High: 2^(f−1) − ⌊(h + 4)/8⌋, and 2^(f−1) − 1 − ⌊h/8⌋ is the complement of ⌊h/8⌋.
+            eighth = ~Cat(entry[3:], Const(0, 1))
+            part, carry = Mux(high, eighth, entry[1:]), Mux(high, ~entry[2], entry[0])
+            magnitude = Cat(part, whole)
+        else:
+            if spec.tie is not None:
+                entry = Mux(backward & (n == spec.tie), 0, entry)
+            magnitude = Mux(high, whole << f, entry)
+        padded = Cat(magnitude, Const(0, spec.native_width))[: spec.native_width]
+        return (padded ^ backward.replicate(spec.native_width)) + (carry ^ backward)

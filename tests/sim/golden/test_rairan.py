@@ -1,0 +1,202 @@
+"""The golden model of Rairán's method: against Table 1 to the letter, and against its description, clock by clock."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.rairan import clock_by_clock, golden_updates, make_spec, random_steps, steps_of
+from support.sequences import rounded
+from support.table1 import every_ts
+
+from tachometry.sim.golden.rairan import Model, orbit
+from tachometry.sim.results import Updates
+from tachometry.spec import RairanTachometer
+
+
+def held(updates: Updates, name: str, n: int, first: int) -> np.ndarray:
+    """An output of the method at every ts, in time with its cause."""
+    row = np.searchsorted(updates.clock, np.arange(n), side="right")
+    return np.append(first, updates.more[name])[row]
+
+
+@pytest.mark.parametrize("dt", [1, 2, 3, 7, 40, 1000])
+def test_to_the_letter_it_is_table_1_at_every_ts(dt: int) -> None:
+    """A million ts of all speeds in each dt."""
+    n = 1_000_000 if dt == 40 else 200_000
+    spec = make_spec(dt, max_ticks=2000, paper_exact=True)
+    step = random_steps(np.random.default_rng(dt), n, dt)
+    updates = golden_updates(spec, step)
+    wanted = np.array(every_ts(np.abs(step).tolist(), dt))
+    assert np.array_equal(held(updates, "n_ep1", n, 0), wanted[:, 0])
+    assert np.array_equal(held(updates, "n_dt1", n, 1), wanted[:, 1])
+    assert len(updates.clock) > n / dt / 20
+    assert (updates.velocity >= 0).all()
+    assert not updates.forced.any()
+
+
+def exact(estimate: str, n_ep1: int, n_dt1: int) -> Fraction:
+    """Eqs. (6) and (11)."""
+    n1 = Fraction(n_ep1, n_dt1)
+    if n1 == 0:
+        return n1
+    n2 = Fraction(n_ep1, n_dt1 + 1) if n_ep1 == 1 else Fraction(n_ep1 - 1, n_dt1)
+    return {"n1": n1, "n2": n2, "n3": 2 / (1 / n1 + 1 / n2)}[estimate]
+
+
+@pytest.mark.parametrize("dt", [1, 2, 3, 7, 40])
+@pytest.mark.parametrize("bound_decay", [True, False])
+def test_it_does_what_is_described_clock_by_clock(dt: int, bound_decay: bool) -> None:
+    for seed, estimate in enumerate(("n1", "n2", "n3")):
+        spec = make_spec(dt, max_ticks=12, bound_decay=bound_decay, estimate=estimate, frac_bits=4 + 8 * (seed > 0))
+        step = random_steps(np.random.default_rng([dt, seed]), 40_000, dt)
+        updates = golden_updates(spec, step)
+        rows, ends = clock_by_clock(step.tolist(), dt, 12, bound_decay=bound_decay)
+        assert updates.clock.tolist() == [row.clock for row in rows]
+        assert updates.more["n_ep1"].tolist() == [row.n_ep1 for row in rows]
+        assert updates.more["n_dt1"].tolist() == [row.n_dt1 for row in rows]
+        assert updates.forced.tolist() == [row.forced for row in rows]
+        assert updates.stalled.tolist() == [row.stalled for row in rows]
+        assert updates.interval.tolist() == [row.n_dt1 for row in rows]
+        wanted = [rounded(row.sign * exact(estimate, row.n_ep1, row.n_dt1), spec.frac_bits) for row in rows]
+        assert updates.velocity.tolist() == wanted
+        assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
+        assert any(row.forced for row in rows) == (bound_decay or any(row.stalled for row in rows))
+
+
+def test_orbit_follows_to_the_end() -> None:
+    assert orbit(np.array([2, 2, 3, 5, 5, 5]), 0).tolist() == [0, 2, 3]
+    assert orbit(np.array([1, 1]), 0).tolist() == [0]
+    assert orbit(np.arange(1, 9).clip(max=7), 0).tolist() == list(range(7))
+
+
+def pulses(period: Fraction, n: int, sign: int = 1) -> np.ndarray:
+    """A count every so many clocks, in n clocks."""
+    step = np.zeros(n, dtype=np.int64)
+    at = (np.arange(1, int(n / period)) * period.numerator) // period.denominator
+    step[at] = sign
+    return step
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_table_1_locks_just_below_the_speed_limit_and_the_default_does_not(sign: int) -> None:
+    """At 0.9995 ω_lim, a count every 1000.5 ts: n1 = ½ for ever, though the speed is outside [n2, n1] = [⅓, ½]."""
+    step = pulses(Fraction(2001, 2), 1_000_000, sign)
+    letter = golden_updates(make_spec(1000, paper_exact=True, estimate="n1"), step)
+    locked = np.array(every_ts(np.abs(step).tolist(), 1000))
+    assert {tuple(row) for row in locked[100_000:].tolist()} == {(1, 2)}
+    assert set((letter.velocity / 2**16)[10:]) == {0.5}
+    default = golden_updates(make_spec(1000, estimate="n1"), step)
+    assert set((default.velocity / 2**16)[10:]) == {sign * 1.0}
+
+
+def test_a_steady_count_with_every_end_of_dt_is_the_speed_limit() -> None:
+    """From 0.2 ω_lim to ω_lim itself: Table 1 never updates Ndt1 again."""
+    step = np.concatenate([pulses(Fraction(5000), 50_001), pulses(Fraction(1000), 50_000)])
+    step[:] = 0
+    step[1000:50_000:5000] = 1
+    step[51_000::1000] = 1
+    assert golden_updates(make_spec(1000, estimate="n1"), step).velocity[-1] == 1 << 16
+
+
+DT, MAX = 40, 25
+
+
+def seen(step: np.ndarray, **options: object) -> Updates:
+    return golden_updates(make_spec(DT, MAX, **options), step)
+
+
+def at_clock(updates: Updates, clock: int) -> float:
+    """The held velocity in counts per dt."""
+    row = np.searchsorted(updates.clock, clock, side="right")
+    return float(np.append(0, updates.velocity)[row]) / 2**16
+
+
+def script(*at: tuple[int, int], n: int = 4000) -> np.ndarray:
+    step = np.zeros(n, dtype=np.int64)
+    for clock, sign in at:
+        step[clock] = sign
+    return step
+
+
+def test_reversal_reads_0_until_there_is_a_new_measurement() -> None:
+    forward, back = [(100 + 10 * k, 1) for k in range(40)], [(500 + 10 * k, -1) for k in range(40)]
+    updates = seen(script(*forward, *back))
+    turn = int(np.flatnonzero(updates.clock == 500)[0])
+    assert updates.velocity[turn - 1] > 3 << 16
+    assert updates.velocity[turn] == 0
+    # A window after the turn: 4 counts in dt, from 3 to 4 of them.
+    assert updates.clock[turn + 1] == 500 + DT
+    assert -(4 << 16) < updates.velocity[turn + 1] < -(3 << 16)
+    assert (updates.velocity[turn + 1 : turn + 9] == updates.velocity[turn + 1]).all()
+
+
+@pytest.mark.parametrize("bound_decay", [True, False])
+@pytest.mark.parametrize("gap", [3, 10, 39, 40, 41, 100, 999])
+def test_standstill_reads_0_in_time(gap: int, bound_decay: bool) -> None:
+    """Never above one count over the time since the last, less a dt to see it by; 0 max_ticks after the last dt."""
+    counts = [(100 + gap * k, 1) for k in range(30)]
+    last = counts[-1][0]
+    updates = seen(script(*counts, n=last + 4000), bound_decay=bound_decay)
+    assert updates.velocity[-1] == 0
+    assert updates.stalled[-1]
+    assert updates.forced[-1]
+    assert updates.clock[-1] <= last + MAX * DT
+    assert np.count_nonzero(updates.stalled) == 1
+    if bound_decay:
+        for clock in range(last + 2 * DT, last + MAX * DT + 10):
+            waited = (clock - last) // DT - 1
+            assert at_clock(updates, clock) <= 1 / waited, clock
+    # The next count ends it.
+    again = seen(script(*counts, (last + 3000, 1), n=last + 3100), bound_decay=bound_decay)
+    assert again.clock[-1] == last + 3000
+    assert not again.stalled[-1]
+    assert 0 < again.velocity[-1] <= (1 << 16) / MAX
+
+
+@pytest.mark.parametrize("clock", [5, 38, 39, 40, 41, 500, 3000])
+def test_one_count_then_silence(clock: int) -> None:
+    updates = seen(script((clock, 1), n=10_000))
+    assert (updates.velocity <= 1 << 16).all()
+    for later in range(clock + DT, clock + MAX * DT, 7):
+        assert at_clock(updates, later) <= max(1 / ((later - clock) // DT), 0)
+    assert at_clock(updates, clock + MAX * DT) == 0
+    assert updates.stalled[-1]
+
+
+@pytest.mark.parametrize("gap", [1, 2, 13, 39, 40, 41, 80, 200])
+def test_dithering_on_one_edge_reads_0_for_ever(gap: int) -> None:
+    counts = [(100 + gap * k, -1 if k % 2 else 1) for k in range(300)]
+    updates = seen(script((90, -1), *counts, n=100 + 301 * gap))
+    after = updates.clock >= 100
+    assert after.sum() >= 299
+    assert not updates.velocity[after].any()
+
+
+def test_a_burst_after_standstill() -> None:
+    """Ten counts as fast as they can come, at rest before and after."""
+    burst = [(5000 + k, 1) for k in range(10)]
+    updates = seen(script(*burst, n=9000))
+    assert updates.velocity.max() <= 10 << 16
+    assert at_clock(updates, 5000 + DT) > 9
+    assert at_clock(updates, 5000 + 2 * DT) <= 1
+    assert at_clock(updates, 5010 + 4 * DT) <= 1 / 2
+    assert at_clock(updates, 5009 + MAX * DT) == 0
+    assert updates.stalled[-1]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"max_ticks": 2048}, "max_ticks must be from 2 to 2047 with method rairan, not 2048"),
+        ({"dt": 4096}, "max_speed must be at most 2048 counts per tick with estimate n3, not 4096"),
+        ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
+        ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own"),
+    ],
+)
+def test_bad_parameters(parameters: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        make_spec(**({"dt": 40} | parameters))
+
+
+def test_without_n3_the_counts_of_a_tick_are_not_limited() -> None:
+    assert isinstance(make_spec(5000, estimate="n1"), RairanTachometer)

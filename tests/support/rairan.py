@@ -1,0 +1,114 @@
+"""The method of Rairán a clock at a time, by the words of docs/rairan.md, and its golden model on bare steps."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.rairan import Model
+from tachometry.sim.results import Updates
+from tachometry.spec import Encoder, RairanTachometer, Timing
+
+DELAY = 4  # clocks from a step to `velocity_valid`
+
+
+def make_spec(dt: int, max_ticks: int = 10, **options: Any) -> RairanTachometer:
+    """A core whose tick has so many clocks."""
+    return RairanTachometer(
+        encoder=Encoder(25), timing=Timing(1_000_000, dt, max_ticks), **({"frac_bits": 16} | options)
+    )
+
+
+def steps_of(step: np.ndarray) -> Steps:
+    """Steps of every clock."""
+    at, none = np.flatnonzero(step), np.empty(0, dtype=np.int64)
+    return Steps(at, step[at].astype(np.int64), none, none, none)
+
+
+def golden_updates(spec: RairanTachometer, step: np.ndarray) -> Updates:
+    """Updates that are caused in the clocks of these steps; `clock` is that of the cause."""
+    updates = Model(spec).updates(None, steps_of(step), len(step) + DELAY)  # type: ignore[arg-type]
+    updates.clock[:] -= DELAY
+    return updates
+
+
+@dataclass(frozen=True)
+class Row:
+    """An update: the clock that causes it, n1 = n_ep1/n_dt1, direction, and flags."""
+
+    clock: int
+    n_ep1: int
+    n_dt1: int
+    sign: int
+    forced: bool
+    stalled: bool
+
+
+def clock_by_clock(
+    step: list[int], dt: int, max_ticks: int, *, bound_decay: bool = True
+) -> tuple[list[Row], list[int]]:
+    """Updates, and clocks in which dt ends."""
+    clock = c_ep = c_dt = sign = 0
+    n_ep, n_dt = 0, 1
+    in_step, rest_is_new = False, True
+    rows: list[Row] = []
+    ends: list[int] = []
+
+    for now, s in enumerate(step):
+        clock += 1
+        new: tuple[int, int] | None = None
+        forced = stalled = False
+        if s and sign and s != sign:  # against the last direction: a new window, and no estimate
+            sign, clock, c_ep, c_dt, in_step, new = s, 0, 1, 0, True, (0, 1)
+        elif s and c_dt:  # the first count after dt opens the next window
+            if c_dt >= 2 or n_ep <= 1:
+                new = (1, c_dt)
+            sign, clock, c_ep, c_dt, in_step = s, 0, 1, 0, True
+        elif clock == dt:
+            ends.append(now)
+            if c_ep >= 2:
+                new = (c_ep, 1)
+            elif c_ep == 1 and n_ep >= 2:
+                new = (1, 1)
+            clock, c_ep, c_dt = 0, 0, min(c_dt + 1, max_ticks)
+            if s:  # the end of dt comes before the count, which opens the next window and has waited for one dt
+                if new is None:
+                    new = (1, 1)
+                sign, c_ep, c_dt, in_step = s, 1, 0, True
+            elif new is None and c_dt == max_ticks and rest_is_new:
+                new, forced, stalled = (0, 1), True, True
+            elif new is None and bound_decay and n_ep:
+                waited = c_dt if in_step else c_dt - 1
+                if waited * n_ep > n_dt:
+                    new, forced = (1, waited), True
+        elif s:
+            sign, c_ep, in_step = s, c_ep + 1, False
+        rest_is_new = c_dt < max_ticks
+        if new is not None:
+            n_ep, n_dt = new
+            rows.append(Row(now, *new, sign, forced, stalled))
+    return rows, ends
+
+
+def random_steps(rng: np.random.Generator, n: int, dt: int, *, turns: float = 0.02) -> np.ndarray:
+    """Stretches of all speeds, regular and not, with reversals, dithering and rests; shape (n,), −1, 0 or +1."""
+    step = np.zeros(n, dtype=np.int64)
+    at, sign = 0, 1
+    while at < n:
+        gap = dt * 10 ** rng.uniform(-1.5, 1.3)
+        if rng.random() < 0.3:
+            gap = dt / int(rng.integers(1, 6)) if rng.random() < 0.5 else dt * int(rng.integers(1, 6))
+        jitter = rng.choice([0, 0, 0.3])
+        count = int(rng.integers(1, 40))
+        gaps = np.maximum(1, np.rint(gap * (1 + jitter * rng.standard_normal(count)))).astype(np.int64)
+        at += int(rng.integers(1, 3 * dt)) if rng.random() < 0.9 else int(rng.integers(1, 30 * dt))
+        clocks = at + np.cumsum(gaps)
+        signs = np.where(rng.random(count) < turns, -1, 1).cumprod() * sign
+        if rng.random() < 0.1:
+            signs = sign * np.where(np.arange(count) % 2, -1, 1)  # dithers on one edge
+        sign = int(signs[-1])
+        inside = clocks < n
+        step[clocks[inside]] = signs[inside]
+        at = int(clocks[-1])
+    return step
