@@ -60,7 +60,7 @@ class Counters(wiring.Component):
             }
         )
         # Cep − 1, and whether there is any.
-        self.c_more, self.any = Signal(range(spec.max_count)), Signal()
+        self.c_more, self.any = Signal(range(max(spec.max_count, 2))), Signal()
         self.c_dt = Signal(range(spec.timing.max_ticks + 1))
         self.rest = Signal()  # it has come to its end
 

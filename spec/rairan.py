@@ -47,6 +47,8 @@ class RairanTachometer(TachometerSpec):
         super().__post_init__()
         if self.estimate not in ESTIMATES:
             raise ValueError(f"estimate must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
+        if self.bounds:
+            raise ValueError(f"bounds must not be given with method {self.method}: it has none yet")
         if self.timing.max_ticks >= MAX_TABLE:
             raise ValueError(
                 f"max_ticks must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"

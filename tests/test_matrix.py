@@ -20,9 +20,10 @@ def test_every_pair_of_options(row: dict, tmp_path: Path) -> None:
     assert count == 0, first
     # All that the configuration can show has happened.
     updates = actual.updates
-    assert np.count_nonzero(updates.forced) > 1
     assert np.count_nonzero(~updates.forced) > 100
-    assert updates.stalled.any()
+    if not row.get("paper_exact"):
+        assert np.count_nonzero(updates.forced) > 1
+        assert updates.stalled.any()
     assert bool(len(actual.errors)) or bool(spec.filter_clocks)
     assert bool(len(actual.index.clock)) == spec.index
     assert bool(len(actual.tick_errors)) == (spec.max_tick_cycles is not None)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.s_method import round_quotient
+from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import RairanTachometer
 
@@ -74,7 +74,7 @@ def windows(spec: RairanTachometer, steps: Steps, n_clocks: int) -> Windows:
     then = following[node]
     counts_before_end = np.searchsorted(at, start[node] + dt, side="left")
     c_ep = counts_before_end - np.maximum(node - 1, 0)
-    within = np.minimum(start[then], n_clocks) - start[node] - 1
+    within = np.maximum(start[then] - start[node] - 1, 0)
     # A count at the very end of the first dt leaves it whole.
     whole = (start[then] - start[node] == dt) & ~turns[then] & (then <= n)
     signs = np.concatenate([[sign[0] if n else 0], sign, [0]])

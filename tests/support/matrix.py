@@ -8,10 +8,11 @@ import numpy as np
 from allpairspy import AllPairs
 
 from tachometry.sim.recording import PinTrace
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 
 CLOCK_HZ = 48_000_000
-FACTORS: dict[str, list[Any]] = {
+S_FACTORS: dict[str, list[Any]] = {
+    "method": ["s"],
     "tick_cycles": [1, 2, 3, 960],
     "max_ticks": [2, 3, 500, 1 << 16],
     "unit": ["count/tick", "rad/s", "rev/s", "rpm"],
@@ -27,21 +28,41 @@ FACTORS: dict[str, list[Any]] = {
     "age": [False, True],
     "bounds": [False, True],
 }
+# What a method has of its own, with what of the rest has to do with it; where a factor is missing, its first value.
+RAIRAN_FACTORS: dict[str, list[Any]] = {
+    "method": ["rairan"],
+    "tick_cycles": [1, 3, 960],
+    "max_ticks": [2, 500],
+    "unit": ["count/tick", "rpm"],
+    "frac_bits": ["fewest", "most"],
+    "velocity_bits": [None, "too few"],
+    "index": ["none", "reset"],
+    "max_speed": [False, True],
+    "estimate": ["n3", "n2", "n1"],
+    "paper_exact": [False, True],
+    "bound_decay": [True, False],
+}
 
 
-def _possible(values: list[Any]) -> bool:
-    """An external tick takes two clocks."""
-    chosen = dict(zip(FACTORS, values, strict=False))
-    return not (chosen.get("external") and chosen["tick_cycles"] == 1)
+def _rows(factors: dict[str, list[Any]]) -> list[dict[str, Any]]:
+    def possible(values: list[Any]) -> bool:
+        """An external tick takes two clocks."""
+        chosen = dict(zip(factors, values, strict=False))
+        return not (chosen.get("external") and chosen["tick_cycles"] == 1)
+
+    return [dict(row._asdict()) for row in AllPairs(OrderedDict(factors), filter_func=possible)]
 
 
 def rows() -> list[dict[str, Any]]:
     """Configurations in which every two values meet."""
-    return [dict(row._asdict()) for row in AllPairs(OrderedDict(FACTORS), filter_func=_possible)]
+    return [row for factors in (S_FACTORS, RAIRAN_FACTORS) for row in _rows(factors)]
 
 
-def spec_of(row: dict[str, Any]) -> STachometer:
+def spec_of(row: dict[str, Any]) -> TachometerSpec:
     """The core of a configuration."""
+    own = [name for name in ("cancel", "estimate", "paper_exact", "bound_decay") if name in row]
+    row = {name: values[0] for name, values in S_FACTORS.items()} | row
+    make = METHODS[row["method"]]
     cycles = row["tick_cycles"]
     encoder = Encoder(500, row["decoding"])
     counts_per_tick = Fraction(9, 4) if cycles > 2 else Fraction(3, 4)
@@ -50,7 +71,7 @@ def spec_of(row: dict[str, Any]) -> STachometer:
         "encoder": encoder,
         "timing": Timing(CLOCK_HZ, cycles, row["max_ticks"]),
         "max_speed": max_speed if row["max_speed"] else None,
-        "cancel": row["cancel"],
+        **{name: row[name] for name in own},
         "filter_clocks": row["filter_clocks"],
         "position_width": row["position_width"],
         "index": row["index"] != "none",
@@ -59,16 +80,16 @@ def spec_of(row: dict[str, Any]) -> STachometer:
         "age": row["age"],
         "bounds": row["bounds"],
     }
-    fewest, most = STachometer(**fixed).frac_bits_range(row["unit"])
+    fewest, most = make(**fixed).frac_bits_range(row["unit"])
     frac_bits = {"fewest": max(fewest, most - 20), "16": min(most, 16), "most": most}[row["frac_bits"]]
-    spec = STachometer(**fixed, unit=row["unit"], frac_bits=frac_bits)
+    spec = make(**fixed, unit=row["unit"], frac_bits=frac_bits)
     if row["velocity_bits"] is None:
         return spec
     less = 0 if row["velocity_bits"] == "as needed" else 2
-    return STachometer(**fixed, unit=row["unit"], frac_bits=frac_bits, velocity_bits=max(8, spec.velocity_width - less))
+    return make(**fixed, unit=row["unit"], frac_bits=frac_bits, velocity_bits=max(8, spec.velocity_width - less))
 
 
-def motion(spec: STachometer, seed: int) -> PinTrace:
+def motion(spec: TachometerSpec, seed: int) -> PinTrace:
     """Speeds about the unit velocity and its multiples, reversals, illegal transitions, creeping, standstill."""
     rng = np.random.default_rng(seed)
     cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks
