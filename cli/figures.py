@@ -32,14 +32,14 @@ Examples:
     "--only",
     default="all",
     metavar="LIST",
-    help="Names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12 (Tsuji 2009), rairan2, rairan3 "
-    "(Rairán 2013).",
+    help="Names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12 (Tsuji 2009), rairan2, rairan3, "
+    "rairan5, rairan7 (Rairán 2013).",
 )
 @option(
     _FIGURES,
     "--hdl/--no-hdl",
     default=True,
-    help="Simulate the hardware beside the golden models of tsuji12, which takes most of the time.",
+    help="Simulate the hardware beside the golden models of tsuji12, rairan5 and rairan7: most of the time.",
 )
 @option(
     "Outputs",

@@ -5,7 +5,9 @@ set -eu
 
 BIN=${BIN:-.venv/bin}
 OUT=${OUT:-build/demo}
-core="--method s --ppr 500 --decoding 1 --clock 50kHz --tick 1ms --max-time 10ms --max-speed 60rad/s"
+common="--ppr 500 --decoding 1 --clock 50kHz --tick 1ms --max-time 10ms --max-speed 60rad/s"
+core="--method s $common"
+motion="--motion ramp:0:40rad/s:5s --vibration 1mrad:50Hz --seed 1"
 
 echo "Verilog, manifest and FuseSoC file:"
 # shellcheck disable=SC2086 # options are words
@@ -14,9 +16,14 @@ echo "Verilog, manifest and FuseSoC file:"
 echo
 echo "Simulation against the golden model and the truth:"
 # shellcheck disable=SC2086
-"$BIN/tachometry" simulate $core --motion ramp:0:40rad/s:5s --vibration 1mrad:50Hz --seed 1 \
+"$BIN/tachometry" simulate $core $motion \
     --vcd "$OUT/ramp.vcd" --plot "$OUT/ramp.png" --trace "$OUT/ramp.csv" --counts "$OUT/ramp_counts.csv" \
     --save-capture "$OUT/ramp.sr"
+
+echo
+echo "All methods, and what others use, on the same edges:"
+# shellcheck disable=SC2086
+"$BIN/tachometry" compare $common $motion --plot "$OUT/methods.png" --csv "$OUT/methods.csv"
 
 echo
 echo "Replay of the capture that the simulation saved:"

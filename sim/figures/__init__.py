@@ -5,6 +5,7 @@
 
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.rairan_algorithm import fig2, fig3
+from tachometry.sim.figures.rairan_runs import fig5, fig7
 from tachometry.sim.figures.result import Claim, Curve, Entry, Panel, Result
 from tachometry.sim.figures.tsuji_methods import fig06, fig07, fig08
 from tachometry.sim.figures.tsuji_runs import fig05, fig09, fig12
@@ -21,6 +22,8 @@ FIGURES: dict[str, Entry] = {
         Entry("tsuji12", fig12, 20),
         Entry("rairan2", fig2, 1),
         Entry("rairan3", fig3, 1),
+        Entry("rairan5", fig5, 50),
+        Entry("rairan7", fig7, 5),
     )
 }
 
