@@ -11,6 +11,7 @@ from tachometry.cli.options import all_of, option
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.option import options_of
 from tachometry.spec.timing import MAX_TICK_CYCLES, whole_clocks
+from tachometry.spec.units import parse_bandwidth
 from tachometry.spec.velocity_output import NATIVE, UNITS, parse_lsb
 
 _ENCODER, _TIMING, _CORE = "Encoder", "Timing", "Core"
@@ -132,6 +133,12 @@ _CORE_OPTIONS = [
         help="Outputs velocity_lower and velocity_upper, which enclose the true mean speed over the measured window, "
         "and bounds_valid.",
     ),
+    option(
+        _CORE,
+        "--lowpass",
+        metavar="BANDWIDTH",
+        help="Low-pass filter of the velocity for measurements of different length, eq. (22), in rad/s, Hz or kHz.",
+    ),
 ]
 
 
@@ -250,6 +257,7 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         external_tick: bool,
         max_tick_period: str | None,
         velocity_bits: int | None,
+        lowpass: str | None,
         **others: Any,
     ) -> Any:
         if dt is not None and tick is not None:
@@ -273,7 +281,13 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
             )
             coarsest, finest = spec.frac_bits_range(unit)
             default = 16 if unit == NATIVE else max(coarsest, min(10, finest))
-            return replace(spec, unit=unit, frac_bits=default if bits is None else bits, velocity_bits=velocity_bits)
+            return replace(
+                spec,
+                unit=unit,
+                frac_bits=default if bits is None else bits,
+                velocity_bits=velocity_bits,
+                lowpass=None if lowpass is None else parse_bandwidth("lowpass", lowpass),
+            )
 
         return command(make=make, **others)
 

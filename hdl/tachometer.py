@@ -11,6 +11,7 @@ from tachometry.hdl.conditioner import InputConditioner
 from tachometry.hdl.decoder import QuadratureDecoder
 from tachometry.hdl.external_tick import ExternalTick
 from tachometry.hdl.index_capture import IndexCapture
+from tachometry.hdl.low_pass import LowPass
 from tachometry.hdl.position_counter import PositionCounter
 from tachometry.hdl.pulse_counter import PulseCounter
 from tachometry.hdl.sampling_clock import SamplingClock
@@ -65,11 +66,14 @@ class Tachometer(wiring.Component):
             if spec.max_tick_cycles
             else SamplingClock(spec.timing.tick_cycles)
         )
+        self.low_pass: LowPass | None = None
         self.velocity_output: Any = None
         self.bound_outputs: dict[str, Any] = {}
+        tags = spec.interval_width + 2 + sum(port.width for port in spec.method_ports) + spec.bounds
+        if spec.lowpass is not None:
+            self.low_pass = LowPass(spec.low_pass, tag_width=tags + 2 * spec.bound_width * spec.bounds)
         if spec.output is not None:
             box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
-            tags = spec.interval_width + 2 + sum(port.width for port in spec.method_ports) + spec.bounds
             self.velocity_output = box(spec.output, native_width=spec.native_width, tag_width=tags)
             if spec.bounds:
                 self.bound_outputs = {
@@ -137,28 +141,40 @@ class Tachometer(wiring.Component):
         return m
 
     def _output(self, m: Module) -> None:
-        """From the datapath to the ports, by way of the unit if there is one."""
+        """From the datapath to the ports, by way of the low-pass filter and of the unit if they are there."""
         spec, datapath = self._spec, self.datapath
+        velocity, valid = datapath.velocity, datapath.velocity_valid
+        bounds = [(name, getattr(datapath, name)) for name in BOUNDS if spec.bounds]
         names = ["interval", "forced", "stalled", *(port.name for port in spec.method_ports)]
         names += ["bounds_valid"] * spec.bounds
         tags, found = (Cat(getattr(side, name) for name in names) for side in (self, datapath))
+        if self.low_pass is not None:
+            m.submodules.low_pass = low_pass = self.low_pass
+            interval = datapath.interval if spec.filter_interval is None else spec.filter_interval
+            m.d.comb += [
+                low_pass.start.eq(valid),
+                low_pass.native.eq(velocity),
+                low_pass.interval.eq(interval),
+                low_pass.tag.eq(Cat(found, *(value for _, value in bounds))),
+            ]
+            velocity, valid, found = low_pass.velocity, low_pass.done, low_pass.tag_out[: len(tags)]
+            ends = low_pass.tag_out[len(tags) :]
+            width = spec.bound_width
+            bounds = [(name, ends[k * width : (k + 1) * width].as_signed()) for k, (name, _) in enumerate(bounds)]
         if self.velocity_output is None:
-            for name in ("velocity", *(BOUNDS if spec.bounds else ())):
-                m.d.comb += getattr(self, name).eq(getattr(datapath, name))
-            m.d.comb += [self.velocity_valid.eq(datapath.velocity_valid), tags.eq(found)]
+            m.d.comb += [self.velocity.eq(velocity), self.velocity_valid.eq(valid), tags.eq(found)]
+            m.d.comb += [getattr(self, name).eq(value) for name, value in bounds]
             return
         m.submodules.velocity_output = output = self.velocity_output
         m.d.comb += [
+            output.start.eq(valid),
+            output.native.eq(velocity),
             output.tag.eq(found),
+            self.velocity.eq(output.velocity),
             tags.eq(output.tag_out),
             self.velocity_valid.eq(output.done),
             self.velocity_overflow.eq(output.velocity_overflow),
         ]
-        for name, box in {"velocity": output, **self.bound_outputs}.items():
-            if box is not output:
-                m.submodules[name] = box
-            m.d.comb += [
-                box.start.eq(datapath.velocity_valid),
-                box.native.eq(getattr(datapath, name)),
-                getattr(self, name).eq(box.velocity),
-            ]
+        for name, value in bounds:
+            m.submodules[name] = box = self.bound_outputs[name]
+            m.d.comb += [box.start.eq(valid), box.native.eq(value), getattr(self, name).eq(box.velocity)]

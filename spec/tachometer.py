@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from tachometry.spec.encoder import Encoder
+from tachometry.spec.low_pass import MAX_EXTRA_BITS, LowPass
 from tachometry.spec.option import options_of
 from tachometry.spec.timing import MAX_TICK_CYCLES, Timing
 from tachometry.spec.units import Speed
@@ -71,6 +72,8 @@ class TachometerSpec:
     bounds : bool
         Outputs `velocity_lower` and `velocity_upper`, which enclose the true mean speed over the measured window, and
         `bounds_valid`.
+    lowpass : Fraction or None
+        G of the low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, in rad/s; None: no filter.
 
     Raises
     ------
@@ -91,12 +94,15 @@ class TachometerSpec:
     max_tick_cycles: int | None = None
     age: bool = False
     bounds: bool = False
+    lowpass: Fraction | None = None
 
     # Name of the method, and of the modules that hold its datapath (in hdl/) and its golden model (in sim/golden/).
     method: ClassVar[str]
     module: ClassVar[str]
     # Whether the method ends the ticks itself, by what it counts.
     own_ticks: ClassVar[bool] = False
+    # Intervals that an update stands for in the low-pass filter; None: those of its measurement.
+    filter_interval: ClassVar[int | None] = None
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
 
@@ -108,6 +114,9 @@ class TachometerSpec:
             raise ValueError(f"filter_clocks must be from 0 to 255, not {self.filter_clocks}")
         if self.index_reset and not self.index:
             raise ValueError("index_reset must be given together with an index")
+        if self.lowpass is not None and (self.lowpass <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS):
+            least = float(4 * self.timing.clock_hz / Fraction(self.interval_unit_cycles << MAX_EXTRA_BITS))
+            raise ValueError(f"lowpass must be at least {least:.4g} rad/s here, not {float(self.lowpass):.9g} rad/s")
         if self.own_ticks and self.max_tick_cycles is not None:
             raise ValueError(f"method must be another than {self.method} for an external tick: it makes its own")
         if self.max_tick_cycles is not None:
@@ -193,6 +202,18 @@ class TachometerSpec:
     def _lsb_per_count(self) -> Fraction:
         count = per_count(self.unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
         return count * Fraction(2) ** self.frac_bits
+
+    @property
+    def low_pass(self) -> LowPass:
+        """The low-pass filter, of which there must be one."""
+        assert self.lowpass is not None
+        longest = (1 << self.interval_width) - 1 if self.filter_interval is None else 255
+        return LowPass(self.lowpass * self.seconds(self.interval_unit_cycles), longest, self.native_width)
+
+    @property
+    def low_pass_latency(self) -> int:
+        """Clocks from the velocity as measured to the filtered one, if they are no closer."""
+        return 0 if self.lowpass is None else self.low_pass.latency
 
     @property
     def greatest_speed(self) -> float:
@@ -290,7 +311,7 @@ class TachometerSpec:
     @property
     def tick_to_velocity(self) -> int:
         """Clocks from `tick` to `velocity_valid`."""
-        return self.datapath_latency + self.output_latency
+        return self.datapath_latency + self.low_pass_latency + self.output_latency
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
@@ -362,6 +383,7 @@ class TachometerSpec:
             "max_tick_cycles": self.max_tick_cycles,
             "age": self.age,
             "bounds": self.bounds,
+            "lowpass": None if self.lowpass is None else f"{float(self.lowpass)!r}rad/s",
         }
         return common | {item.name: getattr(self, item.name) for item in options_of(type(self))}
 

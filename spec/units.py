@@ -42,6 +42,12 @@ def parse_frequency(what: str, text: str | int) -> int:
     return int(hertz)
 
 
+def parse_bandwidth(what: str, text: str) -> Fraction:
+    """rad/s in a text such as `200rad/s` or `30Hz`."""
+    value, unit = _quantity(what, text, {"rad/s": 1, **_FREQUENCY})
+    return value if unit == "rad/s" else value * _FREQUENCY[unit] * 2 * PI
+
+
 def format_time(seconds: Fraction) -> str:
     """A time as people write it: the largest unit that leaves a number of at least 1."""
     for unit, size in _TIME.items():

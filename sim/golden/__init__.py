@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tachometry.sim.golden.front_end import count, decoded
+from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.recording import PinTrace
@@ -29,5 +30,6 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
         last, tick_errors = windows(spec, trace)
         beyond = None
     ticks, index = count(spec, steps, last, trace.n_clocks, beyond)
-    updates = golden.updates(ticks, steps, trace.n_clocks)
-    return Run(trace.n_clocks, with_age(spec, ticks, updates), in_unit(spec, updates), index, steps.errors, tick_errors)
+    measured = golden.updates(ticks, steps, trace.n_clocks)
+    updates = in_unit(spec, filtered(spec, measured, trace.n_clocks))
+    return Run(trace.n_clocks, with_age(spec, ticks, updates), updates, index, steps.errors, tick_errors)

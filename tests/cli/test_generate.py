@@ -61,6 +61,7 @@ def test_defaults(tmp_path: Path) -> None:
         "max_tick_cycles": None,
         "age": False,
         "bounds": False,
+        "lowpass": None,
         "cancel": True,
     }
 

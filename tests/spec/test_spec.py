@@ -155,6 +155,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "max_tick_cycles": None,
         "age": False,
         "bounds": False,
+        "lowpass": None,
         "cancel": False,
     }
     assert described["counts_per_rev"] == 2000

@@ -1,0 +1,55 @@
+"""Golden low-pass filter: eq. (22) of Tsuji 2009, update by update."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tachometry.sim.results import Updates
+from tachometry.spec import TachometerSpec
+
+
+def filtered(spec: TachometerSpec, updates: Updates, n_clocks: int) -> Updates:
+    """Updates with the filtered velocity in counts per tick, those whose strobe falls within `n_clocks`.
+
+    The filter takes an update when it is done with the one before; of those that come meanwhile it takes the last, for
+    the intervals of all.
+    """
+    if spec.lowpass is None:
+        return updates
+    form = spec.low_pass
+    latency = form.latency
+    tables, low_bits, extra, bits = form.tables, form.low_bits, form.extra_bits, form.factor_bits
+    half = 1 << (bits - 1)
+    intervals = updates.interval if spec.filter_interval is None else np.full(len(updates.clock), spec.filter_interval)
+    came = updates.clock - spec.output_latency - latency
+
+    taken: list[tuple[int, int, int]] = []  # clock, row, intervals
+    free = 0
+    for row, (clock, interval) in enumerate(zip(came.tolist(), intervals.tolist(), strict=True)):
+        if taken and clock < taken[-1][0]:
+            before, _, waited = taken[-1]
+            taken[-1] = before, row, min(waited + interval, form.max_interval)
+        else:
+            take = max(clock + 1, free)
+            taken.append((take, row, min(interval, form.max_interval)))
+            free = take + latency - 2
+
+    y, shown = 0, []
+    velocity = updates.velocity.tolist()
+    for _, row, interval in taken:
+        u = velocity[row] << extra
+        places = (interval & ((1 << low_bits) - 1), interval >> low_bits)
+        difference = y - u
+        for table, place in zip(tables, places, strict=False):
+            difference = (table[place] * difference + half) >> bits
+        y = u + difference
+        shown.append((y + (1 << (extra - 1))) >> extra)
+
+    done = np.array([take for take, _, _ in taken], dtype=np.int64) + latency - 1 + spec.output_latency
+    seen = done < n_clocks
+    rows = np.array([row for _, row, _ in taken], dtype=np.int64)[seen]
+    columns = {
+        name: column[rows] for name, column in vars(updates).items() if name not in ("clock", "velocity", "more")
+    }
+    more = {name: column[rows] for name, column in updates.more.items()}
+    return replace(updates, clock=done[seen], velocity=np.array(shown, dtype=np.int64)[seen], more=more, **columns)

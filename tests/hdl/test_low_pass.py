@@ -1,0 +1,69 @@
+"""The low-pass filter's gates against the golden one, with injected updates."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl import low_pass
+from tachometry.sim.golden.low_pass import filtered
+from tachometry.sim.results import Updates
+from tachometry.spec import Encoder, STachometer, Timing
+
+ONE_TABLE = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 20, 60), frac_bits=6, lowpass=Fraction(100_000))
+TWO_TABLES = replace(ONE_TABLE, timing=Timing(48_000_000, 20, 5000), lowpass=Fraction(2000))
+
+
+def check(spec: STachometer, n: int = 150) -> None:
+    """Updates far apart, close together, and while another waits."""
+    form = spec.low_pass
+    rng = np.random.default_rng(2)
+    gaps = np.where(rng.random(n) < 0.5, form.latency + rng.integers(-4, 4, n), rng.integers(1, form.latency, n))
+    came = np.cumsum(gaps)
+    most = spec.max_count << spec.native_frac_bits
+    velocity = rng.integers(-most, most + 1, n)
+    interval = np.choose(
+        rng.integers(3, size=n),
+        [form.max_interval, rng.integers(1, spec.timing.max_ticks + 1, n), rng.integers(1, 4, n)],
+    )
+    none = np.zeros(n, dtype=np.bool_)
+    updates = Updates(came + form.latency, velocity, interval, none, none, none, {"tag": np.arange(n) % 16})
+    wanted = filtered(spec, updates, 1 << 40)
+    at = dict(zip(came.tolist(), zip(velocity.tolist(), interval.tolist(), strict=True), strict=True))
+    order = {clock: k for k, clock in enumerate(came.tolist())}
+    rows = []
+    for clock in range(int(came[-1]) + 2 * form.latency):
+        u, m_s = at.get(clock, (0, 0))
+        start = int(clock in at)
+        rows.append({"start": start, "native": u, "interval": m_s, "tag": order.get(clock, 0) % 16})
+    seen = clock_by_clock(low_pass.LowPass(form, tag_width=4), rows, ["done", "velocity", "tag_out"])
+    got = [(k, row["velocity"], row["tag_out"]) for k, row in enumerate(seen) if row["done"]]
+    columns = (wanted.clock, wanted.velocity, wanted.more["tag"])
+    assert got == list(zip(*(column.tolist() for column in columns), strict=True))
+    assert len(got) < n
+
+
+@pytest.mark.parametrize("spec", [ONE_TABLE, TWO_TABLES], ids=["one table", "two tables"])
+def test_as_the_golden_one(spec: STachometer) -> None:
+    assert len(spec.low_pass.tables) == (2 if spec is TWO_TABLES else 1)
+    check(spec)
+
+
+MUTANTS = {
+    "not rounded": ("Cat(step == bits, total).as_signed()", "Cat(0, total).as_signed()"),
+    "intervals of the first alone": ("Mux(waiting & ~take, next_interval, 0)", "0"),
+    "intervals wrap": ("Mux(sum_ > spec.max_interval, spec.max_interval, sum_)", "sum_"),
+    "taken too early": ("waiting & ~working & ~adding", "waiting & ~working"),
+    "one factor": ("working & last & (second if high else 1)", "working & last"),
+    "no rounding of the output": ("(y + (1 << (extra - 1)))", "y"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(low_pass.LowPass, *MUTANTS[name]), caught():
+        # Few bits below the LSB, so that roundings show.
+        check(replace(ONE_TABLE, lowpass=Fraction(2_400_000)) if name == "not rounded" else TWO_TABLES)
