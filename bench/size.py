@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -93,6 +94,9 @@ CONFIGURATIONS = (
     Configuration("rad-per-s", "velocity in 2^-10 rad/s", replace(REFERENCE, unit="rad/s", frac_bits=10)),
     Configuration("rpm", "velocity in 2^-6 rpm", replace(REFERENCE, unit="rpm", frac_bits=6)),
     Configuration("velocity-16", "16-bit velocity, saturating", replace(REFERENCE, velocity_bits=16)),
+    Configuration("age", "ticks since the update", replace(REFERENCE, age=True)),
+    Configuration("bounds", "bounds of the true speed", replace(REFERENCE, bounds=True)),
+    Configuration("lowpass", "low-pass filter, 200 rad/s", replace(REFERENCE, lowpass=Fraction(200))),
     Configuration(
         "long",
         "at most 2^16 ticks (1.3 s)",

@@ -247,14 +247,10 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     spec, encoding, trace = random_case(seed, method)
     expected, actual = golden.run(spec, trace), engine.run(spec, trace)
     problems = [f"{method}, seed {seed}: {mismatch}" for mismatch in compare(expected, actual)[1]]
-<<<<<<< HEAD
     fewer = FEWER.get(method, 1)
-    if len(actual.ticks.clock) * fewer < MIN_TICKS or len(actual.updates.clock) * fewer < MIN_UPDATES:
-=======
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
-    if len(actual.ticks.clock) < MIN_TICKS or len(actual.updates.clock) < fewest:
->>>>>>> 065be43 (Low-pass filter for fluctuating measurement time, eq. (22), after any method)
+    if len(actual.ticks.clock) * fewer < MIN_TICKS or len(actual.updates.clock) * fewer < fewest:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
     problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
     return problems, covered(spec, trace, actual)
