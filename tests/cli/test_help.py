@@ -25,7 +25,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("flag", ["--help", "-h"])
 def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, flag)
-    for command in ("plan", "generate", "simulate", "replay"):
+    for command in ("plan", "generate", "simulate", "replay", "compare", "figures"):
         assert f"\n  {command} " in text
     assert max(map(len, text.splitlines())) <= 80
 
@@ -42,7 +42,7 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
 @pytest.mark.parametrize(
     ("command", "options", "groups"),
     [
-        ("plan", ["--speeds", "--plot", "--csv"], ["Range", "Outputs"]),
+        ("plan", ["--speeds", "--methods", "--plot", "--csv"], ["Range", "Outputs"]),
         ("generate", ["--name", "--output", "-o"], ["Files"]),
         (
             "simulate",
