@@ -33,7 +33,7 @@ from tachometry.cli.synthesis import (
     versions,
 )
 from tachometry.hdl import export
-from tachometry.spec import Encoder, MTachometer, RairanTachometer, Speed, STachometer, TachometerSpec, Timing
+from tachometry.spec import Encoder, MTachometer, RairanTachometer, Speed, STachometer, TachometerSpec, Timing, TTachometer
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "size"
@@ -75,6 +75,7 @@ BARS = {
 }
 M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
 RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
+TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
 EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
@@ -124,6 +125,8 @@ CONFIGURATIONS = (
         RairanTachometer(**COMMON, paper_exact=True),
         is_option=False,
     ),
+    Configuration("t", "T method", TTachometer(**COMMON), TIMED_BARS, is_option=False),
+    Configuration("t-tick", "T method, times in ticks", TTachometer(**COMMON, timer="tick"), is_option=False),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )
 

@@ -235,11 +235,11 @@ def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     for forced, colour, label in ((False, ESTIMATE, "alteration"), (True, FORCED, "forced")):
         chosen = updates.forced == forced
         time = updates.clock[chosen] / spec.timing.clock_hz
-        m_s = updates.interval[chosen]
+        m_s = updates.interval[chosen] * (spec.interval_unit_cycles / spec.timing.tick_cycles)
         kept = columns(time, m_s)
         axes.plot(time[kept] * scale, m_s[kept], ".", color=colour, markersize=2.5, label=label)
     axes.set_yscale("log")
-    axes.set_ylim(0.8, spec.timing.max_ticks * 1.25)
+    axes.set_ylim(0.8 * spec.interval_unit_cycles / spec.timing.tick_cycles, spec.timing.max_ticks * 1.25)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylabel("$m_s$ (ticks)")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=2)

@@ -4,12 +4,15 @@ from tachometry.spec.encoder import Encoder
 from tachometry.spec.m_method import MTachometer
 from tachometry.spec.rairan import RairanTachometer
 from tachometry.spec.s_method import STachometer
+from tachometry.spec.t_method import TTachometer
 from tachometry.spec.tachometer import Port, TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed
 
 # Every method by its name. The spec names the module that holds `Datapath` in hdl/ and `Model` in sim/golden/.
-METHODS: dict[str, type[TachometerSpec]] = {spec.method: spec for spec in (STachometer, MTachometer, RairanTachometer)}
+METHODS: dict[str, type[TachometerSpec]] = {
+    spec.method: spec for spec in (STachometer, MTachometer, TTachometer, RairanTachometer)
+}
 
 __all__ = [
     "METHODS",
@@ -19,6 +22,7 @@ __all__ = [
     "RairanTachometer",
     "STachometer",
     "Speed",
+    "TTachometer",
     "TachometerSpec",
     "Timing",
 ]

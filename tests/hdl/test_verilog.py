@@ -10,11 +10,11 @@ from support.verilog import run_in_icarus, run_in_verilator
 from tachometry.sim import golden
 from tachometry.sim.results import Run, compare
 
+CASES = [("s", 3), ("s", 12), ("s", 38), ("s", 45), ("m", 2), ("m", 5), ("t", 7), ("t", 24), ("rairan", 3), ("rairan", 4)]
+
 
 @pytest.mark.parametrize("run", [run_in_verilator, run_in_icarus])
-@pytest.mark.parametrize(
-    ("method", "seed"), [("s", 3), ("s", 12), ("s", 38), ("s", 45), ("m", 2), ("m", 5), ("rairan", 3), ("rairan", 4)]
-)
+@pytest.mark.parametrize(("method", "seed"), CASES)
 def test_exported_verilog_agrees_with_the_golden_model(
     method: str, seed: int, run: Callable[..., Run], tmp_path: Path
 ) -> None:

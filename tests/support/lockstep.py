@@ -25,11 +25,13 @@ from tachometry.spec import (
     TachometerSpec,
     Timing,
 )
+from tachometry.spec.timed import TimedTachometer
 
 PULSES_PER_REV = 100
 CLOCK_HZ = 1_000_000
 MIN_TICKS, MIN_UPDATES = 2000, 200
 FEWER = {"rairan": 5}  # reversals and counts that open windows make ticks longer
+MIN_CLOCKS = 6_000  # of methods that measure times
 
 STATES = ("00", "10", "11", "01")
 LEGAL = [f"{STATES[k]}->{STATES[(k + d) % 4]}" for k in range(4) for d in (1, -1)]
@@ -46,13 +48,28 @@ COMMON = [
     "external tick too early",
     "external tick missing",
     "velocity saturated",
-    "update in every clock",
     "bounds",
     "aged",
     "filtered",
     "waited for the filter",
     *LEGAL,
     *ILLEGAL,
+]
+TIMED = [
+    "times in clocks",
+    "times in ticks",
+    "paper exact",
+    "reversal",
+    "count after a silence",
+    "count at the maximum time",
+    "one after the other",
+    "forced after the maximum time",
+    "forced again",
+    "decay",
+    "decay backward",
+    "decay again",
+    "out of range",
+    "speed beyond the maximum",
 ]
 EVENTS = {
     "s": [
@@ -61,9 +78,11 @@ EVENTS = {
         "forced, then alteration",
         "m_s = 1",
         "reciprocal carried",
+        "update in every clock",
         *COMMON,
     ],
-    "m": ["one tick", "a power of two", "another number", *COMMON],
+    "m": ["one tick", "a power of two", "another number", "update in every clock", *COMMON],
+    "t": [*TIMED, *(event for event in COMMON if event != "bounds")],
     "rairan": [
         "low",
         "high",
@@ -76,6 +95,7 @@ EVENTS = {
         "n1",
         "n2",
         "n3",
+        "update in every clock",
         *(event for event in COMMON if "external" not in event and event not in ("sign change", "bounds")),
     ],
 }
@@ -86,12 +106,20 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     rng = np.random.default_rng(seed)
     tick_cycles = int(rng.choice([1, 2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 16]))
     max_ticks = int(rng.choice([2, 3, 5, 10, 20]))
+    timed = issubclass(METHODS[method], TimedTachometer)
+    if timed:  # a division takes some ticks, or only part of one
+        tick_cycles = int(rng.choice([1, 2, 3, 8, 30, 40]))
+        max_ticks = int(rng.choice([2, 3, 10, 60])) * (1 if tick_cycles > 8 else 5)
     decoding = int(rng.choice([1, 2, 4, 4]))
     n_ticks = MIN_TICKS + 20 if method == "m" else max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks)
+    if timed:
+        n_ticks = MIN_CLOCKS // tick_cycles + 20
     external = tick_cycles > 1 and bool(rng.random() < 0.3) and not METHODS[method].own_ticks
     if external:
         n_ticks += n_ticks // 4  # fewer may come
     band = [0.004, 0.05, 0.3, 1.003, 1.4, 3.25]
+    if timed:
+        band = [k * tick_cycles / 16 for k in (0.05, 0.1, 0.3, 0.5, 1, 4)]
     if method == "s" and tick_cycles == 1 and rng.random() < 0.5:
         max_ticks, n_ticks = 3000, 15_000  # the reciprocal is carried
         band = [0.05, 0.3]
@@ -127,7 +155,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     spec = METHODS[method](
         encoder=Encoder(PULSES_PER_REV, decoding),
         timing=Timing(CLOCK_HZ, tick_cycles, max_ticks),
-        frac_bits=int(rng.integers(4, 25)),
+        frac_bits=int(rng.integers(4, 13 if timed and rng.random() < 0.8 else 25)),
         max_speed=max_speed,
         **random_options(method, rng),
         position_width=int(rng.choice([8, 16, 32, 48])),
@@ -136,7 +164,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         index_reset=encoder.index and bool(rng.random() < 0.5),
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
         age=bool(rng.random() < 0.5),
-        bounds=bool(rng.random() < 0.5) and method != "rairan",
+        bounds=bool(rng.random() < 0.5) and not timed and method != "rairan",
     )
     if rng.random() < 0.25:
         spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))
@@ -155,6 +183,12 @@ def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
             "estimate": str(rng.choice(["n1", "n2", "n3", "n3"])),
             "paper_exact": bool(rng.random() < 0.2),
             "bound_decay": bool(rng.random() < 0.7),
+        }
+    if issubclass(METHODS[method], TimedTachometer):
+        return {
+            "timer": str(rng.choice(["clock", "clock", "tick"])),
+            "bound_decay": bool(rng.random() < 0.8),
+            "paper_exact": bool(rng.random() < 0.2),
         }
     return {"average": int(rng.choice([1, 2, 3, 4, 7, 8, 16, 33, 100]))}
 
@@ -199,6 +233,8 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
             "to the letter": rows * spec.paper_exact,
             spec.estimate: rows,
         }
+    if isinstance(spec, TimedTachometer):
+        return covered_by_timed(spec, run)
     assert isinstance(spec, STachometer)
     changed = np.diff(m_e, prepend=0) != 0
     by_count = ~updates.forced
@@ -208,6 +244,30 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         "forced, then alteration": np.count_nonzero(updates.forced[:-1] & by_count[1:]),
         "m_s = 1": np.count_nonzero(updates.interval == 1),
         "reciprocal carried": spec.carried and len(updates.clock),
+    }
+
+
+def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
+    """The same for the methods that measure times."""
+    updates, n = run.updates, len(run.updates.clock)
+    velocity, forced, interval = updates.velocity, updates.forced, updates.interval
+    decay = forced & (interval < spec.max_periods) & (velocity != 0) if spec.decays else np.zeros(n, dtype=np.bool_)
+    overdue = forced & ~decay
+    flagged = updates.more.get("out_of_range", np.zeros(n, dtype=np.bool_))
+    return {
+        "times in ticks" if spec.on_lattice else "times in clocks": n,
+        "paper exact": n * spec.paper_exact,
+        "reversal": np.count_nonzero(~forced & (velocity == 0)),
+        "count after a silence": np.count_nonzero(overdue[:-1] & ~forced[1:]),
+        "count at the maximum time": np.count_nonzero(~forced & (interval == spec.max_periods)),
+        "one after the other": np.count_nonzero(np.diff(updates.clock) == spec.update_spacing),
+        "forced after the maximum time": np.count_nonzero(overdue & ~updates.stalled),
+        "forced again": np.count_nonzero(updates.stalled),
+        "decay": np.count_nonzero(decay),
+        "decay backward": np.count_nonzero(decay & (velocity < 0)),
+        "decay again": np.count_nonzero(decay[1:] & decay[:-1]),
+        "out of range": np.count_nonzero(flagged) * spec.on_lattice,
+        "speed beyond the maximum": np.count_nonzero(flagged) * (not spec.on_lattice),
     }
 
 
@@ -247,10 +307,16 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     spec, encoding, trace = random_case(seed, method)
     expected, actual = golden.run(spec, trace), engine.run(spec, trace)
     problems = [f"{method}, seed {seed}: {mismatch}" for mismatch in compare(expected, actual)[1]]
+    timed = isinstance(spec, TimedTachometer)
     fewer = FEWER.get(method, 1)
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
-    if len(actual.ticks.clock) * fewer < MIN_TICKS or len(actual.updates.clock) * fewer < fewest:
+    ticks, updates = (
+        (MIN_CLOCKS // spec.longest_tick, 10 if spec.lowpass is None else 2)
+        if timed
+        else (MIN_TICKS // fewer, fewest // fewer)
+    )
+    if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
     problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
     return problems, covered(spec, trace, actual)

@@ -1,0 +1,87 @@
+"""A quotient, bit by bit."""
+
+from amaranth import Cat, Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class Divider(wiring.Component):
+    """Signed serial divider, non-restoring: the quotient rounded down, ⌊2^s · dividend / divisor⌋.
+
+    In each step the divisor is taken from the doubled remainder, or added if that is negative; so it stays within
+    −divisor … divisor − 1. The signs that it passes through, inverted but for the first, are the digits of the quotient
+    in two's complement: Σ ±2^i is their weighted sum, and the last one is the correction to a remainder that is not
+    negative. A one that is shifted before them tells when the last has come.
+
+    Latency: `done` is high as many clocks after `start` as the quotient has bits; a start before it, or together with
+    it, begins the next one.
+
+    Parameters
+    ----------
+    divisor_width : int
+    integer_bits : int
+        Of the quotient, without its sign: |dividend| < 2^integer_bits · divisor.
+    scale_bits : int
+        s.
+
+    Members
+    -------
+    start : In(1)
+    dividend : In(signed(divisor_width + integer_bits + 1))
+    divisor : In(divisor_width)
+        Positive; both are valid with `start`.
+    busy : Out(1)
+        A division is under way or done in this clock.
+    done : Out(1)
+    quotient : Out(signed(integer_bits + scale_bits + 1))
+        Valid with `done`.
+    by : Out(divisor_width)
+        The divisor, held until the next start.
+    """
+
+    def __init__(self, *, divisor_width: int, integer_bits: int, scale_bits: int) -> None:
+        self._integer_bits = integer_bits
+        self._steps = integer_bits + scale_bits
+        super().__init__(
+            {
+                "start": In(1),
+                "dividend": In(signed(divisor_width + integer_bits + 1)),
+                "divisor": In(divisor_width),
+                "busy": Out(1),
+                "done": Out(1),
+                "quotient": Out(signed(self._steps + 1)),
+                "by": Out(divisor_width),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        # Only what says that something is under way needs a reset; the rest is loaded before it is used.
+        running = Signal()
+        remainder = Signal(signed(len(self.by) + 1), reset_less=True)
+        left = Signal(self._integer_bits, reset_less=True)
+        digits = Signal(self._steps + 1, reset_less=True)
+        by = Signal.like(self.by, reset_less=True)
+        negative = remainder[-1]
+        m.d.comb += [
+            self.by.eq(by),
+            self.done.eq(running & digits[-1]),
+            self.busy.eq(running),
+            self.quotient.eq(Cat(~negative, digits[: self._steps - 1], ~digits[self._steps - 1])),
+        ]
+        doubled = Cat(left[-1], remainder).as_signed()
+        m.d.sync += [
+            remainder.eq(Mux(negative, doubled + by, doubled - by)),
+            left.eq(left << 1),
+            digits.eq(Cat(~negative, digits)),
+        ]
+        with m.If(self.done):
+            m.d.sync += running.eq(0)
+        with m.If(self.start):
+            m.d.sync += [
+                running.eq(1),
+                Cat(left, remainder).eq(self.dividend),
+                digits.eq(1),
+                by.eq(self.divisor),
+            ]
+        return m

@@ -1,0 +1,60 @@
+"""The time since the last count."""
+
+from amaranth import Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class GapTimer(wiring.Component):
+    """Counts timer periods from count to count, and tells when there have been too many without one.
+
+    Reset is taken for a count in the period before, which opens nothing. Without latency.
+
+    Parameters
+    ----------
+    max_periods : int
+        Periods without a count after which `overdue` is high, and the time begins anew.
+
+    Members
+    -------
+    period : In(1)
+        A timer period ends.
+    count : In(1)
+        With something counted in it.
+    negative : In(1)
+        Its sign.
+    age : Out(range(max_periods + 1), init=1)
+        Periods since the last count, this one included; as the flags valid with `period`.
+    opened : Out(1)
+        There was a count in the last `max_periods`.
+    was_negative : Out(1)
+        The sign of the last count.
+    overdue : Out(1)
+        It was `max_periods` ago, and there is none now.
+    """
+
+    def __init__(self, max_periods: int) -> None:
+        self._max_periods = max_periods
+        super().__init__(
+            {
+                "period": In(1),
+                "count": In(1),
+                "negative": In(1),
+                "age": Out(range(max_periods + 1), init=1),
+                "opened": Out(1),
+                "was_negative": Out(1),
+                "overdue": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        longest = Signal()
+        m.d.comb += self.overdue.eq(self.period & longest & ~self.count)
+        with m.If(self.period):
+            m.d.sync += [self.age.eq(self.age + 1), longest.eq(self.age == self._max_periods - 1)]
+            with m.If(longest | self.count):
+                m.d.sync += [self.age.eq(1), longest.eq(0), self.opened.eq(self.count)]
+            with m.If(self.count):
+                m.d.sync += self.was_negative.eq(self.negative)
+        return m

@@ -1,0 +1,115 @@
+"""Velocity as a quotient of distance and time."""
+
+from amaranth import Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.divider import Divider
+from tachometry.hdl.pulse_counter import saturate
+from tachometry.spec.timed import TimedTachometer
+
+
+class QuotientVelocity(wiring.Component):
+    """Divides, rounds, and holds the result; in between it looks whether the velocity has to sink.
+
+    A measurement may begin when `free` is high. Where `sink` is high and nothing is divided, the greatest speed that
+    the time since the last count allows is: if that, rounded, is nearer to 0 than the velocity, it becomes the
+    velocity. A measurement that begins meanwhile takes the divider, and nothing sinks.
+
+    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after `measure` or `sink`.
+
+    Parameters
+    ----------
+    spec : TimedTachometer
+
+    Members
+    -------
+    measure : In(1)
+        Only if `free`; `dividend` is valid.
+    sink : In(1)
+        `divisor` is the time since the last count.
+    dividend : In(signed)
+        Distance in counts, times the timer periods in a tick.
+    divisor : In(spec.interval_width)
+        Time in timer periods.
+    forced_in, stalled_in, beyond_in : In(1)
+        Valid with `measure` and `sink`, as `divisor`.
+    free : Out(1)
+        No measurement is being divided.
+    velocity, velocity_valid, interval, forced, stalled, out_of_range : Out
+        As those of the datapath.
+    """
+
+    def __init__(self, spec: TimedTachometer) -> None:
+        self._spec = spec
+        self.divider = Divider(
+            divisor_width=spec.interval_width,
+            integer_bits=spec.max_quotient.bit_length(),
+            scale_bits=spec.native_frac_bits + 1,
+        )
+        super().__init__(
+            {
+                "measure": In(1),
+                "sink": In(1),
+                "dividend": In(self.divider.dividend.shape()),
+                "divisor": In(spec.interval_width),
+                "forced_in": In(1),
+                "stalled_in": In(1),
+                "beyond_in": In(1),
+                "free": Out(1),
+                "velocity": Out(signed(spec.native_width)),
+                "velocity_valid": Out(1),
+                "interval": Out(spec.interval_width),
+                "forced": Out(1),
+                "stalled": Out(1),
+                "out_of_range": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec = self._spec
+        m.submodules.divider = divider = self.divider
+        measuring, rounds, compared = Signal(), Signal(), Signal()
+        # Not before the result of the last division is in `velocity`.
+        sinks = self.sink & ~self.measure & ~divider.busy & ~rounds & ~compared if spec.decays else 0
+        backward = self.velocity[-1]
+        greatest = Mux(backward, -spec.timer_periods, spec.timer_periods)
+        m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(rounds & ~self.measure)]
+        m.d.comb += [
+            self.free.eq(~(measuring & (divider.busy | rounds))),
+            divider.start.eq(self.measure | sinks),
+            divider.divisor.eq(self.divisor),
+            divider.dividend.eq(Mux(self.measure, self.dividend, greatest) if spec.decays else self.dividend),
+        ]
+        forced, stalled, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "stalled", "beyond"))
+        with m.If(divider.start):
+            m.d.sync += [
+                measuring.eq(self.measure),
+                forced.eq(self.forced_in),
+                stalled.eq(self.stalled_in),
+                beyond.eq(self.beyond_in),
+            ]
+
+        # The last bit of the quotient is a half: it rounds.
+        rounded = Signal(signed(len(divider.quotient)), reset_less=True)
+        with m.If(divider.done):
+            m.d.sync += rounded.eq((divider.quotient + 1) >> 1)
+        shown, saturated = (
+            saturate(m, rounded, spec.max_count << spec.native_frac_bits) if spec.saturates else (rounded, 0)
+        )
+        change = Signal(signed(max(len(shown), spec.native_width) + 1))
+        m.d.comb += change.eq(shown - self.velocity)
+        nearer = Signal(reset_less=True)
+        m.d.sync += nearer.eq(Mux(backward, ~change[-1] & change.any(), change[-1]))
+        update = compared & (measuring | nearer) if spec.decays else compared
+        m.d.sync += self.velocity_valid.eq(update)
+        with m.If(update):
+            m.d.sync += [
+                self.velocity.eq(shown),
+                self.interval.eq(divider.by),
+                self.forced.eq(forced),
+                self.stalled.eq(stalled),
+                self.out_of_range.eq(beyond | saturated),
+            ]
+        return m

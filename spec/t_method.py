@@ -1,0 +1,33 @@
+"""The T method: the time from one count to the next (Tsuji 2009, Sec. IV-B)."""
+
+from dataclasses import dataclass
+
+from tachometry.spec.timed import TimedTachometer
+
+
+@dataclass(frozen=True, kw_only=True)
+class TTachometer(TimedTachometer):
+    """T-method tachometer: one count over the time since the count before, eq. (9) of Tsuji 2009.
+
+    In counts per tick, correctly rounded. Of two consecutive counts of opposite sign, which are the same edge of the
+    encoder, the velocity is 0.
+    """
+
+    method = "t"
+    module = "t_method"
+
+    @property
+    def max_interval(self) -> int:
+        return self.max_periods
+
+    @property
+    def max_distance(self) -> int:
+        return 1
+
+    @property
+    def max_quotient(self) -> int:
+        return self.timer_periods
+
+    @property
+    def flags_range(self) -> bool:
+        return self.saturates or self.on_lattice

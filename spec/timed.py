@@ -1,0 +1,155 @@
+"""What the methods that measure the time between counts share (Tsuji 2009, Sec. IV-B and C)."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from tachometry.spec.option import option
+from tachometry.spec.tachometer import Port, TachometerSpec
+
+_TIMERS = ("clock", "tick")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimedTachometer(TachometerSpec):
+    """A quotient of counts and time, by a serial divider; docs/timed.md has the rules of every case.
+
+    Parameters
+    ----------
+    timer : str
+        What times are counted in: `clock`, or `tick`, the lattice of the paper, where all counts of a tick are one.
+    bound_decay : bool
+        At ticks, a speed that the silence since the last count excludes becomes the greatest that it allows.
+    paper_exact : bool
+        The published algorithm and nothing else: no decay, and a reversal is no special case.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+
+    timer: str = option("clock", "What times are counted in: clocks, or ticks as in the paper.", choices=_TIMERS)
+    bound_decay: bool = option(
+        True, "While no count comes, let the velocity sink with the greatest speed that this allows."
+    )
+    paper_exact: bool = option(False, "The published algorithm and nothing else.")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.timer not in _TIMERS:
+            raise ValueError(f"timer must be clock or tick, not {self.timer!r}")
+
+    @property
+    def on_lattice(self) -> bool:
+        """Whether times are counted in ticks."""
+        return self.timer == "tick"
+
+    @property
+    def decays(self) -> bool:
+        """Whether the velocity sinks while no count comes."""
+        return self.bound_decay and not self.paper_exact
+
+    @property
+    def timer_cycles(self) -> int:
+        """Clocks in a timer period; nominal, if ticks come from outside."""
+        return self.timing.tick_cycles if self.on_lattice else 1
+
+    @property
+    def timer_periods(self) -> int:
+        """Timer periods in a tick: what counts per timer period are multiplied by."""
+        return self.timing.tick_cycles // self.timer_cycles
+
+    @property
+    def _shortest_period(self) -> int:
+        """Fewest clocks in a timer period."""
+        if not self.on_lattice:
+            return 1
+        return self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
+
+    @property
+    def division_periods(self) -> int:
+        """Timer periods in which a division is done, however short they are."""
+        return -(-self.division_clocks // self._shortest_period)
+
+    @property
+    def max_periods(self) -> int:
+        """Timer periods without a count after which a 0 is forced: the maximum time, or a division if longer."""
+        return max(self.timing.max_ticks * self.timer_periods, self.division_periods)
+
+    @property
+    def max_interval(self) -> int:
+        """Longest measurement in timer periods."""
+        raise NotImplementedError
+
+    @property
+    def max_distance(self) -> int:
+        """Greatest |N| of a measurement, in counts."""
+        raise NotImplementedError
+
+    @property
+    def max_quotient(self) -> int:
+        """Greatest |N·T|/time in counts per tick, before it is saturated."""
+        return self.max_count if self.on_lattice else self.timing.tick_cycles
+
+    @property
+    def saturates(self) -> bool:
+        """Whether a measurement can exceed `max_count`."""
+        return self.max_quotient > self.max_count
+
+    @property
+    def flags_range(self) -> bool:
+        """Whether there is something to flag by `out_of_range`."""
+        return self.saturates
+
+    @property
+    def quotient_bits(self) -> int:
+        """Bits that the divider makes of a quotient after its sign; the last one is for rounding."""
+        return self.max_quotient.bit_length() + self.native_frac_bits + 1
+
+    @property
+    def interval_width(self) -> int:
+        return self.max_interval.bit_length()
+
+    @property
+    def interval_unit_cycles(self) -> int:
+        return self.timer_cycles
+
+    @property
+    def serial(self) -> bool:
+        return False
+
+    @property
+    def min_tick_cycles(self) -> int:
+        # No tick comes too early: it asks the divider only when that is free; and updates are a division apart.
+        return 2
+
+    @property
+    def division_clocks(self) -> int:
+        """Clocks from one division to the next."""
+        # A clock for each digit, its sign included, one to round and one to compare.
+        return self.quotient_bits + 3
+
+    @property
+    def datapath_latency(self) -> int:
+        # And one to hold.
+        return self.division_clocks + 1
+
+    @property
+    def update_spacing(self) -> int:
+        """Fewest clocks between two updates."""
+        if not self.on_lattice or self.max_tick_cycles is not None:
+            return self.division_clocks
+        return self.timing.tick_cycles * -(-self.division_clocks // self.timing.tick_cycles)
+
+    @property
+    def output_serial(self) -> bool:
+        output = self.output
+        return output is not None and len(output.digits) > 2 and self.update_spacing >= output.serial_latency
+
+    @property
+    def method_ports(self) -> tuple[Port, ...]:
+        return (Port("out_of_range", "output"),) if self.flags_range else ()
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        return super().parameters | {"bound_decay": self.decays}

@@ -1,0 +1,73 @@
+"""The datapath of a method that measures times, with injected steps and ticks."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from importlib import import_module
+from typing import Any
+
+from support.sequences import rounded
+from support.simulate import clock_by_clock
+from tachometry.spec import METHODS, Encoder, Timing
+from tachometry.spec.timed import TimedTachometer
+
+OUTPUTS = ["velocity_valid", "velocity", "interval", "forced", "stalled"]
+TICK, MAX_TICKS, FRAC_BITS = 20, 20, 8
+SILENCE = TICK * MAX_TICKS  # clocks after which a 0 is forced
+
+Row = tuple[int, int, int, bool, bool]  # clock of the cause, velocity, interval, forced, stalled
+
+
+def spec_of(method: str, **options: Any) -> TimedTachometer:
+    """Ticks of 20 clocks, a little more than a division takes, and at most 20 of them."""
+    timing = Timing(100 * TICK, TICK, MAX_TICKS)
+    spec = METHODS[method](**{"encoder": Encoder(25), "timing": timing, "frac_bits": FRAC_BITS, **options})
+    assert isinstance(spec, TimedTachometer)
+    return spec
+
+
+def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list[Row]:
+    """All updates; `counts` has the steps by their clocks, or on the lattice the pulse numbers by their ticks."""
+    tick = spec.timing.tick_cycles
+    rows = []
+    for clock in range(n_clocks + spec.datapath_latency):
+        last = clock % tick == tick - 1
+        row = {"tick": int(last)}
+        if spec.on_lattice:
+            row["pulse_count"] = counts.get(clock // tick, 0) if last else row.get("pulse_count", 0)
+        else:
+            row["step"] = counts.get(clock, 0)
+        rows.append(row)
+    module = import_module(f"tachometry.hdl.{spec.module}")
+    seen = clock_by_clock(module.Datapath(spec), rows, OUTPUTS)
+    held = dict.fromkeys(OUTPUTS, 0)
+    for row in seen:  # from update to update all outputs stay
+        held = row if row["velocity_valid"] else held
+        assert {**row, "velocity_valid": 0} == {**held, "velocity_valid": 0}
+    return [
+        (clock - spec.datapath_latency, row["velocity"], row["interval"], bool(row["forced"]), bool(row["stalled"]))
+        for clock, row in enumerate(seen)
+        if row["velocity_valid"]
+    ]
+
+
+def speed(counts: int, clocks: int) -> int:
+    """Raw velocity of some counts in so many clocks."""
+    return rounded(Fraction(counts * TICK, clocks), FRAC_BITS)
+
+
+def decay(last_count: int, velocity: int, until: int) -> list[Row]:
+    """The updates with which a velocity sinks: at the tick, 1 count over the time since the last count."""
+    rows = []
+    for clock in range(last_count + 1, until):
+        if clock % TICK == TICK - 1:
+            most = speed(1 if velocity > 0 else -1, clock - last_count)
+            if abs(most) < abs(velocity):
+                velocity = most
+                rows.append((clock, most, clock - last_count, True, False))
+    return rows
+
+
+def silence(last_count: int, until: int) -> list[Row]:
+    """The zeros that silence forces."""
+    ends = range(last_count + SILENCE, until, SILENCE)
+    return [(end, 0, SILENCE, True, end != last_count + SILENCE) for end in ends]
