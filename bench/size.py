@@ -33,7 +33,16 @@ from tachometry.cli.synthesis import (
     versions,
 )
 from tachometry.hdl import export
-from tachometry.spec import Encoder, MTachometer, RairanTachometer, Speed, STachometer, TachometerSpec, Timing, TTachometer
+from tachometry.spec import (
+    Encoder,
+    MTachometer,
+    RairanTachometer,
+    Speed,
+    STachometer,
+    TachometerSpec,
+    Timing,
+    TTachometer,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "size"

@@ -36,6 +36,8 @@ class TimedTachometer(TachometerSpec):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.bounds:
+            raise ValueError(f"bounds must not be asked of method {self.method}: it has none")
         if self.timer not in _TIMERS:
             raise ValueError(f"timer must be clock or tick, not {self.timer!r}")
 

@@ -10,7 +10,18 @@ from support.verilog import run_in_icarus, run_in_verilator
 from tachometry.sim import golden
 from tachometry.sim.results import Run, compare
 
-CASES = [("s", 3), ("s", 12), ("s", 38), ("s", 45), ("m", 2), ("m", 5), ("t", 7), ("t", 24), ("rairan", 3), ("rairan", 4)]
+CASES = [
+    ("s", 3),
+    ("s", 12),
+    ("s", 38),
+    ("s", 45),
+    ("m", 2),
+    ("m", 5),
+    ("t", 7),
+    ("t", 24),
+    ("rairan", 3),
+    ("rairan", 4),
+]
 
 
 @pytest.mark.parametrize("run", [run_in_verilator, run_in_icarus])
