@@ -17,7 +17,7 @@ from tachometry.cli.methods import Methods, named_methods
 from tachometry.cli.motion_options import FORMS, optional_motion_options
 from tachometry.cli.options import GroupedCommand, option, output
 from tachometry.spec import Encoder, TachometerSpec
-from tachometry.spec.units import format_time
+from tachometry.spec.units import format_time, parse_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.cli.synthesis import Measurement
@@ -61,6 +61,14 @@ Examples:
 @capture_options
 @option(
     "Methods",
+    "--from",
+    "start",
+    metavar="TIME",
+    help="Leave out errors before this time, in s, ms, us or ns: what it takes to get going. "
+    "[default: until every method has a value]",
+)
+@option(
+    "Methods",
     "--size",
     is_flag=True,
     help="Also measure the cores on an ECP5: COMB, FF, Fmax. Takes half a minute a core, and the extra `size`.",
@@ -74,6 +82,7 @@ def compare(
     tables: list[Path],
     capture: Path | None,
     read: Callable[[Path, TachometerSpec], Recording],
+    start: str | None,
     size: bool,
     plot: Path | None,
     csv: Path | None,
@@ -93,13 +102,19 @@ def compare(
     named = named_methods(methods, make, RIVALS)
     spec = make("s", {})
     source = _source(record, capture, read, spec)
+    earliest = 0.0 if start is None else float(parse_time("from", start))
+    if earliest < 0:
+        raise ValueError(f"from must be at least 0, not {start}")
     tools = _tools() if size else {}
     with outputs:
         duration = source.recording.duration
         curves = [curve(source.recording) for curve in _chosen(named, spec.encoder)]
-        instants = common_instants(curves, duration, float(spec.timing.tick_seconds))
+        instants = common_instants(curves, duration, float(spec.timing.tick_seconds), earliest)
         if len(instants) < 2:
-            raise ValueError(f"{source.name} must last until every method has a value, longer than {_time(duration)}")
+            until = "" if start is None else ", and beyond --from"
+            raise ValueError(
+                f"{source.name} must last until every method has a value{until}, longer than {_time(duration)}"
+            )
         scores = [score(curve, duration, instants, source.true_speed) for curve in curves]
         sizes = _sizes(named, tools) if size else {}
         if path := outputs.get("--csv"):

@@ -51,6 +51,7 @@ _SAME_NAME = (
     "methods",
     "speeds",
     "only",
+    "from",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
 _OPTIONS |= {item.name: f"--{item.name.replace('_', '-')}" for spec in METHODS.values() for item in options_of(spec)}

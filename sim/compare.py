@@ -116,9 +116,10 @@ def rival_curve(name: str, recording: Recording, counts_per_rev: int, decoding: 
     return Curve(name, what, estimate, np.empty(0))
 
 
-def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float) -> FloatArray:
-    """Evenly spaced instants, a tick apart or more, from when every curve has begun to the end."""
+def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float, earliest: float = 0.0) -> FloatArray:
+    """Evenly spaced instants, a tick apart or more, from when every curve has begun, and `earliest` (s), to the end."""
     begun = max((curve.estimate.time[0] for curve in curves if len(curve.estimate.time)), default=0.0)
+    begun = max(begun, earliest)
     n = min(int((duration - begun) / tick_seconds), _MOST_INSTANTS)
     return begun + (duration - begun) / max(n, 1) * np.arange(n, dtype=np.float64)
 

@@ -51,6 +51,8 @@ def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
         (["--motion", "stop:1us"], "--motion must last at least two control periods of difference, not 1e-06 s"),
         (["--motion", "stop:1500us", "--methods", "s"], "--motion must last until every method has a value"),
         (["--replay", "x.sr"], "--motion must be given, or --replay, and not both"),
+        (["--from", "2s"], "--motion must last until every method has a value, and beyond --from, longer than 400ms"),
+        (["--from", "-1s"], "--from must be at least 0, not -1s"),
         (["--plot", "x.jpg"], "file must end in .png or .pdf"),
     ],
 )
@@ -123,3 +125,14 @@ def test_sizes_need_their_tools(capsys: pytest.CaptureFixture[str], monkeypatch:
     assert captured.err == (
         "tachometry: error: --size needs the extra `size`: yowasp-nothing is not installed: pip install '.[size]'\n"
     )
+
+
+def test_what_it_takes_to_get_going_can_be_left_out(tmp_path: Path) -> None:
+    worst = []
+    for options in ([], ["--from", "200ms"]):
+        motion = ["--motion", "constant:40rad/s:400ms", "--methods", "difference"]
+        assert run("compare", *CORE, *motion, *options, "--csv", tmp_path / "c.csv") == 0
+        with (tmp_path / "c.csv").open() as file:
+            worst.append(float(next(csv.DictReader(file))["max"]))
+    assert worst[0] > 30
+    assert worst[1] < 10
