@@ -13,14 +13,16 @@ from tachometry.spec.tachometer import BOUNDS
 def in_unit(spec: TachometerSpec, updates: Updates) -> Updates:
     """Updates whose velocity and bounds are native, with those of the output instead.
 
-    Python's integers carry the products: they have up to 90 bits.
+    Where 64 bits do not hold the products, Python's integers do.
     """
     output = spec.output
     if output is None:
         return updates
 
+    kind = np.int64 if output.max_native.bit_length() + output.multiplier.bit_length() < 62 else object
+
     def scaled(native: NDArray[np.int64], towards: int = 0) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        wide = (native.astype(object) * output.multiplier + output.rounding(towards)) >> output.shift
+        wide = (native.astype(kind) * output.multiplier + output.rounding(towards)) >> output.shift
         held = np.clip(wide, -output.limit, output.limit)
         return held.astype(np.int64), (held != wide).astype(bool)
 

@@ -37,24 +37,33 @@ def external_windows(
     last, errors : int64 arrays
         Last clocks of windows; clocks of rises that came too early, and of ends without a rise.
     """
-    last: list[int] = []
-    errors: list[int] = []
+    rises = rises[rises < n_clocks]
+    last: list[NDArray[np.int64]] = []
+    errors: list[NDArray[np.int64]] = []
     before = -1  # the last clock of the window before
 
     def overdue(clock: int) -> None:
         """End windows that no rise ends before `clock`."""
         nonlocal before
-        while before + max_cycles < clock:
-            before += max_cycles
-            last.append(before)
-            errors.append(before)
+        made = np.arange(before + max_cycles, clock, max_cycles)
+        last.append(made)
+        errors.append(made)
+        before += max_cycles * len(made)
 
-    for rise in rises[rises < n_clocks].tolist():
+    # Only rises that are not as far from the one before as they may be have to be looked at one by one.
+    gaps = np.diff(rises, prepend=before)
+    irregular = np.append(np.flatnonzero((gaps < min_cycles) | (gaps > max_cycles)), len(rises))
+    nth = 0
+    while nth < len(rises):
+        rise = int(rises[nth])
         overdue(rise)
         if rise - before < min_cycles:
-            errors.append(rise)
+            errors.append(rises[nth : nth + 1])
+            nth += 1
         else:
-            last.append(rise)
-            before = rise
+            regular = int(irregular[np.searchsorted(irregular, nth, side="right")])
+            last.append(rises[nth:regular])
+            before = int(rises[regular - 1])
+            nth = regular
     overdue(n_clocks)
-    return np.array(last, dtype=np.int64), np.array(errors, dtype=np.int64)
+    return np.concatenate(last, dtype=np.int64), np.concatenate(errors, dtype=np.int64)

@@ -1,0 +1,155 @@
+"""Speed of the golden models beside the simulator, on the same edges in the same run: writes docs/bench.md.
+
+A golden model is vectorised over a whole recording; the simulator works clock by clock, so that it is given the first
+part of it only. Only the ratios mean something: they are of one machine at one time.
+"""
+
+import argparse
+import os
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from tachometry.sim import golden
+from tachometry.sim.encoder import VirtualEncoder
+from tachometry.sim.motion import Vibration, parse_motion
+from tachometry.sim.pysim import PySim
+from tachometry.sim.recording import PinTrace
+from tachometry.sim.results import compare
+from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
+
+MOTION = "ramp:0:300rad/s:4s+ramp:300rad/s:-300rad/s:4s+sine:5rad/s:1Hz:1s+stop:1s"
+CLOCK = "48MHz"
+SIMULATED = 30_000  # clocks of the simulator
+BEGIN = 48_000_000  # where they begin: at about 75 rad/s
+REPEATS = 3
+
+HEAD = """# Speed
+
+How fast the golden models are, which the hardware equals bit for bit, beside Amaranth's simulator (pysim), which runs
+the hardware clock by clock: `make bench` measures both in one run and writes this page. The golden models have the
+{seconds:.0f} s of `--motion "{motion}"` (500 PPR x4, 48 MHz, 20 us: {clocks:.2g} clocks, {ticks:,} ticks,
+{edges:,} edges), the simulator {simulated:,} clocks of it, in which both agree on every bit.
+
+{table}
+
+Measured with {python} on {machine}, {cores} cores. A golden model takes time for edges, ticks and updates, none for
+clocks; the low-pass filter is a recursion, which it follows update by update. A tick is 960 clocks here.
+"""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was measured of one core; times in seconds."""
+
+    name: str
+    clocks: int
+    ticks: int
+    golden_s: float
+    simulated_clocks: int
+    simulated_s: float
+
+    @property
+    def cells(self) -> list[str]:
+        """The row of the table."""
+        fast, slow = self.clocks / self.golden_s, self.simulated_clocks / self.simulated_s
+        return [
+            self.name,
+            f"{self.golden_s * 1e3:.0f} ms",
+            f"{self.ticks / self.golden_s:.2g}",
+            f"{fast:.2g}",
+            f"{slow:.2g}",
+            f"{fast / slow:.2g}",
+        ]
+
+
+COLUMNS = ["core", "golden model", "ticks/s", "clocks/s", "pysim, clocks/s", "ratio"]
+
+
+def fastest(work: Callable[[], object]) -> float:
+    """The shortest time of some runs."""
+    times = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def part_of(trace: PinTrace, begin: int, clocks: int) -> PinTrace:
+    """Some clocks of a trace."""
+    first = int(trace.clock.searchsorted(begin, side="right")) - 1
+    inside = slice(first, int(trace.clock.searchsorted(begin + clocks)))
+    at = (trace.clock[inside] - begin).clip(min=0)
+    return PinTrace(at, trace.a[inside], trace.b[inside], clocks)
+
+
+def measure(name: str, spec: TachometerSpec, trace: PinTrace) -> Result:
+    """Golden model on the whole, simulator on a part; RuntimeError if they disagree."""
+    part = part_of(trace, BEGIN, SIMULATED)
+    start = time.perf_counter()
+    simulated = PySim().run(spec, part)
+    simulated_s = time.perf_counter() - start
+    wrong, first = compare(golden.run(spec, part), simulated)
+    if wrong:
+        raise RuntimeError(f"{name}: hardware and golden model disagree: {first[0]}")
+    ticks = len(golden.run(spec, trace).ticks.clock)
+    return Result(name, trace.n_clocks, ticks, fastest(lambda: golden.run(spec, trace)), SIMULATED, simulated_s)
+
+
+def cores() -> dict[str, TachometerSpec]:
+    """Every method, and the S method with what costs the golden model time."""
+    common = {"encoder": Encoder(500), "timing": Timing.parse(CLOCK, "20us", "10ms")}
+    found = {name: method(**common) for name, method in METHODS.items()}
+    return found | {
+        "s, in rad/s": replace(found["s"], unit="rad/s", frac_bits=10),
+        "s, with bounds": replace(found["s"], bounds=True),
+        "s, low-pass": replace(found["s"], lowpass=Fraction(200)),
+    }
+
+
+def main() -> None:
+    """Measure, print, and write the page if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, help="page to be written, docs/bench.md")
+    output = parser.parse_args().output
+    encoder = VirtualEncoder(500, jitter=0.02, vibration=Vibration(1e-3, 50), seed=1)
+    trace = encoder.record(parse_motion(MOTION)).recording.place(48_000_000)
+    results = [
+        measure(name, spec, trace) for name, spec in track(cores().items(), "Cores", console=Console(stderr=True))
+    ]
+    table = Table(box=None, header_style="")
+    for column in COLUMNS:
+        table.add_column(column, justify="left" if column == "core" else "right")
+    for result in results:
+        table.add_row(*result.cells)
+    Console().print(table)
+    if output is None:
+        return
+    rows = [COLUMNS, ["---", *["---:"] * (len(COLUMNS) - 1)], *(result.cells for result in results)]
+    page = HEAD.format(
+        seconds=trace.n_clocks / 48e6,
+        motion=MOTION,
+        clocks=trace.n_clocks,
+        ticks=results[0].ticks,
+        edges=len(trace.clock) - 1,
+        simulated=SIMULATED,
+        table="\n".join(f"| {' | '.join(row)} |" for row in rows),
+        python=f"Python {platform.python_version()}",
+        machine=platform.machine(),
+        cores=os.cpu_count(),
+    )
+    beside = output.with_name(f".{output.name}.part")
+    beside.write_text(page, encoding="utf-8")
+    beside.replace(output)
+
+
+if __name__ == "__main__":
+    main()
