@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures icarus test formal bench size lint clean
+.PHONY: help venv demo figures compare icarus test formal bench size lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -58,6 +58,9 @@ formal: $(VENV)/.formal ## properties of the exported core, proven by induction,
 
 bench: $(VENV)/.run ## speed of the golden models beside the simulator, in one run, written to docs/bench.md
 	$(BIN)/python bench/golden.py -o docs/bench.md
+
+compare: $(VENV)/.run ## all methods and what others use in several situations, written to docs/compare.md
+	$(BIN)/python bench/compare.py
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
 	$(BIN)/python bench/size.py -o docs/size.md

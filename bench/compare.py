@@ -1,0 +1,170 @@
+"""All methods and what others use, in several situations: writes docs/compare.md.
+
+Every table is that of a `tachometry compare`, whose command stands above it.
+"""
+
+import csv
+import shlex
+import sys
+import tempfile
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+
+from tachometry.cli.main import main as tachometry
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "compare.md"
+CORE = "--ppr 500 --clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/s"
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What is to be compared: a title, what is seen in the table, the options of the command, those of the core first."""
+
+    title: str
+    text: str
+    options: str
+    core: str = CORE
+
+    @property
+    def command(self) -> str:
+        """The command whose table it is."""
+        return f"tachometry compare {self.core} {self.options}"
+
+
+SITUATIONS = (
+    Situation(
+        "The paper's experiment",
+        """500 counts per revolution and a tick of 1 ms, which is also the unit of time of M/T and T: the setting
+that the S method was made for. It has half the error of M with the same measurement time, and T (on the
+paper's lattice) has no value above the unit velocity. The rivals are not bound to the lattice:
+LinuxCNC's timestamps of 0.5 µs win by far.""",
+        "--methods s,m:average=4,t:timer=tick,rairan,hostmot2,simplefoc,odrive "
+        "--motion ramp:0:40rad/s:5s --from 100ms --vibration 1mrad:50Hz --seed 1",
+        "--ppr 500 --decoding 1 --clock 50kHz --tick 1ms --max-time 10ms --max-speed 60rad/s",
+    ),
+    Situation(
+        "Ramp",
+        """A clock of 0.1 µs as the timer beats a lattice of 100 µs: T, then LinuxCNC's timestamps, then the
+tracking loops, which lag by a constant 2 ms. Of what needs neither a timer nor a divider, S is best.""",
+        "--motion ramp:0:100rad/s:400ms --from 40ms",
+    ),
+    Situation(
+        "Ramp, real encoder",
+        """T measures one count, so every error of the disc and all jitter is in it; here it is worse than S, which
+takes many counts when it is fast. Methods that average over their 1 ms keep their error, and their
+delay.""",
+        "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
+    ),
+    Situation(
+        "Slow",
+        """0.04 counts per tick. All that measure the time between counts are alike; a filter of 5 ms takes the
+jitter out, at the price of its delay.""",
+        "--motion constant:1.3rad/s:4s --from 500ms --jitter 0.05 --seed 1",
+    ),
+    Situation(
+        "Fast",
+        """7 counts per tick and 5 % jitter: whoever averages longest wins, and at constant speed delay costs
+nothing. S is best of the cores. Rairán's estimate is constant, and off by up to eq. (13): 1/13 of the
+speed.""",
+        "--motion constant:217rad/s:1s --from 100ms --jitter 0.05 --seed 1",
+    ),
+    Situation(
+        "Fast, ideal encoder",
+        "The same without jitter: S within eq. (18); LinuxCNC's and SimpleFOC's timestamps still resolve more.",
+        "--motion constant:217rad/s:1s --from 100ms",
+    ),
+    Situation(
+        "At the unit velocity, with vibration",
+        """The case of Tsuji's Fig. 9(b): S cancels alternate alterations, and has the least error of the cores.""",
+        "--motion ramp:31rad/s:32rad/s:1s --from 100ms --vibration 0.2mrad:170Hz --nonuniformity 0.1 --seed 1",
+    ),
+    Situation(
+        "Reversals",
+        """Delay counts: filters of 5 ms are worst but for M. S and the tracking loops are alike, LinuxCNC's
+timestamps are best.""",
+        "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
+    ),
+    Situation(
+        "At rest on an edge",
+        """The line dithers. T, Rairán (with what was added to it) and LinuxCNC know that both edges are one, and
+show 0: what is left is the vibration itself. S shows what vibration it sees, tracking loops follow it.""",
+        "--motion stop:1s --vibration 0.3mrad:40Hz --from 100ms",
+    ),
+    Situation(
+        "Stop",
+        """From 20 rad/s to rest at once. T and Rairán fall with the time since the last count; S holds its last
+value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms: a shorter `--max-time`
+mends that.""",
+        "--motion constant:20rad/s:200ms+stop:100ms --from 100ms",
+    ),
+)
+
+HEAD = """# Methods beside each other
+
+Made by `python bench/compare.py`: each table is that of the command above it, by the golden models of the cores, which
+the hardware equals bit for bit, and float models of what others use, with the settings that their projects come with
+(they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs). Errors are those of the held velocity
+against the shaft's; the delay is the shift of the true speed that comes closest, where there is one.
+
+**When to use what**, of the tables below:
+
+- *S*: no timer faster than the tick is at hand, or no divider is wanted; fast, with a real encoder; around multiples of
+  the unit velocity. Its tick can be as short as a clock, and then it is as fine as T at low speeds.
+- *T*: slow shafts, good discs, sudden stops. It suffers most from an uneven disc and from jitter.
+- *Rairán*: bounds of the speed and a constant value at constant speed matter more than its error, up to 1/3 at ω_lim.
+- *M*: nothing else fits, or its noise is filtered anyway.
+- *LinuxCNC's timestamps* (counts over the time between the latest counts, as M/T): nearly always good where a timer
+  and a division in software, or a divider, are at hand, and 1 ms is fast enough.
+- *Tracking loops* (ODrive, moteus): smooth, with a delay that is constant and known, 2 ms with their defaults.
+- *Filtered differences, SimpleFOC*: constant speed; 5 ms of delay everywhere else.
+
+Tsuji 2009, Fig. 8, says the same of M/T with a timer of 200 ns and S with ticks of 20 µs: M/T is better below about
+130 rad/s of an encoder of 81,000 counts, S above ([figures.md](figures.md)).
+
+"""
+
+
+def rows(command: str) -> list[dict[str, str]]:
+    """The table of a command, by method."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "table.csv"
+        try:
+            tachometry([*shlex.split(command)[1:], "--csv", str(file)])
+        except SystemExit as stop:
+            if stop.code:
+                raise
+        with file.open(encoding="utf-8") as table:
+            return list(csv.DictReader(table))
+
+
+def table(found: list[dict[str, str]]) -> str:
+    """The same in Markdown."""
+
+    def cell(row: dict[str, str], name: str, scale: float = 1) -> str:
+        return f"{scale * float(row[name]):.3g}" if row[name] else ""
+
+    heads = ("method", "updates/s", "longest T_m (ms)", "RMS error (rad/s)", "greatest (rad/s)", "delay (ms)")
+    lines = [heads, ("---",) + ("---:",) * (len(heads) - 1)]
+    for row in found:
+        numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms", 1), ("max", 1), ("delay", 1e3))
+        lines.append((row["name"], *(cell(row, name, scale) for name, scale in numbers)))
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def section(situation: Situation) -> str:
+    """A situation's part of the page."""
+    options = situation.options.replace(" --motion", " \\\n        --motion")
+    shown = f"    tachometry compare {situation.core} \\\n        {options}"
+    text = textwrap.fill(" ".join(situation.text.split()), 120)
+    return f"## {situation.title}\n\n{text}\n\n{shown}\n\n{table(rows(situation.command))}"
+
+
+def page() -> str:
+    """The page docs/compare.md."""
+    return HEAD + "\n".join(section(situation) for situation in SITUATIONS)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    sys.stdout.write(f"written: {PAGE}\n")
