@@ -19,7 +19,7 @@ CORE = "--ppr 500 --clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/
 
 @dataclass(frozen=True)
 class Situation:
-    """What is to be compared: a title, what is seen in the table, the options of the command, those of the core first."""
+    """What is compared: a title, what is seen in the table, the options of the command, those of the core first."""
 
     title: str
     text: str
