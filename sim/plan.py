@@ -99,7 +99,8 @@ def _performance(spec: TachometerSpec, speed: NDArray[np.float64], tick_seconds:
     timer_seconds, longest = tick_seconds / periods, longest * periods
     if spec.method == "t":
         return t_performance(speed, counts, timer_seconds, longest)
-    return mt_performance(speed, spec.parameters["min_ticks"] * periods, counts, timer_seconds, longest)
+    least = spec.parameters["min_time"] or spec.timing.tick_cycles
+    return mt_performance(speed, least * periods // spec.timing.tick_cycles, counts, timer_seconds, longest)
 
 
 def standstill_ticks(spec: STachometer) -> int:
