@@ -7,6 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.bounds import bound_members
 from tachometry.spec import RairanTachometer
 
 
@@ -41,6 +42,9 @@ class Counters(wiring.Component):
         Of the last update: it came without a count; and it is that of the maximum time.
     n_ep1, n_dt1 : Out
         Only with `paper_exact`: as in Table 1.
+    loose, unsynced, known : Out(1)
+        Only with bounds: n says nothing of the least speed; what it measures did not begin in step with dt; there has
+        been a count that dt was in step with.
     """
 
     def __init__(self, spec: RairanTachometer) -> None:
@@ -57,6 +61,7 @@ class Counters(wiring.Component):
                 "forced": Out(1),
                 "stalled": Out(1),
                 **(_ports(spec) if spec.paper_exact else {}),
+                **({name: Out(1) for name in ("loose", "unsynced", "known")} if spec.bounds else {}),
             }
         )
         # Cep − 1, and whether there is any.
@@ -132,10 +137,23 @@ class Counters(wiring.Component):
         in_step, waits = Signal(), Signal()
         with m.If(pulse):
             m.d.sync += in_step.eq(opens)
+        known = Signal()
+        with m.If(opens):
+            m.d.sync += known.eq(1)
         waited = self.c_dt + in_step
         m.d.comb += waits.eq(self.last & ~pulse)
 
-        def set_(n: Value | int, *, high: int = 0, forced: int = 0, stalled: int = 0) -> None:
+        def set_(
+            n: Value | int,
+            *,
+            high: int = 0,
+            forced: int = 0,
+            stalled: int = 0,
+            loose: Value | int = 0,
+            unsynced: Value | int = 0,
+        ) -> None:
+            if spec.bounds:
+                m.d.sync += [self.loose.eq(loose), self.unsynced.eq(unsynced), self.known.eq(known)]
             m.d.sync += [
                 self.update.eq(1),
                 self.n.eq(n),
@@ -151,14 +169,14 @@ class Counters(wiring.Component):
             set_(self.c_more, high=1)
         with m.Elif(self.last & (pulse | (one & self.high))):
             # Ndt1 ← 1 by a count just at the end of dt, or Nep1 ← 1.
-            set_(1)
+            set_(1, loose=~pulse)
         with m.Elif(opens & ((self.c_dt != 1) | ~self.high)):
-            set_(self.c_dt)
+            set_(self.c_dt, loose=self.rest, unsynced=~in_step)
         with m.Elif(waits & ~self.rest & (self.c_dt == spec.timing.max_ticks - 1)):
             set_(0, forced=1, stalled=1)
         if spec.bound_decay:
             with m.Elif(waits & Mux(self.high, waited != 0, (waited > self.n) & self.n.any())):
-                set_(waited, forced=1)
+                set_(waited, forced=1, loose=1)
 
     def _update_to_the_letter(self, m: Module, opens: Signal) -> None:
         """Lines 5 to 9 of Table 1."""
@@ -203,6 +221,8 @@ class Datapath(wiring.Component):
     forced, stalled : Out(1)
     n_ep1, n_dt1 : Out
         n1 = Nep1/Ndt1 of the velocity; 0 and 1 for the velocity 0. With `paper_exact` as in Table 1.
+    velocity_lower, velocity_upper, bounds_valid : Out
+        With `spec.bounds`: n2 and n1, a clock wider and rounded outward.
     """
 
     def __init__(self, spec: RairanTachometer) -> None:
@@ -219,6 +239,7 @@ class Datapath(wiring.Component):
                 "forced": Out(1),
                 "stalled": Out(1),
                 **_ports(spec),
+                **bound_members(spec),
             }
         )
         self._spec = spec
@@ -257,7 +278,36 @@ class Datapath(wiring.Component):
                 self.stalled.eq(stalled),
                 Cat(self.n_ep1, self.n_dt1).eq(Cat(*letter) if letter else Cat(counts, low[: spec.interval_width])),
             ]
+        if spec.bounds:
+            self._bounds(m, update=update, backward=backward)
         return m
+
+    def _bounds(self, m: Module, *, update: Signal, backward: Signal) -> None:
+        """Both looked up; backwards, the negative of each is the other."""
+        spec, counters = self._spec, self.counters
+        width = spec.bound_width - 1
+        low = ~counters.high & counters.unsynced
+        places = {
+            "lower": Mux(counters.loose, 0, Cat(counters.high, counters.n)),
+            "upper": Cat(counters.high, (counters.n - low)[: len(counters.n)]),
+        }
+        entries: dict[str, Signal] = {}
+        for name, place in places.items():
+            table = getattr(spec, f"{name}_table")
+            m.submodules[name] = memory = Memory(shape=width, depth=len(table), init=table)
+            read = memory.read_port()
+            entries[name] = entry = Signal(width, name=name)
+            m.d.comb += read.addr.eq(place[: len(read.addr)])
+            m.d.sync += entry.eq(read.data)
+        valid = Signal()
+        m.d.comb += valid.eq(counters.known & (counters.high | counters.n.any()))
+        (valid,) = self._later(m, 2, valid)
+        with m.If(update):
+            m.d.sync += [
+                self.velocity_lower.eq(Mux(backward, -entries["upper"], entries["lower"])),
+                self.velocity_upper.eq(Mux(backward, -entries["lower"], entries["upper"])),
+                self.bounds_valid.eq(valid),
+            ]
 
     @staticmethod
     def _later(m: Module, clocks: int, *values: Signal) -> list[Signal]:

@@ -47,16 +47,15 @@ class RairanTachometer(TachometerSpec):
         super().__post_init__()
         if self.estimate not in ESTIMATES:
             raise ValueError(f"estimate must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
-        if self.bounds:
-            raise ValueError(f"bounds must not be given with method {self.method}: it has none yet")
+        if self.bounds and self.paper_exact:
+            raise ValueError("bounds must not be given with paper_exact, which leaves its own")
         if self.timing.max_ticks >= MAX_TABLE:
             raise ValueError(
                 f"max_ticks must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
             )
-        if self.estimate == "n3" and self.max_count > MAX_TABLE:
-            raise ValueError(
-                f"max_speed must be at most {MAX_TABLE} counts per tick with estimate n3, not {self.max_count}"
-            )
+        if (self.estimate == "n3" or self.bounds) and self.max_count > MAX_TABLE:
+            why = "estimate n3" if self.estimate == "n3" else "bounds"
+            raise ValueError(f"max_speed must be at most {MAX_TABLE} counts per tick with {why}, not {self.max_count}")
 
     @property
     def depth(self) -> int:
@@ -81,6 +80,36 @@ class RairanTachometer(TachometerSpec):
     def table_width(self) -> int:
         """Bits of an entry."""
         return max(self.table).bit_length()
+
+    def _bound(self, d: int, more: int, towards: int) -> int:
+        """`d` counts in dt, or one in −d of them, that may be `more` clocks longer; rounded outward, and clipped."""
+        dt = self.timing.tick_cycles
+        up, down = (d * dt, dt + more) if d >= 0 else (dt, -d * dt + more)
+        if down <= 0:
+            return self.bound_limit
+        raw = (up << self.native_frac_bits) // down if towards < 0 else -((-up << self.native_frac_bits) // down)
+        return min(raw, self.bound_limit)
+
+    @property
+    def lower_table(self) -> tuple[int, ...]:
+        """Lower bounds by twice the address of the estimate, and one more if it is high; 0 for low 0.
+
+        n2 of a dt, or of Ndt1 + 1 of them, that took a clock longer.
+        """
+        rows = [(self._bound(-i - 1, 1, -1) if i else 0, self._bound(i, 1, -1)) for i in range(self.bound_depth)]
+        return tuple(entry for row in rows for entry in row)
+
+    @property
+    def upper_table(self) -> tuple[int, ...]:
+        """Upper bounds likewise; none for low 0. n1 of a dt, or of Ndt1 of them, that took a clock less."""
+        none = self.bound_limit
+        rows = [(self._bound(-i, -1, 1) if i else none, self._bound(i + 1, -1, 1)) for i in range(self.bound_depth)]
+        return tuple(entry for row in rows for entry in row)
+
+    @property
+    def bound_depth(self) -> int:
+        """Entries of each bound's table for low speeds, and for high ones: by Ndt1 and by Nep1 − 1."""
+        return 1 << max(self.timing.max_ticks, self.max_count - 1).bit_length()
 
     @property
     def tie(self) -> int | None:

@@ -1,6 +1,7 @@
 """Golden model of Rairán 2013: Table 1, window by window, with what docs/rairan.md adds to it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +102,10 @@ class Events:
     stalled: Bools
     n_ep1: Ints
     n_dt1: Ints
+    # Of the bounds: the least speed is 0; the count that the measurement began with was not in step with dt; valid.
+    loose: Bools
+    unsynced: Bools
+    valid: Bools
 
 
 def latest(marked: Bools, values: Ints, first: int) -> Ints:
@@ -145,8 +150,28 @@ class Model:
             forced=events.forced,
             stalled=events.stalled,
             velocity_overflow=np.zeros(len(events.clock), dtype=np.bool_),
-            more={"n_ep1": events.n_ep1, "n_dt1": events.n_dt1},
+            more=self._bounds(events) | {"n_ep1": events.n_ep1, "n_dt1": events.n_dt1},
         )
+
+    def _bounds(self, events: Events) -> dict[str, NDArray[Any]]:
+        """n2 and n1 of a time that is a clock longer and shorter, rounded outward."""
+        spec, dt = self._spec, self._spec.timing.tick_cycles
+        if not spec.bounds:
+            return {}
+        n, high, none = events.n, events.high, spec.bound_limit
+        bits = spec.native_frac_bits
+        lower = round_quotient(np.where(high, (n - 1) * dt, dt), np.where(high, dt + 1, (n + 1) * dt + 1), bits, -1)
+        lower[events.loose | (n == 0)] = 0
+        time = np.where(high, 1, n - events.unsynced) * dt - 1
+        upper = round_quotient(np.where(high, n, 1) * dt, np.maximum(time, 1), bits, 1)
+        upper = np.where((time <= 0) | (n == 0), none, np.minimum(upper, none))
+        lower = np.minimum(lower, none)
+        back = events.sign < 0
+        return {
+            "velocity_lower": np.where(back, -upper, lower),
+            "velocity_upper": np.where(back, -lower, upper),
+            "bounds_valid": events.valid,
+        }
 
     def _alternating(self, found: Windows) -> tuple[Ints, Ints, Bools, Bools, Ints]:
         """What can happen in a window, in order: the end of its first dt, then the count that ends it.
@@ -183,7 +208,12 @@ class Model:
         spec, dt = self._spec, self._spec.timing.tick_cycles
         clock, value, is_nep, happens, sign = self._alternating(found)
         turns = ~is_nep & np.repeat(found.turns, 2)
+        sign = np.where(turns, -sign, sign)
         sets, n, high = self._regime(value, is_nep, happens, turns)
+        nth = np.arange(len(found.start)) > 0  # the first window is not one that a count opened
+        loose = np.stack([found.c_ep == 1, found.n_dt >= spec.timing.max_ticks], axis=1).ravel()
+        unsynced = np.stack([np.zeros_like(nth), ~found.in_step & (found.end > found.start + dt)], axis=1).ravel()
+        known = np.repeat(nth, 2)
         # With no count for long, from what the end of the first dt left.
         n0, high0 = n[::2], high[::2]
         most = spec.timing.max_ticks
@@ -200,11 +230,19 @@ class Model:
         n = np.concatenate([n[sets], whole - np.repeat(~found.in_step, n_forced), np.zeros_like(rest_at)])
         forced = np.arange(len(clock)) >= np.count_nonzero(sets)
         high = np.append(high[sets], np.zeros(np.count_nonzero(forced), dtype=np.bool_))
-        sign = np.concatenate([sign[sets], np.repeat(found.sign, n_forced), found.sign[rests]])
+        sign = np.concatenate(
+            [sign[sets], np.repeat(found.sign, n_forced), np.where(nth | (found.c_ep > 0), found.sign, 1)[rests]]
+        )
+        alone = forced[np.count_nonzero(sets) :]
+        loose, unsynced = np.append(loose[sets], alone), np.append(unsynced[sets], ~alone)
+        known = np.concatenate([known[sets], np.repeat(nth, n_forced), nth[rests]])
         order = np.argsort(clock, kind="stable")
+        loose, unsynced, known = loose[order], unsynced[order], known[order]
         clock, n, high, sign, forced = clock[order], n[order], high[order], sign[order], forced[order]
         n_ep1 = np.where(high, n, np.minimum(n, 1))
-        return Events(clock, n, high, sign, forced, forced & (n == 0), n_ep1, np.where(high | (n == 0), 1, n))
+        n_dt1 = np.where(high | (n == 0), 1, n)
+        stalled, valid = forced & (n == 0), known & (n > 0)
+        return Events(clock, n, high, sign, forced, stalled, n_ep1, n_dt1, loose, unsynced, valid)
 
     def _to_the_letter(self, found: Windows) -> Events:
         clock, value, is_nep, happens, sign = self._alternating(found)
@@ -213,7 +251,7 @@ class Model:
         n_dt1 = latest(happens & ~is_nep, value, 1)
         never = np.zeros(np.count_nonzero(happens), dtype=np.bool_)
         rows = (clock[happens], n[happens], high[happens], sign[happens])
-        return Events(*rows, never, never, n_ep1[happens], n_dt1[happens])
+        return Events(*rows, never, never, n_ep1[happens], n_dt1[happens], never, never, never)
 
     def _velocity(self, n: Ints, high: Bools, sign: Ints) -> Ints:
         """n1, n2 or n3 with its sign, correctly rounded."""

@@ -8,6 +8,7 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl import rairan
 from tachometry.sim.golden.rairan import Model
+from tachometry.spec.tachometer import BOUNDS
 
 NAMES = ["velocity", "interval", "forced", "stalled", "n_ep1", "n_dt1"]
 
@@ -15,11 +16,12 @@ NAMES = ["velocity", "interval", "forced", "stalled", "n_ep1", "n_dt1"]
 def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) -> None:
     """Every update, in its clock, with every output; and every end of dt."""
     spec = make_spec(dt, max_ticks, **options)
+    names = NAMES + [*BOUNDS, "bounds_valid"] * spec.bounds
     rows = [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
-    seen = clock_by_clock(rairan.Datapath(spec), rows, ["velocity_valid", "last", "beyond", *NAMES])
-    got = [(clock, *(row[name] for name in NAMES)) for clock, row in enumerate(seen) if row["velocity_valid"]]
+    seen = clock_by_clock(rairan.Datapath(spec), rows, ["velocity_valid", "last", "beyond", *names])
+    got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
     updates = golden_updates(spec, step)
-    columns = [getattr(updates, name, updates.more.get(name)).astype(int).tolist() for name in NAMES]
+    columns = [getattr(updates, name, updates.more.get(name)).astype(int).tolist() for name in names]
     assert got == list(zip((updates.clock + DELAY).tolist(), *columns, strict=True))
     ends, beyond = Model(spec).windows(steps_of(step), len(step))
     assert [clock for clock, row in enumerate(seen[: len(step)]) if row["last"]] == ends.tolist()
@@ -35,7 +37,7 @@ def steps(dt: int = 6, n: int = 4000) -> np.ndarray:
 
 
 @pytest.mark.parametrize("dt", [1, 2, 3, 6, 40])
-@pytest.mark.parametrize("options", [{}, {"paper_exact": True}, {"bound_decay": False}])
+@pytest.mark.parametrize("options", [{}, {"paper_exact": True}, {"bound_decay": False}, {"bounds": True}])
 def test_every_update(dt: int, options: dict) -> None:
     check(steps(dt), dt, **options)
 
@@ -78,6 +80,21 @@ def test_mutants_are_caught(name: str) -> None:
 def test_mutant_of_the_letter_is_caught() -> None:
     with mutant(rairan.Counters, "opens.eq(pulse & late), self", "opens.eq(pulse & (late | due)), self"), caught():
         check(steps(), paper_exact=True)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("loose=self.rest, unsynced=~in_step", "loose=0, unsynced=~in_step"),
+        ("loose=self.rest, unsynced=~in_step", "loose=self.rest"),
+        ("set_(1, loose=~pulse)", "set_(1)"),
+        ("set_(waited, forced=1, loose=1)", "set_(waited, forced=1)"),
+        ("self.known.eq(known)", "self.known.eq(1)"),
+    ],
+)
+def test_mutants_of_bounds_are_caught(right: str, wrong: str) -> None:
+    with mutant(rairan.Counters, right, wrong), caught():
+        check(steps(), bounds=True)
 
 
 def test_mutant_of_a_tie_is_caught() -> None:

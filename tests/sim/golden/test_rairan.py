@@ -189,6 +189,14 @@ def test_a_burst_after_standstill() -> None:
     [
         ({"max_ticks": 2048}, "max_ticks must be from 2 to 2047 with method rairan, not 2048"),
         ({"dt": 4096}, "max_speed must be at most 2048 counts per tick with estimate n3, not 4096"),
+        (
+            {"dt": 4096, "estimate": "n1", "bounds": True},
+            "max_speed must be at most 2048 counts per tick with bounds, not 4096",
+        ),
+        (
+            {"paper_exact": True, "bounds": True},
+            "bounds must not be given with paper_exact, which leaves its own",
+        ),
         ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
         ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own"),
     ],
