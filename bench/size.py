@@ -36,6 +36,7 @@ from tachometry.hdl import export
 from tachometry.spec import (
     Encoder,
     MTachometer,
+    MTTachometer,
     RairanTachometer,
     Speed,
     STachometer,
@@ -135,7 +136,9 @@ CONFIGURATIONS = (
         is_option=False,
     ),
     Configuration("t", "T method", TTachometer(**COMMON), TIMED_BARS, is_option=False),
+    Configuration("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS, is_option=False),
     Configuration("t-tick", "T method, times in ticks", TTachometer(**COMMON, timer="tick"), is_option=False),
+    Configuration("mt-tick", "M/T method, times in ticks", MTTachometer(**COMMON, timer="tick"), is_option=False),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )
 

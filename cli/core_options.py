@@ -148,8 +148,8 @@ _METHOD = option(
     type=click.Choice(list(METHODS)),
     default="s",
     help="How velocity is measured: s averages in step with the alterations of the pulse number, m counts the "
-    "pulses of a tick or some, t takes the time between two counts (Tsuji 2009); rairan begins its ticks with a count "
-    "(Rairán 2013).",
+    "pulses of a tick or some, t takes the time between two counts, mt the time of many (Tsuji 2009); rairan begins "
+    "its ticks with a count (Rairán 2013).",
 )
 
 # Options that are parameters of the core by the same name.

@@ -19,7 +19,8 @@ from tachometry.sim.theory.performance import (
     s_performance,
     t_performance,
 )
-from tachometry.spec import MTachometer, STachometer, TachometerSpec
+from tachometry.spec import MTachometer, MTTachometer, STachometer, TachometerSpec
+from tachometry.spec.timed import TimedTachometer
 
 _UNITS = 10  # of the default range
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
@@ -95,12 +96,11 @@ def _performance(spec: TachometerSpec, speed: NDArray[np.float64], tick_seconds:
         return m_performance(speed, spec.average, counts, tick_seconds)
     if spec.method == "rairan":
         return rairan_performance(speed, spec.parameters["estimate"], counts, tick_seconds, longest)
-    periods = 1 if spec.parameters["timer"] == "tick" else spec.timing.tick_cycles
-    timer_seconds, longest = tick_seconds / periods, longest * periods
-    if spec.method == "t":
-        return t_performance(speed, counts, timer_seconds, longest)
-    least = spec.parameters["min_time"] or spec.timing.tick_cycles
-    return mt_performance(speed, least * periods // spec.timing.tick_cycles, counts, timer_seconds, longest)
+    assert isinstance(spec, TimedTachometer)
+    timer_seconds, longest = tick_seconds / spec.timer_periods, spec.max_periods
+    if isinstance(spec, MTTachometer):
+        return mt_performance(speed, spec.min_periods, counts, timer_seconds, longest)
+    return t_performance(speed, counts, timer_seconds, longest)
 
 
 def standstill_ticks(spec: STachometer) -> int:

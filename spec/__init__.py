@@ -2,6 +2,7 @@
 
 from tachometry.spec.encoder import Encoder
 from tachometry.spec.m_method import MTachometer
+from tachometry.spec.mt_method import MTTachometer
 from tachometry.spec.rairan import RairanTachometer
 from tachometry.spec.s_method import STachometer
 from tachometry.spec.t_method import TTachometer
@@ -11,12 +12,13 @@ from tachometry.spec.units import Speed
 
 # Every method by its name. The spec names the module that holds `Datapath` in hdl/ and `Model` in sim/golden/.
 METHODS: dict[str, type[TachometerSpec]] = {
-    spec.method: spec for spec in (STachometer, MTachometer, TTachometer, RairanTachometer)
+    spec.method: spec for spec in (STachometer, MTachometer, TTachometer, MTTachometer, RairanTachometer)
 }
 
 __all__ = [
     "METHODS",
     "Encoder",
+    "MTTachometer",
     "MTachometer",
     "Port",
     "RairanTachometer",

@@ -21,10 +21,6 @@ class TTachometer(TimedTachometer):
         return self.max_periods
 
     @property
-    def max_distance(self) -> int:
-        return 1
-
-    @property
     def max_quotient(self) -> int:
         return self.timer_periods
 

@@ -84,11 +84,6 @@ class TimedTachometer(TachometerSpec):
         raise NotImplementedError
 
     @property
-    def max_distance(self) -> int:
-        """Greatest |N| of a measurement, in counts."""
-        raise NotImplementedError
-
-    @property
     def max_quotient(self) -> int:
         """Greatest |N·T|/time in counts per tick, before it is saturated."""
         return self.max_count if self.on_lattice else self.timing.tick_cycles

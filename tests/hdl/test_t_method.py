@@ -44,8 +44,8 @@ def test_paper_exact_has_no_sign_rule_and_no_decay() -> None:
 
 
 MUTANTS = {
-    "no sign rule": ("timer.was_negative == timer.negative", "Value.cast(1)"),
-    "as if there were one": ("(same | many)", "same"),
+    "no sign rule": ("Mux(self._same | many,", "Mux(1,"),
+    "as if there were one": ("self._same | many", "self._same"),
     "time of many": ("Mux(many, 1, timer.age)", "timer.age"),
 }
 

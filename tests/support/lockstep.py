@@ -82,6 +82,10 @@ EVENTS = {
         *COMMON,
     ],
     "m": ["one tick", "a power of two", "another number", "update in every clock", *COMMON],
+    "mt": [
+        "longer than the maximum time",
+        *(event for event in [*TIMED, *COMMON] if event not in ("bounds", "out of range")),
+    ],
     "t": [*TIMED, *(event for event in COMMON if event != "bounds")],
     "rairan": [
         "low",
@@ -168,6 +172,10 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     )
     if rng.random() < 0.25:
         spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))
+    if method == "mt" and rng.random() < 0.6:
+        longest = int(rng.choice([2, max_ticks]))
+        unit_cycles = spec.interval_unit_cycles
+        spec = replace(spec, min_time=unit_cycles * int(rng.integers(1, longest * tick_cycles // unit_cycles + 1)))
     spec = random_output(spec, rng)
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
     trace = encoding.recording.place(CLOCK_HZ)
@@ -258,6 +266,9 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
         "times in ticks" if spec.on_lattice else "times in clocks": n,
         "paper exact": n * spec.paper_exact,
         "reversal": np.count_nonzero(~forced & (velocity == 0)),
+        "longer than the maximum time": np.count_nonzero(
+            np.abs(velocity) * interval > spec.timer_periods << spec.native_frac_bits + 1
+        ),
         "count after a silence": np.count_nonzero(overdue[:-1] & ~forced[1:]),
         "count at the maximum time": np.count_nonzero(~forced & (interval == spec.max_periods)),
         "one after the other": np.count_nonzero(np.diff(updates.clock) == spec.update_spacing),
@@ -311,11 +322,7 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     fewer = FEWER.get(method, 1)
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
-    ticks, updates = (
-        (MIN_CLOCKS // spec.longest_tick, 10 if spec.lowpass is None else 2)
-        if timed
-        else (MIN_TICKS // fewer, fewest // fewer)
-    )
+    ticks, updates = (MIN_CLOCKS // spec.longest_tick, 1) if timed else (MIN_TICKS // fewer, fewest // fewer)
     if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
     problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
