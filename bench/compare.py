@@ -35,25 +35,26 @@ class Situation:
 SITUATIONS = (
     Situation(
         "The paper's experiment",
-        """500 counts per revolution and a tick of 1 ms, which is also the unit of time of M/T and T: the setting
-that the S method was made for. It has half the error of M with the same measurement time, and T (on the
-paper's lattice) has no value above the unit velocity. The rivals are not bound to the lattice:
-LinuxCNC's timestamps of 0.5 µs win by far.""",
-        "--methods s,m:average=4,t:timer=tick,rairan,hostmot2,simplefoc,odrive "
+        """500 counts per revolution and a tick of 1 ms, which is also the unit of time of T and M/T: the setting
+that the S method was made for. It has half the error of M and of M/T in the same measurement time; T
+has no value above the unit velocity. The rivals are not bound to the lattice: LinuxCNC's timestamps of
+0.5 µs win by far.""",
+        "--methods s,m:average=4,t:timer=tick,mt:timer=tick:min-time=3ms,rairan,hostmot2,simplefoc,odrive "
         "--motion ramp:0:40rad/s:5s --from 100ms --vibration 1mrad:50Hz --seed 1",
         "--ppr 500 --decoding 1 --clock 50kHz --tick 1ms --max-time 10ms --max-speed 60rad/s",
     ),
     Situation(
         "Ramp",
-        """A clock of 0.1 µs as the timer beats a lattice of 100 µs: T, then LinuxCNC's timestamps, then the
-tracking loops, which lag by a constant 2 ms. Of what needs neither a timer nor a divider, S is best.""",
+        """A clock of 0.1 µs as the timer beats a lattice of 100 µs: M/T (T_c is a tick) and T by a factor of 20
+and more, then LinuxCNC's timestamps, then the tracking loops, which lag by a constant 2 ms. Of what
+needs no divider, S is the best core.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",
     ),
     Situation(
         "Ramp, real encoder",
-        """T measures one count, so every error of the disc and all jitter is in it; here it is worse than S, which
-takes many counts when it is fast. Methods that average over their 1 ms keep their error, and their
-delay.""",
+        """T measures one count, so every error of the disc and all jitter is in it, and in M/T while its windows
+are short. S, whose windows are longer, is the best core; a longer `--min-time` would give M/T the same.
+Methods that average over 1 ms or more keep their errors, and their delays.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),
     Situation(
@@ -65,37 +66,39 @@ jitter out, at the price of its delay.""",
     Situation(
         "Fast",
         """7 counts per tick and 5 % jitter: whoever averages longest wins, and at constant speed delay costs
-nothing. S is best of the cores. Rairán's estimate is constant, and off by up to eq. (13): 1/13 of the
-speed.""",
+nothing. S is the best core. Rairán's estimate is nearly constant, and off by up to eq. (13): 1/13 of
+the speed.""",
         "--motion constant:217rad/s:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
         "Fast, ideal encoder",
-        "The same without jitter: S within eq. (18); LinuxCNC's and SimpleFOC's timestamps still resolve more.",
+        """The same without jitter: M/T with a timer and a tenth of the time is as good as S within its eq. (18);
+what averages over 1 ms resolves more.""",
         "--motion constant:217rad/s:1s --from 100ms",
     ),
     Situation(
         "At the unit velocity, with vibration",
-        """The case of Tsuji's Fig. 9(b): S cancels alternate alterations, and has the least error of the cores.""",
+        """The case of Tsuji's Fig. 9(b): S cancels alternate alterations, and has the least error of the cores.
+Filters and tracking loops, which average the vibration out, have less.""",
         "--motion ramp:31rad/s:32rad/s:1s --from 100ms --vibration 0.2mrad:170Hz --nonuniformity 0.1 --seed 1",
     ),
     Situation(
         "Reversals",
-        """Delay counts: filters of 5 ms are worst but for M. S and the tracking loops are alike, LinuxCNC's
-timestamps are best.""",
+        """Delay counts: filters of 5 ms are worst but for M. LinuxCNC's timestamps are best, then M/T; S and the
+tracking loops are alike.""",
         "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
         "At rest on an edge",
-        """The line dithers. T, Rairán (with what was added to it) and LinuxCNC know that both edges are one, and
-show 0: what is left is the vibration itself. S shows what vibration it sees, tracking loops follow it.""",
+        """The line dithers. T, M/T, Rairán (with what was added to it) and LinuxCNC know that both edges are one,
+and show 0: what is left is the vibration itself. S and the tracking loops show what they see of it.""",
         "--motion stop:1s --vibration 0.3mrad:40Hz --from 100ms",
     ),
     Situation(
         "Stop",
-        """From 20 rad/s to rest at once. T and Rairán fall with the time since the last count; S holds its last
-value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms: a shorter `--max-time`
-mends that.""",
+        """From 20 rad/s to rest at once. T, M/T and Rairán fall with the time since the last count; S holds its
+last value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms: a shorter `--max-
+time` mends that.""",
         "--motion constant:20rad/s:200ms+stop:100ms --from 100ms",
     ),
 )
@@ -111,11 +114,13 @@ against the shaft's; the delay is the shift of the true speed that comes closest
 
 - *S*: no timer faster than the tick is at hand, or no divider is wanted; fast, with a real encoder; around multiples of
   the unit velocity. Its tick can be as short as a clock, and then it is as fine as T at low speeds.
-- *T*: slow shafts, good discs, sudden stops. It suffers most from an uneven disc and from jitter.
+- *M/T*: a fast timer and a divider are at hand: the least error of the cores on ramps and reversals. With `--min-time`
+  it trades delay for quiet, as averaging does; on a lattice (`--timer tick`) it is M at high speeds.
+- *T*: as M/T at slow speeds and sudden stops, with less logic. It suffers most from an uneven disc and from jitter.
 - *Rairán*: bounds of the speed and a constant value at constant speed matter more than its error, up to 1/3 at ω_lim.
 - *M*: nothing else fits, or its noise is filtered anyway.
-- *LinuxCNC's timestamps* (counts over the time between the latest counts, as M/T): nearly always good where a timer
-  and a division in software, or a divider, are at hand, and 1 ms is fast enough.
+- *LinuxCNC's timestamps* (counts over the time between the latest counts, as M/T): nearly always good where 1 ms is fast
+  enough and software divides.
 - *Tracking loops* (ODrive, moteus): smooth, with a delay that is constant and known, 2 ms with their defaults.
 - *Filtered differences, SimpleFOC*: constant speed; 5 ms of delay everywhere else.
 

@@ -7,12 +7,12 @@ import numpy as np
 from tachometry.sim.encoder import Encoding
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
-from tachometry.sim.figures.tsuji_methods import AVERAGE, COUNTS, MIN_TICKS, TICK, UNIT
+from tachometry.sim.figures.tsuji_methods import AVERAGE, COUNTS, TICK, UNIT, lattice_mt
 from tachometry.sim.golden.s_method import alterations
 from tachometry.sim.motion import FloatArray
 from tachometry.sim.results import Run
 from tachometry.sim.tables import held_velocity
-from tachometry.sim.theory import tsuji_eq13_velocity, tsuji_eq18_resolution
+from tachometry.sim.theory import tsuji_eq18_resolution
 from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
 
 # The clock is a few times the edge rate at 40 rad/s; ticks and times are the paper's.
@@ -168,12 +168,11 @@ def fig12(lab: Lab) -> Result:
     instants = np.arange(0.02, duration - TICK / 2, TICK)
     truth = encoding.true_speed(instants)
     slow, fast = truth < UNIT / 4, truth > 2 * UNIT
-    curves = {}
+    curves, runs = {}, {}
     for number, (name, spec) in enumerate(specs.items()):
-        run = lab.lockstep(spec, encoding, number / len(specs), (number + 1) / len(specs))
-        curves[name] = _steps(name, run, spec)
-    within, far_within, most = _deviation(run, spec, encoding)
-    curves = {"M": curves["M"], "M/T": _mt_curve(run), "S": curves["S"]}
+        runs[name] = lab.lockstep(spec, encoding, number / len(specs), (number + 1) / len(specs))
+        curves[name] = _steps(name, runs[name], spec)
+    within, far_within, most = _deviation(runs["S"], specs["S"], encoding)
     panels, rms = [], {}
     for name, curve in curves.items():
         error = curve.y[np.searchsorted(curve.x, instants, side="right") - 1] - truth
@@ -223,20 +222,9 @@ def fig12(lab: Lab) -> Result:
 def _methods() -> dict[str, TachometerSpec]:
     return {
         "M": MTachometer(average=AVERAGE, **_CORE),  # type: ignore[arg-type]
+        "M/T": lattice_mt(**_CORE),
         "S": STachometer(**_CORE),  # type: ignore[arg-type]
     }
-
-
-def _mt_curve(run: Run) -> Curve:
-    """M/T by eq. (13), from the ticks of a run: from a tick with a count to the first such one T_c later."""
-    position = run.ticks.position
-    counted = np.flatnonzero(run.ticks.pulse_count)
-    ends = [int(counted[0])]
-    while (following := np.searchsorted(counted, ends[-1] + MIN_TICKS)) < len(counted):
-        ends.append(int(counted[following]))
-    at = np.array(ends)
-    velocity = tsuji_eq13_velocity(np.diff(position[at]), np.diff(at), COUNTS, TICK)
-    return Curve("M/T", (at[1:] + 1) * TICK, velocity, "held")
 
 
 def _deviation(run: Run, spec: TachometerSpec, encoding: Encoding) -> tuple[float, bool, tuple[float, float]]:
