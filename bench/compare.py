@@ -97,8 +97,8 @@ and show 0: what is left is the vibration itself. S and the tracking loops show 
     Situation(
         "Stop",
         """From 20 rad/s to rest at once. T, M/T and Rairán fall with the time since the last count; S holds its
-last value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms: a shorter `--max-
-time` mends that.""",
+last value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms: a shorter
+`--max-time` mends that.""",
         "--motion constant:20rad/s:200ms+stop:100ms --from 100ms",
     ),
 )
@@ -119,8 +119,8 @@ against the shaft's; the delay is the shift of the true speed that comes closest
 - *T*: as M/T at slow speeds and sudden stops, with less logic. It suffers most from an uneven disc and from jitter.
 - *Rairán*: bounds of the speed and a constant value at constant speed matter more than its error, up to 1/3 at ω_lim.
 - *M*: nothing else fits, or its noise is filtered anyway.
-- *LinuxCNC's timestamps* (counts over the time between the latest counts, as M/T): nearly always good where 1 ms is fast
-  enough and software divides.
+- *LinuxCNC's timestamps* (counts over the time between the latest counts, as M/T): nearly always good where 1 ms is
+  fast enough and software divides.
 - *Tracking loops* (ODrive, moteus): smooth, with a delay that is constant and known, 2 ms with their defaults.
 - *Filtered differences, SimpleFOC*: constant speed; 5 ms of delay everywhere else.
 
