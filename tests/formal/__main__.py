@@ -35,14 +35,15 @@ def main(chosen: list[str]) -> bool:
     prepare(_FOLDER)
     proofs = {proof.name: proof for proof in PROOFS if not chosen or proof.name in chosen}
     mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs]
-    # Mutants exist one at a time, so they are exported before anything runs.
+    # Mutants exist one at a time, so they are exported before anything runs, and after all modules have been loaded.
+    right_texts = [_exported(proof) for proof in proofs.values()]
     wrong_texts = [_exported(proofs[wrong.proof], wrong) for wrong in mutants]
     fine = True
     proven: set[str] = set()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         right = [
-            pool.submit(solve, proof, _exported(proof), _FOLDER, f"proof{number}")
-            for number, proof in enumerate(proofs.values())
+            pool.submit(solve, proof, text, _FOLDER, f"proof{number}")
+            for number, (proof, text) in enumerate(zip(proofs.values(), right_texts, strict=True))
         ]
         refuted = [
             pool.submit(solve, proofs[wrong.proof], text, _FOLDER, f"mutant{number}", wrong.refuted, wrong.steps)

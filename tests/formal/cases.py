@@ -12,12 +12,15 @@ from tachometry.hdl.conditioner import InputConditioner
 from tachometry.hdl.decoder import QuadratureDecoder
 from tachometry.hdl.glitch_filter import GlitchFilter
 from tachometry.hdl.interval import IntervalAccumulator
+from tachometry.hdl.m_method import Datapath as MDatapath
+from tachometry.hdl.m_method import MovingSum
 from tachometry.hdl.position_counter import PositionCounter
 from tachometry.hdl.pulse_counter import PulseCounter
 from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.sampling_clock import SamplingClock
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.hdl.update_age import UpdateAge
+from tachometry.spec import Encoder, MTachometer, Speed, STachometer, Timing
 from tachometry.spec.carried_reciprocal import CarriedReciprocal as CarriedSpec
 
 
@@ -96,11 +99,27 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         "FRAC_BITS": spec.frac_bits,
         "CANCEL": int(spec.cancel),
         "TICK_TO_VELOCITY": latency,
+        "AGE": int(spec.age),
     }
     probes = _METHOD_PROBES | within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
+    probes |= within("aged", {"core_age": "age"}, spec.age)
     probes |= within("carried", _CARRIED_PROBES, bool(carried))
     probes |= within("serial", _SERIAL_PROBES, bool(carried) and serial)
     return Proof(name, spec, "method", parameters | carried, probes, depth or latency + 2, without, max_table)
+
+
+def m_method(name: str, spec: MTachometer) -> Proof:
+    """The M method, from ticks to updates."""
+    parameters = {
+        "N": spec.average,
+        "MAX_COUNT": spec.max_count,
+        "COUNT_WIDTH": spec.count_width,
+        "INTERVAL_WIDTH": spec.interval_width,
+        "BOUND_WIDTH": spec.bound_width,
+        "FRAC_BITS": spec.frac_bits,
+        "TICK_TO_VELOCITY": spec.tick_to_velocity,
+    }
+    return Proof(name, spec, "m_method", parameters, {}, depth=spec.tick_to_velocity + spec.average + 2)
 
 
 def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Proof:
@@ -122,6 +141,19 @@ def small(**options: Any) -> STachometer:
     return core(**{"tick_cycles": 2, "max_count": 1, "frac_bits": 4, "position_width": 8} | options)
 
 
+def small_m(average: int) -> MTachometer:
+    """A core of the M method, a tick a clock, with bounds."""
+    s = small(tick_cycles=1, bounds=True)
+    return MTachometer(
+        encoder=s.encoder,
+        timing=s.timing,
+        frac_bits=4,
+        position_width=8,
+        bounds=True,
+        average=average,
+    )
+
+
 PROOFS = [
     front("x4, 960 clocks", core(960, max_count=20)),
     front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
@@ -133,6 +165,11 @@ PROOFS = [
     method("eq. (21), 5 ticks", small(max_ticks=5)),
     method("eq. (21), 1 clock", small(tick_cycles=1)),
     method("eq. (21), 16 ticks", small(tick_cycles=1, max_ticks=16)),
+    method("age", small(age=True), depth=14),
+    method("age, 1 clock", small(tick_cycles=1, age=True, max_ticks=5)),
+    m_method("M", small_m(1)),
+    m_method("M of 4", small_m(4)),
+    m_method("M of 3", small_m(3)),
     method("serial", small(tick_cycles=7, max_ticks=16), depth=14),
     method("sums", core(40, 8, max_count=7), depth=2, without="p4_* */p5_velocity */p7_* */lemma_since"),
     method(
@@ -200,8 +237,8 @@ MUTANTS = [
     Mutant(
         "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
     ),
-    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "up = ~_reduce", "up = _reduce"),
-    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "signed(), ~remainder", "signed(), remainder", 32),
+    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
+    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
     Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
     Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
@@ -213,5 +250,11 @@ MUTANTS = [
         "~(opening | self.previous).any()",
         "~self.previous.any()",
     ),
+    Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
+    Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place == last - 1", "wrap = place == last - 2"),
+    Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
+    Mutant("M of 4", "pm_stalled", MovingSum, "(quiet == last)", "(quiet >= last - 1)"),
+    Mutant("M of 3", "pm_bounds", MDatapath, "numerator.eq(total + bounds.get(name, 0))", "numerator.eq(total)"),
+    Mutant("M of 4", "pm_known", MDatapath, "known.append(seen == spec.average)", "known.append(seen != 0)"),
     Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
 ]

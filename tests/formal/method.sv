@@ -13,7 +13,8 @@ module method #(
     parameter TICK_TO_VELOCITY = 9,
     parameter CARRIED = 0,        // the table of the carried reciprocal has that many entries; 0: all looked up
     parameter C = 8,              // what it divides
-    parameter SERIAL = 0          // carried, and its scaler does a step a clock
+    parameter SERIAL = 0,         // carried, and its scaler does a step a clock
+    parameter AGE = 0             // there is an age
 ) (
     input clk, input rst, input a, input b
 );
@@ -141,6 +142,13 @@ module method #(
       wire core_running;
       wire [$clog2(LAST + 2)-1:0] core_step;
       always @* lemma_running: assert (!core_running || core_step <= LAST);
+    end
+    if (AGE) begin : aged
+      localparam LAG = TICK_TO_VELOCITY / T + 1;  // ticks whose updates are on their way
+      wire [I-1:0] core_age;
+      always @*
+        p8_age: assert (velocity_valid ? core_age == 0 : core_age >= since_update
+            && core_age <= since_update + LAG && core_age <= MAX_TICKS);
     end
     if (CARRIED) begin : carried
       wire core_carried;
