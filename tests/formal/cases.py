@@ -119,7 +119,14 @@ def m_method(name: str, spec: MTachometer) -> Proof:
         "FRAC_BITS": spec.frac_bits,
         "TICK_TO_VELOCITY": spec.tick_to_velocity,
     }
-    return Proof(name, spec, "m_method", parameters, {}, depth=spec.tick_to_velocity + spec.average + 2)
+    return Proof(
+        name,
+        spec,
+        "m_method",
+        parameters,
+        {},
+        depth=max(spec.tick_to_velocity + spec.average + 2, 3 * spec.average + 1),
+    )
 
 
 def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Proof:
