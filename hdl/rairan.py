@@ -65,13 +65,15 @@ class Counters(wiring.Component):
             }
         )
         # Cep − 1, and whether there is any.
-        self.c_more, self.any = Signal(range(max(spec.max_count, 2))), Signal()
+        self.c_more = Signal(range(max(spec.max_count, 2)))
+        self.any = Signal()
         self.c_dt = Signal(range(spec.timing.max_ticks + 1))
         self.rest = Signal()  # it has come to its end
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        pulse, opens, late = Signal(), Signal(), Signal()  # late: dt has ended since the last count, Cdt ≠ 0
+        pulse, opens = Signal(), Signal()
+        late = Signal()  # dt has ended since the last count, Cdt ≠ 0
         due = self._clock(m, opens)
         m.d.comb += pulse.eq(self.step.any())
         self._count(m, pulse, opens)
@@ -84,7 +86,8 @@ class Counters(wiring.Component):
                 m.d.sync += late.eq(0)
             self._update_to_the_letter(m, opens)
             return m
-        moved, turns = Signal(), Signal()
+        moved = Signal()
+        turns = Signal()
         m.d.comb += [
             turns.eq(pulse & moved & (self.step[1] ^ self.backward)),
             self.last.eq(due & ~(pulse & late) & ~turns),
@@ -133,8 +136,8 @@ class Counters(wiring.Component):
         """What a count or the end of dt makes of the estimate."""
         spec = self._spec
         several, one = self.c_more.any(), self.any
-        # The last count opened its window; dt ends without a count.
-        in_step, waits = Signal(), Signal()
+        in_step = Signal()  # the last count opened its window
+        waits = Signal()  # dt ends without a count
         with m.If(pulse):
             m.d.sync += in_step.eq(opens)
         known = Signal()

@@ -16,11 +16,13 @@ from tachometry.hdl.m_method import Datapath as MDatapath
 from tachometry.hdl.m_method import MovingSum
 from tachometry.hdl.position_counter import PositionCounter
 from tachometry.hdl.pulse_counter import PulseCounter
+from tachometry.hdl.rairan import Counters
+from tachometry.hdl.rairan import Datapath as RairanDatapath
 from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.sampling_clock import SamplingClock
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
 from tachometry.hdl.update_age import UpdateAge
-from tachometry.spec import Encoder, MTachometer, Speed, STachometer, Timing
+from tachometry.spec import Encoder, MTachometer, RairanTachometer, Speed, STachometer, Timing
 from tachometry.spec.carried_reciprocal import CarriedReciprocal as CarriedSpec
 
 
@@ -161,6 +163,43 @@ def small_m(average: int) -> MTachometer:
     )
 
 
+_RAIRAN_PROBES = {
+    "core_step": "decoder.step",
+    "core_left": "datapath.counters.left",
+    "core_more": "datapath.counters.c_more",
+    "core_any": "datapath.counters.any",
+    "core_dt": "datapath.counters.c_dt",
+    "core_n": "datapath.counters.n",
+    "core_high": "datapath.counters.high",
+    "core_backward": "datapath.counters.backward",
+    "core_moved": "datapath.counters.moved",
+    "core_late": "datapath.counters.late",
+    "core_in_step": "datapath.counters.in_step",
+    "core_rest": "datapath.counters.rest",
+    "core_beyond": "datapath.counters.beyond",
+}
+
+
+def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof:
+    """PR: the method of Rairán, from steps to updates."""
+    spec = RairanTachometer(
+        encoder=Encoder(1, 4),
+        timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),
+        max_speed=Speed.parse(f"{max_count}rev/s"),
+        frac_bits=4,
+        position_width=8,
+    )
+    assert spec.max_count == max_count, spec.max_count
+    parameters = {
+        "T": tick_cycles,
+        "MAX_TICKS": max_ticks,
+        "MAX_COUNT": max_count,
+        "VELOCITY_WIDTH": spec.velocity_width,
+        "FRAC_BITS": spec.frac_bits,
+    }
+    return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES, depth=7)
+
+
 PROOFS = [
     front("x4, 960 clocks", core(960, max_count=20)),
     front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
@@ -189,6 +228,7 @@ PROOFS = [
     method("serial, carried", small(tick_cycles=12, max_ticks=6), max_table=4),
     reciprocal("2049 ticks", core(5, 2049, max_count=1)),
     reciprocal("6 ticks", small(max_ticks=6), max_table=4),
+    rairan("Rairán", 3, 4, 2),
 ]
 
 
@@ -264,4 +304,13 @@ MUTANTS = [
     Mutant("M of 3", "pm_bounds", MDatapath, "numerator.eq(total + bounds.get(name, 0))", "numerator.eq(total)"),
     Mutant("M of 4", "pm_known", MDatapath, "known.append(seen == spec.average)", "known.append(seen != 0)"),
     Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
+    Mutant("Rairán", "pr_tick", Counters, "start = cycles - 2", "start = cycles - 1"),
+    Mutant("Rairán", "pr_update", Counters, "pulse & (late | due) | turns", "pulse & late | turns"),
+    Mutant("Rairán", "pr_estimate", Counters, "in_step.eq(opens)", "in_step.eq(0)", 32),
+    Mutant("Rairán", "pr_velocity", RairanDatapath, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
+    Mutant(
+        "Rairán", "pr_rest", Counters, "waits & ~self.rest & (self.c_dt == ", "waits & self.rest & (self.c_dt == ", 32
+    ),
+    Mutant("Rairán", "pr_range", Counters, "with m.If(full):", "with m.If(0):"),
+    Mutant("Rairán", "pr_flag", Counters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
 ]

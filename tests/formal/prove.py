@@ -10,7 +10,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from tachometry.hdl import export
-from tachometry.spec import STachometer
+from tachometry.spec import TachometerSpec
 
 _SECONDS = 280
 
@@ -44,7 +44,7 @@ class Proof:
     Parameters
     ----------
     name : str
-    spec : STachometer
+    spec : TachometerSpec
     checker : str
         Module, and file in this folder.
     parameters : dict
@@ -60,7 +60,7 @@ class Proof:
     """
 
     name: str
-    spec: STachometer
+    spec: TachometerSpec
     checker: str
     parameters: dict[str, int]
     probes: dict[str, str]

@@ -1,0 +1,122 @@
+// Properties of the method of Rairan: from steps to updates. The reference is the list in docs/rairan.md, with a count
+// of all counts in dt, and Nep1 and Ndt1 themselves. `rst` may come at any time.
+// core_* show signals of the core to the lemmas, and its steps to the reference; prove.py connects them.
+module rairan #(
+    parameter T = 3,              // tick_cycles
+    parameter MAX_TICKS = 4,
+    parameter MAX_COUNT = 2,
+    parameter VELOCITY_WIDTH = 7,
+    parameter FRAC_BITS = 4
+) (
+    input clk, input rst, input a, input b
+);
+  localparam V = VELOCITY_WIDTH, W = 8;
+  wire tick, velocity_valid, forced, stalled, overflow;
+  wire signed [V-1:0] velocity;
+  wire [$clog2(MAX_COUNT+1)-1:0] n_ep1;
+  wire [$clog2(MAX_TICKS+1)-1:0] n_dt1;
+  tachometer core (
+      .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .velocity(velocity), .velocity_valid(velocity_valid),
+      .forced(forced), .stalled(stalled), .overflow(overflow), .n_ep1(n_ep1), .n_dt1(n_dt1)
+  );
+  wire signed [1:0] core_step;
+  wire signed [$clog2(T-1):0] core_left;
+  wire [$clog2(MAX_COUNT<3?2:MAX_COUNT)-1:0] core_more;
+  wire [$clog2(MAX_TICKS+1)-1:0] core_dt;
+  wire [$clog2((MAX_TICKS>MAX_COUNT?MAX_TICKS:MAX_COUNT)+1)-1:0] core_n;
+  wire core_any, core_high, core_backward, core_moved, core_late, core_in_step, core_rest, core_beyond;
+
+  reg [W-1:0] clock = 0, c_ep = 0, c_dt = 0, n_ep = 0, n_dt = 1, idle = 0;
+  reg moved = 0, back = 0, in_step = 0;
+  wire count = core_step != 0, backward = core_step < 0;
+  wire turns = count && moved && backward != back;
+  wire late = count && !turns && c_dt != 0;
+  wire ends = !turns && !late && clock == T - 1;
+  wire [W-1:0] held = c_ep > MAX_COUNT ? MAX_COUNT : c_ep;
+  wire [W-1:0] waited = in_step ? c_dt + 1 : c_dt;
+  reg update, alone, rests;
+  reg [W-1:0] ep, dt;
+  always @* begin
+    {update, alone, rests} = 0;
+    ep = n_ep;
+    dt = n_dt;
+    if (turns) {update, ep, dt} = {1'b1, {W{1'b0}}, {{W-1{1'b0}}, 1'b1}};
+    else if (late) begin
+      if (c_dt >= 2 || n_ep < 2) begin
+        update = 1;
+        ep = 1;
+        dt = c_dt;
+      end
+    end else if (ends) begin
+      if (held >= 2) begin
+        update = 1;
+        ep = held;
+        dt = 1;
+      end else if (count || (held == 1 && n_ep >= 2)) begin
+        update = 1;
+        ep = 1;
+        dt = 1;
+      end else if (c_dt == MAX_TICKS - 1) begin
+        {update, alone, rests} = 3'b111;
+        ep = 0;
+        dt = 1;
+      end else if (c_dt != MAX_TICKS && waited * n_ep > n_dt) begin
+        {update, alone} = 2'b11;
+        ep = 1;
+        dt = waited;
+      end
+    end
+  end
+  always @(posedge clk)
+    if (rst) begin
+      {clock, c_ep, c_dt, n_ep, idle, moved, back, in_step} <= 0;
+      n_dt <= 1;
+    end else begin
+      clock <= turns || late || ends ? 0 : clock + 1;
+      c_ep <= turns || late || (ends && count) ? 1 : ends ? 0 : c_ep + count;
+      c_dt <= count ? 0 : ends && c_dt != MAX_TICKS ? c_dt + 1 : c_dt;
+      if (count) {moved, back, in_step} <= {1'b1, backward, turns || late || ends};
+      n_ep <= ep;
+      n_dt <= dt;
+      idle <= count ? 0 : idle == MAX_TICKS * T ? idle : idle + 1;
+    end
+
+  // As late as the core shows them.
+  wire update_, alone_, rests_, back_, tick_, more_;
+  wire [W-1:0] ep_, dt_, idle_, n_ep_;
+  delay #(3 + 2 * W, 4) delays (clk, rst, {update, alone, rests, ep, dt}, {update_, alone_, rests_, ep_, dt_});
+  delay #(2 * W + 1, 3) delayed_registers (clk, rst, {back, idle, n_ep}, {back_, idle_, n_ep_});
+  delay #(2, 2) delayed_ends (clk, rst, {ends, ends && c_ep > MAX_COUNT}, {tick_, more_});
+
+  // n3 = 2/q or (q - 1/q)/2, times 2^f, and 1/2, rounded down: below it 2q raw, and 2q (raw + 1) above.
+  wire signed [23:0] q = ep_ >= 2 ? 2 * ep_ - 1 : 2 * dt_ + 1;
+  wire signed [23:0] wanted = (ep_ >= 2 ? (q * q - 1) << FRAC_BITS : 4 << FRAC_BITS) + q;
+  wire signed [23:0] magnitude = back_ ? -velocity : velocity;
+  wire signed [23:0] have = 2 * q * magnitude;
+
+  // Lemmas: what the induction needs to know of the state.
+  wire signed [W:0] elapsed = $signed({1'b0, clock});
+  always @* begin
+    lemma_left: assert (core_left == T - 2 - elapsed);
+    lemma_clock: assert (clock < T && c_ep <= clock + 1);
+    lemma_count: assert (core_any == (c_ep != 0) && core_more == (held == 0 ? 0 : held - 1));
+    lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0) && core_rest == (c_dt == MAX_TICKS));
+    lemma_in_dt: assert (c_dt == 0 || c_ep == 0);
+    lemma_flags: assert (core_moved == moved && core_backward == back && core_in_step == in_step);
+    lemma_beyond: assert (core_beyond == (c_ep > MAX_COUNT));
+    lemma_n: assert (core_high == (n_ep >= 2) && core_n == (n_ep >= 2 ? n_ep - 1 : n_ep == 0 ? 0 : n_dt));
+    lemma_pair: assert (n_dt >= 1 && n_dt <= MAX_TICKS && n_ep <= MAX_COUNT && (n_ep == 1 || n_dt == 1));
+    lemma_held: assert (n_ep_ != 0 || velocity == 0);
+    lemma_waits: assert (c_dt == MAX_TICKS ? n_ep == 0 : idle <= c_dt * T + clock);
+  end
+  always @* begin
+    pr_tick: assert (tick == tick_);
+    pr_range: assert (c_dt <= MAX_TICKS && core_dt <= MAX_TICKS && core_more < MAX_COUNT && core_left >= -1
+        && core_more + core_any == (c_ep > MAX_COUNT ? MAX_COUNT : c_ep));
+    pr_update: assert (velocity_valid == update_);
+    pr_estimate: assert (!velocity_valid || (n_ep1 == ep_ && n_dt1 == dt_ && forced == alone_ && stalled == rests_));
+    pr_velocity: assert (!velocity_valid || (ep_ == 0 ? velocity == 0 : have <= wanted && wanted < have + 2 * q));
+    pr_rest: assert (idle_ < MAX_TICKS * T || velocity == 0);
+    pr_flag: assert (!more_ || overflow);
+  end
+endmodule
