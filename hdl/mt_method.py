@@ -36,4 +36,10 @@ class Datapath(TimedDatapath):
                 m.d.sync += [length.eq(1), late.eq(0)]
         with m.If(timer.count):
             m.d.sync += way.eq(Mux(opens, 0, total))
+        if spec.bounds and spec.on_lattice:
+            # Between the last edges of two ticks of opposite sign lies a count more or less than in the ticks after.
+            quotient, opening = self.quotient_velocity, Signal()
+            with m.If(timer.count & opens):
+                m.d.sync += opening.eq(timer.negative)
+            m.d.comb += [quotient.less.eq(opening & ~timer.negative), quotient.more.eq(~opening & timer.negative)]
         return ends, total, Mux(ends, length, timer.age)

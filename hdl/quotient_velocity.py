@@ -1,11 +1,13 @@
 """Velocity as a quotient of distance and time."""
 
-from amaranth import Module, Mux, Signal, signed
+from amaranth import Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.divider import Divider
 from tachometry.hdl.pulse_counter import saturate
+from tachometry.spec.tachometer import BOUNDS
 from tachometry.spec.timed import TimedTachometer
 
 
@@ -36,7 +38,12 @@ class QuotientVelocity(wiring.Component):
         Valid with `measure` and `sink`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
+    less, more : In(1)
+        With `spec.bounds`: the distance may also have been a count less, or more.
+    known, was_negative : In(1)
+        With `spec.bounds`: there are bounds; sign of the last count.
     velocity, velocity_valid, interval, forced, stalled, out_of_range : Out
+    velocity_lower, velocity_upper, bounds_valid : Out
         As those of the datapath.
     """
 
@@ -47,6 +54,14 @@ class QuotientVelocity(wiring.Component):
             integer_bits=spec.max_quotient.bit_length(),
             scale_bits=spec.native_frac_bits + 1,
         )
+        self.bound_dividers = {
+            name: Divider(
+                divisor_width=(spec.max_interval + 1).bit_length(),
+                integer_bits=spec.max_bound.bit_length(),
+                scale_bits=spec.native_frac_bits,
+            )
+            for name in (BOUNDS if spec.bounds else ())
+        }
         super().__init__(
             {
                 "measure": In(1),
@@ -63,6 +78,8 @@ class QuotientVelocity(wiring.Component):
                 "forced": Out(1),
                 "stalled": Out(1),
                 "out_of_range": Out(1),
+                **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
+                **bound_members(spec),
             }
         )
 
@@ -72,7 +89,9 @@ class QuotientVelocity(wiring.Component):
         m.submodules.divider = divider = self.divider
         measuring, rounds, compared = Signal(), Signal(), Signal()
         # Not before the result of the last division is in `velocity`.
-        sinks = self.sink & ~self.measure & ~divider.busy & ~rounds & ~compared if spec.decays else 0
+        sinks = Signal()
+        if spec.decays:
+            m.d.comb += sinks.eq(self.sink & ~self.measure & ~divider.busy & ~rounds & ~compared)
         backward = self.velocity[-1]
         greatest = Mux(backward, -spec.timer_periods, spec.timer_periods)
         m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(rounds & ~self.measure)]
@@ -112,4 +131,41 @@ class QuotientVelocity(wiring.Component):
                 self.stalled.eq(stalled),
                 self.out_of_range.eq(beyond | saturated),
             ]
+        if spec.bounds:
+            self._bounds(m, sinks, update)
         return m
+
+    def _bounds(self, m: Module, sinks: Value, update: Value) -> None:
+        """Two more dividers, as long as the first, for the ends of what the velocity can have been."""
+        counted = Signal()
+        greatest = self._spec.timer_periods
+        m.d.comb += counted.eq(self.measure & ~self.forced_in)
+        known = Signal(reset_less=True)
+        with m.If(self.divider.start):
+            m.d.sync += known.eq(self.known)
+        for name, box in self.bound_dividers.items():
+            m.submodules[f"divider_{name}"] = box
+            upper = name == "velocity_upper"
+            # The upper bound is rounded up: as the negative of what is rounded down.
+            distance = -(self.dividend + self.more) if upper else self.dividend - self.less
+            # While it sinks, the shaft is no farther back than its last edge.
+            signs = self.velocity[-1], self.was_negative
+            still = sinks & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
+            end, none = Signal.like(box.dividend), Signal(reset_less=True)
+            m.d.comb += [
+                end.eq(Mux(counted, distance, Mux(still, 0, -greatest))),
+                box.start.eq(self.divider.start),
+                box.dividend.eq(end),
+                # The edges lie within a period before what shows them.
+                box.divisor.eq(self.divisor + Mux(counted, Mux(end[-1], -1, 1), 0)),
+            ]
+            with m.If(self.divider.start):
+                m.d.sync += none.eq(counted & end[-1] & (self.divisor == 1))
+            limit = -self._spec.bound_limit
+            lower = Signal.like(box.quotient, reset_less=True)
+            with m.If(box.done):
+                m.d.sync += lower.eq(Mux(none, limit, box.quotient))
+            with m.If(update):
+                m.d.sync += getattr(self, name).eq(-lower if upper else lower)
+        with m.If(update):
+            m.d.sync += self.bounds_valid.eq(known)

@@ -4,8 +4,10 @@ from amaranth import Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.gap_timer import GapTimer
 from tachometry.hdl.quotient_velocity import QuotientVelocity
+from tachometry.spec.tachometer import BOUNDS
 from tachometry.spec.timed import TimedTachometer
 
 
@@ -36,6 +38,8 @@ class TimedDatapath(wiring.Component):
         And there was no count in the maximum time before it either.
     out_of_range : Out(1)
         The velocity was too high to be measured, and is saturated; only if that can be.
+    velocity_lower, velocity_upper, bounds_valid : Out
+        With `spec.bounds`.
     """
 
     def __init__(self, spec: TimedTachometer) -> None:
@@ -53,6 +57,7 @@ class TimedDatapath(wiring.Component):
                 "forced": Out(1),
                 "stalled": Out(1),
                 **{port.name: Out(port.width) for port in spec.method_ports},
+                **bound_members(spec),
             }
         )
 
@@ -105,4 +110,14 @@ class TimedDatapath(wiring.Component):
             *(getattr(self, name).eq(getattr(quotient, name)) for name in ("forced", "stalled")),
             *(getattr(self, port.name).eq(getattr(quotient, port.name)) for port in spec.method_ports),
         ]
+        if spec.bounds:
+            # Of the first period after reset not all was seen.
+            begun = Signal()
+            with m.If(timer.overdue):
+                m.d.sync += begun.eq(1)
+            m.d.comb += [
+                quotient.was_negative.eq(timer.was_negative),
+                quotient.known.eq(~quotient.beyond_in & (begun | timer.opened)),
+                *(getattr(self, name).eq(getattr(quotient, name)) for name in (*BOUNDS, "bounds_valid")),
+            ]
         return m

@@ -36,8 +36,8 @@ class TimedTachometer(TachometerSpec):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.bounds:
-            raise ValueError(f"bounds must not be asked of method {self.method}: it has none")
+        if self.bounds and self.paper_exact:
+            raise ValueError("bounds must not be given with paper_exact, which has none")
         if self.timer not in _TIMERS:
             raise ValueError(f"timer must be clock or tick, not {self.timer!r}")
 
@@ -87,6 +87,11 @@ class TimedTachometer(TachometerSpec):
     def max_quotient(self) -> int:
         """Greatest |N·T|/time in counts per tick, before it is saturated."""
         return self.max_count if self.on_lattice else self.timing.tick_cycles
+
+    @property
+    def max_bound(self) -> int:
+        # Distance/(time − 1) is at most twice distance/time; on the lattice reversals may add a count.
+        return 2 * self.max_quotient + 1
 
     @property
     def saturates(self) -> bool:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.timed import Counts, Ints, Measurements, chain, updates, with_silences
+from tachometry.sim.golden.timed import Counts, Ints, Measurements, chain, enclosure, updates, with_silences
 from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import MTTachometer
 
@@ -34,13 +34,20 @@ class Model:
         opening, ends = ends[:-1], ends[1:]
         opening, ends = opening[~first[ends]], ends[~first[ends]]
         none = np.zeros(len(ends), dtype=np.bool_)
+        distance, time = self._distance(counts.size, opening, ends), period[ends] - period[opening]
+        # On the lattice, whole ticks are summed: if they differ, the way from edge to edge is a count more or less.
+        differ = (np.sign(counts.size[opening]) - np.sign(counts.size[ends])) // 2 * spec.on_lattice
+        least, most = enclosure(distance, time, less=np.maximum(-differ, 0), more=np.maximum(differ, 0))
         found = Measurements(
             clock=counts.clock(period[ends]),
-            distance=self._distance(counts.size, opening, ends),
-            time=period[ends] - period[opening],
+            distance=distance,
+            time=time,
             forced=none,
             stalled=none,
             beyond=none,
+            least=least,
+            most=most,
+            known=~none,
         )
         return updates(spec, counts, with_silences(spec, counts, found), ticks, n_clocks)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.timed import Counts, Measurements, chain, updates, with_silences
+from tachometry.sim.golden.timed import Counts, Measurements, chain, enclosure, updates, with_silences
 from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import TTachometer
 
@@ -28,13 +28,18 @@ class Model:
         many = np.abs(counts.size) > 1
         same = np.append(False, sign[1:] == sign[:-1])[: len(sign)] | spec.paper_exact | many
         none = np.zeros(len(sign), dtype=np.bool_)
+        distance, time = np.where(same, sign, 0), np.where(many, 1, gap)
+        least, most = enclosure(distance, time)
         found = Measurements(
             clock=counts.clock(counts.period),
-            distance=np.where(same, sign, 0),
-            time=np.where(many, 1, gap),
+            distance=distance,
+            time=time,
             forced=none,
             stalled=none,
             beyond=many,
+            least=least,
+            most=most,
+            known=~many,
         )
         opened = (gap <= spec.max_periods) & (np.arange(len(gap)) > 0)
         asked = with_silences(spec, counts, found[opened | many])

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.results import Ticks, Updates
+from tachometry.spec.tachometer import BOUNDS
 from tachometry.spec.timed import TimedTachometer
 
 Ints = NDArray[np.int64]
@@ -86,6 +87,10 @@ class Measurements:
     time : int64 array, shape (n,), timer periods
     forced, stalled, beyond : bool arrays, shape (n,)
         `beyond`: out of range before any division.
+    least, most : int64 arrays, shape (n, 2)
+        The same, distance and time, with the least and the greatest speed that can have been; time 0: there is none.
+    known : bool array, shape (n,)
+        There are such.
     """
 
     clock: Ints
@@ -94,6 +99,9 @@ class Measurements:
     forced: NDArray[np.bool_]
     stalled: NDArray[np.bool_]
     beyond: NDArray[np.bool_]
+    least: Ints
+    most: Ints
+    known: NDArray[np.bool_]
 
     def __getitem__(self, rows: Any) -> "Measurements":
         return Measurements(*(column[rows] for column in vars(self).values()))
@@ -105,12 +113,35 @@ class Measurements:
         return both[np.argsort(both.clock, kind="stable")]
 
 
+def enclosure(distance: Ints, time: Ints, less: Ints | int = 0, more: Ints | int = 0) -> tuple[Ints, Ints]:
+    """`least` and `most` of distances from edge to edge, which lie within a period before what shows them.
+
+    The distance may also have been `less` or `more` than said.
+    """
+    low, high = distance - less, distance + more
+    return (
+        np.stack([low, np.where(low < 0, time - 1, time + 1)], axis=1),
+        np.stack([high, np.where(high > 0, time - 1, time + 1)], axis=1),
+    )
+
+
 def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) -> Measurements:
     """And a 0 for every silence."""
     period, stalled = counts.silences(spec.max_periods)
     none = np.zeros(len(period), dtype=np.int64)
+    time = np.full(len(period), spec.max_periods)
     silent = Measurements(
-        counts.clock(period), none, np.full(len(period), spec.max_periods), none == 0, stalled, none > 0
+        clock=counts.clock(period),
+        distance=none,
+        time=time,
+        forced=none == 0,
+        stalled=stalled,
+        beyond=none > 0,
+        # The shaft is between the same two edges at both ends.
+        least=np.stack([none - 1, time], axis=1),
+        most=np.stack([none + 1, time], axis=1),
+        # Of the first period after reset not all was seen.
+        known=(np.arange(len(period)) > 0) | ~stalled,
     )
     return found.merged(silent)
 
@@ -150,7 +181,11 @@ def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: I
     first = np.append(True, last[1:] != last[:-1])[: len(last)]
     nearer = (greatest < np.abs(velocity)) & (first | (rank < np.roll(least, 1)))
     none = np.zeros(len(clock), dtype=np.bool_)
-    return Measurements(clock, sign, age, ~none, none, none)[nearer]
+    last_size = np.append(0, counts.size)[np.searchsorted(counts.period, period)]
+    # No farther back than its last edge.
+    least = np.stack([np.where((sign > 0) & (last_size > 0), 0, -1), age], axis=1)
+    most = np.stack([np.where((sign < 0) & (last_size < 0), 0, 1), age], axis=1)
+    return Measurements(clock, sign, age, ~none, none, none, least, most, ~none)[nearer]
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Ticks, n_clocks: int) -> Updates:
@@ -159,6 +194,7 @@ def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: T
         taken = taken.merged(_sinking(spec, counts, taken, rounded(spec, taken.distance, taken.time)[0], ticks))
     taken = taken[taken.clock + spec.tick_to_velocity < n_clocks]
     velocity, saturated = rounded(spec, taken.distance, taken.time)
+    more = {"out_of_range": saturated | taken.beyond} if spec.flags_range else {}
     return Updates(
         clock=taken.clock + spec.tick_to_velocity,
         velocity=velocity,
@@ -166,5 +202,15 @@ def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: T
         forced=taken.forced,
         stalled=taken.stalled,
         velocity_overflow=np.zeros(len(velocity), dtype=np.bool_),
-        more={"out_of_range": saturated | taken.beyond} if spec.flags_range else {},
+        more=more | (_bounds(spec, taken) if spec.bounds else {}),
     )
+
+
+def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any]]:
+    """Bounds of the velocity in counts per tick, rounded outward."""
+    found: dict[str, NDArray[Any]] = {"bounds_valid": taken.known}
+    for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
+        distance, time = ends.T
+        exact = round_quotient(distance * spec.timer_periods, np.maximum(time, 1), spec.native_frac_bits, towards)
+        found[name] = np.where(time > 0, exact, towards * spec.bound_limit)
+    return found

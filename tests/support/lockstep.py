@@ -84,9 +84,9 @@ EVENTS = {
     "m": ["one tick", "a power of two", "another number", "update in every clock", *COMMON],
     "mt": [
         "longer than the maximum time",
-        *(event for event in [*TIMED, *COMMON] if event not in ("bounds", "out of range")),
+        *(event for event in [*TIMED, *COMMON] if event != "out of range"),
     ],
-    "t": [*TIMED, *(event for event in COMMON if event != "bounds")],
+    "t": [*TIMED, *COMMON],
     "rairan": [
         "low",
         "high",
@@ -168,7 +168,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         index_reset=encoder.index and bool(rng.random() < 0.5),
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
         age=bool(rng.random() < 0.5),
-        bounds=bool(rng.random() < 0.5) and not timed and not options.get("paper_exact"),
+        bounds=bool(rng.random() < 0.5) and not options.get("paper_exact"),
     )
     if rng.random() < 0.25:
         spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))

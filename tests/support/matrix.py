@@ -9,6 +9,7 @@ from allpairspy import AllPairs
 
 from tachometry.sim.recording import PinTrace
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
+from tachometry.spec.timed import TimedTachometer
 
 CLOCK_HZ = 48_000_000
 S_FACTORS: dict[str, list[Any]] = {
@@ -44,6 +45,21 @@ RAIRAN_FACTORS: dict[str, list[Any]] = {
     "bounds": [False, True],
 }
 
+TIMED_FACTORS: dict[str, list[Any]] = {
+    "method": ["t", "mt"],
+    "tick_cycles": [1, 3, 960],
+    "max_ticks": [2, 500],
+    "unit": ["count/tick", "rpm"],
+    "frac_bits": ["fewest", "most"],
+    "velocity_bits": [None, "too few"],
+    "max_speed": [False, True],
+    "external": [False, True],
+    "timer": ["clock", "tick"],
+    "paper_exact": [False, True],
+    "bound_decay": [True, False],
+    "bounds": [False, True],
+}
+
 
 def _rows(factors: dict[str, list[Any]]) -> list[dict[str, Any]]:
     def possible(values: list[Any]) -> bool:
@@ -58,12 +74,12 @@ def _rows(factors: dict[str, list[Any]]) -> list[dict[str, Any]]:
 
 def rows() -> list[dict[str, Any]]:
     """Configurations in which every two values meet."""
-    return [row for factors in (S_FACTORS, RAIRAN_FACTORS) for row in _rows(factors)]
+    return [row for factors in (S_FACTORS, RAIRAN_FACTORS, TIMED_FACTORS) for row in _rows(factors)]
 
 
 def spec_of(row: dict[str, Any]) -> TachometerSpec:
     """The core of a configuration."""
-    own = [name for name in ("cancel", "estimate", "paper_exact", "bound_decay") if name in row]
+    own = [name for name in ("cancel", "estimate", "timer", "paper_exact", "bound_decay") if name in row]
     row = {name: values[0] for name, values in S_FACTORS.items()} | row
     make = METHODS[row["method"]]
     cycles = row["tick_cycles"]
@@ -114,7 +130,8 @@ def motion(spec: TachometerSpec, seed: int) -> PinTrace:
     clock = np.append(0, clock)
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
     a, b = np.isin(quarter, [1, 2]).astype(np.uint8), np.isin(quarter, [2, 3]).astype(np.uint8)
-    trace = PinTrace(clock, a, b, int(clock[-1]) + 17 * longest // 10 + 40 * cycles + 300, z)
+    rest = 22 if isinstance(spec, TimedTachometer) else 17
+    trace = PinTrace(clock, a, b, int(clock[-1]) + rest * longest // 10 + 40 * cycles + 300, z)
     if spec.max_tick_cycles is None:
         return trace
     gap = np.full(trace.n_clocks // cycles + 1, cycles)
