@@ -208,7 +208,8 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
         coarsest, finest = spec.frac_bits_range(unit)
         spec = replace(spec, unit=unit, frac_bits=int(rng.integers(max(coarsest, finest - 12), finest + 1)))
     if rng.random() < 0.3:
-        spec = replace(spec, velocity_bits=max(8, spec.velocity_width - int(rng.integers(-2, 4))))
+        narrower = 10 if isinstance(spec, TimedTachometer) else 4
+        spec = replace(spec, velocity_bits=max(8, spec.velocity_width - int(rng.integers(-2, narrower))))
     return spec
 
 
