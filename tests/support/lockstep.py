@@ -31,7 +31,6 @@ PULSES_PER_REV = 100
 CLOCK_HZ = 1_000_000
 MIN_TICKS, MIN_UPDATES = 2000, 200
 FEWER = {"rairan": 10}  # reversals and counts that open windows make ticks longer
-MIN_CLOCKS = 6_000  # of methods that measure times
 
 STATES = ("00", "10", "11", "01")
 LEGAL = [f"{STATES[k]}->{STATES[(k + d) % 4]}" for k in range(4) for d in (1, -1)]
@@ -112,12 +111,12 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     max_ticks = int(rng.choice([2, 3, 5, 10, 20]))
     timed = issubclass(METHODS[method], TimedTachometer)
     if timed:  # a division takes some ticks, or only part of one
-        tick_cycles = int(rng.choice([1, 2, 3, 8, 30, 40]))
+        tick_cycles = int(rng.choice([1, 2, 2, 3, 3, 4, 4, 8, 8, 32], p=[0.12] + 8 * [0.105] + [0.04]))
         max_ticks = int(rng.choice([2, 3, 10, 60])) * (1 if tick_cycles > 8 else 5)
+    elif tick_cycles > 4:  # for time
+        max_ticks = min(max_ticks, 5)
     decoding = int(rng.choice([1, 2, 4, 4]))
-    n_ticks = MIN_TICKS + 20 if method == "m" else max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks)
-    if timed:
-        n_ticks = MIN_CLOCKS // tick_cycles + 20
+    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else MIN_TICKS + 20
     external = tick_cycles > 1 and bool(rng.random() < 0.3) and not METHODS[method].own_ticks
     if external:
         n_ticks += n_ticks // 4  # fewer may come
@@ -323,7 +322,7 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     fewer = FEWER.get(method, 1)
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
-    ticks, updates = (MIN_CLOCKS // spec.longest_tick, 1) if timed else (MIN_TICKS // fewer, fewest // fewer)
+    ticks, updates = MIN_TICKS // fewer, 5 if timed else fewest // fewer
     if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
     problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
