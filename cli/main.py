@@ -10,11 +10,9 @@ import click
 from tachometry.cli.compare import compare
 from tachometry.cli.figures import figures
 from tachometry.cli.generate import generate
-from tachometry.cli.options import in_terms_of_options
+from tachometry.cli.options import INTERRUPTED, in_terms_of_options
 from tachometry.cli.plan import plan
 from tachometry.cli.simulate import replay, simulate
-
-_INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 
 
 @click.group(
@@ -56,7 +54,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     except KeyboardInterrupt:
         # The simulator's, if they had not begun yet.
         warnings.filterwarnings("ignore", message="coroutine .* was never awaited")
-        code = _fail("interrupted", _INTERRUPTED)
+        code = _fail("interrupted", INTERRUPTED)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "tachometry"
         code = _fail(f"error: {error.format_message()} (see {command} --help)")

@@ -11,6 +11,8 @@ import click
 from tachometry.spec import METHODS
 from tachometry.spec.option import options_of
 
+INTERRUPTED = 130  # exit status: 128 + SIGINT, as shells have it
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 # What the objects behind the options call their parameters, at the head of a message.
@@ -29,6 +31,8 @@ _PARAMETERS = {
     "max_tick_period": "--max-tick-period",
     "phase_error_deg": "--phase-error",
     "duty_error_deg": "--duty-error",
+    "vcd_from": "--vcd-from",
+    "vcd_to": "--vcd-to",
 }
 _SAME_NAME = (
     "clock",
@@ -52,6 +56,8 @@ _SAME_NAME = (
     "speeds",
     "only",
     "from",
+    "vcd",
+    "engine",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
 _OPTIONS |= {item.name: f"--{item.name.replace('_', '-')}" for spec in METHODS.values() for item in options_of(spec)}

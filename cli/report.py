@@ -8,10 +8,11 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
+from tachometry.cli.options import INTERRUPTED
 from tachometry.sim.encoder import Encoding
 from tachometry.sim.results import Mismatch, Run
 from tachometry.sim.tables import held_velocity, velocity_error
@@ -53,14 +54,27 @@ def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[
 
 def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
     """The same, of clocks that are simulated."""
-    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"))
+    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), _ClocksPerSecond())
+
+
+class _ClocksPerSecond(ProgressColumn):
+    """How fast it goes."""
+
+    def render(self, task: Task) -> Text:
+        return Text("" if task.speed is None else f"{task.speed:.3g} clocks/s")
+
+
+def interrupted(n_clocks: int, wanted: int) -> int:
+    """Tell that a simulation has been ended early; the exit status."""
+    print(f"tachometry: interrupted after {n_clocks} of {wanted} clocks", file=sys.stderr)
+    return INTERRUPTED
 
 
 def print_summary(
-    spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int, first: list[Mismatch]
+    spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int, first: list[Mismatch], engine: str
 ) -> None:
     """Print the table and the verdict on stdout."""
-    print_rows(summary(spec, run, truth, n_mismatches))
+    print_rows([("engine", engine), *summary(spec, run, truth, n_mismatches)])
     console = stdout_console()
     for mismatch in first:
         console.print(Text(f"first mismatch in {mismatch}"))

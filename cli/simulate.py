@@ -10,6 +10,7 @@ import click
 
 from tachometry.cli.capture_options import capture_options
 from tachometry.cli.core_options import core_options
+from tachometry.cli.engine_options import engine_options
 from tachometry.cli.files import Outputs
 from tachometry.cli.motion_options import FORMS, motion_options
 from tachometry.cli.options import GroupedCommand, output_options
@@ -20,6 +21,8 @@ if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs nei
     from tachometry.sim.encoder import Encoding
     from tachometry.sim.recording import PinTrace, Recording
     from tachometry.sim.results import Run
+
+    Window = Callable[[TachometerSpec, int], tuple[int, int]]
 
 
 @click.command(
@@ -37,28 +40,32 @@ Examples:
   tachometry simulate --ppr 24 --clock 100kHz --tick 2ms --max-time 100ms \\
       --motion constant:15rpm:1s --bounce 5:1ms --filter 110 --plot knob.png
 
-The simulator runs some 10,000 clocks a second: choose a --clock that is a few
-times the edge rate.""",
+Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
+a --clock that is a few times the edge rate then.""",
 )
 @core_options
 @motion_options
 @output_options
+@engine_options
 def simulate(
     spec: TachometerSpec,
     record: Callable[[TachometerSpec], Encoding],
     tables: list[Path],
     targets: dict[str, Path],
+    engine: str,
+    window: Window,
 ) -> int:
     """Run a core on a virtual encoder, against the golden model and the truth.
 
     The hardware is simulated clock by clock and compared with the golden model in every bit of every update and tick.
     The table at the end also tells what was lost on the way, and how far the velocity is from the shaft's.
 
-    Equal options give equal files. Exit status 1 if hardware and golden model differ.
+    Ctrl-C ends the simulation, and what was simulated so far is told and written. Equal options give equal files. Exit
+    status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=tables)
     truth = record(spec)
-    return _run_and_report(spec, "--motion", truth.recording, truth, outputs)
+    return _run_and_report(spec, "--motion", truth.recording, truth, outputs, engine, window)
 
 
 @click.command(
@@ -70,18 +77,21 @@ Examples:
   tachometry replay scope.csv --a CH1 --b CH2 --ppr 1024 \\
       --clock 500kHz --tick 100us --plot run.png
 
-The simulator runs some 10,000 clocks a second: choose a --clock that is a few
-times the edge rate. Edges closer than a clock are flagged as errors or lost.""",
+Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
+a --clock that is a few times the edge rate then. Edges closer than a clock are flagged as errors or lost.""",
 )
 @click.argument("capture", type=click.Path(path_type=Path))
 @core_options
 @capture_options
 @output_options
+@engine_options
 def replay(
     spec: TachometerSpec,
     capture: Path,
     read: Callable[[Path, TachometerSpec], Recording],
     targets: dict[str, Path],
+    engine: str,
+    window: Window,
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
@@ -89,19 +99,27 @@ def replay(
     waveform (.vcd), whose one-bit variables are named with their scopes: --a top.a --b top.b.
     Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
 
-    Equal options and captures give equal files. Exit status 1 if hardware and golden model differ.
+    Ctrl-C ends the simulation, and what was simulated so far is told and written. Equal options and captures give equal
+    files. Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=[capture])
-    return _run_and_report(spec, str(capture), read(capture, spec), None, outputs)
+    return _run_and_report(spec, str(capture), read(capture, spec), None, outputs, engine, window)
 
 
 def _run_and_report(
-    spec: TachometerSpec, source: str, recording: Recording, truth: Encoding | None, outputs: Outputs
+    spec: TachometerSpec,
+    source: str,
+    recording: Recording,
+    truth: Encoding | None,
+    outputs: Outputs,
+    engine: str,
+    window: Window,
 ) -> int:
     """Run hardware and golden model, write what is wanted, print the summary; the exit status."""
-    from tachometry.cli.report import clocks_progress, print_summary
+    from tachometry.cli.report import clocks_progress, interrupted, print_summary
     from tachometry.sim import golden
-    from tachometry.sim.pysim import PySim
+    from tachometry.sim.engine import Interrupted
+    from tachometry.sim.engines import pick
     from tachometry.sim.recording import nominal_ticks
     from tachometry.sim.results import compare
 
@@ -109,18 +127,34 @@ def _run_and_report(
     if spec.max_tick_cycles and trace.tick_in is None:
         trace = trace.with_tick_in(nominal_ticks(spec, trace.n_clocks))
     _require_a_tick(spec, source, trace)
+    shown, chosen, wanted = window(spec, trace.n_clocks), pick(engine), trace.n_clocks
     with outputs:
         expected = golden.run(spec, trace)
-        with clocks_progress(trace.n_clocks) as progress:
-            actual = PySim().run(spec, trace, vcd=outputs.get("--vcd"), progress=progress)
+        try:
+            with clocks_progress(trace.n_clocks) as progress:
+                actual = chosen.run(spec, trace, vcd=outputs.get("--vcd"), window=shown, progress=progress)
+        except Interrupted as early:
+            actual = early.run
+            if actual.n_clocks < _least(spec):
+                raise
+            trace = trace.until(actual.n_clocks)
+            expected = golden.run(spec, trace)
         _write(spec, trace, actual, truth, outputs)
     n_mismatches, first = compare(expected, actual)
-    print_summary(spec, actual, truth, n_mismatches, first)
-    return 1 if n_mismatches else 0
+    missing = " (there is no C++ compiler)" if (engine, chosen.name) == ("auto", "pysim") else ""
+    print_summary(spec, actual, truth, n_mismatches, first, chosen.name + missing)
+    if n_mismatches:
+        return 1
+    return interrupted(actual.n_clocks, wanted) if actual.n_clocks < wanted else 0
+
+
+def _least(spec: TachometerSpec) -> int:
+    """Fewest clocks of which something can be told."""
+    return spec.longest_tick + spec.tick_latency
 
 
 def _require_a_tick(spec: TachometerSpec, source: str, trace: PinTrace) -> None:
-    needed = spec.longest_tick + spec.tick_latency
+    needed = _least(spec)
     if trace.n_clocks < needed:
         raise ValueError(
             f"{source} must last at least {needed} clocks of --clock ({format_time(spec.seconds(needed))}), "

@@ -11,10 +11,12 @@ from amaranth.sim import Simulator
 from numpy.typing import NDArray
 
 from tachometry.hdl import Tachometer
+from tachometry.sim.engine import Interrupted, driven_pins
 from tachometry.sim.recording import PinTrace
 from tachometry.sim.results import STROBES, Run, observed
+from tachometry.sim.watched import shown
 from tachometry.sim.waveform import Waveform
-from tachometry.spec import Port, TachometerSpec
+from tachometry.spec import TachometerSpec
 
 # The simulator counts in femtoseconds; a nanosecond per clock keeps every instant exact. Waveforms have true times.
 _PERIOD = 1e-9
@@ -54,6 +56,7 @@ class PySim:
         trace: PinTrace,
         *,
         vcd: Path | None = None,
+        window: tuple[int, int] | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> Run:
         """See `Engine.run`."""
@@ -64,13 +67,13 @@ class PySim:
         strobe = Signal()
         top.d.comb += strobe.eq(Cat(getattr(core, port.name) for port in outputs if port.name in STROBES).any())
         values = _packed(top, [getattr(core, port.name) for port in outputs])
-        shown = _shown(core) if vcd is not None else {}
-        shown_values = _packed(top, list(shown.values()))
+        seen = shown(core) if vcd is not None else {}
+        seen_values = _packed(top, list(seen.values()))
         simulator = Simulator(top)
         simulator.add_clock(_PERIOD)
 
         async def bench(ctx: Any) -> None:
-            await drive(ctx, trace, {port.name: getattr(core, port.name) for port in _pins(spec, trace)}, _PERIOD)
+            await drive(ctx, trace, {port.name: getattr(core, port.name) for port in driven_pins(spec, trace)}, _PERIOD)
 
         simulator.add_testbench(bench)
 
@@ -85,48 +88,31 @@ class PySim:
 
         simulator.add_process(collect)
 
+        done, interrupt = 0, None
+        begin, end = window or (0, trace.n_clocks)
         with ExitStack() as stack:
             waveform = None
             if vcd is not None:
-                widths = {name: (len(value), value.shape().signed) for name, value in shown.items()}
+                widths = {name: (len(value), value.shape().signed) for name, value in seen.items()}
                 waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, widths))
-                _watch(simulator, waveform, shown_values)
-            for clock in range(0, trace.n_clocks, _CLOCKS_PER_CALL):
-                done = min(clock + _CLOCKS_PER_CALL, trace.n_clocks)
-                simulator.run_until(done * _PERIOD)
-                if progress is not None:
-                    progress(done)
+                _watch(simulator, waveform, seen_values, begin, end)
+            try:
+                while done < trace.n_clocks:
+                    after = min(done + _CLOCKS_PER_CALL, trace.n_clocks)
+                    simulator.run_until(after * _PERIOD)
+                    done = after
+                    if progress is not None:
+                        progress(done)
+            except KeyboardInterrupt as raised:
+                interrupt = raised
             if waveform is not None:
-                waveform.close(trace.n_clocks)
+                waveform.close(min(done, end))
 
-        return observed(spec, trace.n_clocks, _unpack(rows, [(port.width, port.signed) for port in outputs]))
-
-
-def _pins(spec: TachometerSpec, trace: PinTrace) -> list[Port]:
-    """The inputs that a trace drives.
-
-    Raises
-    ------
-    ValueError
-        If the trace lacks one.
-    """
-    pins = [port for port in spec.ports if port.direction == "input" and port.name not in ("clk", "rst")]
-    missing = [port.name for port in pins if port.name not in trace.lines]
-    if missing:
-        raise ValueError(f"the trace must have the lines of the core, and lacks {', '.join(missing)}")
-    return pins
-
-
-def _shown(core: Tachometer) -> dict[str, Value]:
-    """Signals of the waveform, in the order in which they are shown."""
-    inner = {"m_e": core.pulse_count, **core.datapath.probes}
-    order = (
-        *("a", "b", "z", "tick_in", "decode_error", "tick", "tick_error", *inner, "overflow", "velocity_valid"),
-        *("velocity", "velocity_overflow", "interval", "forced", "stalled", "index_valid", "index_position"),
-        *("position", "swallowed_edges"),
-    )
-    ports = {port.name for port in core.spec.ports}
-    return {name: inner[name] if name in inner else getattr(core, name) for name in order if name in ports | {*inner}}
+        kept = [row for row in rows if row[0] < done]
+        run = observed(spec, done, _unpack(kept, [(port.width, port.signed) for port in outputs]))
+        if interrupt is not None:
+            raise Interrupted(run) from interrupt
+        return run
 
 
 def _packed(top: Module, values: list[Value]) -> Signal:
@@ -136,11 +122,12 @@ def _packed(top: Module, values: list[Value]) -> Signal:
     return packed
 
 
-def _watch(simulator: Simulator, waveform: Waveform, packed: Signal) -> None:
+def _watch(simulator: Simulator, waveform: Waveform, packed: Signal, begin: int, end: int) -> None:
     async def watch(ctx: Any) -> None:
         clock = 0
         async for _, _, value in ctx.tick().sample(packed):
-            waveform.sample(clock, value)
+            if begin <= clock < end:
+                waveform.sample(clock, value)
             clock += 1
 
     simulator.add_process(watch)
@@ -154,4 +141,4 @@ def _unpack(rows: list[tuple[int, int]], shapes: list[tuple[int, bool]]) -> NDAr
         mask, sign = (1 << width) - 1, (1 << (width - 1)) if is_signed else 0
         columns.append([(((packed >> shift) & mask) ^ sign) - sign for _, packed in rows])
         shift += width
-    return np.array(columns, dtype=np.int64).T
+    return np.array(columns, dtype=np.int64).reshape(len(columns), -1).T

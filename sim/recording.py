@@ -138,6 +138,12 @@ class PinTrace(_Lines):
         if self.clock[0] != 0 or np.any(np.diff(self.clock) <= 0):
             raise ValueError("clocks of a pin trace must begin at 0 and must increase")
 
+    def until(self, n_clocks: int) -> "PinTrace":
+        """The first clocks of the trace."""
+        inside = self.clock < n_clocks
+        lines = {name: line[inside] for name, line in self.lines.items()}
+        return PinTrace(self.clock[inside], n_clocks=n_clocks, **lines)
+
     def with_tick_in(self, rises: NDArray[np.int64]) -> "PinTrace":
         """The same trace with an external tick that is high for one clock from each of the clocks `rises`.
 

@@ -37,6 +37,7 @@ class Waveform:
         self._shifts = [sum(width for width, _ in list(widths.values())[:k]) for k in range(len(widths))]
         self._masks = [(1 << width) - 1 for width, _ in widths.values()]
         self._last: int | None = None
+        self._time = 0
 
     def sample(self, clock: int, packed: int) -> None:
         """The signals in clock `clock`, packed in order, the first in the least significant bits."""
@@ -46,11 +47,12 @@ class Waveform:
             for variable, shift, mask in zip(self._variables, self._shifts, self._masks, strict=True):
                 if (changed >> shift) & mask:
                     self._writer.change(variable, time, (packed >> shift) & mask)
+            self._time = time
             self._last = packed
 
     def close(self, clock: int) -> None:
-        """End the waveform at clock `clock` and write the save file."""
-        self._writer.close((clock * 10**12) // self._clock_hz)
+        """End the waveform at clock `clock`, or where it has come to, and write the save file."""
+        self._writer.close(max((clock * 10**12) // self._clock_hz, self._time))
         self._file.close()
         with self._path.with_suffix(".gtkw").open("w", newline="\n") as file:
             save = GTKWSave(file)

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -262,6 +263,13 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
         ("--motion stop:1s --counts {new}/../file/c.csv", "file/c.csv: Not a directory"),
         ("--motion stop:1s --trace {new}/c.csv --counts {new}/..", "--counts must be a file, which {folder} is not"),
         ("--motion stop:1s --trace /dev/null", "--trace must be a file, which /dev/null is not"),
+        ("--motion stop:1s --vcd-from 1ms", "--vcd must be given together with --vcd-from and --vcd-to"),
+        (
+            "--motion stop:1s --vcd {new}/v.vcd --vcd-from 5ms --vcd-to 90",
+            "--vcd-from must be before --vcd-to and the end of the run, clock 90, not 100",
+        ),
+        ("--motion stop:1s --vcd {new}/v.vcd --vcd-to 1m", "vcd-to must be"),
+        ("--motion stop:1s --engine fast", "Invalid value for '--engine': 'fast' is not one of"),
         ("--motion stop:1s --a A", "No such option '--a'"),
     ],
 )
@@ -298,27 +306,35 @@ def test_ctrl_c_in_the_simulation(
 
     (tmp_path / "t.csv").write_text("before")
     monkeypatch.setattr(PySim, "run", interrupted)
-    options = [*all_outputs(tmp_path / "new"), "--trace", str(tmp_path / "t.csv")]
+    options = [*all_outputs(tmp_path / "new"), "--trace", str(tmp_path / "t.csv"), "--engine", "pysim"]
     assert run("simulate", *CORE, *MOTION, *options) == 130
     assert capsys.readouterr() == ("", "tachometry: interrupted\n")
     assert contents(tmp_path) == {"t.csv": b"before"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-def test_ctrl_c_from_a_terminal(tmp_path: Path) -> None:
+@pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
+def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, tmp_path: Path) -> None:
+    options = [*CORE, "--motion", "constant:20:1000s", "--engine", engine, *all_outputs(tmp_path / "new")]
     process = subprocess.Popen(
-        [*COMMAND, "simulate", *CORE, "--motion", "constant:20:100s", *all_outputs(tmp_path / "new")],
+        [*COMMAND, "simulate", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
-    while process.poll() is None and not list(tmp_path.glob("new/.tachometry-*/new/v.vcd")):
+    while process.poll() is None and not any(
+        file.stat().st_size > 200_000 for file in tmp_path.glob("new/.tachometry-*/new/v.vcd")
+    ):
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=30)
-    assert (process.returncode, out, err) == (130, "", "tachometry: interrupted\n")
-    assert not list(tmp_path.iterdir())
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    told = re.fullmatch(r"tachometry: interrupted after (\d+) of 20000000 clocks\n", err)
+    assert told is not None, err
+    assert summary(out)["simulated"].startswith(f"{told[1]} clocks")
+    assert "PASS" in out
+    assert set(contents(tmp_path / "new")) == {*OUTPUTS.values(), "v.gtkw"}
 
 
 def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture[str]) -> None:

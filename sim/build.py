@@ -1,0 +1,150 @@
+"""Compiled code: the C++ compiler, and a cache of what it made."""
+
+import functools
+import hashlib
+import importlib.util
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import platformdirs
+
+FLAGS = ("-std=c++17", "-O2", "-w", "-fPIC", "-fvisibility=hidden", "-pthread")
+
+_KEPT = 1000  # files
+_ABANDONED = 24 * 3600.0  # seconds after which a folder is no build that is under way
+
+
+class NoCompiler(OSError):
+    """There is no C++ compiler."""
+
+
+def find_compiler() -> tuple[str, ...] | None:
+    """The compiler that `CXX` names, or the system's, or that of the package ziglang; None if there is none."""
+    for words in (shlex.split(os.environ.get("CXX", "")), ["c++"], ["g++"], ["clang++"]):
+        if words and shutil.which(words[0]):
+            return tuple(words)
+    return (sys.executable, "-m", "ziglang", "c++") if importlib.util.find_spec("ziglang") else None
+
+
+def compiler() -> tuple[str, ...]:
+    """The same.
+
+    Raises
+    ------
+    NoCompiler
+        If there is none.
+    """
+    found = find_compiler()
+    if found is None:
+        raise NoCompiler(
+            "there is no C++ compiler: install g++ or clang, or pip install 'tachometry[compiler]', or take pysim"
+        )
+    return found
+
+
+@functools.cache
+def version(command: tuple[str, ...]) -> str:
+    """What a compiler says that it is."""
+    return subprocess.run([*command, "--version"], capture_output=True, text=True).stdout
+
+
+def run(command: Sequence[str | Path], what: str, folder: Path | None = None, text: str | None = None) -> str:
+    """Run a tool on an input; its output.
+
+    Raises
+    ------
+    OSError
+        If it fails, with the line that says why.
+    """
+    done = subprocess.run(list(map(str, command)), cwd=folder, input=text, capture_output=True, text=True)
+    if done.returncode:
+        said = (done.stderr + done.stdout).splitlines() or [f"exit status {done.returncode}"]
+        raise OSError(f"{what}: {next((line for line in said if 'error' in line.lower()), said[-1])}")
+    return done.stdout
+
+
+def digest(*parts: object) -> str:
+    """A name for some content: different content has another name."""
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def compile_library(source: str, folder: Path, *more: str | Path) -> Path:
+    """A shared library of a C++ text, in `folder`; `more` are options, and files to be compiled or linked with it."""
+    (folder / "model.cc").write_text(source, encoding="utf-8")
+    command = [*compiler(), *FLAGS, "-shared", "-o", "model.so", "model.cc", *more]
+    run(command, f"{compiler()[-1]} cannot compile the core", folder)
+    return folder / "model.so"
+
+
+def cache_folder() -> Path:
+    """Where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache."""
+    given = os.environ.get("TACHOMETRY_CACHE")
+    return Path(given) if given else platformdirs.user_cache_path("tachometry")
+
+
+def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
+    """The file that `make` makes in a folder that it is given, or the one that it made before for the same key.
+
+    A file is named by its own content, and renamed into the cache when it is whole; a file `key` says which it is. So
+    builds of one thing at the same time do no harm, and a file that is not whole is made anew.
+
+    Parameters
+    ----------
+    key : str
+        Digest of all that decides what `make` makes.
+    suffix : str
+        Of the file.
+    """
+    folder = cache_folder()
+    if (found := _intact(folder, key)) is not None:
+        return found
+    folder.mkdir(parents=True, exist_ok=True)
+    _prune(folder)
+    with tempfile.TemporaryDirectory(prefix=".building-", dir=folder, ignore_cleanup_errors=True) as name:
+        made = make(Path(name))
+        target = folder / f"{hashlib.sha256(made.read_bytes()).hexdigest()}{suffix}"
+        made.replace(target)
+        index = Path(name) / "index"
+        index.write_text(target.name)
+        index.replace(folder / key)
+    return target
+
+
+def _intact(folder: Path, key: str) -> Path | None:
+    """The file of a key, if it is there and whole."""
+    try:
+        name = (folder / key).read_text(errors="replace")
+        if not re.fullmatch(r"[0-9a-f]{64}\.\w+", name):
+            return None
+        target = folder / name
+        whole = hashlib.sha256(target.read_bytes()).hexdigest() == target.stem
+        if whole:
+            os.utime(target)
+            os.utime(folder / key)
+    except OSError:
+        return None
+    return target if whole else None
+
+
+def _prune(folder: Path) -> None:
+    """Remove what has not been used for longest, and builds that were killed."""
+    aged = []
+    for path in folder.iterdir():
+        try:
+            age = time.time() - path.stat().st_mtime
+        except OSError:  # another run has removed it
+            continue
+        if not path.name.startswith(".building-"):
+            aged.append((age, path))
+        elif age > _ABANDONED:
+            shutil.rmtree(path, ignore_errors=True)
+    for _, path in sorted(aged)[_KEPT:]:
+        path.unlink(missing_ok=True)
