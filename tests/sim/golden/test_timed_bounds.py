@@ -9,8 +9,9 @@ from support.mutant import caught, mutant
 
 from tachometry.sim.golden import model, timed
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.results import Ticks
+from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import Encoder, MTTachometer, Timing, TTachometer
+from tachometry.spec.tachometer import BOUNDS
 from tachometry.spec.timed import TimedTachometer
 
 INSTANTS = 1 << 10  # in a clock
@@ -31,6 +32,22 @@ def edges(n: int, seed: int) -> tuple[Ints, Ints]:
     gaps[rng.random(n) < 1e-4] *= 300
     turns = np.where(rng.random(n) < rng.choice([0.001, 0.3]), -1, 1)
     return np.cumsum(np.ceil(gaps).astype(np.int64)) + 10 * INSTANTS, np.cumprod(turns)
+
+
+def check_silence(spec: TimedTachometer, updates: Updates) -> None:
+    """Without a count the shaft may have come within a hair of the next edge, and over none."""
+    forced = updates.forced & updates.more["bounds_valid"]
+    lasted = (updates.interval * spec.interval_unit_cycles)[forced]
+    lower, upper = (updates.more[name][forced] * lasted for name in BOUNDS)
+    one, velocity = TICK << spec.native_frac_bits, updates.velocity[forced]
+    assert (velocity == 0).sum() > 5
+    assert ((upper >= one) & (upper < one + lasted))[velocity >= 0].all()
+    assert ((lower <= -one) & (lower > -one - lasted))[velocity <= 0].all()
+    if spec.bound_decay:
+        assert (velocity != 0).sum() > 5
+    # What sinks has passed an edge last, and has not come back over it; after a reversal it may go on either way.
+    assert ((lower == 0) | (lower <= -one))[velocity > 0].all()
+    assert ((upper == 0) | (upper >= one))[velocity < 0].all()
 
 
 def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, float, float]:
@@ -58,6 +75,7 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
         first = edge_of[end - updates.interval]
     else:
         last, first = (np.searchsorted(clock, at) for at in (end, end - updates.interval))
+    check_silence(spec, updates)
     chosen = ~updates.forced & updates.more["bounds_valid"]
     last, first = last[chosen], first[chosen]
     # Where the shaft is when it passes: half a count before or after the counts on its sides.
