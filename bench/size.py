@@ -139,6 +139,15 @@ CONFIGURATIONS = (
     Configuration("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS, is_option=False),
     Configuration("t-tick", "T method, times in ticks", TTachometer(**COMMON, timer="tick"), is_option=False),
     Configuration("mt-tick", "M/T method, times in ticks", MTTachometer(**COMMON, timer="tick"), is_option=False),
+    *(
+        Configuration(f"{name}-bounds", f"{what}, with bounds", method(**COMMON, bounds=True), {}, False, ("ECP5",))
+        for name, what, method in (
+            ("m", "M method", MTachometer),
+            ("rairan", "Rairán's method", RairanTachometer),
+            ("t", "T method", TTachometer),
+            ("mt", "M/T method", MTTachometer),
+        )
+    ),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )
 
