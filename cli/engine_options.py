@@ -16,11 +16,11 @@ _ENGINE_OPTIONS = [
     option(
         _SIMULATION,
         "--engine",
-        type=click.Choice(["auto", "pysim", "cxxrtl"]),
+        type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"]),
         default="auto",
         help="pysim is Amaranth's simulator, some 10,000 clocks a second; cxxrtl is compiled, some 10,000,000 and "
         "more, needs a C++ compiler, and some seconds when a core is new. auto is cxxrtl with a compiler, else "
-        "pysim.",
+        "pysim. verilator is compiled from the exported Verilog.",
     ),
     option(_SIMULATION, "--vcd-from", metavar="TIME", help="Where --vcd begins; a plain number is clocks."),
     option(_SIMULATION, "--vcd-to", metavar="TIME", help="Where it ends."),

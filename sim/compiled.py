@@ -37,19 +37,26 @@ class Design:
 
     Parameters
     ----------
-    component : wiring.Component
-        With the ports of the spec.
     spec : TachometerSpec
     pins : list of Port
         Inputs, in the order of the bits of a level.
-    n_words : int
-        Number of outputs `shown_0`, `shown_1` ….
+    watched : Watched or None
+        The core with shown signals, if there are any to be shown.
     """
 
-    component: wiring.Component
     spec: TachometerSpec
     pins: list[Port]
-    n_words: int = 0
+    watched: Watched | None = None
+
+    @property
+    def component(self) -> wiring.Component:
+        """The hardware, with the ports of the spec."""
+        return Tachometer(self.spec) if self.watched is None else self.watched
+
+    @property
+    def n_words(self) -> int:
+        """Number of outputs `shown_0`, `shown_1` …."""
+        return 0 if self.watched is None else self.watched.n_words
 
     @property
     def outputs(self) -> list[Port]:
@@ -88,8 +95,7 @@ class CompiledEngine(ABC):
         """See `Engine.run`."""
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
-        component = Tachometer(spec) if watched is None else watched
-        design = Design(component, spec, pins, 0 if watched is None else watched.n_words)
+        design = Design(spec, pins, watched)
         play = _Play(self.library(design), design, trace, window or (0, trace.n_clocks))
         interrupt = None
         with ExitStack() as stack:

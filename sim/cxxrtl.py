@@ -20,7 +20,7 @@ _MODEL = """
 using namespace cxxrtl_design;
 template <size_t N> inline const value<N> &now(const value<N> &port) {{ return port; }}
 template <size_t N> inline const value<N> &now(const wire<N> &port) {{ return port.curr; }}
-template <class Integer> int64_t extended(Integer raw, int width, bool is_signed);
+template <class Integer> static inline int64_t extended(Integer raw, int width, bool is_signed);
 struct Model {{
   p_top top;
   void pins(uint8_t level) {{ {pins} }}

@@ -3,7 +3,7 @@
 from tachometry.sim.build import compiler, find_compiler
 from tachometry.sim.engine import Engine
 
-ENGINES = ("pysim", "cxxrtl")
+ENGINES = ("pysim", "cxxrtl", "verilator")
 
 
 def pick(name: str = "auto") -> Engine:
@@ -27,6 +27,12 @@ def pick(name: str = "auto") -> Engine:
 
         compiler()
         return Cxxrtl()
+    if name == "verilator":
+        from tachometry.sim.verilator import Verilator, home
+
+        compiler()
+        home()
+        return Verilator()
     raise ValueError(f"engine must be one of auto, {', '.join(ENGINES)}, not {name!r}")
 
 

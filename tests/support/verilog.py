@@ -5,47 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from support.compiled import verilate
+from support.compiled import lint
 from tachometry.hdl import export
 from tachometry.sim.recording import PinTrace
 from tachometry.sim.results import STROBES, Run, observed
+from tachometry.sim.verilator import Verilator
 from tachometry.spec import Port, TachometerSpec
 
-# Both benches read a line (clock, level of each pin) for every change, and write a row (clock, value of each output)
-# for every clock with a strobe.
-_VERILATOR = """
-#include <cstdio>
-#include <cstdint>
-#include "Vcore.h"
-int64_t get(uint64_t raw, int width, bool is_signed) {
-  return is_signed ? int64_t(raw << (64 - width)) >> (64 - width) : int64_t(raw);
-}
-int main(int argc, char **argv) {
-  Vcore top;
-  FILE *in = fopen(argv[1], "rb"), *out = fopen(argv[2], "wb");
-  int64_t change[1 + @N_PINS@];
-  bool more = fread(change, sizeof change, 1, in) == 1;
-  top.rst = true;
-  for (int k = 0; k < 3; k++) {
-    top.clk = false; top.eval(); top.clk = true; top.eval();
-  }
-  top.rst = false;
-  for (int64_t clock = 0; clock < @N_CLOCKS@; clock++) {
-    if (more && change[0] == clock) {
-      const int64_t *pin = change;
-      @SET_PINS@
-      more = fread(change, sizeof change, 1, in) == 1;
-    }
-    top.clk = false; top.eval();
-    if (@STROBES@) {
-      const int64_t row[] = {clock, @OUTPUTS@};
-      fwrite(row, sizeof row, 1, out);
-    }
-    top.clk = true; top.eval();
-  }
-  return fclose(out);
-}
-"""
+# The bench reads a line (clock, level of each pin) for every change, and writes a row (clock, value of each output) for
+# every clock with a strobe.
 _ICARUS = """
 module bench;
   reg clk, rst;
@@ -97,21 +65,10 @@ def _changes(pins: list[Port], trace: PinTrace) -> np.ndarray:
 
 
 def run_in_verilator(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
-    """Compile the exported Verilog with -Wall, any warning an error, and play a trace on it."""
-    pins, outputs, strobes = _ports(spec)
-    main = _filled(
-        _VERILATOR,
-        N_PINS=len(pins),
-        N_CLOCKS=trace.n_clocks,
-        SET_PINS=" ".join(f"top.{pin.name} = *++pin;" for pin in pins),
-        STROBES=" || ".join(f"top.{name}" for name in strobes),
-        OUTPUTS=", ".join(f"get(top.{port.name}, {port.width}, {int(port.signed)})" for port in outputs),
-    )
-    (folder / "core.v").write_text(export(spec)["tachometer.v"])
-    program = verilate(folder / "core.v", main)
-    _changes(pins, trace).tofile(folder / "pins")
-    subprocess.run([program, "pins", "rows"], cwd=folder, check=True)
-    return observed(spec, trace.n_clocks, np.fromfile(folder / "rows", dtype=np.int64).reshape(-1, 1 + len(outputs)))
+    """Read the exported Verilog with -Wall, any warning an error, and play a trace on it."""
+    (folder / "tachometer.v").write_text(export(spec)["tachometer.v"])
+    lint(["tachometer.v"], "tachometer", folder)
+    return Verilator().run(spec, trace)
 
 
 def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
