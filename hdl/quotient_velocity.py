@@ -87,7 +87,7 @@ class QuotientVelocity(wiring.Component):
         m = Module()
         spec = self._spec
         m.submodules.divider = divider = self.divider
-        measuring, rounds, compared = Signal(), Signal(), Signal()
+        measuring, rounds, compared = (Signal(name=name) for name in ("measuring", "rounds", "compared"))
         # Not before the result of the last division is in `velocity`.
         sinks = Signal()
         if spec.decays:

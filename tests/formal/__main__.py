@@ -8,7 +8,8 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from formal.cases import MUTANTS, PROOFS, Mutant
+from formal.cases import PROOFS
+from formal.mutants import MUTANTS, Mutant
 from formal.prove import Proof, Result, prepare, solve
 from support.mutant import mutant
 

@@ -1,28 +1,20 @@
-"""What is proven of which core, and what each proof refutes."""
+"""What is proven of which core."""
 
-from dataclasses import dataclass
 from typing import Any
 from unittest.mock import patch
 
 from formal.prove import Proof
 
-from tachometry.hdl.alteration import AlterationDetector
-from tachometry.hdl.carried_reciprocal import CarriedReciprocal
-from tachometry.hdl.conditioner import InputConditioner
-from tachometry.hdl.decoder import QuadratureDecoder
-from tachometry.hdl.glitch_filter import GlitchFilter
-from tachometry.hdl.interval import IntervalAccumulator
-from tachometry.hdl.m_method import Datapath as MDatapath
-from tachometry.hdl.m_method import MovingSum
-from tachometry.hdl.position_counter import PositionCounter
-from tachometry.hdl.pulse_counter import PulseCounter
-from tachometry.hdl.rairan import Counters
-from tachometry.hdl.rairan import Datapath as RairanDatapath
-from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
-from tachometry.hdl.sampling_clock import SamplingClock
-from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
-from tachometry.hdl.update_age import UpdateAge
-from tachometry.spec import Encoder, MTachometer, RairanTachometer, Speed, STachometer, Timing
+from tachometry.spec import (
+    Encoder,
+    MTachometer,
+    MTTachometer,
+    RairanTachometer,
+    Speed,
+    STachometer,
+    Timing,
+    TTachometer,
+)
 from tachometry.spec.carried_reciprocal import CarriedReciprocal as CarriedSpec
 
 
@@ -200,6 +192,68 @@ def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof
     return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES, depth=7)
 
 
+_TIMED_PROBES = {
+    "core_step": "decoder.step",
+    "core_age": "datapath.gap_timer.age",
+    "core_longest": "datapath.gap_timer.longest",
+    "core_opened": "datapath.gap_timer.opened",
+    "core_negative": "datapath.gap_timer.was_negative",
+    "core_measuring": "datapath.quotient_velocity.measuring",
+    "core_rounds": "datapath.quotient_velocity.rounds",
+    "core_compared": "datapath.quotient_velocity.compared",
+    "core_forced": "datapath.quotient_velocity.forced",
+    "core_stalled": "datapath.quotient_velocity.stalled",
+    "core_rounded": "datapath.quotient_velocity.rounded",
+    "core_running": "datapath.quotient_velocity.divider.running",
+    "core_remainder": "datapath.quotient_velocity.divider.remainder",
+    "core_left": "datapath.quotient_velocity.divider.left",
+    "core_digits": "datapath.quotient_velocity.divider.digits",
+    "core_by": "datapath.quotient_velocity.divider.by",
+}
+_WINDOW_OF_MT_PROBES = {
+    "core_length": "datapath.length",
+    "core_late": "datapath.late",
+    "core_way": "datapath.way",
+}
+
+
+def timed(
+    name: str, method: type[TTachometer | MTTachometer], tick_cycles: int, max_count: int, **options: Any
+) -> Proof:
+    """PT: the T and the M/T method, from steps and ticks to updates."""
+    spec = method(
+        encoder=Encoder(1, 4),
+        timing=Timing(4 * tick_cycles, tick_cycles, 4),
+        max_speed=Speed.parse(f"{max_count}rev/s"),
+        frac_bits=4,
+        position_width=8,
+        **options,
+    )
+    assert spec.max_count == max_count, spec.max_count
+    mt = isinstance(spec, MTTachometer)
+    parameters = {
+        "MT": int(mt),
+        "LATTICE": int(spec.on_lattice),
+        "T": tick_cycles,
+        "COUNT_WIDTH": spec.count_width,
+        "MAX_COUNT": max_count,
+        "MAX_PERIODS": spec.max_periods,
+        "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,
+        "MAX_QUOTIENT": spec.max_quotient,
+        "SATURATES": int(spec.saturates),
+        "FLAGS": int(spec.flags_range),
+        "INTEGER_BITS": spec.max_quotient.bit_length(),
+        "INTERVAL_WIDTH": spec.interval_width,
+        "FRAC_BITS": spec.frac_bits,
+        "DIVISION_CLOCKS": spec.division_clocks,
+    }
+    probes = _TIMED_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
+    probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
+    probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
+    probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
+    return Proof(name, spec, "timed", parameters, probes, depth=4)
+
+
 PROOFS = [
     front("x4, 960 clocks", core(960, max_count=20)),
     front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
@@ -229,88 +283,8 @@ PROOFS = [
     reciprocal("2049 ticks", core(5, 2049, max_count=1)),
     reciprocal("6 ticks", small(max_ticks=6), max_table=4),
     rairan("Rairán", 3, 4, 2),
-]
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """`right` in the source of `box` made `wrong`: violates `refuted` within `steps` clocks in the proof's core."""
-
-    proof: str
-    refuted: str
-    box: Any
-    right: str
-    wrong: str
-    steps: int = 24
-
-
-MUTANTS = [
-    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
-    Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
-    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~self.level_b", "~change_b & self.level_b"),
-    Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
-    Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
-    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
-    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
-    Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
-    Mutant("x2, 7 clocks", "p3_overflow", PulseCounter, "above.eq(value > ", "above.eq(value >= "),
-    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
-    Mutant("eq. (21), 1 clock", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
-    Mutant(
-        "eq. (21), 1 clock",
-        "p4_range",
-        IntervalAccumulator,
-        "self.m_s == self._max_ticks - 1",
-        "self.m_s == self._max_ticks",
-    ),
-    Mutant("eq. (21), 1 clock", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
-    Mutant("eq. (21), 1 clock", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
-    Mutant(
-        "eq. (21), 1 clock",
-        "p5_numerator",
-        IntervalAccumulator,
-        "opening - self.previous + d1",
-        "opening - self.previous",
-    ),
-    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
-    Mutant("eq. (21), 1 clock", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
-    Mutant(
-        "eq. (17)",
-        "p5_velocity",
-        PipelinedScaler,
-        "= reciprocal.rounding(towards)",
-        "= reciprocal.rounding(towards) >> 1",
-    ),
-    Mutant(
-        "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
-    ),
-    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
-    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
-    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
-    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
-    Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
-    Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "clocks_since_reset[-1]", "clocks_since_reset[-2]"),
-    Mutant(
-        "eq. (21), 1 clock",
-        "p7_stalled",
-        IntervalAccumulator,
-        "~(opening | self.previous).any()",
-        "~self.previous.any()",
-    ),
-    Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
-    Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place == last - 1", "wrap = place == last - 2"),
-    Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
-    Mutant("M of 4", "pm_stalled", MovingSum, "(quiet == last)", "(quiet >= last - 1)"),
-    Mutant("M of 3", "pm_bounds", MDatapath, "numerator.eq(total + bounds.get(name, 0))", "numerator.eq(total)"),
-    Mutant("M of 4", "pm_known", MDatapath, "known.append(seen == spec.average)", "known.append(seen != 0)"),
-    Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
-    Mutant("Rairán", "pr_tick", Counters, "start = cycles - 2", "start = cycles - 1"),
-    Mutant("Rairán", "pr_update", Counters, "pulse & (late | due) | turns", "pulse & late | turns"),
-    Mutant("Rairán", "pr_estimate", Counters, "in_step.eq(opens)", "in_step.eq(0)", 32),
-    Mutant("Rairán", "pr_velocity", RairanDatapath, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
-    Mutant(
-        "Rairán", "pr_rest", Counters, "waits & ~self.rest & (self.c_dt == ", "waits & self.rest & (self.c_dt == ", 32
-    ),
-    Mutant("Rairán", "pr_range", Counters, "with m.If(full):", "with m.If(0):"),
-    Mutant("Rairán", "pr_flag", Counters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
+    timed("T", TTachometer, 2, 1),
+    timed("M/T", MTTachometer, 2, 1),
+    timed("T in ticks", TTachometer, 2, 2, timer="tick"),
+    timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),
 ]

@@ -1,0 +1,146 @@
+"""What each proof refutes."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from tachometry.hdl.alteration import AlterationDetector
+from tachometry.hdl.carried_reciprocal import CarriedReciprocal
+from tachometry.hdl.conditioner import InputConditioner
+from tachometry.hdl.decoder import QuadratureDecoder
+from tachometry.hdl.divider import Divider
+from tachometry.hdl.gap_timer import GapTimer
+from tachometry.hdl.glitch_filter import GlitchFilter
+from tachometry.hdl.interval import IntervalAccumulator
+from tachometry.hdl.m_method import Datapath as MDatapath
+from tachometry.hdl.m_method import MovingSum
+from tachometry.hdl.mt_method import Datapath as MTDatapath
+from tachometry.hdl.position_counter import PositionCounter
+from tachometry.hdl.pulse_counter import PulseCounter
+from tachometry.hdl.quotient_velocity import QuotientVelocity
+from tachometry.hdl.rairan import Counters
+from tachometry.hdl.rairan import Datapath as RairanDatapath
+from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.sampling_clock import SamplingClock
+from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.update_age import UpdateAge
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """`right` in the source of `box` made `wrong`: violates `refuted` within `steps` clocks in the proof's core."""
+
+    proof: str
+    refuted: str
+    box: Any
+    right: str
+    wrong: str
+    steps: int = 24
+
+
+MUTANTS = [
+    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
+    Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
+    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~self.level_b", "~change_b & self.level_b"),
+    Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
+    Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
+    Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
+    Mutant("x2, 7 clocks", "p3_overflow", PulseCounter, "above.eq(value > ", "above.eq(value >= "),
+    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
+    Mutant("eq. (21), 1 clock", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p4_range",
+        IntervalAccumulator,
+        "self.m_s == self._max_ticks - 1",
+        "self.m_s == self._max_ticks",
+    ),
+    Mutant("eq. (21), 1 clock", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
+    Mutant("eq. (21), 1 clock", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p5_numerator",
+        IntervalAccumulator,
+        "opening - self.previous + d1",
+        "opening - self.previous",
+    ),
+    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
+    Mutant("eq. (21), 1 clock", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
+    Mutant(
+        "eq. (17)",
+        "p5_velocity",
+        PipelinedScaler,
+        "= reciprocal.rounding(towards)",
+        "= reciprocal.rounding(towards) >> 1",
+    ),
+    Mutant(
+        "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
+    ),
+    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
+    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
+    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
+    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
+    Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
+    Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "clocks_since_reset[-1]", "clocks_since_reset[-2]"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p7_stalled",
+        IntervalAccumulator,
+        "~(opening | self.previous).any()",
+        "~self.previous.any()",
+    ),
+    Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
+    Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place == last - 1", "wrap = place == last - 2"),
+    Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
+    Mutant("M of 4", "pm_stalled", MovingSum, "(quiet == last)", "(quiet >= last - 1)"),
+    Mutant("M of 3", "pm_bounds", MDatapath, "numerator.eq(total + bounds.get(name, 0))", "numerator.eq(total)"),
+    Mutant("M of 4", "pm_known", MDatapath, "known.append(seen == spec.average)", "known.append(seen != 0)"),
+    Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
+    Mutant("Rairán", "pr_tick", Counters, "start = cycles - 2", "start = cycles - 1"),
+    Mutant("Rairán", "pr_update", Counters, "pulse & (late | due) | turns", "pulse & late | turns"),
+    Mutant("Rairán", "pr_estimate", Counters, "in_step.eq(opens)", "in_step.eq(0)", 32),
+    Mutant("Rairán", "pr_velocity", RairanDatapath, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
+    Mutant(
+        "Rairán", "pr_rest", Counters, "waits & ~self.rest & (self.c_dt == ", "waits & self.rest & (self.c_dt == ", 32
+    ),
+    Mutant("Rairán", "pr_range", Counters, "with m.If(full):", "with m.If(0):"),
+    Mutant("Rairán", "pr_flag", Counters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
+    Mutant("T", "pt_update", QuotientVelocity, "compared & (measuring | nearer)", "compared & nearer"),
+    Mutant(
+        "M/T in ticks", "pt_update", MTDatapath, "length == self._min_periods", "length == self._min_periods - 1", 32
+    ),
+    Mutant("T in ticks", "pt_spacing", Divider, "digits.eq(1)", "digits.eq(2)", 32),
+    Mutant("T", "pt_interval", GapTimer, "self.age.eq(1)", "self.age.eq(2)"),
+    Mutant(
+        "T in ticks", "pt_range", GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods", 32
+    ),
+    Mutant("T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant(
+        "M/T in ticks", "pt_velocity", MTDatapath, "way.eq(Mux(opens, 0, total))", "way.eq(Mux(ends, 0, total))", 32
+    ),
+    Mutant("T", "pt_flag", QuotientVelocity, "beyond | saturated", "beyond"),
+    Mutant("T in ticks", "pt_flag", QuotientVelocity, "beyond | saturated", "saturated"),
+    Mutant("T", "pt_saturated", QuotientVelocity, "self.velocity.eq(shown)", "self.velocity.eq(rounded)"),
+    Mutant("T in ticks", "pt_sinks", QuotientVelocity, "change.any(), change[-1])", "change.any(), 1)"),
+    Mutant("T in ticks", "pt_bound", QuotientVelocity, "compared & (measuring | nearer)", "compared & measuring", 32),
+    Mutant(
+        "T in ticks",
+        "pt_rest",
+        GapTimer,
+        "self.period & longest & ~self.count",
+        "self.period & longest & self.count",
+        40,
+    ),
+    Mutant(
+        "T in ticks", "pt_stalled", QuotientVelocity, "stalled.eq(self.stalled_in)", "stalled.eq(self.forced_in)", 32
+    ),
+    Mutant(
+        "T in ticks",
+        "pt_held",
+        QuotientVelocity,
+        "velocity_valid.eq(update)",
+        "velocity_valid.eq(update & measuring)",
+        32,
+    ),
+]

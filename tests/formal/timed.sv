@@ -1,0 +1,232 @@
+// Properties of the methods that divide counts by time: from the ticks and steps to the updates at the ports, by the
+// rules of docs/timed.md. The reference knows the clocks since the last count, and what was asked of a division, not how
+// it is done. `rst` may come at any time.
+// core_* show signals of the core to the lemmas, and its steps to the reference; prove.py connects them.
+module timed #(
+    parameter MT = 0,             // M/T and not T
+    parameter LATTICE = 0,        // timer periods are ticks
+    parameter T = 4,              // tick_cycles
+    parameter COUNT_WIDTH = 3,
+    parameter MAX_COUNT = 2,
+    parameter MAX_PERIODS = 16,   // timer periods in the maximum time
+    parameter MIN_PERIODS = 4,    // M/T: in T_c
+    parameter MAX_QUOTIENT = 4,
+    parameter SATURATES = 1,
+    parameter FLAGS = 1,          // there is an out_of_range
+    parameter INTEGER_BITS = 3,
+    parameter INTERVAL_WIDTH = 5,
+    parameter FRAC_BITS = 4,
+    parameter DIVISION_CLOCKS = 11
+) (
+    input clk, input rst, input a, input b
+);
+  localparam V = COUNT_WIDTH + FRAC_BITS, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS + 1, W = 8;
+  localparam P = LATTICE ? 1 : T, B = DIVISION_CLOCKS, LONG = MAX_PERIODS * (LATTICE ? T : 1), PHASES = LATTICE ? T : 1;
+  wire tick, velocity_valid, forced, stalled;
+  wire signed [COUNT_WIDTH-1:0] pulse_count;
+  wire signed [V-1:0] velocity;
+  wire [I-1:0] interval;
+  tachometer core (
+      .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
+      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
+  );
+  wire core_running, core_rounds, core_compared, core_measuring, core_forced, core_stalled, core_opened;
+  wire core_negative, core_longest;
+  wire signed [1:0] core_step;
+  wire [$clog2(MAX_PERIODS+1)-1:0] core_age;
+  wire signed [I:0] core_remainder;
+  wire [Q-1:0] core_left;
+  wire [N:0] core_digits;
+  wire [I-1:0] core_by;
+  wire signed [N:0] core_rounded;
+
+  // The port that is not always there.
+  wire beyond;
+  generate
+    if (FLAGS) begin : flagged
+      wire out_of_range;
+      assign beyond = out_of_range != 0;
+    end else assign beyond = 0;
+  endgenerate
+
+  // What a timer period counted, as late as `tick`.
+  wire moved, back;
+  delay #(2, 2) delayed_steps (clk, rst, {core_step != 0, core_step < 0}, {moved, back});
+  wire period = LATTICE ? tick : 1;
+  wire signed [COUNT_WIDTH-1:0] size = LATTICE ? pulse_count : !moved ? 0 : back ? -1 : 1;
+  wire count = period && size != 0, negative = size < 0;
+  wire many = LATTICE && !MT && (size > 1 || size < -1);
+
+  // Clocks since the last count, after reset as if for ever; timer periods since the last count or forced 0.
+  reg [W-1:0] idle = LONG + B, age = 1, length = 1;
+  reg was_negative = 0;
+  wire opened = idle < LONG;
+  wire overdue = period && !count && age == MAX_PERIODS;
+  always @(posedge clk)
+    if (rst) begin
+      idle <= LONG + B;
+      age <= 1;
+      was_negative <= 0;
+    end else begin
+      idle <= count ? 0 : idle == LONG + B ? idle : idle + 1;
+      if (period) age <= count || overdue ? 1 : age + 1;
+      if (count) was_negative <= negative;
+    end
+
+  // The window of M/T: its length, and its way so far, in counts.
+  reg signed [W-1:0] way = 0;
+  wire signed [W-1:0] pair = MT && LATTICE ? size : negative != was_negative ? 0 : negative ? -1 : 1;
+  wire closes = MT && count && opened && length > MIN_PERIODS;
+  always @(posedge clk)
+    if (rst) begin
+      way <= 0;
+      length <= 1;
+    end else begin
+      if (period) length <= closes || !opened || overdue ? 1 : length + 1;
+      if (count) way <= closes || !opened ? 0 : way + pair;
+    end
+
+  // The division under way: clocks since it began, whether it is of a measurement, its distance and time.
+  reg [4:0] since = 0;
+  reg measuring = 0, silent = 0, still = 0, many_now = 0;
+  reg signed [I+Q:0] distance = 0;
+  reg [I-1:0] times = 1;
+  wire free = since == 0 || since == B || !measuring;
+  wire measured = MT ? closes : count && free && (opened || many);
+  wire sinks = tick && !count && !overdue && since == 0;
+  wire signed [W-1:0] pairs = MT ? way + pair : many ? (negative ? -1 : 1) : pair;
+  always @(posedge clk)
+    if (rst) since <= 0;
+    else begin
+      since <= overdue || measured || sinks ? 1 : since == 0 || since == B ? 0 : since + 1;
+      if (overdue || measured || sinks) begin
+        measuring <= overdue || measured;
+        silent <= !count;
+        still <= !count && !opened;
+        many_now <= many;
+        distance <= overdue ? 0 : measured ? P * pairs : velocity < 0 ? -P : P;
+        times <= measured ? (MT ? length : many ? 1 : age) : age;
+      end
+    end
+
+  // The one that was due in the last clock, and what was shown before.
+  reg due = 0, due_measuring = 0, due_silent = 0, due_still = 0, due_many = 0;
+  reg signed [I+Q:0] due_distance = 0;
+  reg [I-1:0] due_times = 1;
+  reg [V+I+2:0] held = 0;
+  reg signed [V-1:0] past = 0;
+  reg [4:0] spacing = B;  // clocks since the last update
+  wire [V+I+2:0] outputs = {velocity, interval, forced, stalled, beyond};
+  always @(posedge clk)
+    if (rst) begin
+      {due, held, past} <= 0;
+      spacing <= B;
+    end else begin
+      spacing <= velocity_valid ? 1 : spacing == B ? B : spacing + 1;
+      due <= since == B;
+      {due_measuring, due_silent, due_still, due_many} <= {measuring, silent, still, many_now};
+      due_distance <= distance;
+      due_times <= times;
+      held <= outputs;
+      past <= velocity;
+    end
+
+  // 2^f x + 1/2 = (2^(f+1) distance + times) / (2 times), rounded down, and the largest that can be shown.
+  wire signed [N+I+2:0] wanted = (due_distance <<< (FRAC_BITS + 1)) + $signed({1'b0, due_times});
+  wire signed [N+I+2:0] divisor = $signed({1'b0, due_times, 1'b0}), have = divisor * velocity;
+  localparam signed [V-1:0] LIMIT = MAX_COUNT << FRAC_BITS;
+  wire fits = !SATURATES || (wanted < divisor * (LIMIT + 1) && wanted >= -divisor * LIMIT);
+  wire signed [N+1:0] shown = !SATURATES ? core_rounded : core_rounded > LIMIT ? LIMIT
+      : core_rounded < -LIMIT ? -LIMIT : core_rounded;
+
+  // Lemmas: what the induction needs to know of the state. Of a division: its distance, shifted, is the remainder and
+  // the divisor times the digits so far, 1 or -1 each.
+  wire [4:0] j = since - 1;
+  wire signed [N+I+1:0] all = distance <<< (FRAC_BITS + 1);
+  wire signed [N+I+1:0] taken = all >>> (N - j);
+  wire signed [N+1:0] digits = $signed({1'b0, core_digits, 1'b0}) - (3 <<< j) + 1;
+  wire signed [N+I+1:0] passed = $signed({1'b0, times}) * digits;
+  wire signed [N+I+2:0] asked = all + $signed({1'b0, times}), twice = $signed({1'b0, times, 1'b0});
+  wire signed [N+I+2:0] found = twice * core_rounded;
+  wire signed [W+3:0] most = MAX_QUOTIENT * times, farthest = (LATTICE ? MAX_COUNT : 1) * (length - 1);
+  reg [$clog2(T):0] phase = PHASES;  // of the timer period, 1 to PHASES; waits for the first tick
+  always @(posedge clk) phase <= rst ? PHASES : period ? 1 : phase == PHASES ? PHASES : phase + 1;
+  always @* begin
+    lemma_idle: assert (idle <= LONG + B && age >= 1 && age <= MAX_PERIODS);
+    lemma_age: assert (!opened || (LATTICE ? idle + 1 == (age - 1) * T + phase : age == idle + 1));
+    lemma_timer: assert (core_age == age && core_longest == (age == MAX_PERIODS) && core_opened == opened
+        && core_negative == was_negative);
+    lemma_since: assert (since <= B && since <= spacing + !velocity_valid && spacing <= B);
+    lemma_free: assert (since == 0 || !measuring || since >= (age - 1) * PHASES + phase);
+    lemma_running: assert (core_running == (since >= 1 && since <= N + 1) && core_rounds == (since == N + 2)
+        && core_compared == (since == B));
+    lemma_kept: assert (since == 0 || (core_measuring == measuring && core_forced == silent && core_stalled == still
+        && core_by == times));
+    lemma_asked: assert (since == 0 || (times >= 1 && distance <= most && -distance <= most));
+    lemma_times: assert (times <= MAX_PERIODS + (MT ? MIN_PERIODS : 0));
+    lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
+    lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
+    lemma_left: assert (!core_running || core_left == ((distance << j) & ((1 << Q) - 1)));
+    lemma_digits: assert (!core_running || core_digits >> j == 1);
+    lemma_remainder: assert (!core_running || (core_remainder < $signed({1'b0, times})
+        && core_remainder >= -$signed({1'b0, times})));
+    lemma_quotient: assert (!core_running || taken == core_remainder + passed);
+    lemma_rounded: assert (since < N + 2 || (found <= asked && asked < found + twice));
+    lemma_sinks: assert (since == 0 || measuring || (distance == (velocity < 0 ? -P : P) && silent));
+    lemma_sunk: assert (!due || due_measuring || (due_distance == (past < 0 ? -P : P) && due_silent));
+    lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
+    lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
+    lemma_still: assert (since == 0 || measuring || !still || velocity == 0);
+    lemma_due_still: assert (!due || due_measuring || !due_still || past == 0);
+    lemma_limit: assert (velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+2-:V]));
+  end
+  generate
+    if (FLAGS) begin : flag
+      wire core_beyond;
+      always @* lemma_beyond: assert (since == 0 || core_beyond == many_now);
+    end
+    if (LATTICE) begin : lattice
+      wire signed [$clog2(T-1):0] core_window;
+      reg [$clog2(T):0] clock = 0;
+      reg ticked = 0;
+      always @(posedge clk) begin
+        clock <= rst || clock == T - 1 ? 0 : clock + 1;
+        ticked <= !rst && (ticked || tick);
+      end
+      always @* begin
+        lemma_window: assert (clock < T && core_window == T - 2 - $signed({1'b0, clock}));
+        lemma_phase: assert (phase >= 1 && phase <= T && (!tick || phase == T) && (ticked || !opened)
+            && (!ticked || (phase == (clock + T - 2) % T + 1 && tick == (phase == T))));
+        lemma_size: assert (pulse_count <= MAX_COUNT && -pulse_count <= MAX_COUNT);
+      end
+    end
+    if (MT) begin : mt
+      wire [I-1:0] core_length;
+      wire core_late;
+      wire signed [I+Q:0] core_way;
+      always @* begin
+        lemma_length: assert (length >= 1 && (!opened || (length <= MIN_PERIODS + age && core_length == length
+            && core_late == (length > MIN_PERIODS))));
+        lemma_unopened: assert (opened || length == 1);
+        lemma_core_length: assert (opened || age == 1 || (core_length == 1 && !core_late));
+        lemma_way: assert (!opened || (core_way == P * way && way <= farthest && -way <= farthest));
+        lemma_window_free: assert (since == 0 || !measuring || since >= (length - 1) * PHASES + phase);
+      end
+    end
+  endgenerate
+  always @* begin
+    pt_update: assert (due && due_measuring ? velocity_valid : !velocity_valid || due);
+    pt_spacing: assert (!velocity_valid || spacing >= B);
+    pt_interval: assert (!velocity_valid || (interval == due_times && forced == due_silent));
+    pt_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_PERIODS + (MT ? MIN_PERIODS : 0)));
+    pt_velocity: assert (!velocity_valid || (SATURATES && beyond) || (have <= wanted && wanted < have + divisor));
+    pt_flag: assert (!velocity_valid || beyond == (FLAGS && (!fits || due_many)));
+    pt_saturated: assert (fits || !velocity_valid || velocity == (due_distance < 0 ? -LIMIT : LIMIT));
+    pt_sinks: assert (!velocity_valid || due_measuring || (forced && !stalled
+        && (past < 0 ? velocity <= 0 && velocity > past : velocity >= 0 && velocity < past)));
+    pt_bound: assert (!due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
+    pt_rest: assert (idle < LONG + B || velocity == 0);
+    pt_stalled: assert (!velocity_valid || stalled == due_still);
+    pt_held: assert (velocity_valid || outputs == held);
+  end
+endmodule
