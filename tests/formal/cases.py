@@ -218,12 +218,17 @@ _WINDOW_OF_MT_PROBES = {
 
 
 def timed(
-    name: str, method: type[TTachometer | MTTachometer], tick_cycles: int, max_count: int, **options: Any
+    name: str,
+    method: type[TTachometer | MTTachometer],
+    tick_cycles: int,
+    max_count: int,
+    max_ticks: int = 4,
+    **options: Any,
 ) -> Proof:
     """PT: the T and the M/T method, from steps and ticks to updates."""
     spec = method(
         encoder=Encoder(1, 4),
-        timing=Timing(4 * tick_cycles, tick_cycles, 4),
+        timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),
         max_speed=Speed.parse(f"{max_count}rev/s"),
         frac_bits=4,
         position_width=8,
@@ -285,6 +290,6 @@ PROOFS = [
     rairan("Rairán", 3, 4, 2),
     timed("T", TTachometer, 2, 1),
     timed("M/T", MTTachometer, 2, 1),
-    timed("T in ticks", TTachometer, 2, 2, timer="tick"),
+    timed("T in ticks", TTachometer, 2, 2, 12, timer="tick"),
     timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),
 ]

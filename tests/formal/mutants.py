@@ -112,9 +112,7 @@ MUTANTS = [
     ),
     Mutant("T in ticks", "pt_spacing", Divider, "digits.eq(1)", "digits.eq(2)", 32),
     Mutant("T", "pt_interval", GapTimer, "self.age.eq(1)", "self.age.eq(2)"),
-    Mutant(
-        "T in ticks", "pt_range", GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods", 32
-    ),
+    Mutant("T", "pt_range", GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods", 32),
     Mutant("T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
     Mutant(
         "M/T in ticks", "pt_velocity", MTDatapath, "way.eq(Mux(opens, 0, total))", "way.eq(Mux(ends, 0, total))", 32
@@ -125,22 +123,20 @@ MUTANTS = [
     Mutant("T in ticks", "pt_sinks", QuotientVelocity, "change.any(), change[-1])", "change.any(), 1)"),
     Mutant("T in ticks", "pt_bound", QuotientVelocity, "compared & (measuring | nearer)", "compared & measuring", 32),
     Mutant(
-        "T in ticks",
+        "T",
         "pt_rest",
         GapTimer,
         "self.period & longest & ~self.count",
         "self.period & longest & self.count",
         40,
     ),
+    Mutant("T", "pt_stalled", QuotientVelocity, "stalled.eq(self.stalled_in)", "stalled.eq(self.forced_in)", 32),
     Mutant(
-        "T in ticks", "pt_stalled", QuotientVelocity, "stalled.eq(self.stalled_in)", "stalled.eq(self.forced_in)", 32
-    ),
-    Mutant(
-        "T in ticks",
+        "T",
         "pt_held",
         QuotientVelocity,
         "velocity_valid.eq(update)",
-        "velocity_valid.eq(update & measuring)",
+        "velocity_valid.eq(update & ~forced)",
         32,
     ),
 ]
