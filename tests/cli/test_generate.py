@@ -158,7 +158,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
             "--max-tick-period must be a whole number of clocks, not 33ns",
         ),
         ("--ppr 9 --external-tick --tick 1", "--tick, in clocks, must be at least 2 with an external tick, not 1"),
-        ("--ppr 9 --foo", "No such option '--foo'. (see tachometry generate --help)"),
+        ("--ppr 9 --qqq", "No such option '--qqq'. (see tachometry generate --help)"),
         ("--ppr 9 more", "Got unexpected extra argument (more)"),
     ],
 )
