@@ -114,7 +114,7 @@ def test_in_simulator() -> None:
         test_module=FILE.stem,
         build_dir=folder,
         test_dir=folder,
-        results_xml="results.xml",
+        results_xml=str(folder / "results.xml"),
         extra_env={"PYTHONPATH": f"{FILE.parent}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"},
     )
     assert get_results(report) == (1, 0), "core and golden model differ"

@@ -39,11 +39,11 @@ def generate(folder: Path, *words: str) -> int:
     return stop.value.code
 
 
-def play(folder: Path, simulator: str = "icarus") -> str:
+def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
     """What the bench says, empty if it passes; tachometry is not there."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "COCOTB"))}
     done = subprocess.run(
-        [sys.executable, folder / "test_spindle.py"],
+        [sys.executable, *more, folder / "test_spindle.py"],
         cwd=folder,
         env=environment | {"SIM": simulator, "CXXFLAGS": "-O0"},
         capture_output=True,
@@ -61,6 +61,11 @@ def play(folder: Path, simulator: str = "icarus") -> str:
 def test_passes_in_icarus(case: str, tmp_path: Path) -> None:
     assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
     assert play(tmp_path) == ""
+
+
+def test_passes_in_pytest(tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split()) == 0
+    assert play(tmp_path, "icarus", "-m", "pytest", "-s") == ""
 
 
 @pytest.mark.parametrize("case", ["s", "mt"])
