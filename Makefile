@@ -56,8 +56,9 @@ test: $(VENV)/.test lint icarus ## lint, types and all tests
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m formal
 
-bench: $(VENV)/.run ## speed of the golden models beside the simulator, in one run, written to docs/bench.md
+bench: $(VENV)/.test ## speed of the golden models and of the engines, in one run, written to docs/bench.md
 	$(BIN)/python bench/golden.py -o docs/bench.md
+	$(BIN)/python bench/engines.py -o docs/bench.md
 
 compare: $(VENV)/.run ## all methods and what others use in several situations, written to docs/compare.md
 	$(BIN)/python bench/compare.py

@@ -84,12 +84,12 @@ class Cxxrtl(CompiledEngine):
 
         def make(folder: Path) -> Path:
             text = translate(netlist)
-            return build.compile_library(design.source(text + _model(design, text)), folder, f"-I{headers()}")
+            return build.compile_library(design.source(text + model_of(design, text)), folder, f"-I{headers()}")
 
         return build.cached(key, ".so", make)
 
 
-def _model(design: Design, text: str) -> str:
+def model_of(design: Design, text: str) -> str:
     """The struct `Model` for what CXXRTL has written."""
     if "bool converged = true;" not in text:
         raise NotImplementedError("a core must settle in one evaluation")

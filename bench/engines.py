@@ -1,0 +1,276 @@
+"""Speed of the engines on the same edges in the same run, and what makes the compiled one fast: part of docs/bench.md.
+
+Times are processor time, so that what else runs on the machine matters little; still only the ratios mean something.
+"""
+
+import argparse
+import ctypes
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from amaranth.back import cxxrtl as amaranth_cxxrtl
+from amaranth.back import rtlil
+from golden import BEGIN, MOTION, part_of
+from rich.console import Console
+from rich.table import Table
+
+from tachometry.hdl import Tachometer
+from tachometry.sim import build, golden
+from tachometry.sim.compiled import Design
+from tachometry.sim.cxxrtl import headers, model_of, translate
+from tachometry.sim.encoder import VirtualEncoder
+from tachometry.sim.engine import Engine, driven_pins
+from tachometry.sim.engines import pick
+from tachometry.sim.motion import Vibration, parse_motion
+from tachometry.sim.recording import PinTrace
+from tachometry.sim.results import Run, compare
+from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
+
+SLOW = 30_000  # clocks of pysim
+FAST = 12_000_000  # clocks of the others
+REPEATS = 2
+
+_HEADING = "\n## Engines\n"
+_PAGE = """
+The same motion through `--engine`: pysim has {slow:,} clocks of it, the compiled engines {fast:,}, the bare loop the
+same: a C++ loop around the same CXXRTL module, without debug information, that plays the same changes with `step()`
+on both levels of the clock, adds up the outputs at the strobes, and does nothing else.
+{repeats} runs, the fastest counts; a core that is new takes some seconds more, once. Every run is compared with the
+golden model, bit by bit. Clocks per second, in processor time:
+
+{speeds}
+
+All ten seconds, {clocks:,} clocks, by cxxrtl, compared with the golden model in every bit of every update:
+
+{whole}
+
+What makes it fast, each with what stands above it, on the S method:
+
+{steps}
+
+- Debug information keeps every value of every clock in memory; without it the compiler keeps what it needs.
+- `step()` on both levels of the clock settles the core twice; all flip-flops take the rising edge, so that one
+  evaluation does, with the level and the reset as constants.
+- A commit asks of every flip-flop whether it has changed; here it is a copy, and of a model that is local to the loop
+  hardly that.
+- There are no black boxes. Values of more than 32 bits are pairs of words: they remain.
+- Room for rows is asked for between clocks, never within one: a clock that may be left half done keeps alive what it
+  has worked out, which cost a third.
+- The engine is slower than the fastest loop, whose model begins and ends with it: a call ends every 50 ms, for progress
+  and Ctrl-C, and the state outlives it; then there are the rows, and the elaboration of the core and its look-up in the
+  cache, about a tenth of a second of each run.
+"""
+
+# The loops that are measured; each counts the clocks with a strobe.
+_LOOPS = """
+#define LOOP ENTRY __attribute__((flatten))
+#define ADD if (model.strobe()) { n++; model.outputs(row); for (int64_t value : row) sum += value; }
+#define CLOCKS(...) int64_t n = 0, next = 0, sum = 0, row[N_COLUMNS - 1]; \\
+  for (int64_t clock = 0; clock < n_clocks; clock++) { \\
+    if (next < n_changes && at[next] == clock) model.pins(level[next++]); __VA_ARGS__ } return n + (sum << 32);
+#define ARGUMENTS const int64_t *at, const uint8_t *level, int64_t n_changes, int64_t n_clocks
+LOOP int64_t twice(ARGUMENTS) {
+  std::unique_ptr<Model> home(new Model);
+  Model &model = *home;
+  CLOCKS(model.top.p_clk.set<bool>(false); model.top.step(); ADD
+         model.top.p_clk.set<bool>(true); model.top.step();)
+}
+LOOP int64_t once(ARGUMENTS) {
+  std::unique_ptr<Model> home(new Model);
+  Model &model = *home;
+  CLOCKS(model.settle(); ADD model.top.p_top::commit();)
+}
+LOOP int64_t copied(ARGUMENTS) {
+  std::unique_ptr<Model> home(new Model);
+  Model &model = *home;
+  CLOCKS(model.settle(); ADD model.edge();)
+}
+LOOP int64_t bare(ARGUMENTS) {
+  Model model;
+  CLOCKS(model.settle(); ADD model.edge();)
+}
+"""
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Clocks per second of one core."""
+
+    core: str
+    pysim: float
+    verilator: float
+    bare: float
+    cxxrtl: float
+
+    @property
+    def cells(self) -> list[str]:
+        """The row of the table."""
+        rates = (self.pysim, self.verilator, self.bare, self.cxxrtl)
+        ratios = (self.cxxrtl / self.pysim, self.cxxrtl / self.verilator, self.cxxrtl / self.bare)
+        return [self.core, *(f"{rate:.3g}" for rate in rates), *(f"{ratio:.3g}" for ratio in ratios)]
+
+
+SPEED_COLUMNS = ["core", "pysim", "verilator", "bare loop", "cxxrtl", "÷ pysim", "÷ verilator", "÷ bare loop"]
+WHOLE_COLUMNS = ["core", "cxxrtl", "golden model", "ratio", "updates", "mismatches"]
+STEP_COLUMNS = ["loop", "clocks/s"]
+
+
+def seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """The shortest processor time of some runs."""
+    times = []
+    for _ in range(repeats):
+        begun = time.process_time()
+        work()
+        times.append(time.process_time() - begun)
+    return min(times)
+
+
+def loops(spec: TachometerSpec, trace: PinTrace, *, debug: bool = False) -> Any:
+    """The library with the loops; `debug` with what Amaranth's `cxxrtl.convert` writes as it stands."""
+    design = Design(spec, driven_pins(spec, trace))
+    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+        text = (
+            amaranth_cxxrtl.convert(Tachometer(spec), name="top", emit_src=False)
+            if debug
+            else translate(rtlil.convert(Tachometer(spec), name="top", emit_src=False))
+        )
+    source = design.source(text + model_of(design, text)) + _LOOPS
+    key = build.digest("bench", source, build.compiler(), build.version(build.compiler()), build.FLAGS)
+    made = build.cached(key, ".so", lambda folder: build.compile_library(source, folder, f"-I{headers()}"))
+    return ctypes.CDLL(str(made))
+
+
+def strobes(library: Any, name: str, trace: PinTrace) -> int:
+    """Run a loop of a library: clocks with a strobe."""
+    at, level = np.ascontiguousarray(trace.clock, dtype=np.int64), np.ascontiguousarray(trace.level)
+    call = getattr(library, name)
+    call.restype = ctypes.c_int64
+    pointers = (ctypes.c_void_p(at.ctypes.data), ctypes.c_void_p(level.ctypes.data))
+    found: int = call(*pointers, ctypes.c_int64(len(at)), ctypes.c_int64(trace.n_clocks))
+    return found
+
+
+def checked(engine: Engine, spec: TachometerSpec, trace: PinTrace) -> tuple[Run, float]:
+    """Run an engine: what it gave, and its processor time; RuntimeError if the golden model disagrees."""
+    begun = time.process_time()
+    run = engine.run(spec, trace)
+    took = time.process_time() - begun
+    wrong, first = compare(golden.run(spec, trace), run)
+    if wrong:
+        raise RuntimeError(f"{engine.name}, {spec.method}: hardware and golden model disagree: {first[0]}")
+    return run, took
+
+
+def speed(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW, fast: int = FAST) -> Speed:
+    """Measure one core on all engines."""
+    parts = {engine: part_of(trace, BEGIN, slow if engine == "pysim" else fast) for engine in ENGINES}
+    rates = {}
+    for engine, part in parts.items():
+        chosen = pick(engine)
+        run, took = checked(chosen, spec, part)
+        if engine != "pysim":  # the first run may have built the core
+            took = seconds(lambda: chosen.run(spec, part))  # noqa: B023
+        rates[engine] = part.n_clocks / took
+    library, part = loops(spec, trace), parts["cxxrtl"]
+    ticks = strobes(library, "twice", part) & 0xFFFFFFFF
+    clocks = [run.ticks.clock, run.updates.clock, run.index.clock, run.errors, run.tick_errors]
+    if ticks != len(np.unique(np.concatenate(clocks))):
+        raise RuntimeError(f"{name}: the bare loop sees {ticks} strobes, which are not those of cxxrtl")
+    bare = part.n_clocks / seconds(lambda: strobes(library, "twice", part))
+    return Speed(name, rates["pysim"], rates["verilator"], bare, rates["cxxrtl"])
+
+
+ENGINES = ("pysim", "verilator", "cxxrtl")
+
+
+def whole(name: str, spec: TachometerSpec, trace: PinTrace) -> list[str]:
+    """All of the motion on cxxrtl and on the golden model."""
+    engine = pick("cxxrtl")
+    engine.run(spec, part_of(trace, BEGIN, 1000))  # the core is built
+    begun = time.process_time()
+    run = engine.run(spec, trace)
+    took = time.process_time() - begun
+    model = seconds(lambda: golden.run(spec, trace))
+    wrong, _ = compare(golden.run(spec, trace), run)
+    cells = (f"{took:.2g} s", f"{model * 1e3:.0f} ms", f"{took / model:.3g}")
+    return [name, *cells, f"{len(run.updates.clock):,}", str(wrong)]
+
+
+def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[list[str]]:
+    """The loops, from the one of the manual to the bare one of the table above."""
+    part = part_of(trace, BEGIN, n_clocks)
+    with_debug, without = loops(spec, part, debug=True), loops(spec, part)
+    rows = [
+        ("`cxxrtl.convert` as it stands, `step()` on both levels of the clock", with_debug, "twice"),
+        ("without debug information", without, "twice"),
+        ("one evaluation a clock, reset and edge as constants", without, "once"),
+        ("flip-flops copied unasked", without, "copied"),
+        ("model local to the loop, which it does not outlive", without, "bare"),
+    ]
+    if len({strobes(library, loop, part) for _, library, loop in rows}) > 1:
+        raise RuntimeError("the loops do not see the same strobes")
+    engine = pick("cxxrtl")
+    engine.run(spec, part)
+    took = {name: seconds(lambda: strobes(library, loop, part)) for name, library, loop in rows}  # noqa: B023
+    took["the engine through its interface"] = seconds(lambda: engine.run(spec, part))
+    return [[name, f"{part.n_clocks / each:.3g}"] for name, each in took.items()]
+
+
+def markdown(columns: list[str], rows: list[list[str]]) -> str:
+    """A table."""
+    lines = [columns, ["---", *["---:"] * (len(columns) - 1)], *rows]
+    return "\n".join(f"| {' | '.join(row)} |" for row in lines)
+
+
+def show(columns: list[str], rows: list[list[str]]) -> None:
+    """The same on the terminal."""
+    table = Table(box=None, header_style="")
+    for column in columns:
+        table.add_column(column, justify="left" if column == columns[0] else "right")
+    for row in rows:
+        table.add_row(*row)
+    console = Console()
+    console.print(table)
+    console.print()
+
+
+def main() -> None:
+    """Measure, print, and replace this part of the page if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/bench.md")
+    output = parser.parse_args().output
+    encoder = VirtualEncoder(500, jitter=0.02, vibration=Vibration(1e-3, 50), seed=1)
+    trace = encoder.record(parse_motion(MOTION)).recording.place(48_000_000)
+    common = {"encoder": Encoder(500), "timing": Timing.parse("48MHz", "20us", "10ms")}
+    cores = {name: method(**common) for name, method in METHODS.items()}
+    speeds = [speed(name, spec, trace).cells for name, spec in cores.items()]
+    show(SPEED_COLUMNS, speeds)
+    entire = [whole(name, spec, trace) for name, spec in cores.items()]
+    show(WHOLE_COLUMNS, entire)
+    loop = steps(cores["s"], trace)
+    show(STEP_COLUMNS, loop)
+    if output is None:
+        return
+    part = _PAGE.format(
+        slow=SLOW,
+        fast=FAST,
+        repeats=REPEATS,
+        clocks=trace.n_clocks,
+        speeds=markdown(SPEED_COLUMNS, speeds),
+        whole=markdown(WHOLE_COLUMNS, entire),
+        steps=markdown(STEP_COLUMNS, loop),
+    )
+    before = output.read_text(encoding="utf-8").split(_HEADING)[0] if output.exists() else "# Speed\n"
+    beside = output.with_name(f".{output.name}.part")
+    beside.write_text(before + _HEADING + part, encoding="utf-8")
+    beside.replace(output)
+
+
+if __name__ == "__main__":
+    main()

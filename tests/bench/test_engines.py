@@ -1,0 +1,32 @@
+"""The benchmark of the engines measures what it says."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from support.script import load
+
+from tachometry.sim.encoder import VirtualEncoder
+from tachometry.sim.motion import parse_motion
+from tachometry.sim.recording import PinTrace
+from tachometry.spec import Encoder, STachometer, Timing
+
+sys.path.append(str(Path(__file__).parents[2] / "bench"))  # it takes the motion from its neighbour
+bench = load("engines")
+SPEC = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"))
+
+
+@pytest.fixture
+def trace(monkeypatch: pytest.MonkeyPatch) -> PinTrace:
+    monkeypatch.setattr(bench, "BEGIN", 100_000)
+    return VirtualEncoder(500).record(parse_motion("constant:300rad/s:20ms")).recording.place(48_000_000)
+
+
+def test_all_engines_and_the_bare_loop_see_the_same(trace: PinTrace) -> None:
+    speed = bench.speed("s", SPEC, trace, slow=3000, fast=100_000)
+    assert min(speed.pysim, speed.verilator, speed.bare, speed.cxxrtl) > 0
+    assert len(speed.cells) == len(bench.SPEED_COLUMNS)
+
+
+def test_every_step_sees_the_same(trace: PinTrace) -> None:
+    assert len(bench.steps(SPEC, trace, n_clocks=100_000)) == 6
