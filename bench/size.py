@@ -85,6 +85,7 @@ BARS = {
 }
 M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
 RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
+ADAPTIVE_BARS = {"ECP5": {"COMB": 700, "MULT": 0, "Fmax": 100}}
 TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
 EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
@@ -129,6 +130,13 @@ CONFIGURATIONS = (
     Configuration("m", "M method", MTachometer(**COMMON), M_BARS, is_option=False),
     Configuration("m-10", "M method, mean of 10 ticks", MTachometer(**COMMON, average=10), M_BARS, is_option=False),
     Configuration("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS, is_option=False),
+    Configuration(
+        "rairan-adaptive",
+        "adaptive dt, 1 %, 1000 rad/s",
+        RairanTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), adaptive=Fraction(1, 100)),
+        ADAPTIVE_BARS,
+        is_option=False,
+    ),
     Configuration(
         "rairan-exact",
         "Table 1 to the letter, n3",

@@ -1,5 +1,6 @@
 """The method of Rairán 2013."""
 
+from collections.abc import Callable
 from typing import Any
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
@@ -8,6 +9,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bounds import bound_members
+from tachometry.hdl.dt_shift import DtShift
 from tachometry.spec import RairanTachometer
 
 
@@ -42,6 +44,8 @@ class Counters(wiring.Component):
         Of the last update: it came without a count; and it is that of the maximum time.
     n_ep1, n_dt1 : Out
         Only with `paper_exact`: as in Table 1.
+    shift : Out
+        Only if dt is adaptive: n is of dt·2^shift.
     loose, unsynced, known : Out(1)
         Only with bounds: n says nothing of the least speed; what it measures did not begin in step with dt; there has
         been a count that dt was in step with.
@@ -55,26 +59,32 @@ class Counters(wiring.Component):
                 "last": Out(1),
                 "beyond": Out(1),
                 "update": Out(1),
-                "n": Out(range(max(spec.max_count, spec.timing.max_ticks) + 1)),
+                "n": Out(range(max(spec.max_pulse_count, spec.timing.max_ticks) + 1)),
                 "high": Out(1),
                 "backward": Out(1),
                 "forced": Out(1),
                 "stalled": Out(1),
                 **(_ports(spec) if spec.paper_exact else {}),
+                **({"shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
                 **({name: Out(1) for name in ("loose", "unsynced", "known")} if spec.bounds else {}),
             }
         )
         # Cep − 1, and whether there is any.
-        self.c_more = Signal(range(max(spec.max_count, 2)))
+        self.c_more = Signal(range(max(spec.max_pulse_count, 2)))
         self.any = Signal()
         self.c_dt = Signal(range(spec.timing.max_ticks + 1))
         self.rest = Signal()  # it has come to its end
+        self.dt = DtShift(spec, len(self.n)) if spec.adaptive else None
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         pulse, opens = Signal(), Signal()
         late = Signal()  # dt has ended since the last count, Cdt ≠ 0
         due = self._clock(m, opens)
+        if self.dt is not None:
+            m.submodules.dt = self.dt
+            m.d.comb += [self.dt.nominal.eq(due), self.dt.opens.eq(opens)]
+            due = self.dt.last
         m.d.comb += pulse.eq(self.step.any())
         self._count(m, pulse, opens)
         if self._spec.paper_exact:
@@ -97,8 +107,17 @@ class Counters(wiring.Component):
             m.d.sync += [moved.eq(1), self.backward.eq(self.step[1]), late.eq(0)]
         with m.Elif(self.last):
             m.d.sync += late.eq(1)
+        if self.dt is not None:
+            # With the decay it is low from the second dt on.
+            several, stays = self.c_more.any(), self.high & (self._spec.bound_decay | (self.c_dt == 1))
+            measured = Mux(late, Mux(stays, self.n, self.c_dt), Mux(several, self.c_more, 1))
+            m.d.comb += [self.dt.turns.eq(turns), self.dt.high.eq(Mux(late, stays, several)), self.dt.n.eq(measured)]
         self._update(m, pulse=pulse, opens=opens, turns=turns)
         return m
+
+    def _of_dt(self, constant: Callable[[int], int]) -> Value | int:
+        """A constant that depends on k of dt·2^k."""
+        return constant(0) if self.dt is None else self.dt.of(constant)
 
     def _clock(self, m: Module, opens: Signal) -> Value:
         """Count dt from where a window opens, and on; whether it is over."""
@@ -116,7 +135,9 @@ class Counters(wiring.Component):
     def _count(self, m: Module, pulse: Signal, opens: Signal) -> None:
         """Cep, which a window that a count opens begins with that count, and Cdt since the last count."""
         c_more, c_dt, most = self.c_more, self.c_dt, self._spec.max_count
-        full = self.any & (c_more == most - 1) if most < self._spec.timing.tick_cycles else Const(0)
+        full: Value = Const(0)
+        if most < self._spec.timing.tick_cycles:
+            full = self.any & (c_more == self._of_dt(lambda k: (most << k) - 1))
         with m.If(pulse):
             m.d.sync += self.any.eq(1)
             with m.If(full):
@@ -126,11 +147,15 @@ class Counters(wiring.Component):
         with m.If(self.last):
             m.d.sync += [c_more.eq(0), self.any.eq(0), self.beyond.eq(0)]
             with m.If(~self.rest):
-                m.d.sync += [c_dt.eq(c_dt + 1), self.rest.eq(self.c_dt == self._spec.timing.max_ticks - 1)]
+                m.d.sync += [c_dt.eq(c_dt + 1), self.rest.eq(self._is_longest())]
         with m.If(opens):
             m.d.sync += [c_more.eq(0), self.any.eq(1), self.beyond.eq(0)]
         with m.If(pulse & ~self.last if self._spec.paper_exact else pulse):
             m.d.sync += [c_dt.eq(0), self.rest.eq(0)]
+
+    def _is_longest(self) -> Value:
+        """Cdt is one less than the maximum time has dt."""
+        return self.c_dt == self._of_dt(lambda k: self._spec.max_dt(k) - 1)
 
     def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal) -> None:
         """What a count or the end of dt makes of the estimate."""
@@ -145,6 +170,11 @@ class Counters(wiring.Component):
             m.d.sync += known.eq(1)
         waited = self.c_dt + in_step
         m.d.comb += waits.eq(self.last & ~pulse)
+        n: Value = self.n
+        if self.dt is not None:
+            # n is that of the window before, whose k may be one more or less, until this one has measured.
+            differs = (self.shift - self.dt.shift)[:2]
+            n = Mux(differs[0], Mux(differs[1], n >> 1, n << 1), n)
 
         def set_(
             n: Value | int,
@@ -155,6 +185,8 @@ class Counters(wiring.Component):
             loose: Value | int = 0,
             unsynced: Value | int = 0,
         ) -> None:
+            if self.dt is not None:
+                m.d.sync += self.shift.eq(self.dt.shift)
             if spec.bounds:
                 m.d.sync += [self.loose.eq(loose), self.unsynced.eq(unsynced), self.known.eq(known)]
             m.d.sync += [
@@ -175,10 +207,10 @@ class Counters(wiring.Component):
             set_(1, loose=~pulse)
         with m.Elif(opens & ((self.c_dt != 1) | ~self.high)):
             set_(self.c_dt, loose=self.rest, unsynced=~in_step)
-        with m.Elif(waits & ~self.rest & (self.c_dt == spec.timing.max_ticks - 1)):
+        with m.Elif(waits & ~self.rest & self._is_longest()):
             set_(0, forced=1, stalled=1)
         if spec.bound_decay:
-            with m.Elif(waits & Mux(self.high, waited != 0, (waited > self.n) & self.n.any())):
+            with m.Elif(waits & Mux(self.high, waited != 0, (waited > n) & self.n.any())):
                 set_(waited, forced=1, loose=1)
 
     def _update_to_the_letter(self, m: Module, opens: Signal) -> None:
@@ -224,6 +256,8 @@ class Datapath(wiring.Component):
     forced, stalled : Out(1)
     n_ep1, n_dt1 : Out
         n1 = Nep1/Ndt1 of the velocity; 0 and 1 for the velocity 0. With `paper_exact` as in Table 1.
+    dt_shift : Out
+        Only if dt is adaptive: both are of dt·2^dt_shift.
     velocity_lower, velocity_upper, bounds_valid : Out
         With `spec.bounds`: n2 and n1, a clock wider and rounded outward.
     """
@@ -262,7 +296,9 @@ class Datapath(wiring.Component):
         tag = [counters.n, counters.high, counters.backward, counters.forced, counters.stalled]
         if spec.paper_exact:
             tag += [counters.n_ep1, counters.n_dt1]
-        update, n, high, backward, forced, stalled, *letter = self._later(m, 2, counters.update, *tag)
+        if spec.adaptive:
+            tag += [counters.shift]
+        update, n, high, backward, forced, stalled, *more = self._later(m, 2, counters.update, *tag)
         entry = Signal(spec.table_width)
         m.d.sync += entry.eq(read.data)
         m.d.comb += [
@@ -272,15 +308,20 @@ class Datapath(wiring.Component):
             read.addr.eq(counters.n[: len(read.addr)]),
         ]
         m.d.sync += self.velocity_valid.eq(update)
+        shift = more[0] if spec.adaptive else 0
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())[: len(self.n_ep1)]
         with m.If(update):
             m.d.sync += [
-                self.velocity.eq(self._velocity(n, high, backward, entry)),
-                self.interval.eq(low),
+                self.velocity.eq(self._velocity(n, high, backward, entry, shift)),
+                self.interval.eq(low << shift if spec.adaptive else low),
                 self.forced.eq(forced),
                 self.stalled.eq(stalled),
-                Cat(self.n_ep1, self.n_dt1).eq(Cat(*letter) if letter else Cat(counts, low[: spec.interval_width])),
+                Cat(self.n_ep1, self.n_dt1).eq(
+                    Cat(*more) if spec.paper_exact else Cat(counts, low[: spec.interval_width])
+                ),
             ]
+            if spec.adaptive:
+                m.d.sync += self.dt_shift.eq(shift)
         if spec.bounds:
             self._bounds(m, update=update, backward=backward)
         return m
@@ -290,10 +331,11 @@ class Datapath(wiring.Component):
         spec, counters = self._spec, self.counters
         width = spec.bound_width - 1
         low = ~counters.high & counters.unsynced
-        places = {
-            "lower": Mux(counters.loose, 0, Cat(counters.high, counters.n)),
-            "upper": Cat(counters.high, (counters.n - low)[: len(counters.n)]),
-        }
+        n, above = counters.n, (counters.n - low)[: len(counters.n)]
+        if spec.adaptive:
+            mark = Mux(counters.high, spec.high_depth << counters.shift, Const(spec.low_depth) >> counters.shift)
+            n, above = n | mark, above | mark
+        places = {"lower": Mux(counters.loose, 0, Cat(counters.high, n)), "upper": Cat(counters.high, above)}
         entries: dict[str, Signal] = {}
         for name, place in places.items():
             table = getattr(spec, f"{name}_table")
@@ -321,20 +363,33 @@ class Datapath(wiring.Component):
             values = tuple(registers)
         return list(values)
 
-    def _velocity(self, n: Signal, high: Signal, backward: Signal, entry: Value) -> Value:
+    def _velocity(self, n: Signal, high: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
         """The estimate with its sign: the complement and a carry are −v, so one adder rounds and negates."""
         spec = self._spec
         f = spec.native_frac_bits
         whole = (n + 1 if spec.estimate == "n1" else n) & high.replicate(len(n) + 1)
         carry: Value = Const(0)
-        if spec.estimate == "n3":
+        if spec.estimate != "n3":
+            entry = self._without_tie(n, backward, entry, shift)
+        if spec.adaptive:
+            # With three more bits, high: 2^f·(2n + 1)/2 − 2^f/(2q), rounded down, as below; the shift drops the rest.
+            part = ~Cat(entry, Const(0, f + 2 - len(entry))) if spec.estimate == "n3" else Const(0, f + 2)
+            magnitude = Mux(high, Cat(part, Const(0, 1), whole), entry << 2) >> shift
+            magnitude, carry = magnitude[3:], magnitude[2]
+        elif spec.estimate == "n3":
             # Low: ⌊(h + 1)/2⌋. High: 2^(f−1) − ⌊(h + 4)/8⌋, and 2^(f−1) − 1 − ⌊h/8⌋ is the complement of ⌊h/8⌋.
             eighth = ~Cat(entry[3:], Const(0, 1))
             part, carry = Mux(high, eighth, entry[1:]), Mux(high, ~entry[2], entry[0])
             magnitude = Cat(part, whole)
         else:
-            if spec.tie is not None:
-                entry = Mux(backward & (n == spec.tie), 0, entry)
             magnitude = Mux(high, whole << f, entry)
         padded = Cat(magnitude, Const(0, spec.native_width))[: spec.native_width]
         return (padded ^ backward.replicate(spec.native_width)) + (carry ^ backward)
+
+    def _without_tie(self, n: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
+        """Half an LSB backwards is rounded to 0."""
+        ties = {k: tie for k in range(self._spec.max_shift + 1) if (tie := self._spec.tie(k)) is not None}
+        if not ties:
+            return entry
+        hits = [(n == tie) & (shift == k) if self._spec.adaptive else n == tie for k, tie in ties.items()]
+        return Mux(backward & Cat(hits).any() if len(hits) > 1 else backward & hits[0], 0, entry)

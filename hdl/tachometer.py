@@ -55,7 +55,9 @@ class Tachometer(wiring.Component):
         )
         self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
-        self.pulse_counter = PulseCounter(spec.longest_tick, spec.max_count, stretched=spec.own_ticks)
+        self.pulse_counter = PulseCounter(
+            max(spec.longest_tick, spec.max_pulse_count), spec.max_pulse_count, stretched=spec.own_ticks
+        )
         self.position_counter = PositionCounter(spec.position_width)
         self.index_capture = IndexCapture(spec.position_width) if spec.index else None
         self.datapath = datapath(spec)

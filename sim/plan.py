@@ -19,7 +19,7 @@ from tachometry.sim.theory.performance import (
     s_performance,
     t_performance,
 )
-from tachometry.spec import MTachometer, MTTachometer, STachometer, TachometerSpec
+from tachometry.spec import MTachometer, MTTachometer, RairanTachometer, STachometer, TachometerSpec
 from tachometry.spec.timed import TimedTachometer
 
 _UNITS = 10  # of the default range
@@ -94,13 +94,30 @@ def _performance(spec: TachometerSpec, speed: NDArray[np.float64], tick_seconds:
         return replace(found, resolution=np.where(found.forced, worst, found.resolution))
     if isinstance(spec, MTachometer):
         return m_performance(speed, spec.average, counts, tick_seconds)
-    if spec.method == "rairan":
-        return rairan_performance(speed, spec.parameters["estimate"], counts, tick_seconds, longest)
+    if isinstance(spec, RairanTachometer):
+        if spec.adaptive is None:
+            return rairan_performance(speed, spec.estimate, counts, tick_seconds, longest)
+        shift = _steady_shift(spec, speed / spec.unit_velocity)
+        each = [
+            rairan_performance(speed, spec.estimate, counts, tick_seconds * 2**k, longest >> k)
+            for k in range(spec.max_shift + 1)
+        ]
+        columns = (
+            np.choose(shift, [getattr(found, name) for found in each]) for name in ("resolution", "time", "forced")
+        )
+        return Performance(*columns)
     assert isinstance(spec, TimedTachometer)
     timer_seconds, longest = tick_seconds / spec.timer_periods, spec.max_periods
     if isinstance(spec, MTTachometer):
         return mt_performance(speed, spec.min_periods, counts, timer_seconds, longest)
     return t_performance(speed, counts, timer_seconds, longest)
+
+
+def _steady_shift(spec: RairanTachometer, ratio: NDArray[np.float64]) -> NDArray[np.int64]:
+    """k of an adaptive dt that comes from shorter ones, at speeds in counts per tick."""
+    rule = spec.adaptive_dt
+    doubled = np.ceil(np.log2((rule.fewest - 1) / ratio) + 1e-12)
+    return np.where(ratio * rule.slow <= 1, 0, np.clip(doubled, 0, rule.max_shift)).astype(np.int64)
 
 
 def standstill_ticks(spec: STachometer) -> int:

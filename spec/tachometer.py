@@ -162,7 +162,7 @@ class TachometerSpec:
     @property
     def native_width(self) -> int:
         """Bits of the velocity in counts per tick: a mean of pulse numbers never exceeds the largest of them."""
-        return self.count_width + self.native_frac_bits
+        return signed_width(self.max_count) + self.native_frac_bits
 
     @property
     def output(self) -> VelocityOutput | None:
@@ -265,9 +265,14 @@ class TachometerSpec:
         return float(self.unit_velocity / self._lsb_per_count)
 
     @property
+    def max_pulse_count(self) -> int:
+        """Largest |m_e| of the longest tick that a method with its own makes, but for a wait for a count."""
+        return self.max_count
+
+    @property
     def count_width(self) -> int:
         """Bits of `pulse_count`."""
-        return signed_width(self.max_count)
+        return signed_width(self.max_pulse_count)
 
     @property
     def velocity_width(self) -> int:

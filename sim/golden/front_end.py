@@ -146,7 +146,7 @@ def count(
     n_clocks : int
     beyond : bool array or None
         Windows that may be longer than nominal: whether the method raises `overflow`. A sum that has left
-        ±max_count is saturated, whatever comes after.
+        ±max_pulse_count is saturated, whatever comes after.
     """
     total = np.concatenate([[0], np.cumsum(steps.step)])  # total[k] = sum of the first k steps
 
@@ -155,10 +155,10 @@ def count(
 
     reached = steps_through(last)
     sums = np.diff(reached, prepend=0)
-    overflow = np.abs(sums) > spec.max_count
+    overflow = np.abs(sums) > spec.max_pulse_count
     if beyond is not None:
-        left = first_beyond(steps, last, spec.max_count)
-        sums = np.where(left != 0, left * spec.max_count, sums)
+        left = first_beyond(steps, last, spec.max_pulse_count)
+        sums = np.where(left != 0, left * spec.max_pulse_count, sums)
         overflow = (left != 0) | beyond
     rises = steps.index
     captured = steps_through(rises)
@@ -173,7 +173,7 @@ def count(
     glitches = np.searchsorted(steps.swallowed, strobe, side="right")
     ticks = Ticks(
         clock=strobe,
-        pulse_count=np.clip(sums, -spec.max_count, spec.max_count),
+        pulse_count=np.clip(sums, -spec.max_pulse_count, spec.max_pulse_count),
         position=wrapped(reached - origin[np.searchsorted(rises, last, side="right")]),
         overflow=overflow,
         swallowed_edges=2 * np.minimum(glitches, (1 << 15) - 1),

@@ -101,9 +101,7 @@ MUTANTS = [
     Mutant("Rairán", "pr_update", Counters, "pulse & (late | due) | turns", "pulse & late | turns"),
     Mutant("Rairán", "pr_estimate", Counters, "in_step.eq(opens)", "in_step.eq(0)", 32),
     Mutant("Rairán", "pr_velocity", RairanDatapath, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
-    Mutant(
-        "Rairán", "pr_rest", Counters, "waits & ~self.rest & (self.c_dt == ", "waits & self.rest & (self.c_dt == ", 32
-    ),
+    Mutant("Rairán", "pr_rest", Counters, "waits & ~self.rest & self", "waits & self.rest & self", 32),
     Mutant("Rairán", "pr_range", Counters, "with m.If(full):", "with m.If(0):"),
     Mutant("Rairán", "pr_flag", Counters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
     Mutant("T", "pt_update", QuotientVelocity, "compared & (measuring | nearer)", "compared & nearer"),

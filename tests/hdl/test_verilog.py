@@ -21,6 +21,7 @@ CASES = [
     ("t", 24),
     ("rairan", 3),
     ("rairan", 4),
+    ("rairan", 82),
 ]
 
 

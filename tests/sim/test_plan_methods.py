@@ -1,5 +1,7 @@
 """What plans of all methods promise, measured on their golden models with the virtual encoder."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -10,11 +12,11 @@ from tachometry.sim.plan import plan_at, standstill
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 
 TICKS = 3000
-OPTIONS: dict[str, dict[str, object]] = {"m": {"average": 3}}
+OPTIONS: dict[str, dict[str, object]] = {"m": {"average": 3}, "adaptive": {"adaptive": Fraction(1, 20)}}
 
 
 def spec_of(method: str) -> TachometerSpec:
-    return METHODS[method](
+    return METHODS["rairan" if method == "adaptive" else method](
         encoder=Encoder(500),
         timing=Timing(1_000_000, 100, 50),
         max_speed=Speed.parse("900rad/s"),
@@ -43,7 +45,7 @@ def test_no_error_is_greater_than_the_resolution(method: str) -> None:
         error = np.abs(updates.velocity[settled] * spec.rad_per_s_per_lsb - speed)
         # A count's time is told to a clock. That is in the resolution of methods that measure times by the clock, and
         # not in that of Rairán's, to which the speed is a clock in dt higher or lower.
-        clock = speed / spec.timing.tick_cycles if method == "rairan" else 0.0
+        clock = speed / spec.timing.tick_cycles if spec.method == "rairan" else 0.0
         expected = plan_at(spec, speed + clock * np.array([-1, 0, 1])).resolution.max()
         bound = expected + clock + 0.51 * spec.rad_per_s_per_lsb
         assert error.max() <= bound, units

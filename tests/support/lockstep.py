@@ -94,6 +94,8 @@ EVENTS = {
         "count after rest",
         "dt longer than nominal",
         "to the letter",
+        "dt longer",
+        "dt shorter again",
         "n1",
         "n2",
         "n3",
@@ -176,6 +178,9 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         longest = int(rng.choice([2, max_ticks]))
         unit_cycles = spec.interval_unit_cycles
         spec = replace(spec, min_time=unit_cycles * int(rng.integers(1, longest * tick_cycles // unit_cycles + 1)))
+    if isinstance(spec, RairanTachometer) and max_ticks >= 10 and not spec.paper_exact:
+        spec = replace(spec, adaptive=Fraction(1, 4))
+        spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.max_pulse_count))))
     spec = random_output(spec, rng)
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
     trace = encoding.recording.place(CLOCK_HZ)
@@ -231,6 +236,7 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         return {kind: len(updates.clock)}
     if isinstance(spec, RairanTachometer):
         rows, stalled = len(updates.clock), updates.stalled
+        shift = updates.more.get("dt_shift", np.zeros(rows, dtype=np.int64))
         return {
             "low": np.count_nonzero(updates.interval > 1),
             "high": np.count_nonzero(updates.more["n_ep1"] > 1),
@@ -240,6 +246,8 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
             "count after rest": np.count_nonzero(stalled[:-1] & (updates.more["n_ep1"][1:] == 1)),
             "dt longer than nominal": np.count_nonzero(np.diff(run.ticks.clock) > spec.timing.tick_cycles),
             "to the letter": rows * spec.paper_exact,
+            "dt longer": np.count_nonzero(shift),
+            "dt shorter again": np.count_nonzero(np.diff(shift) < 0),
             spec.estimate: rows,
         }
     if isinstance(spec, TimedTachometer):
@@ -322,7 +330,8 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     timed = isinstance(spec, TimedTachometer)
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
-    ticks, updates = MIN_TICKS, 5 if timed else fewest
+    # Ticks of an adaptive dt are longer.
+    ticks, updates = MIN_TICKS // (4 if spec.parameters.get("adaptive") else 1), 5 if timed else fewest
     if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
     problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]

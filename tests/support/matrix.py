@@ -32,6 +32,7 @@ S_FACTORS: dict[str, list[Any]] = {
 # What a method has of its own, with what of the rest has to do with it; where a factor is missing, its first value.
 RAIRAN_FACTORS: dict[str, list[Any]] = {
     "method": ["rairan"],
+    "adaptive": [None, Fraction(1, 4)],
     "tick_cycles": [1, 3, 960],
     "max_ticks": [2, 500],
     "unit": ["count/tick", "rpm"],
@@ -63,11 +64,14 @@ TIMED_FACTORS: dict[str, list[Any]] = {
 
 def _rows(factors: dict[str, list[Any]]) -> list[dict[str, Any]]:
     def possible(values: list[Any]) -> bool:
-        """An external tick takes two clocks, and Table 1 to the letter has no bounds."""
+        """An external tick takes two clocks, Table 1 to the letter has no bounds, dt is doubled in four at least."""
         chosen = dict(zip(factors, values, strict=False))
-        return not (chosen.get("external") and chosen["tick_cycles"] == 1) and not (
-            chosen.get("paper_exact") and chosen.get("bounds")
+        bad = (
+            chosen.get("external") and chosen["tick_cycles"] == 1,
+            chosen.get("paper_exact") and (chosen.get("bounds") or chosen.get("adaptive")),
+            chosen.get("adaptive") and chosen.get("max_ticks") == 2,
         )
+        return not any(bad)
 
     return [dict(row._asdict()) for row in AllPairs(OrderedDict(factors), filter_func=possible)]
 
@@ -79,7 +83,7 @@ def rows() -> list[dict[str, Any]]:
 
 def spec_of(row: dict[str, Any]) -> TachometerSpec:
     """The core of a configuration."""
-    own = [name for name in ("cancel", "estimate", "timer", "paper_exact", "bound_decay") if name in row]
+    own = [name for name in ("cancel", "estimate", "timer", "paper_exact", "bound_decay", "adaptive") if name in row]
     row = {name: values[0] for name, values in S_FACTORS.items()} | row
     make = METHODS[row["method"]]
     cycles = row["tick_cycles"]

@@ -1,6 +1,8 @@
 """The method of Rairán a clock at a time, by the words of docs/rairan.md, and its golden model on bare steps."""
 
 from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt
 from typing import Any
 
 import numpy as np
@@ -43,12 +45,39 @@ class Row:
     sign: int
     forced: bool
     stalled: bool
+    k: int = 0
+
+
+def least_count(target: Fraction) -> int:
+    """The least Nep1 for which eq. (13) is within the target."""
+    n = 2
+    while Fraction(1, 2 * n - 1) > target:
+        n += 1
+    return n
+
+
+def next_k(k: int, n_ep: int, n_dt: int, target: Fraction, most: int) -> int:
+    """k after a window of dt·2^k that measured Nep1/Ndt1, `most` being the greatest."""
+    fewest = least_count(target)
+    slow = min(fewest - 1, isqrt(2**most)) + (k > 0)
+    # One count in so many dt, that of the measurement being 2^k of them.
+    if Fraction(n_dt * 2**k, n_ep) >= slow:
+        return max(k - 1, 0)
+    if n_ep >= 2 * fewest:
+        return max(k - 1, 0)
+    return k if n_ep >= fewest else min(k + 1, most)
 
 
 def clock_by_clock(
-    step: list[int], dt: int, max_ticks: int, *, bound_decay: bool = True
+    step: list[int],
+    dt: int,
+    max_ticks: int,
+    *,
+    bound_decay: bool = True,
+    adaptive: tuple[Fraction, int] | None = None,
 ) -> tuple[list[Row], list[int]]:
-    """Updates, and clocks in which dt ends."""
+    """Updates, and clocks in which dt ends. `adaptive`: the target, and the greatest k."""
+    k = k_of_n = 0
     clock = c_ep = c_dt = sign = 0
     n_ep, n_dt = 0, 1
     in_step, rest_is_new = False, True
@@ -59,35 +88,42 @@ def clock_by_clock(
         clock += 1
         new: tuple[int, int] | None = None
         forced = stalled = False
+        then, measured = k, None
         if s and sign and s != sign:  # against the last direction: a new window, and no estimate
             sign, clock, c_ep, c_dt, in_step, new = s, 0, 1, 0, True, (0, 1)
+            then = 0
         elif s and c_dt:  # the first count after dt opens the next window
             if c_dt >= 2 or n_ep <= 1:
                 new = (1, c_dt)
+            measured = new or (n_ep, n_dt)
             sign, clock, c_ep, c_dt, in_step = s, 0, 1, 0, True
-        elif clock == dt:
+        elif clock == dt << k:
             ends.append(now)
             if c_ep >= 2:
                 new = (c_ep, 1)
             elif c_ep == 1 and n_ep >= 2:
                 new = (1, 1)
-            clock, c_ep, c_dt = 0, 0, min(c_dt + 1, max_ticks)
+            clock, c_ep, c_dt = 0, 0, min(c_dt + 1, max_ticks >> k)
             if s:  # the end of dt comes before the count, which opens the next window and has waited for one dt
                 if new is None:
                     new = (1, 1)
+                measured = new
                 sign, c_ep, c_dt, in_step = s, 1, 0, True
-            elif new is None and c_dt == max_ticks and rest_is_new:
+            elif new is None and c_dt == max_ticks >> k and rest_is_new:
                 new, forced, stalled = (0, 1), True, True
             elif new is None and bound_decay and n_ep:
                 waited = c_dt if in_step else c_dt - 1
-                if waited * n_ep > n_dt:
+                if waited and (n_ep > 1 or waited << k > n_dt << k_of_n):
                     new, forced = (1, waited), True
         elif s:
             sign, c_ep, in_step = s, c_ep + 1, False
-        rest_is_new = c_dt < max_ticks
+        rest_is_new = c_dt < max_ticks >> k
         if new is not None:
             n_ep, n_dt = new
-            rows.append(Row(now, *new, sign, forced, stalled))
+            k_of_n = k
+            rows.append(Row(now, *new, sign, forced, stalled, k))
+        if adaptive is not None:
+            k = then if measured is None else next_k(k, *measured, *adaptive)
     return rows, ends
 
 

@@ -10,7 +10,9 @@ from support.table1 import every_ts
 
 from tachometry.sim.golden.rairan import Model, orbit
 from tachometry.sim.results import Updates
-from tachometry.spec import RairanTachometer
+from tachometry.sim.theory.rairan import rairan_eq13_max_error
+from tachometry.spec import RairanTachometer, Speed, Timing
+from tachometry.spec.adaptive import parse_target
 
 
 def held(updates: Updates, name: str, n: int, first: int) -> np.ndarray:
@@ -61,6 +63,49 @@ def test_it_does_what_is_described_clock_by_clock(dt: int, bound_decay: bool) ->
         assert updates.velocity.tolist() == wanted
         assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
         assert any(row.forced for row in rows) == (bound_decay or any(row.stalled for row in rows))
+
+
+def steady_steps(rng: np.random.Generator, n: int, dt: int) -> np.ndarray:
+    """Stretches of many counts at all speeds, so that dt settles, with reversals and rests; shape (n,)."""
+    step, at, sign = np.zeros(n, dtype=np.int64), 0, 1
+    while at < n:
+        gap = max(1.0, dt * 10 ** rng.uniform(-1.3, 1.3))
+        clocks = at + (np.arange(1, int(rng.integers(2, 150)) + 1) * gap).astype(np.int64)
+        step[clocks[clocks < n]] = sign
+        at = int(clocks[-1]) + int(rng.choice([0, 0, dt, 40 * dt]))
+        sign *= int(rng.choice([1, 1, -1]))
+    return step
+
+
+@pytest.mark.parametrize(
+    ("dt", "max_ticks", "target"), [(1, 12, "0.2"), (3, 40, "0.1"), (7, 70, "0.04"), (40, 33, "5%")]
+)
+@pytest.mark.parametrize("bound_decay", [True, False])
+def test_adaptive_dt_clock_by_clock(dt: int, max_ticks: int, target: str, bound_decay: bool) -> None:
+    for seed, estimate in enumerate(("n1", "n2", "n3", "n3")):
+        goal = parse_target(target, Timing(1, 1, 2))
+        options = {"adaptive": goal, "bound_decay": bound_decay, "estimate": estimate}
+        spec = make_spec(dt, max_ticks, **options, frac_bits=5 + 7 * (seed > 0))
+        rng = np.random.default_rng([dt, seed])
+        step = steady_steps(rng, 60_000, dt) if seed < 3 else random_steps(rng, 60_000, dt)
+        updates = golden_updates(spec, step)
+        rows, ends = clock_by_clock(
+            step.tolist(), dt, max_ticks, bound_decay=bound_decay, adaptive=(goal, spec.max_shift)
+        )
+        for name, wanted in (
+            ("clock", [row.clock for row in rows]),
+            ("forced", [row.forced for row in rows]),
+            ("stalled", [row.stalled for row in rows]),
+            ("interval", [row.n_dt1 << row.k for row in rows]),
+            ("n_ep1", [row.n_ep1 for row in rows]),
+            ("n_dt1", [row.n_dt1 for row in rows]),
+            ("dt_shift", [row.k for row in rows]),
+        ):
+            assert getattr(updates, name, updates.more.get(name)).tolist() == wanted, name
+        exactly = [row.sign * exact(estimate, row.n_ep1, row.n_dt1) / 2**row.k for row in rows]
+        assert updates.velocity.tolist() == [rounded(value, spec.frac_bits) for value in exactly]
+        assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
+        assert set(updates.more["dt_shift"].tolist()) == set(range(spec.max_shift + 1))
 
 
 def test_orbit_follows_to_the_end() -> None:
@@ -197,6 +242,24 @@ def test_a_burst_after_standstill() -> None:
             {"paper_exact": True, "bounds": True},
             "bounds must not be given with paper_exact, which leaves its own",
         ),
+        ({"adaptive": Fraction(1, 3)}, "adaptive must be more than 0 and less than 1/3, not 0.333333333"),
+        ({"adaptive": Fraction(0)}, "adaptive must be more than 0 and less than 1/3, not 0"),
+        (
+            {"adaptive": Fraction(1, 10), "paper_exact": True},
+            "adaptive must not be given with paper_exact, which has one dt",
+        ),
+        (
+            {"adaptive": Fraction(1, 10), "max_ticks": 3},
+            "max_ticks must be at least 4 with adaptive, not 3",
+        ),
+        (
+            {"adaptive": Fraction(1, 10), "dt": 1025},
+            "max_speed must be at most 1024 counts per tick with adaptive, not 1025",
+        ),
+        (
+            {"adaptive": Fraction(1, 1000), "dt": 4},
+            "adaptive must be at least 0.03226 with this speed and time, not 0.001",
+        ),
         ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
         ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own"),
     ],
@@ -204,6 +267,47 @@ def test_a_burst_after_standstill() -> None:
 def test_bad_parameters(parameters: dict, message: str) -> None:
     with pytest.raises(ValueError, match=f"^{message}$"):
         make_spec(**({"dt": 40} | parameters))
+
+
+@pytest.mark.parametrize(
+    ("text", "target"), [("0.1%", "1/1000"), ("0.001", "1/1000"), (" 5 %", "1/20"), ("1/8", "1/8")]
+)
+def test_targets(text: str, target: str) -> None:
+    assert parse_target(text, Timing(1, 1, 2)) == Fraction(target)
+
+
+@pytest.mark.parametrize("text", ["", "%", "1ms", "a%", "1/0"])
+def test_bad_targets(text: str) -> None:
+    with pytest.raises(ValueError, match=r"^adaptive must be a fraction such as 0\.1% or 0\.001, not '"):
+        parse_target(text, Timing(1, 1, 2))
+
+
+@pytest.mark.parametrize("target", [Fraction(1, 10), Fraction(1, 50), Fraction(1, 200)])
+def test_at_a_steady_speed_eq13_is_within_the_target_and_dt_no_longer_than_that_takes(target: Fraction) -> None:
+    dt, looked_at, shifts = 48, 0, set()
+    spec = make_spec(dt, 300, adaptive=target, max_speed=Speed.parse("5000rev/s"))
+    rule, most = spec.adaptive_dt, spec.max_shift
+    assert (spec.max_count, most) == (24, 6)
+    for period in np.geomspace(2.1, 2.2 * rule.fewest * dt, 40):
+        gap = Fraction(period).limit_denominator(1000)
+        step = pulses(gap, int(30 * gap) + (12 * dt << most))
+        updates = golden_updates(spec, step)
+        looked = updates.clock <= np.flatnonzero(step)[-1]
+        looked[: np.count_nonzero(looked) * 2 // 3] = False
+        (shift,) = set(updates.more["dt_shift"][looked].tolist())
+        n_ep, n_dt = updates.more["n_ep1"][looked], updates.more["n_dt1"][looked]
+        error, true = rairan_eq13_max_error(n_ep / n_dt), float(dt / gap)
+        # The estimate keeps to the bound, but for a clock and the rounding.
+        slack = 1.1 / (dt << shift) + 2**-17 / true
+        assert (np.abs(updates.velocity[looked] / 2**16 / true - 1) <= error + slack).all(), gap
+        if true * 2**most > rule.fewest or (rule.slow == rule.fewest - 1 and gap > (rule.slow + 1) * dt):
+            looked_at += 1
+            shifts.add(shift)
+            assert (error <= target).all(), gap
+            # Half as long, dt has fewer counts than it takes, or the last of them late: in the last half gap.
+            assert shift == 0 or true * 2 ** (shift - 1) <= rule.fewest - 0.5 + 0.05, gap
+    assert looked_at > 10
+    assert len(shifts) > 3
 
 
 def test_without_n3_the_counts_of_a_tick_are_not_limited() -> None:

@@ -1,0 +1,88 @@
+"""How long dt is, where it follows the speed."""
+
+from collections.abc import Callable
+
+from amaranth import Array, Module, Mux, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.spec import RairanTachometer
+
+
+class DtShift(wiring.Component):
+    """k of dt·2^k, and the end of dt from those of nominal ones.
+
+    Latency: k and `last` are those of the new window in the clock after `opens`.
+
+    Parameters
+    ----------
+    spec : RairanTachometer
+        With a target.
+    width : int
+        Bits of `n`.
+
+    Members
+    -------
+    opens, turns : In(1)
+        A window begins; with a count against the direction.
+    nominal : In(1)
+        The last clock of a nominal dt.
+    n, high : In
+        What the window that ends has measured: Ndt1, or Nep1 − 1 if `high`.
+    shift : Out
+        k of the window.
+    last : Out(1)
+        With `nominal`: dt·2^k ends; without latency.
+    """
+
+    def __init__(self, spec: RairanTachometer, width: int) -> None:
+        self._spec = spec
+        super().__init__(
+            {
+                "opens": In(1),
+                "turns": In(1),
+                "nominal": In(1),
+                "n": In(width),
+                "high": In(1),
+                "shift": Out(range(spec.max_shift + 1)),
+                "last": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec, rule = self._spec, self._spec.adaptive_dt
+        mask = Signal(spec.max_shift)  # 2^k − 1
+        passed = Signal(spec.max_shift)
+        m.d.comb += self.last.eq(self.nominal & (passed == mask))
+        with m.If(self.nominal):
+            m.d.sync += passed.eq(passed + 1)
+        with m.If(self.last | self.opens):
+            m.d.sync += passed.eq(0)
+        rare, slow = self._soon(m, rule.rare_to), self._soon(m, rule.slow_from)
+        down, up = Signal(), Signal()
+        m.d.comb += [
+            down.eq(Mux(self.high, (self.n < rare) | (self.n >= 2 * rule.fewest - 1), self.n >= slow)),
+            up.eq(~self.high | (self.n < rule.fewest - 1)),
+        ]
+        with m.If(self.opens):
+            with m.If(self.turns):
+                m.d.sync += [self.shift.eq(0), mask.eq(0)]
+            with m.Elif(down), m.If(mask[0]):
+                m.d.sync += [self.shift.eq(self.shift - 1), mask.eq(mask >> 1)]
+            with m.Elif(up & ~mask[-1]):
+                m.d.sync += [self.shift.eq(self.shift + 1), mask.eq((mask << 1) | 1)]
+        return m
+
+    def of(self, constant: Callable[[int], int]) -> Value:
+        """A constant that depends on k."""
+        return Array([constant(min(k, self._spec.max_shift)) for k in range(1 << len(self.shift))])[self.shift]
+
+    def _soon(self, m: Module, constant: Callable[[int], int]) -> Value:
+        """The same from a register: but for a reversal, which does not ask, a window takes dt at least."""
+        value = self.of(constant)
+        if self._spec.timing.tick_cycles == 1:
+            return value
+        held = Signal.like(value, init=constant(0))
+        m.d.sync += held.eq(value)
+        return held

@@ -1,0 +1,54 @@
+"""dt of Rairán 2013 that follows the speed: dt·2^k, the shortest for which eq. (13) stays within a target."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt
+
+from tachometry.spec.timing import Timing
+
+
+def parse_target(text: str, timing: Timing) -> Fraction:
+    """A fraction such as `0.1%` or `0.001`; the timing is not used."""
+    number = text.strip()
+    try:
+        return Fraction(number[:-1]) / 100 if number.endswith("%") else Fraction(number)
+    except (ValueError, ZeroDivisionError):
+        raise ValueError(f"adaptive must be a fraction such as 0.1% or 0.001, not {text!r}") from None
+
+
+@dataclass(frozen=True)
+class AdaptiveDt:
+    """The rule by which a window takes its k from what the one before it measured, see docs/rairan.md.
+
+    Parameters
+    ----------
+    target : Fraction
+        Greatest relative error, eq. (13): less than 1/3, which any estimate has.
+    max_shift : int
+        K, the greatest k.
+    """
+
+    target: Fraction
+    max_shift: int
+
+    @property
+    def fewest(self) -> int:
+        """The least Nep1 within the target: 1/(2·Nep1 − 1), eq. (13)."""
+        least = (1 / self.target + 1) / 2
+        return -(-least.numerator // least.denominator)
+
+    @property
+    def slow(self) -> int:
+        """The least Ndt1 for which dt is as short as it can be, k = 0.
+
+        Within the target, 1/(2·Ndt1 + 1), or as good as what Nep1 = 2^K/Ndt1 would give, where no k reaches it.
+        """
+        return min(self.fewest - 1, isqrt(1 << self.max_shift))
+
+    def slow_from(self, shift: int) -> int:
+        """The least Ndt1 at which k is lessened or stays 0: the time of a count is `slow` dt, one more for k > 0."""
+        return -(-(self.slow + (shift > 0)) >> shift)
+
+    def rare_to(self, shift: int) -> int:
+        """The greatest Nep1 at which k is lessened because the counts are so far apart."""
+        return (1 << shift) // (self.slow + 1)
