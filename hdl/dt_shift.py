@@ -60,12 +60,15 @@ class DtShift(wiring.Component):
         with m.If(self.last | self.opens):
             m.d.sync += passed.eq(0)
         rare, slow = self._soon(m, rule.rare_to), self._soon(m, rule.slow_from)
-        down, up = Signal(), Signal()
+        down, up, falls = Signal(), Signal(), Signal()
+        falling = Signal()  # to 0, unless there are enough counts on the way
         m.d.comb += [
-            down.eq(Mux(self.high, (self.n < rare) | (self.n >= 2 * rule.fewest - 1), self.n >= slow)),
             up.eq(~self.high | (self.n < rule.fewest - 1)),
+            falls.eq(Mux(self.high, self.n < rare, self.n >= slow) | (falling & up)),
+            down.eq(falls | (self.high & (self.n >= 2 * rule.fewest - 1))),
         ]
         with m.If(self.opens):
+            m.d.sync += falling.eq(falls & (mask >> 1).any() & ~self.turns)
             with m.If(self.turns):
                 m.d.sync += [self.shift.eq(0), mask.eq(0)]
             with m.Elif(down), m.If(mask[0]):

@@ -11,15 +11,15 @@ from tachometry.spec.adaptive import AdaptiveDt
 Ints = NDArray[np.int64]
 
 
-def next_shift(rule: AdaptiveDt, shift: int, n: int, *, high: bool) -> int:
-    """k of a window after one of dt·2^shift that measured Nep1 = n (high) or Ndt1 = n."""
+def next_shift(rule: AdaptiveDt, shift: int, n: int, *, high: bool, falling: bool) -> tuple[int, bool]:
+    """k of a window after one of dt·2^shift that measured Nep1 = n (high) or Ndt1 = n, and whether it falls to 0."""
     wanted = rule.slow + (shift > 0)
     seldom = n * wanted <= 1 << shift if high else n << shift >= wanted
-    if seldom or (high and n >= 2 * rule.fewest):
-        return max(shift - 1, 0)
-    if not high or n < rule.fewest:
-        return min(shift + 1, rule.max_shift)
-    return shift
+    enough = high and n >= rule.fewest
+    falls = seldom or (falling and not enough)
+    if falls or (high and n >= 2 * rule.fewest):
+        return max(shift - 1, 0), falls and shift > 1
+    return shift if enough else min(shift + 1, rule.max_shift), False
 
 
 def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tuple[Ints, Ints, Ints]:
@@ -34,7 +34,7 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
         The first node from each on that is a count against the direction, or the end.
     """
     clock, turn, rule = start.tolist(), next_turn.tolist(), spec.adaptive_dt
-    end, node, shift = len(clock) - 1, 0, 0
+    end, node, shift, falling = len(clock) - 1, 0, 0, False
     found: list[tuple[int, int, int]] = []
     while node != end:
         due = clock[node] + (spec.timing.tick_cycles << shift)
@@ -45,6 +45,7 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
         waited = (clock[then] - clock[node] - 1) // (due - clock[node])
         high = c_ep > 1 and waited <= 1
         n = c_ep if high else min(max(waited, 1), spec.max_dt(shift))
-        node, shift = then, 0 if then == turn[then] else next_shift(rule, shift, n, high=high)
+        shift, falling = (0, False) if then == turn[then] else next_shift(rule, shift, n, high=high, falling=falling)
+        node = then
     nodes, thens, shifts = np.array(found, dtype=np.int64).T
     return nodes, thens, shifts

@@ -150,7 +150,9 @@ def test_mutants_of_adaptive_dt_begin_with_what_is_right() -> None:
     [
         ("(passed == mask)", "(passed == (mask >> 1))"),
         ("with m.If(self.last | self.opens):", "with m.If(self.last):"),
-        ("(self.n < rare) |", "0 |"),
+        ("self.n < rare,", "0,"),
+        ("(falling & up)", "0"),
+        ("(mask >> 1).any() & ~self.turns", "~self.turns"),
         ("2 * rule.fewest - 1)", "2 * rule.fewest - 2)"),
         ("self.n >= slow", "self.n > slow"),
         ("(self.n < rule.fewest - 1)", "(self.n < rule.fewest)"),

@@ -31,7 +31,7 @@ def speeds() -> list[float]:
     return [*(10 ** np.random.default_rng(5).uniform(-2, 1.3, 40)).tolist(), *near]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, "adaptive"])
 def test_no_error_is_greater_than_the_resolution(method: str) -> None:
     spec = spec_of(method)
     tick = float(spec.timing.tick_seconds)

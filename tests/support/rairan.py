@@ -56,16 +56,18 @@ def least_count(target: Fraction) -> int:
     return n
 
 
-def next_k(k: int, n_ep: int, n_dt: int, target: Fraction, most: int) -> int:
-    """k after a window of dt·2^k that measured Nep1/Ndt1, `most` being the greatest."""
+def next_k(k: int, falls: bool, n_ep: int, n_dt: int, target: Fraction, most: int) -> tuple[int, bool]:
+    """k after a window of dt·2^k that measured Nep1/Ndt1, `most` being the greatest; and whether it falls to 0."""
     fewest = least_count(target)
     slow = min(fewest - 1, isqrt(2**most)) + (k > 0)
     # One count in so many dt, that of the measurement being 2^k of them.
     if Fraction(n_dt * 2**k, n_ep) >= slow:
-        return max(k - 1, 0)
+        return max(k - 1, 0), k > 1
     if n_ep >= 2 * fewest:
-        return max(k - 1, 0)
-    return k if n_ep >= fewest else min(k + 1, most)
+        return max(k - 1, 0), False
+    if n_ep >= fewest:
+        return k, False
+    return (k - 1, k > 1) if falls else (min(k + 1, most), False)
 
 
 def clock_by_clock(
@@ -78,6 +80,7 @@ def clock_by_clock(
 ) -> tuple[list[Row], list[int]]:
     """Updates, and clocks in which dt ends. `adaptive`: the target, and the greatest k."""
     k = k_of_n = 0
+    falls = False
     clock = c_ep = c_dt = sign = 0
     n_ep, n_dt = 0, 1
     in_step, rest_is_new = False, True
@@ -123,7 +126,10 @@ def clock_by_clock(
             k_of_n = k
             rows.append(Row(now, *new, sign, forced, stalled, k))
         if adaptive is not None:
-            k = then if measured is None else next_k(k, *measured, *adaptive)
+            if measured is not None:
+                k, falls = next_k(k, falls, *measured, *adaptive)
+            elif then != k or (new == (0, 1) and not forced):
+                k, falls = 0, False
     return rows, ends
 
 
