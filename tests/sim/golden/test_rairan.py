@@ -217,6 +217,28 @@ def test_dithering_on_one_edge_reads_0_for_ever(gap: int) -> None:
     assert not updates.velocity[after].any()
 
 
+@pytest.mark.parametrize("target", [Fraction(1, 4), Fraction(1, 30)])
+def test_situations_with_an_adaptive_dt(target: Fraction) -> None:
+    """A reversal reads 0, and is measured in the shortest dt; rest is seen in time; dithering reads 0 for ever."""
+    forward, back = [(100 + 30 * k, 1) for k in range(200)], [(6200 + 30 * k, -1) for k in range(200)]
+    dithers = [(13_000 + 50 * k, 1 - 2 * (k % 2)) for k in range(100)]
+    burst = [(22_000 + k, 1) for k in range(10)]
+    updates = seen(script(*forward, *back, *dithers, *burst, n=26_000), adaptive=target)
+    shift = updates.more["dt_shift"]
+    turn = int(np.flatnonzero(updates.clock == 6200)[0])
+    assert updates.velocity[turn - 1] > 0 == updates.velocity[turn]
+    assert shift[turn - 1] > 0 == shift[turn + 1]
+    assert updates.velocity[turn + 1] < 0
+    assert updates.clock[turn + 1] <= 6200 + 2 * DT
+    inside = (updates.clock >= 13_000) & (updates.clock < 13_000 + 99 * 50)
+    assert inside.any()
+    assert not updates.velocity[inside].any()
+    assert at_clock(updates, 12_170 + MAX * DT) == 0
+    assert at_clock(updates, 22_009 + MAX * DT) == 0
+    assert updates.stalled[-1]
+    assert 0 < updates.velocity[updates.clock >= 22_000].max() <= 10 << 16
+
+
 def test_a_burst_after_standstill() -> None:
     """Ten counts as fast as they can come, at rest before and after."""
     burst = [(5000 + k, 1) for k in range(10)]

@@ -1,5 +1,7 @@
 """Bounds of Rairán's method: they enclose the true mean speed of every measured window, in exact integers."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
@@ -11,13 +13,13 @@ FINE = 64  # parts of a clock in which the true times of the counts are known
 FRAC_BITS = 10
 
 
-def enclosed(dt: int, n: int, seed: int) -> tuple[int, float, float]:
+def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float, float]:
     """Updates that were looked at, the mean width of their bounds, and that of [n2, n1], where both are finite.
 
     A count is seen in the first clock after it. What is measured goes from the true time of a count to that of the next
     (Ndt1), or to the last clock of dt, and between two counts in one direction the shaft turns evenly.
     """
-    spec = make_spec(dt, 30, bounds=True, frac_bits=FRAC_BITS)
+    spec = make_spec(dt, 30, bounds=True, frac_bits=FRAC_BITS, **options)
     rng = np.random.default_rng([dt, seed])
     step = random_steps(rng, n, dt, turns=0.002)
     updates = golden_updates(spec, step)
@@ -28,6 +30,7 @@ def enclosed(dt: int, n: int, seed: int) -> tuple[int, float, float]:
     true = np.append(at * FINE - within, (n + 100 * dt) * FINE)
 
     rows = np.flatnonzero(updates.more["bounds_valid"])
+    in_dt = dt << updates.more["dt_shift"][rows] if options else np.full(len(rows), dt)
     clock, n_ep, n_dt = updates.clock[rows], updates.more["n_ep1"][rows], updates.more["n_dt1"][rows]
     forced, lower, upper = (
         x[rows] for x in (updates.forced, *(updates.more[f"velocity_{k}er"] for k in ("low", "upp")))
@@ -36,8 +39,8 @@ def enclosed(dt: int, n: int, seed: int) -> tuple[int, float, float]:
     by_count = (step[clock] != 0) & (n_ep == 1) & ~forced
     last = seen - (step[clock] != 0)  # before this clock
     # Opening count: the one before, the one that began this dt, or the last at all.
-    opening = np.where(by_count | forced, last, np.searchsorted(at, clock - dt))
-    assert (by_count | forced | (at[np.minimum(opening, len(at) - 1)] == clock - dt)).all()
+    opening = np.where(by_count | forced, last, np.searchsorted(at, clock - in_dt))
+    assert (by_count | forced | (at[np.minimum(opening, len(at) - 1)] == clock - in_dt)).all()
     following = np.minimum(last + 1, len(at))
     straight = (following < len(at)) & (np.append(sign, 0)[following] == sign[last])
     end = np.where(by_count, true[following], (clock - ~forced) * FINE)
@@ -64,6 +67,12 @@ def test_they_enclose_the_true_mean_speed_of_a_million_windows() -> None:
     assert all(width >= least for _, width, least in found)
     _, width, least = found[-1]
     assert width < 1.2 * least
+
+
+@pytest.mark.parametrize("dt", [1, 2, 8])
+def test_they_enclose_it_where_dt_is_adaptive(dt: int) -> None:
+    looked_at, _, _ = enclosed(dt, 10**6, seed=2, adaptive=Fraction(1, 7))
+    assert looked_at > 10**5 // dt
 
 
 def test_they_are_tight_where_dt_has_many_clocks() -> None:
