@@ -43,11 +43,11 @@ class Waveform:
         """The signals in clock `clock`, packed in order, the first in the least significant bits."""
         changed = -1 if self._last is None else packed ^ self._last
         if changed:
-            time = (clock * 10**12) // self._clock_hz
+            # Kept before it is written: Ctrl-C may come between.
+            self._time = time = (clock * 10**12) // self._clock_hz
             for variable, shift, mask in zip(self._variables, self._shifts, self._masks, strict=True):
                 if (changed >> shift) & mask:
                     self._writer.change(variable, time, (packed >> shift) & mask)
-            self._time = time
             self._last = packed
 
     def close(self, clock: int) -> None:
