@@ -5,14 +5,16 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.update_age import UpdateAge
 from tachometry.spec import low_pass
 
 
 class LowPass(wiring.Component):
     """y ← u + E·(y − u), E = e^(−G·m·T): eq. (22) of Tsuji 2009, with E from a table, a bit of it a clock.
 
+    m is the number of ticks since the update before: what is measured over overlapping windows is not filtered twice.
     An update that comes while the filter works waits; one that comes while another waits takes its place and adds its
-    intervals.
+    ticks.
 
     Latency: `done` is high `spec.latency` clocks after `start`, if the filter was at rest.
 
@@ -24,9 +26,12 @@ class LowPass(wiring.Component):
 
     Members
     -------
+    tick : In(1)
     start : In(1)
-        `native`, `interval` and `tag` are new.
-    native, interval, tag : In
+        `native`, `clear` and `tag` are new.
+    native, tag : In
+    clear : In(1)
+        This is taken as it is, for whatever time.
     done : Out(1)
     velocity, tag_out : Out
         Valid with `done`, and held until the next.
@@ -37,8 +42,9 @@ class LowPass(wiring.Component):
         super().__init__(
             {
                 "start": In(1),
+                "tick": In(1),
                 "native": In(signed(spec.native_width)),
-                "interval": In(range(spec.max_interval + 1)),
+                "clear": In(1),
                 "tag": In(tag_width),
                 "done": Out(1),
                 "velocity": Out(signed(spec.native_width)),
@@ -51,12 +57,17 @@ class LowPass(wiring.Component):
         spec = self._spec
         extra, bits = spec.extra_bits, spec.factor_bits
 
+        # Ticks from the clock of the update before on.
+        elapsed = UpdateAge(spec.max_interval)
+        m.submodules.elapsed = elapsed
+        m.d.comb += [elapsed.tick.eq(self.tick), elapsed.update.eq(self.start)]
+
         # The update that waits.
         waiting, take = Signal(), Signal()
         next_u, next_tag = Signal.like(self.native, reset_less=True), Signal.like(self.tag, reset_less=True)
-        next_interval = Signal.like(self.interval, reset_less=True)
+        next_interval, next_clear = Signal.like(elapsed.age, reset_less=True), Signal(reset_less=True)
         sum_ = Signal(range(2 * spec.max_interval + 1))
-        m.d.comb += sum_.eq(self.interval + Mux(waiting & ~take, next_interval, 0))
+        m.d.comb += sum_.eq(elapsed.before + Mux(waiting & ~take, next_interval, 0))
         with m.If(take):
             m.d.sync += waiting.eq(0)
         with m.If(self.start):
@@ -64,6 +75,7 @@ class LowPass(wiring.Component):
                 waiting.eq(1),
                 next_u.eq(self.native),
                 next_tag.eq(self.tag),
+                next_clear.eq(self.clear),
                 next_interval.eq(Mux(sum_ > spec.max_interval, spec.max_interval, sum_)),
             ]
 
@@ -104,7 +116,7 @@ class LowPass(wiring.Component):
                 second.eq(0),
                 u.eq(next_u),
                 tag.eq(next_tag),
-                d.eq(y - (next_u << extra)),
+                d.eq(Mux(next_clear, 0, y - (next_u << extra))),
             ]
         with m.If(adding):
             m.d.sync += y.eq((u << extra) + d)

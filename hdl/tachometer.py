@@ -152,11 +152,11 @@ class Tachometer(wiring.Component):
         tags, found = (Cat(getattr(side, name) for name in names) for side in (self, datapath))
         if self.low_pass is not None:
             m.submodules.low_pass = low_pass = self.low_pass
-            interval = datapath.interval if spec.filter_interval is None else spec.filter_interval
             m.d.comb += [
                 low_pass.start.eq(valid),
                 low_pass.native.eq(velocity),
-                low_pass.interval.eq(interval),
+                low_pass.tick.eq(self.tick),
+                low_pass.clear.eq(datapath.stalled & int(spec.last_when_stalled)),
                 low_pass.tag.eq(Cat(found, *(value for _, value in bounds))),
             ]
             velocity, valid, found = low_pass.velocity, low_pass.done, low_pass.tag_out[: len(tags)]

@@ -1,6 +1,6 @@
 """How old the velocity is."""
 
-from amaranth import Module, Mux, Signal
+from amaranth import Module, Mux
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -19,15 +19,18 @@ class UpdateAge(wiring.Component):
     -------
     tick, update : In(1)
     age : Out(range(max_age + 1))
+    before : Out(range(max_age + 1))
+        What it was before an update of this clock.
     """
 
     def __init__(self, max_age: int) -> None:
         self._max_age = max_age
-        super().__init__({"tick": In(1), "update": In(1), "age": Out(range(max_age + 1))})
+        super().__init__(
+            {"tick": In(1), "update": In(1), "age": Out(range(max_age + 1)), "before": Out(range(max_age + 1))}
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        count = Signal.like(self.age)
-        m.d.comb += self.age.eq(Mux(self.update, 0, count))
-        m.d.sync += count.eq(self.age + (self.tick & (self.age != self._max_age)))
+        m.d.comb += self.age.eq(Mux(self.update, 0, self.before))
+        m.d.sync += self.before.eq(self.age + (self.tick & (self.age != self._max_age)))
         return m

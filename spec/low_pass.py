@@ -1,6 +1,6 @@
 """The low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, and how exact it has to be.
 
-    y ← u + E·(y − u),   E = e^(−G·m·T) for an update u over m intervals of T
+    y ← u + E·(y − u),   E = e^(−G·m·T) for an update u, m ticks of T after the one before
 
 In units of 2^−k LSB of u the hardware forms d ← round(E'·d) once, d = y − u, or twice where E is a product of two table
 entries E' of p bits. With α = 1 − E, least for m = 1:
@@ -29,9 +29,9 @@ class LowPass:
     Parameters
     ----------
     exponent : Fraction
-        G·T: what one interval adds to the exponent.
+        G·T: what one tick adds to the exponent.
     max_interval : int
-        Most intervals that an update can stand for; longer ones count as that.
+        Most ticks that an update can stand for; more count as that.
     native_width : int
         Bits of u, signed.
     """

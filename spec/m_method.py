@@ -30,7 +30,6 @@ class MTachometer(TachometerSpec):
 
     method = "m"
     module = "m_method"
-    filter_interval = 1
 
     def __post_init__(self) -> None:
         super().__post_init__()

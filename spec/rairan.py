@@ -55,6 +55,7 @@ class RairanTachometer(TachometerSpec):
     method = "rairan"
     module = "rairan"
     own_ticks = True
+    last_when_stalled = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

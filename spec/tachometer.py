@@ -101,8 +101,8 @@ class TachometerSpec:
     module: ClassVar[str]
     # Whether the method ends the ticks itself, by what it counts.
     own_ticks: ClassVar[bool] = False
-    # Intervals that an update stands for in the low-pass filter; None: those of its measurement.
-    filter_interval: ClassVar[int | None] = None
+    # Whether there are no more updates once one is `stalled`.
+    last_when_stalled: ClassVar[bool] = False
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
 
@@ -115,7 +115,7 @@ class TachometerSpec:
         if self.index_reset and not self.index:
             raise ValueError("index_reset must be given together with an index")
         if self.lowpass is not None and (self.lowpass <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS):
-            least = float(4 * self.timing.clock_hz / Fraction(self.interval_unit_cycles << MAX_EXTRA_BITS))
+            least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))
             raise ValueError(f"lowpass must be at least {least:.4g} rad/s here, not {float(self.lowpass):.9g} rad/s")
         if self.own_ticks and self.max_tick_cycles is not None:
             raise ValueError(f"method must be another than {self.method} for an external tick: it makes its own")
@@ -207,8 +207,9 @@ class TachometerSpec:
     def low_pass(self) -> LowPass:
         """The low-pass filter, of which there must be one."""
         assert self.lowpass is not None
-        longest = (1 << self.interval_width) - 1 if self.filter_interval is None else 255
-        return LowPass(self.lowpass * self.seconds(self.interval_unit_cycles), longest, self.native_width)
+        # Those that wait for the filter add up, at most a tick in each of its clocks.
+        longest = max((1 << self.timing.max_ticks.bit_length()) - 1, 255)
+        return LowPass(self.lowpass * self.timing.tick_seconds, longest, self.native_width)
 
     @property
     def low_pass_latency(self) -> int:

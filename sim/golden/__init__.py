@@ -31,5 +31,5 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
         beyond = None
     ticks, index = count(spec, steps, last, trace.n_clocks, beyond)
     measured = golden.updates(ticks, steps, trace.n_clocks)
-    updates = in_unit(spec, filtered(spec, measured, trace.n_clocks))
+    updates = in_unit(spec, filtered(spec, ticks, measured, trace.n_clocks))
     return Run(trace.n_clocks, with_age(spec, ticks, updates), updates, index, steps.errors, tick_errors)

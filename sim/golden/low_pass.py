@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from tachometry.sim.results import Updates
+from tachometry.sim.results import Ticks, Updates
 from tachometry.spec import TachometerSpec
 
 
-def filtered(spec: TachometerSpec, updates: Updates, n_clocks: int) -> Updates:
+def filtered(spec: TachometerSpec, ticks: Ticks, updates: Updates, n_clocks: int) -> Updates:
     """Updates with the filtered velocity in counts per tick, those whose strobe falls within `n_clocks`.
 
     The filter takes an update when it is done with the one before; of those that come meanwhile it takes the last, for
-    the intervals of all.
+    the ticks of all. What is the last update of a shaft at rest it takes as it is.
     """
     if spec.lowpass is None:
         return updates
@@ -20,8 +20,10 @@ def filtered(spec: TachometerSpec, updates: Updates, n_clocks: int) -> Updates:
     latency = form.latency
     tables, low_bits, extra, bits = form.tables, form.low_bits, form.extra_bits, form.factor_bits
     half = 1 << (bits - 1)
-    intervals = updates.interval if spec.filter_interval is None else np.full(len(updates.clock), spec.filter_interval)
     came = updates.clock - spec.output_latency - latency
+    # Ticks from the clock of the update before, or from reset, on.
+    intervals = np.diff(np.searchsorted(ticks.clock, came, side="left"), prepend=0)
+    clears = (updates.stalled & spec.last_when_stalled).tolist()
 
     taken: list[tuple[int, int, int]] = []  # clock, row, intervals
     free = 0
@@ -39,7 +41,7 @@ def filtered(spec: TachometerSpec, updates: Updates, n_clocks: int) -> Updates:
     for _, row, interval in taken:
         u = velocity[row] << extra
         places = (interval & ((1 << low_bits) - 1), interval >> low_bits)
-        difference = y - u
+        difference = 0 if clears[row] else y - u
         for table, place in zip(tables, places, strict=False):
             difference = (table[place] * difference + half) >> bits
         y = u + difference

@@ -27,10 +27,10 @@ def test_counts_ticks_since_the_update() -> None:
 
 MUTANTS = {
     "wraps": ("(self.tick & (self.age != self._max_age))", "self.tick"),
-    "goes on at an update": ("Mux(self.update, 0, count)", "count"),
+    "goes on at an update": ("Mux(self.update, 0, self.before)", "self.before"),
     "a tick with the update is lost": (
-        "count.eq(self.age + (self.tick &",
-        "count.eq(self.age + (self.tick & ~self.update &",
+        "before.eq(self.age + (self.tick &",
+        "before.eq(self.age + (self.tick & ~self.update &",
     ),
 }
 
