@@ -140,7 +140,8 @@ _OUTPUT_OPTIONS = [
     ),
     output(
         "--trace",
-        help="CSV with a row per update: clock, tick, interval (ticks), forced, raw velocity, velocity in rad/s.",
+        help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
+        "velocity in rad/s.",
     ),
     output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts)."),
     output(

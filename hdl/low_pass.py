@@ -66,8 +66,6 @@ class LowPass(wiring.Component):
         waiting, take = Signal(), Signal()
         next_u, next_tag = Signal.like(self.native, reset_less=True), Signal.like(self.tag, reset_less=True)
         next_interval, next_clear = Signal.like(elapsed.age, reset_less=True), Signal(reset_less=True)
-        sum_ = Signal(range(2 * spec.max_interval + 1))
-        m.d.comb += sum_.eq(elapsed.before + Mux(waiting & ~take, next_interval, 0))
         with m.If(take):
             m.d.sync += waiting.eq(0)
         with m.If(self.start):
@@ -76,7 +74,8 @@ class LowPass(wiring.Component):
                 next_u.eq(self.native),
                 next_tag.eq(self.tag),
                 next_clear.eq(self.clear),
-                next_interval.eq(Mux(sum_ > spec.max_interval, spec.max_interval, sum_)),
+                # No overflow: those that wait have come since the filter began, fewer clocks ago than it can count.
+                next_interval.eq(elapsed.before + Mux(waiting & ~take, next_interval, 0)),
             ]
 
         # The state, in 2^−extra of an LSB, and what it differs by from the update.

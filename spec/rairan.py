@@ -76,6 +76,10 @@ class RairanTachometer(TachometerSpec):
     def _check_adaptive(self, target: Fraction) -> None:
         if self.paper_exact:
             raise ValueError("adaptive must not be given with paper_exact, which has one dt")
+        if self.lowpass is not None:
+            raise ValueError(
+                "lowpass must not be given with adaptive, whose ticks differ: its time is counted in ticks"
+            )
         if not 0 < target < Fraction(1, 3):
             raise ValueError(f"adaptive must be more than 0 and less than 1/3, not {float(target):.9g}")
         if self.timing.max_ticks < 4:

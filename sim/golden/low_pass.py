@@ -30,7 +30,7 @@ def filtered(spec: TachometerSpec, ticks: Ticks, updates: Updates, n_clocks: int
     for row, (clock, interval) in enumerate(zip(came.tolist(), intervals.tolist(), strict=True)):
         if taken and clock < taken[-1][0]:
             before, _, waited = taken[-1]
-            taken[-1] = before, row, min(waited + interval, form.max_interval)
+            taken[-1] = before, row, waited + interval
         else:
             take = max(clock + 1, free)
             taken.append((take, row, min(interval, form.max_interval)))

@@ -172,13 +172,13 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         age=bool(rng.random() < 0.5),
         bounds=bool(rng.random() < 0.5) and not options.get("paper_exact"),
     )
-    if rng.random() < 0.25:
+    if rng.random() < 0.25 and getattr(spec, "adaptive", None) is None:
         spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))
     if method == "mt" and rng.random() < 0.6:
         longest = int(rng.choice([2, max_ticks]))
         unit_cycles = spec.interval_unit_cycles
         spec = replace(spec, min_time=unit_cycles * int(rng.integers(1, longest * tick_cycles // unit_cycles + 1)))
-    if isinstance(spec, RairanTachometer) and max_ticks >= 10 and not spec.paper_exact:
+    if isinstance(spec, RairanTachometer) and max_ticks >= 10 and not (spec.paper_exact or spec.lowpass):
         spec = replace(spec, adaptive=Fraction(1, 4))
         spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.max_pulse_count))))
     spec = random_output(spec, rng)
