@@ -100,7 +100,7 @@ def compare(
     inputs = tables if capture is None else [capture]
     outputs = Outputs({name: path for name, path in given.items() if path is not None}, inputs=inputs)
     named = named_methods(methods, make, RIVALS)
-    spec = make("s", {})
+    spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
     source = _source(record, capture, read, spec)
     earliest = 0.0 if start is None else float(parse_time("from", start))
     if earliest < 0:
