@@ -7,7 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.bounds import bound_members
+from tachometry.hdl.members import tick_members, update_members
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec import MTachometer
 from tachometry.spec.tachometer import BOUNDS
@@ -119,18 +119,7 @@ class Datapath(wiring.Component):
     """
 
     def __init__(self, spec: MTachometer) -> None:
-        super().__init__(
-            {
-                "tick": In(1),
-                "pulse_count": In(signed(spec.count_width)),
-                "velocity": Out(signed(spec.native_width)),
-                "velocity_valid": Out(1),
-                "interval": Out(spec.interval_width),
-                "forced": Out(1),
-                "stalled": Out(1),
-                **bound_members(spec),
-            }
-        )
+        super().__init__(tick_members(spec) | update_members(spec))
         self._spec = spec
         self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
         self.scaler: Any = None

@@ -4,8 +4,8 @@ from amaranth import Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.divider import Divider
+from tachometry.hdl.members import update_members
 from tachometry.hdl.pulse_counter import saturate
 from tachometry.spec.tachometer import BOUNDS
 from tachometry.spec.timed import TimedTachometer
@@ -72,14 +72,9 @@ class QuotientVelocity(wiring.Component):
                 "stalled_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
-                "velocity": Out(signed(spec.native_width)),
-                "velocity_valid": Out(1),
-                "interval": Out(spec.interval_width),
-                "forced": Out(1),
-                "stalled": Out(1),
                 "out_of_range": Out(1),
                 **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
-                **bound_members(spec),
+                **update_members(spec),
             }
         )
 

@@ -8,8 +8,8 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.dt_shift import DtShift
+from tachometry.hdl.members import tick_members, update_members
 from tachometry.spec import RairanTachometer
 
 
@@ -268,15 +268,9 @@ class Datapath(wiring.Component):
                 "step_now": In(signed(2)),
                 "last": Out(1),
                 "beyond": Out(1),
-                "tick": In(1),
-                "pulse_count": In(signed(spec.count_width)),
-                "velocity": Out(signed(spec.native_width)),
-                "velocity_valid": Out(1),
-                "interval": Out(spec.interval_width),
-                "forced": Out(1),
-                "stalled": Out(1),
+                **tick_members(spec),
                 **_ports(spec),
-                **bound_members(spec),
+                **update_members(spec),
             }
         )
         self._spec = spec

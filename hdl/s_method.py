@@ -2,14 +2,13 @@
 
 from typing import Any
 
-from amaranth import Cat, Module, Signal, Value, signed
+from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.alteration import AlterationDetector
-from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.interval import IntervalAccumulator
+from tachometry.hdl.members import tick_members, update_members
 from tachometry.hdl.reciprocal import Reciprocal
 from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
@@ -44,18 +43,7 @@ class Datapath(wiring.Component):
     """
 
     def __init__(self, spec: STachometer) -> None:
-        super().__init__(
-            {
-                "tick": In(1),
-                "pulse_count": In(signed(spec.count_width)),
-                "velocity": Out(signed(spec.native_width)),
-                "velocity_valid": Out(1),
-                "interval": Out(spec.interval_width),
-                "forced": Out(1),
-                "stalled": Out(1),
-                **bound_members(spec),
-            }
-        )
+        super().__init__(tick_members(spec) | update_members(spec))
         self._spec = spec
         self.alteration = AlterationDetector(spec.count_width)
         self.interval_accumulator = IntervalAccumulator(

@@ -4,8 +4,8 @@ from amaranth import Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.bounds import bound_members
 from tachometry.hdl.gap_timer import GapTimer
+from tachometry.hdl.members import tick_members, update_members
 from tachometry.hdl.quotient_velocity import QuotientVelocity
 from tachometry.spec.tachometer import BOUNDS
 from tachometry.spec.timed import TimedTachometer
@@ -48,16 +48,10 @@ class TimedDatapath(wiring.Component):
         self.quotient_velocity = QuotientVelocity(spec)
         super().__init__(
             {
-                "tick": In(1),
-                "pulse_count": In(signed(spec.count_width)),
+                **tick_members(spec),
                 **({} if spec.on_lattice else {"step": In(signed(2))}),
-                "velocity": Out(signed(spec.native_width)),
-                "velocity_valid": Out(1),
-                "interval": Out(spec.interval_width),
-                "forced": Out(1),
-                "stalled": Out(1),
                 **{port.name: Out(port.width) for port in spec.method_ports},
-                **bound_members(spec),
+                **update_members(spec),
             }
         )
 
