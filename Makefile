@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test formal bench size lint clean
+.PHONY: help venv demo figures compare icarus test verify formal bench size lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -59,6 +59,9 @@ formal: $(VENV)/.formal ## properties of the exported core, proven by induction,
 bench: $(VENV)/.test ## speed of the golden models and of the engines, in one run, written to docs/bench.md
 	$(BIN)/python bench/golden.py -o docs/bench.md
 	$(BIN)/python bench/engines.py -o docs/bench.md
+
+verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks
+	$(BIN)/tachometry verify --clocks 1000000000 -o build/verify
 
 compare: $(VENV)/.run ## all methods and what others use in several situations, written to docs/compare.md
 	$(BIN)/python bench/compare.py

@@ -53,6 +53,7 @@ _SAME_NAME = (
     "lsb",
     "method",
     "methods",
+    "engines",
     "speeds",
     "only",
     "from",

@@ -139,12 +139,13 @@ def observed(spec: TachometerSpec, n_clocks: int, rows: NDArray[np.int64]) -> Ru
 
 @dataclass(frozen=True)
 class Mismatch:
-    """The first row in which two runs differ in one signal."""
+    """The first row in which two runs differ in one signal; `clock` is the earlier of the rows'."""
 
     signal: str
     row: int
     expected: int | None
     actual: int | None
+    clock: int
 
     def __str__(self) -> str:
         return f"{self.signal}[{self.row}]: expected {self.expected}, got {self.actual}"
@@ -161,18 +162,22 @@ def compare(expected: Run, actual: Run) -> tuple[int, list[Mismatch]]:
         The first of them in each signal that differs.
     """
     count, first = 0, []
-    pairs = [(name, getattr(expected, name), getattr(actual, name)) for name in ("errors", "tick_errors")]
+    both = (expected, actual)
+    pairs = []
+    for name in ("errors", "tick_errors"):
+        clocks = [getattr(run, name) for run in both]
+        pairs.append((name, clocks, clocks))
     for group in ("ticks", "updates", "index"):
-        left, right = getattr(expected, group), getattr(actual, group)
-        rows = [{**vars(side), **vars(side).get("more", {})} for side in (left, right)]
-        pairs += [(f"{group}.{name}", rows[0][name], rows[1][name]) for name in rows[0] if name != "more"]
-    for signal, left, right in pairs:
+        rows = [{**vars(side), **vars(side).get("more", {})} for side in (getattr(run, group) for run in both)]
+        clocks = [side["clock"] for side in rows]
+        pairs += [(f"{group}.{name}", clocks, [side[name] for side in rows]) for name in rows[0] if name != "more"]
+    for signal, clocks, (left, right) in pairs:
         common = min(len(left), len(right))
         differ = np.flatnonzero(left[:common] != right[:common])
         surplus = max(len(left), len(right)) - common
         if len(differ) or surplus:
             row = int(differ[0]) if len(differ) else common
-            values = [int(side[row]) if row < len(side) else None for side in (left, right)]
-            first.append(Mismatch(signal, row, *values))
+            old, new = (int(side[row]) if row < len(side) else None for side in (left, right))
+            first.append(Mismatch(signal, row, old, new, min(int(side[row]) for side in clocks if row < len(side))))
             count += len(differ) + surplus
     return count, first
