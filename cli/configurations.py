@@ -70,9 +70,8 @@ FACTORS: dict[str, dict[str, list[str]]] = {
     },
 }
 
-# What cannot be together; the first for time.
+# What cannot be together.
 APART = (
-    (("tick", "--tick 960"), ("max_ticks", "65536")),
     (("tick", "--tick 1"), ("external", "--external-tick")),
     (("exact", "--paper-exact"), ("bounds", "--bounds")),
     (("exact", "--paper-exact"), ("decay", "--no-bound-decay")),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options import GroupedCommand, option
+from tachometry.cli.options import GroupedCommand, option, output_folder
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.sim.figures import Entry, Lab, Result
@@ -41,14 +41,8 @@ Examples:
     default=True,
     help="Simulate the hardware beside the golden models of tsuji12, rairan5 and rairan7: most of the time.",
 )
-@option(
-    "Outputs",
-    "-o",
-    "--output",
-    "directory",
-    type=click.Path(path_type=Path, file_okay=False),
-    default="build/figures",
-    metavar="DIR",
+@output_folder(
+    "build/figures",
     help="Folder of the .svg, .png and .csv of each figure, and of claims.csv, which has a row per claim.",
 )
 def figures(only: str, hdl: bool, directory: Path) -> int:

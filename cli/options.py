@@ -128,6 +128,12 @@ def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[
     return option(_OUTPUTS, name, type=click.Path(path_type=Path), metavar="FILE", callback=callback, help=help)
 
 
+def output_folder(default: str, *, help: str) -> Callable[[Any], Any]:
+    """Decorator for the option that names the folder of all outputs, handed to the command as `directory`."""
+    kind = click.Path(path_type=Path, file_okay=False)
+    return option(_OUTPUTS, "-o", "--output", "directory", type=kind, default=default, metavar="DIR", help=help)
+
+
 _OUTPUT_OPTIONS = [
     output(
         "--vcd",

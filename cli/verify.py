@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tachometry.cli.configurations import configurations, spec_of
-from tachometry.cli.options import INTERRUPTED, GroupedCommand, option
+from tachometry.cli.options import INTERRUPTED, GroupedCommand, option, output_folder
 from tachometry.spec import METHODS
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
@@ -72,16 +72,7 @@ later ones find them in the cache.""",
     metavar="N",
     help="Processes. [default: one for each core of the computer]",
 )
-@option(
-    "Outputs",
-    "-o",
-    "--output",
-    "directory",
-    type=click.Path(path_type=Path, file_okay=False),
-    default="build/verify",
-    metavar="DIR",
-    help="Folder of the captures of failing motions; it is made when there is one.",
-)
+@output_folder("build/verify", help="Folder of the captures of failing motions; it is made when there is one.")
 def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None, directory: Path) -> int:
     """Hold all engines against the golden models, in many configurations.
 

@@ -4,21 +4,14 @@ import csv
 from pathlib import Path
 
 import pytest
+from support.command import run
 
 from tachometry.cli import synthesis
-from tachometry.cli.main import main
 from tachometry.sim.compare import RIVALS
 from tachometry.spec import METHODS, TachometerSpec
 
 CORE = "--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms".split()
 MOTION = ["--motion", "ramp:0:40rad/s:200ms+sine:30:10Hz:200ms"]
-
-
-def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(arg) for arg in args])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
 
 
 def test_all_methods_in_one_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,17 +4,14 @@ import csv
 from pathlib import Path
 
 import pytest
+from support import command
 
-from tachometry.cli.main import main
 from tachometry.sim.figures import FIGURES, Lab
 from tachometry.sim.golden import m_method
 
 
 def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main(["figures", *(str(arg) for arg in args)])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
+    return command.run("figures", *args)
 
 
 def test_figures_data_and_claims(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,17 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.command import run
 
-from tachometry.cli.main import main
 from tachometry.hdl.export import export
 from tachometry.spec import Encoder, Speed, STachometer, Timing
-
-
-def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(arg) for arg in args])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
 
 
 def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,18 +3,10 @@
 from pathlib import Path
 
 import pytest
-
-from tachometry.cli.main import main
+from support.command import run
 
 CORE = "--ppr 24 --clock 100kHz --tick 1ms --max-time 20ms".split()
 LINES = "--index --index-reset --external-tick".split()
-
-
-def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(arg) for arg in args])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
 
 
 def test_a_capture_keeps_index_and_tick(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,8 +11,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from support.command import run
 
-from tachometry.cli.main import main
 from tachometry.sim import theory
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.manifest import manifest
@@ -21,13 +21,6 @@ OPTIONS = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400ra
 SPEC = STachometer(
     encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("400rad/s")
 )
-
-
-def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(arg) for arg in args])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
 
 
 def tables(text: str) -> tuple[dict[str, str], list[str], list[list[str]]]:
@@ -166,6 +159,8 @@ def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFi
 def test_amaranth_is_not_loaded(tmp_path: Path) -> None:
     code = f"""
 import sys
+from support.command import run
+
 from tachometry.cli.main import main
 try:
     main(["plan", "--ppr", "9", "--plot", {str(tmp_path / "p.png")!r}])

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
+from support import command
 
-from tachometry.cli.main import main
 from tachometry.spec import METHODS
 
 OPTIONS = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400rad/s".split()
@@ -15,10 +15,7 @@ UNIT = 50 * math.pi
 
 
 def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main(["plan", *(str(arg) for arg in (*OPTIONS, *args))])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
+    return command.run("plan", *OPTIONS, *args)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -3,21 +3,14 @@
 from pathlib import Path
 
 import pytest
+from support.command import run
 
-from tachometry.cli.main import main
 from tachometry.sim.capture import write_csv, write_sr
 from tachometry.sim.encoder import VirtualEncoder
 from tachometry.sim.motion import parse_motion
 from tachometry.sim.recording import Recording
 
 CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
-
-
-def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(arg) for arg in args])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
 
 
 def recorded() -> Recording:

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.command import run
 
-from tachometry.cli.main import main
 from tachometry.sim import golden
 from tachometry.sim.capture import read_capture
 from tachometry.sim.encoder import VirtualEncoder
@@ -29,13 +29,6 @@ MOTION = ["--motion", "ramp:0:20:200ms+stop:50ms+constant:-15:100ms"]
 OUTPUTS = {"--vcd": "v.vcd", "--plot": "p.png", "--trace": "t.csv", "--counts": "c.csv", "--save-capture": "s.sr"}
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()"]
 SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
-
-
-def run(*args: str | Path) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(arg) for arg in args])
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
 
 
 def all_outputs(folder: Path) -> list[str]:

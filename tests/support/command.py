@@ -1,0 +1,15 @@
+"""The command `tachometry`, in this process."""
+
+from pathlib import Path
+
+import pytest
+
+from tachometry.cli.main import main
+
+
+def run(*args: str | Path) -> int:
+    """Its exit status."""
+    with pytest.raises(SystemExit) as stop:
+        main([str(arg) for arg in args])
+    assert isinstance(stop.value.code, int)
+    return stop.value.code
