@@ -148,7 +148,7 @@ _OUTPUT_OPTIONS = [
     output(
         "--trace",
         help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
-        "velocity in rad/s.",
+        "velocity in rad/s; then bounds and outputs of the method.",
     ),
     output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts)."),
     output(

@@ -68,18 +68,22 @@ def velocity_error(
 
 
 def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
-    """Write a CSV with a row per update: when it came, which tick closed its window, and what it says."""
+    """Write a CSV with a row per update: when it came, which tick closed its window, and what it says.
+
+    Bounds and outputs of the method follow, raw, by the names of their ports.
+    """
     updates = run.updates
     tick = np.searchsorted(run.ticks.clock, updates.clock - spec.tick_to_velocity, side="right") - 1
-    columns = (
-        updates.clock,
-        tick,
-        updates.interval,
-        updates.forced.astype(np.int64),
-        updates.velocity,
-        updates.velocity * spec.rad_per_s_per_lsb,
-    )
-    write_csv(path, "clock,tick,interval,forced,velocity_raw,velocity_rad_s", columns)
+    columns = {
+        "clock": updates.clock,
+        "tick": tick,
+        "interval": updates.interval,
+        "forced": updates.forced.astype(np.int64),
+        "velocity_raw": updates.velocity,
+        "velocity_rad_s": updates.velocity * spec.rad_per_s_per_lsb,
+        **{name: column.astype(np.int64) for name, column in updates.more.items()},
+    }
+    write_csv(path, ",".join(columns), columns.values())
 
 
 def write_counts(path: Path, run: Run) -> None:

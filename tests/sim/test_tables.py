@@ -67,4 +67,8 @@ def test_csv(tmp_path: Path) -> None:
         "clock,tick,interval,forced,velocity_raw,velocity_rad_s\n"
         f"{41 + AFTER},1,2,0,3,{3 * LSB!r}\n{81 + AFTER},3,2,1,-5,{-5 * LSB!r}\n"
     )
+    more = {"velocity_lower": np.array([-7, 8]), "bounds_valid": np.array([False, True])}
+    write_trace(tmp_path / "m.csv", SPEC, replace(RUN, updates=replace(RUN.updates, more=more)))
+    lines = (tmp_path / "m.csv").read_text().splitlines()
+    assert [line.split(",")[6:] for line in lines] == [list(more), ["-7", "0"], ["8", "1"]]
     assert (tmp_path / "c.csv").read_bytes() == b"tick,pulse_count,position\n0,0,0\n1,1,1\n2,1,2\n3,-2,0\n4,-2,-2\n"
