@@ -153,12 +153,17 @@ def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, ND
     return np.clip(exact, -limit, limit), np.abs(exact) > limit
 
 
+def _among(values: Ints, ordered: Ints) -> NDArray[np.bool_]:
+    """Which of the values, none negative, stand in an ordered array; `np.isin` would sort or hash it."""
+    return np.append(ordered, -1)[np.searchsorted(ordered, values)] == values
+
+
 def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Ticks) -> Measurements:
     """Ticks at which the velocity sinks; `held` is the velocity after each measurement.
 
     A tick without a count asks, if nothing is being divided; a measurement that begins meanwhile takes the divider.
     """
-    ask = ticks.clock[~np.isin(ticks.clock, np.append(taken.clock, counts.clock(counts.period)))]
+    ask = ticks.clock[~(_among(ticks.clock, taken.clock) | _among(ticks.clock, counts.clock(counts.period)))]
     clock = np.append(taken.clock, ask)
     order = np.argsort(clock)
     clock, measured = clock[order], order < len(taken.clock)
