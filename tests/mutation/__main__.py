@@ -1,0 +1,62 @@
+"""How many wrong cores the tests' motions tell from the right one: `make mutate`.
+
+Names of methods as arguments choose those.
+"""
+
+import os
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+from mutation.cases import CASES
+from mutation.score import Score, judge
+
+from tachometry.spec import METHODS
+
+LEAST = 0.99  # of the mutants that are not equivalent
+
+
+def _row(*cells: object) -> None:
+    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
+
+
+def main(chosen: list[str]) -> bool:
+    """Whether enough mutants of every method were killed; prints the tables."""
+    unknown = sorted(set(chosen) - set(METHODS))
+    if unknown:
+        print(f"method must be one of {', '.join(METHODS)}, not {unknown[0]}", file=sys.stderr)
+        sys.exit(2)
+    scores: list[Score] = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        _row("core", "mutants", "killed", "equivalent", "survivors", "seconds")
+        _row("---", *["---:"] * 5)
+        for case in CASES:
+            if not chosen or case.method in chosen:
+                start = time.monotonic()
+                score = judge(case, pool)
+                scores.append(score)
+                seconds = f"{time.monotonic() - start:.0f}"
+                _row(case.name, score.mutants, score.killed, score.equivalent, len(score.survivors), seconds)
+    print()
+    _row("method", "mutants", "killed", "equivalent", "survivors", "score")
+    _row("---", *["---:"] * 5)
+    fine = True
+    for method in METHODS:
+        of_method = [score for score in scores if score.case.method == method]
+        if not of_method:
+            continue
+        mutants, killed = (sum(getattr(score, name) for score in of_method) for name in ("mutants", "killed"))
+        equivalent = sum(score.equivalent for score in of_method)
+        fine &= killed >= LEAST * (mutants - equivalent)
+        share = f"{100 * killed / (mutants - equivalent):.1f} %"
+        _row(method, mutants, killed, equivalent, mutants - killed - equivalent, share)
+    for score in scores:
+        if score.survivors:
+            print(f"\nsurvivors of {score.case.name}:")
+        for mutant in score.survivors:
+            print(f"  {', '.join(mutant.lines)}: {mutant.place}")
+    return fine
+
+
+if __name__ == "__main__":
+    sys.exit(not main(sys.argv[1:]))

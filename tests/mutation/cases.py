@@ -1,0 +1,82 @@
+"""What is mutated: small cores in which, method by method, all hardware is there."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
+
+
+@dataclass(frozen=True)
+class Case:
+    """A core and how often it is mutated.
+
+    Parameters
+    ----------
+    name : str
+    spec : TachometerSpec
+    mutants : int
+    max_table : int
+        Stands in for `MAX_TABLE` of the S method, so that small cores carry their reciprocal as large ones do.
+    """
+
+    name: str
+    spec: TachometerSpec
+    mutants: int
+    max_table: int = 2048
+
+    @property
+    def method(self) -> str:
+        """Of the core."""
+        return self.spec.method
+
+
+def _case(
+    method: str,
+    name: str,
+    tick_cycles: int,
+    max_ticks: int,
+    max_count: int,
+    mutants: int = 520,
+    max_table: int = 2048,
+    decoding: int = 4,
+    **options: Any,
+) -> Case:
+    """A core by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each."""
+    # One revolution a second is a count a tick.
+    spec = METHODS[method](
+        encoder=Encoder(1, decoding),
+        timing=Timing(decoding * tick_cycles, tick_cycles, max_ticks),
+        max_speed=Speed.parse(f"{max_count}rev/s"),
+        position_width=8,
+        **{"frac_bits": 4} | options,
+    )
+    return Case(f"{method}, {name}", spec, mutants, max_table)
+
+
+_FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_reset": True}
+
+CASES = [
+    _case("s", "table", 3, 10, 2, age=True),
+    _case("s", "carried, serial", 16, 10, 2, max_table=4, **_FRONT),
+    _case("s", "carried, bounds", 2, 9, 1, max_table=4, bounds=True, cancel=False),
+    _case("m", "of 3", 3, 2, 2, average=3, bounds=True, age=True),
+    _case(
+        "m",
+        "of 4, rpm, low pass",
+        6,
+        2,
+        3,
+        average=4,
+        unit="rpm",
+        max_tick_cycles=9,
+        lowpass=Fraction(1, 2),
+        decoding=2,
+    ),
+    _case("t", "in clocks", 8, 4, 3, bounds=True, age=True),
+    _case("t", "in ticks", 4, 12, 2, timer="tick", unit="rad/s", velocity_bits=8, **_FRONT),
+    _case("mt", "in clocks", 8, 4, 3, bounds=True, age=True),
+    _case("mt", "in ticks", 4, 12, 2, timer="tick", max_tick_cycles=6, decoding=1),
+    _case("rairan", "adaptive", 3, 8, 2, adaptive=Fraction(1, 4), bounds=True, age=True),
+    _case("rairan", "n2, low pass", 4, 6, 2, estimate="n2", lowpass=Fraction(1, 2), **_FRONT),
+]

