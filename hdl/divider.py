@@ -11,7 +11,7 @@ class Divider(wiring.Component):
     In each step the divisor is taken from the doubled remainder, or added if that is negative; so it stays within
     −divisor … divisor − 1. The signs that it passes through, inverted but for the first, are the digits of the quotient
     in two's complement: Σ ±2^i is their weighted sum, and the last one is the correction to a remainder that is not
-    negative. A one that is shifted before them tells when the last has come.
+    negative. A counter tells when the last has come: it ends from any state, unlike a mark among the digits.
 
     Latency: `done` is high as many clocks after `start` as the quotient has bits; a start before it, or together with
     it, begins the next one.
@@ -58,21 +58,23 @@ class Divider(wiring.Component):
         m = Module()
         # Only what says that something is under way needs a reset; the rest is loaded before it is used.
         running = Signal()
+        steps = Signal(signed((self._steps - 1).bit_length() + 1), reset_less=True)  # counts down to −1
         remainder = Signal(signed(len(self.by) + 1), reset_less=True)
         left = Signal(self._integer_bits, reset_less=True)
-        digits = Signal(self._steps + 1, reset_less=True)
+        digits = Signal(self._steps, reset_less=True)
         by = Signal.like(self.by, reset_less=True)
         negative = remainder[-1]
         m.d.comb += [
             self.by.eq(by),
-            self.done.eq(running & digits[-1]),
+            self.done.eq(running & steps[-1]),
             self.busy.eq(running),
-            self.quotient.eq(Cat(~negative, digits[: self._steps - 1], ~digits[self._steps - 1])),
+            self.quotient.eq(Cat(~negative, digits[:-1], ~digits[-1])),
         ]
         doubled = Cat(left[-1], remainder).as_signed()
         m.d.sync += [
             remainder.eq(Mux(negative, doubled + by, doubled - by)),
             left.eq(left << 1),
+            steps.eq(steps - 1),
             digits.eq(Cat(~negative, digits)),
         ]
         with m.If(self.done):
@@ -81,7 +83,7 @@ class Divider(wiring.Component):
             m.d.sync += [
                 running.eq(1),
                 Cat(left, remainder).eq(self.dividend),
-                digits.eq(1),
+                steps.eq(self._steps - 1),
                 by.eq(self.divisor),
             ]
         return m

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from amaranth import Array, Module, Mux, Signal, Value
+from amaranth import Array, Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -52,14 +52,15 @@ class DtShift(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         spec, rule = self._spec, self._spec.adaptive_dt
-        mask = Signal(spec.max_shift)  # 2^k − 1
+        # 2^k − 1, of no state of its own: after an upset it could be that of another k.
+        mask = self._soon(m, Cat(self.shift > k for k in range(spec.max_shift)))
         passed = Signal(spec.max_shift)
         m.d.comb += self.last.eq(self.nominal & (passed == mask))
         with m.If(self.nominal):
             m.d.sync += passed.eq(passed + 1)
         with m.If(self.last | self.opens):
             m.d.sync += passed.eq(0)
-        rare, slow = self._soon(m, rule.rare_to), self._soon(m, rule.slow_from)
+        rare, slow = (self._soon(m, self.of(limit), limit(0)) for limit in (rule.rare_to, rule.slow_from))
         down, up, falls = Signal(), Signal(), Signal()
         falling = Signal()  # to 0, unless there are enough counts on the way
         m.d.comb += [
@@ -70,22 +71,23 @@ class DtShift(wiring.Component):
         with m.If(self.opens):
             m.d.sync += falling.eq(falls & (mask >> 1).any() & ~self.turns)
             with m.If(self.turns):
-                m.d.sync += [self.shift.eq(0), mask.eq(0)]
+                m.d.sync += self.shift.eq(0)
+            with m.Elif(self.shift > spec.max_shift):
+                m.d.sync += self.shift.eq(spec.max_shift)
             with m.Elif(down), m.If(mask[0]):
-                m.d.sync += [self.shift.eq(self.shift - 1), mask.eq(mask >> 1)]
+                m.d.sync += self.shift.eq(self.shift - 1)
             with m.Elif(up & ~mask[-1]):
-                m.d.sync += [self.shift.eq(self.shift + 1), mask.eq((mask << 1) | 1)]
+                m.d.sync += self.shift.eq(self.shift + 1)
         return m
 
     def of(self, constant: Callable[[int], int]) -> Value:
         """A constant that depends on k."""
         return Array([constant(min(k, self._spec.max_shift)) for k in range(1 << len(self.shift))])[self.shift]
 
-    def _soon(self, m: Module, constant: Callable[[int], int]) -> Value:
-        """The same from a register: but for a reversal, which does not ask, a window takes dt at least."""
-        value = self.of(constant)
+    def _soon(self, m: Module, value: Value, init: int = 0) -> Value:
+        """From a register what depends on k: but for a reversal, which does not ask, a window takes dt at least."""
         if self._spec.timing.tick_cycles == 1:
             return value
-        held = Signal.like(value, init=constant(0))
+        held = Signal.like(value, init=init)
         m.d.sync += held.eq(value)
         return held

@@ -16,6 +16,9 @@ from tachometry.spec.tachometer import BOUNDS
 class MovingSum(wiring.Component):
     """Sum of the last n pulse numbers, the present one included.
 
+    It is a difference of what had been counted in all up to now and n ticks ago, modulo 2^sum_width: n ticks after an
+    upset, both have it. A sum from which the oldest number is taken when a new one is added would keep it for ever.
+
     Latency: none. What was counted before the first tick after reset is 0, whatever the memory still holds.
 
     Parameters
@@ -52,36 +55,38 @@ class MovingSum(wiring.Component):
         if self._length == 1:
             m.d.comb += [self.total.eq(self.m_e), self.empty.eq(~self.m_e.any())]
             return m
-        # The sum without the tick that will be the oldest when the next one comes.
-        kept = Signal.like(self.total)
         last = self._length - 1
         quiet = Signal(range(self._length), init=last)
-        m.d.comb += [self.total.eq(kept + self.m_e), self.empty.eq(~self.m_e.any() & (quiet == last))]
-        oldest = self._oldest(m, last)
+        m.d.comb += self.empty.eq(~self.m_e.any() & (quiet >= last))
         with m.If(self.tick):
-            m.d.sync += kept.eq(self.total - oldest)
             with m.If(self.m_e.any()):
                 m.d.sync += quiet.eq(0)
-            with m.Elif(quiet != last):
+            with m.Elif(quiet < last):
                 m.d.sync += quiet.eq(quiet + 1)
+        if last == 1:
+            previous = Signal.like(self.m_e)
+            with m.If(self.tick):
+                m.d.sync += previous.eq(self.m_e)
+            m.d.comb += self.total.eq(previous + self.m_e)
+            return m
+        # All numbers up to the last tick, and up to this one.
+        before, through = Signal.like(self.total), Signal.like(self.total)
+        m.d.comb += [through.eq(before + self.m_e), self.total.eq(through - self._earlier(m, before, last))]
+        with m.If(self.tick):
+            m.d.sync += before.eq(through)
         return m
 
-    def _oldest(self, m: Module, last: int) -> Value:
-        """m_e(i − last), valid with `tick`."""
-        if last == 1:
-            past = Signal.like(self.m_e)
-            with m.If(self.tick):
-                m.d.sync += past.eq(self.m_e)
-            return past
-        m.submodules.past = memory = Memory(shape=signed(len(self.m_e)), depth=last, init=[])
+    def _earlier(self, m: Module, value: Signal, last: int) -> Value:
+        """What `value` was `last` ticks ago, valid with `tick`."""
+        m.submodules.past = memory = Memory(shape=value.shape(), depth=last, init=[])
         write, read = memory.write_port(), memory.read_port()
         place, following, full = Signal(range(last)), Signal(range(last)), Signal()
-        wrap = place == last - 1
+        wrap = place >= last - 1
         m.d.comb += [
             following.eq(Mux(self.tick, Mux(wrap, 0, place + 1), place)),
             read.addr.eq(following),
             write.addr.eq(place),
-            write.data.eq(self.m_e),
+            write.data.eq(value),
             write.en.eq(self.tick),
         ]
         m.d.sync += [place.eq(following), full.eq(full | (self.tick & wrap))]

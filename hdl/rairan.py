@@ -146,16 +146,21 @@ class Counters(wiring.Component):
                 m.d.sync += c_more.eq(c_more + self.any)
         with m.If(self.last):
             m.d.sync += [c_more.eq(0), self.any.eq(0), self.beyond.eq(0)]
-            with m.If(~self.rest):
-                m.d.sync += [c_dt.eq(c_dt + 1), self.rest.eq(self._is_longest())]
+            m.d.sync += self.rest.eq(self._is_longest())
+            with m.If(~self._is(self._spec.max_dt)):
+                m.d.sync += c_dt.eq(c_dt + 1)
         with m.If(opens):
             m.d.sync += [c_more.eq(0), self.any.eq(1), self.beyond.eq(0)]
         with m.If(pulse & ~self.last if self._spec.paper_exact else pulse):
             m.d.sync += [c_dt.eq(0), self.rest.eq(0)]
 
+    def _is(self, constant: Callable[[int], int]) -> Value:
+        """Cdt is a constant that depends on k of dt·2^k."""
+        return self.c_dt == self._of_dt(constant)
+
     def _is_longest(self) -> Value:
-        """Cdt is one less than the maximum time has dt."""
-        return self.c_dt == self._of_dt(lambda k: self._spec.max_dt(k) - 1)
+        """With this end of dt Cdt is what the maximum time has dt, or has been so before."""
+        return self._is(self._spec.max_dt) | self._is(lambda k: self._spec.max_dt(k) - 1)
 
     def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal) -> None:
         """What a count or the end of dt makes of the estimate."""
@@ -179,6 +184,7 @@ class Counters(wiring.Component):
         def set_(
             n: Value | int,
             *,
+            update: Value | int = 1,
             high: int = 0,
             forced: int = 0,
             stalled: int = 0,
@@ -190,7 +196,7 @@ class Counters(wiring.Component):
             if spec.bounds:
                 m.d.sync += [self.loose.eq(loose), self.unsynced.eq(unsynced), self.known.eq(known)]
             m.d.sync += [
-                self.update.eq(1),
+                self.update.eq(update),
                 self.n.eq(n),
                 self.high.eq(high),
                 self.forced.eq(forced),
@@ -207,8 +213,9 @@ class Counters(wiring.Component):
             set_(1, loose=~pulse)
         with m.Elif(opens & ((self.c_dt != 1) | ~self.high)):
             set_(self.c_dt, loose=self.rest, unsynced=~in_step)
-        with m.Elif(waits & ~self.rest & self._is_longest()):
-            set_(0, forced=1, stalled=1)
+        with m.Elif(waits & self._is_longest()):
+            # At rest no update would mend it after an upset.
+            set_(0, update=~self.rest, forced=1, stalled=1)
         if spec.bound_decay:
             with m.Elif(waits & Mux(self.high, waited != 0, (waited > n) & self.n.any())):
                 set_(waited, forced=1, loose=1)
@@ -304,7 +311,9 @@ class Datapath(wiring.Component):
         m.d.sync += self.velocity_valid.eq(update)
         shift = more[0] if spec.adaptive else 0
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())[: len(self.n_ep1)]
-        with m.If(update):
+        # At rest no update mends what an upset has done to the outputs.
+        shown = update | stalled
+        with m.If(shown):
             m.d.sync += [
                 self.velocity.eq(self._velocity(n, high, backward, entry, shift)),
                 self.interval.eq(low << shift if spec.adaptive else low),
@@ -317,10 +326,10 @@ class Datapath(wiring.Component):
             if spec.adaptive:
                 m.d.sync += self.dt_shift.eq(shift)
         if spec.bounds:
-            self._bounds(m, update=update, backward=backward)
+            self._bounds(m, shown=shown, backward=backward)
         return m
 
-    def _bounds(self, m: Module, *, update: Signal, backward: Signal) -> None:
+    def _bounds(self, m: Module, *, shown: Value, backward: Signal) -> None:
         """Both looked up; backwards, the negative of each is the other."""
         spec, counters = self._spec, self.counters
         width = spec.bound_width - 1
@@ -341,7 +350,7 @@ class Datapath(wiring.Component):
         valid = Signal()
         m.d.comb += valid.eq(counters.known & (counters.high | counters.n.any()))
         (valid,) = self._later(m, 2, valid)
-        with m.If(update):
+        with m.If(shown):
             m.d.sync += [
                 self.velocity_lower.eq(Mux(backward, -entries["upper"], entries["lower"])),
                 self.velocity_upper.eq(Mux(backward, -entries["lower"], entries["upper"])),

@@ -6,6 +6,8 @@ the way, which does not change the floor. The one adds v for a bit a clock, the 
 multiplier's canonical form and takes any update rate.
 """
 
+from typing import Any
+
 from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
@@ -54,16 +56,14 @@ class _VelocityOutput(wiring.Component):
             }
         )
 
-    def _hold(self, m: Module, valid: Value, total: Value, tag: Value) -> None:
-        """Let the outputs take `total` when it is valid."""
+    def _shown(self, m: Module, total: Value, tag: Value) -> list[Any]:
+        """What lets the outputs take `total`."""
         rounded = Signal.like(total)
         m.d.comb += rounded.eq(total)
         velocity, overflow = rounded, Const(0)
         if self._output.limit < self._output.greatest:
             velocity, overflow = saturate(m, rounded, self._output.limit)
-        m.d.sync += self.done.eq(valid)
-        with m.If(valid):
-            m.d.sync += [self.velocity.eq(velocity), self.velocity_overflow.eq(overflow), self.tag_out.eq(tag)]
+        return [self.velocity.eq(velocity), self.velocity_overflow.eq(overflow), self.tag_out.eq(tag)]
 
 
 class SerialVelocityOutput(_VelocityOutput):
@@ -96,7 +96,10 @@ class SerialVelocityOutput(_VelocityOutput):
             m.d.sync += running.eq(0)
         with m.If(self.start):
             m.d.sync += [running.eq(1), step.eq(0), bit.eq(output.multiplier & 1), total.eq(low)]
-        self._hold(m, complete, total >> (output.shift - bits - 1), self.tag)
+        m.d.sync += self.done.eq(complete)
+        shown = self._shown(m, total >> (output.shift - bits - 1), self.tag)
+        with m.If(complete):
+            m.d.sync += shown
         return m
 
 
@@ -128,5 +131,6 @@ class PipelinedVelocityOutput(_VelocityOutput):
         left = self._output.shift - place
         if left:
             valid, tag, total = later(valid, tag, ((total + (self._rounding >> place)) >> left).as_signed())
-        self._hold(m, valid, total, tag)
+        # As long as `native` and `tag` stay, so does what they become.
+        m.d.sync += [self.done.eq(valid), *self._shown(m, total, tag)]
         return m

@@ -208,6 +208,7 @@ _TIMED_PROBES = {
     "core_remainder": "datapath.quotient_velocity.divider.remainder",
     "core_left": "datapath.quotient_velocity.divider.left",
     "core_digits": "datapath.quotient_velocity.divider.digits",
+    "core_steps": "datapath.quotient_velocity.divider.steps",
     "core_by": "datapath.quotient_velocity.divider.by",
 }
 _WINDOW_OF_MT_PROBES = {

@@ -36,7 +36,8 @@ module timed #(
   wire [$clog2(MAX_PERIODS+1)-1:0] core_age;
   wire signed [I:0] core_remainder;
   wire [Q-1:0] core_left;
-  wire [N:0] core_digits;
+  wire [N-1:0] core_digits;
+  wire signed [$clog2(N):0] core_steps;
   wire [I-1:0] core_by;
   wire signed [N:0] core_rounded;
 
@@ -144,7 +145,8 @@ module timed #(
   wire [4:0] j = since - 1;
   wire signed [N+I+1:0] all = distance <<< (FRAC_BITS + 1);
   wire signed [N+I+1:0] taken = all >>> (N - j);
-  wire signed [N+1:0] digits = $signed({1'b0, core_digits, 1'b0}) - (3 <<< j) + 1;
+  wire [N-1:0] found_digits = core_digits & ((1 << j) - 1);
+  wire signed [N+1:0] digits = $signed({1'b0, found_digits, 1'b0}) - (1 <<< j) + 1;
   wire signed [N+I+1:0] passed = $signed({1'b0, times}) * digits;
   wire signed [N+I+2:0] asked = all + $signed({1'b0, times}), twice = $signed({1'b0, times, 1'b0});
   wire signed [N+I+2:0] found = twice * core_rounded;
@@ -167,7 +169,7 @@ module timed #(
     lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
     lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
     lemma_left: assert (!core_running || core_left == ((distance << j) & ((1 << Q) - 1)));
-    lemma_digits: assert (!core_running || core_digits >> j == 1);
+    lemma_steps: assert (!core_running || core_steps == N - 1 - $signed({1'b0, j}));
     lemma_remainder: assert (!core_running || (core_remainder < $signed({1'b0, times})
         && core_remainder >= -$signed({1'b0, times})));
     lemma_quotient: assert (!core_running || taken == core_remainder + passed);

@@ -54,9 +54,9 @@ def test_wide_quotients() -> None:
 MUTANTS = {
     "restoring nothing": ("Mux(negative, doubled + by, doubled - by)", "doubled - by"),
     "no digit of the dividend": ("Cat(left[-1], remainder)", "Cat(0, remainder)"),
-    "first sign inverted": ("~digits[self._steps - 1])", "digits[self._steps - 1])"),
-    "no correction": ("Cat(~negative, digits[: self._steps - 1]", "Cat(1, digits[: self._steps - 1]"),
-    "a step too many": ("Signal(self._steps + 1, reset_less", "Signal(self._steps + 2, reset_less"),
+    "first sign inverted": ("~digits[-1])", "digits[-1])"),
+    "no correction": ("Cat(~negative, digits[:-1]", "Cat(1, digits[:-1]"),
+    "a step too many": ("steps.eq(self._steps - 1)", "steps.eq(self._steps)"),
     "not stopped": ("running.eq(0)", "running.eq(1)"),
 }
 

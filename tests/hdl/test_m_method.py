@@ -81,9 +81,9 @@ def test_reset_forgets() -> None:
 
 
 MUTANTS = {
-    "one tick too many": ("wrap = place == last - 1", "wrap = place == last - 2"),
-    "the oldest stays": ("self.total - oldest", "self.total"),
-    "empty after a tick less": ("(quiet == last)", "(quiet >= last - 1)"),
+    "one tick too many": ("wrap = place >= last - 1", "wrap = place >= last - 2"),
+    "the oldest stays": ("through - self._earlier(m, before, last)", "through"),
+    "empty after a tick less": ("(quiet >= last)", "(quiet >= last - 1)"),
 }
 
 
