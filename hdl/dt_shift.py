@@ -72,8 +72,9 @@ class DtShift(wiring.Component):
             m.d.sync += falling.eq(falls & (mask >> 1).any() & ~self.turns)
             with m.If(self.turns):
                 m.d.sync += self.shift.eq(0)
-            with m.Elif(self.shift > spec.max_shift):
-                m.d.sync += self.shift.eq(spec.max_shift)
+            if spec.max_shift & (spec.max_shift + 1):  # an upset can lead beyond it
+                with m.Elif(self.shift > spec.max_shift):
+                    m.d.sync += self.shift.eq(spec.max_shift)
             with m.Elif(down), m.If(mask[0]):
                 m.d.sync += self.shift.eq(self.shift - 1)
             with m.Elif(up & ~mask[-1]):

@@ -158,9 +158,9 @@ class Datapath(wiring.Component):
         if spec.bounds:
             # Of the first tick not all was seen.
             seen = Signal(range(spec.average + 1))
-            with m.If(self.tick & (seen != spec.average)):
+            with m.If(self.tick & (seen < spec.average)):
                 m.d.sync += seen.eq(seen + 1)
-            known.append(seen == spec.average)
+            known.append(seen >= spec.average)
             tags.append(self.bounds_valid)
         bounds = BOUNDS if spec.bounds else {}
         if self.scaler is None:
