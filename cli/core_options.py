@@ -1,7 +1,7 @@
 """Options of the core: what all methods share, and what each has of its own."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import Field, replace
 from typing import Any
 
@@ -205,6 +205,16 @@ def _argument(name: str) -> str:
 _METHOD_OPTIONS = _method_options()
 
 
+def methods_with(name: str) -> Collection[str]:
+    """Methods that have an option; none if it is not of methods."""
+    return _METHOD_OPTIONS.get(name, {})
+
+
+def method_options(command: Any) -> Any:
+    """Decorator: the options that not all methods have."""
+    return all_of([_method_option(*item) for item in _METHOD_OPTIONS.items()], command)
+
+
 def method_values(method: str, timing: Timing, given: dict[str, Any]) -> dict[str, Any]:
     """Values of the method's fields, of what was given of options, by their names; None stands for what was not."""
     values = {}
@@ -313,5 +323,4 @@ def core_and_make_options(command: Callable[..., Any]) -> Callable[..., Any]:
         given = {name: others.pop(_argument(name)) for name in _METHOD_OPTIONS}
         return command(spec=make(method, given), make=make, **others)
 
-    options = [_METHOD, *(_method_option(*item) for item in _METHOD_OPTIONS.items())]
-    return common_options(all_of(options, build))
+    return common_options(_METHOD(method_options(build)))

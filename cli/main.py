@@ -13,6 +13,7 @@ from tachometry.cli.generate import generate
 from tachometry.cli.options import INTERRUPTED, in_terms_of_options
 from tachometry.cli.plan import plan
 from tachometry.cli.simulate import replay, simulate
+from tachometry.cli.sweep import sweep
 from tachometry.cli.verify import verify
 
 
@@ -45,6 +46,7 @@ cli.add_command(generate)
 cli.add_command(simulate)
 cli.add_command(replay)
 cli.add_command(compare)
+cli.add_command(sweep)
 cli.add_command(figures)
 cli.add_command(verify)
 

@@ -55,12 +55,26 @@ def named_methods(
                 left_out[name] = in_terms_of_options(str(error))
         return Methods(specs | dict.fromkeys(others), left_out)
     specs = {}
+    for name, method, given in listed_methods(text, others):
+        specs[name] = None if method is None else make(method, given)
+    return Methods(specs)
+
+
+def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, dict[str, Any]]]:
+    """What is in a list with commas: each with its method, None of `others`, and what is given of its options.
+
+    Raises
+    ------
+    ValueError
+        If a name is not known.
+    """
+    found: list[tuple[str, str | None, dict[str, Any]]] = []
     for name in (word.strip() for word in text.split(",")):
         method, *words = name.split(":")
         if method in METHODS:
-            specs[name] = make(method, method_options_of_text(method, words))
+            found.append((name, method, method_options_of_text(method, words)))
         elif name in others:
-            specs[name] = None
+            found.append((name, None, {}))
         else:
             raise ValueError(f"methods must be of {', '.join([*METHODS, *others])}, or all, not {name!r}")
-    return Methods(specs)
+    return found

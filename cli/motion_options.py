@@ -11,7 +11,7 @@ from tachometry.cli.options import all_of, option
 from tachometry.spec import TachometerSpec
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.encoder import Encoding
+    from tachometry.sim.encoder import Encoding, VirtualEncoder
 
 _MOTION, _FAULTS = "Motion", "Encoder faults"
 
@@ -118,12 +118,39 @@ def optional_motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return all_of([_motion(required=False), *_OPTIONS], _recording(command))
 
 
+def encoder_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the same, handed to the command as `motion`, a text, and `encoder`, a function of a spec."""
+    return all_of([_motion(required=True), *_OPTIONS], _encoding(command))
+
+
+def tables_of(motion: str) -> list[Path]:
+    """Files that a motion reads."""
+    kind, _, table = motion.strip().partition(":")
+    return [Path(table)] if kind == "csv" else []
+
+
 def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
+
+    @functools.wraps(command)
+    def build(*, motion: str | None, encoder: Callable[[TachometerSpec], VirtualEncoder], **others: Any) -> Any:
+        def record(spec: TachometerSpec) -> Encoding:
+            from tachometry.sim.motion import parse_motion
+
+            assert motion is not None
+            return encoder(spec).record(parse_motion(motion))
+
+        if motion is None:
+            return command(record=None, tables=[], **others)
+        return command(record=record, tables=tables_of(motion), **others)
+
+    return _encoding(build)
+
+
+def _encoding(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def build(
         *,
-        motion: str | None,
         vibration: str | None,
         jitter: float,
         nonuniformity: float,
@@ -135,12 +162,12 @@ def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
         seed: int,
         **others: Any,
     ) -> Any:
-        def record(spec: TachometerSpec) -> Encoding:
+        def encoder(spec: TachometerSpec) -> VirtualEncoder:
             from tachometry.sim.encoder import VirtualEncoder
             from tachometry.sim.imperfections import Bounce
-            from tachometry.sim.motion import Vibration, parse_motion
+            from tachometry.sim.motion import Vibration
 
-            encoder = VirtualEncoder(
+            return VirtualEncoder(
                 spec.encoder.pulses_per_rev,
                 vibration=None if vibration is None else Vibration.parse(vibration),
                 jitter=jitter,
@@ -153,12 +180,7 @@ def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
                 lost=lost,
                 index=spec.index,
             )
-            assert motion is not None
-            return encoder.record(parse_motion(motion))
 
-        if motion is None:
-            return command(record=None, tables=[], **others)
-        kind, _, table = motion.strip().partition(":")
-        return command(record=record, tables=[Path(table)] if kind == "csv" else [], **others)
+        return command(encoder=encoder, **others)
 
     return build

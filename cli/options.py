@@ -59,6 +59,10 @@ _SAME_NAME = (
     "from",
     "vcd",
     "engine",
+    "vary",
+    "axes",
+    "workers",
+    "results",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
 _OPTIONS |= {item.name: f"--{item.name.replace('_', '-')}" for spec in METHODS.values() for item in options_of(spec)}

@@ -54,14 +54,18 @@ def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[
 
 def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
     """The same, of clocks that are simulated."""
-    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), _ClocksPerSecond())
+    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), PerSecond("clocks"))
 
 
-class _ClocksPerSecond(ProgressColumn):
+class PerSecond(ProgressColumn):
     """How fast it goes."""
 
+    def __init__(self, what: str) -> None:
+        super().__init__()
+        self._what = what
+
     def render(self, task: Task) -> Text:
-        return Text("" if task.speed is None else f"{task.speed:.3g} clocks/s")
+        return Text("" if task.speed is None else f"{task.speed:.3g} {self._what}/s")
 
 
 def interrupted(n_clocks: int, wanted: int) -> int:

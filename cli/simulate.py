@@ -120,12 +120,9 @@ def _run_and_report(
     from tachometry.sim import golden
     from tachometry.sim.engine import Interrupted
     from tachometry.sim.engines import pick
-    from tachometry.sim.recording import nominal_ticks
     from tachometry.sim.results import compare
 
-    trace = recording.place(spec.timing.clock_hz)
-    if spec.max_tick_cycles and trace.tick_in is None:
-        trace = trace.with_tick_in(nominal_ticks(spec, trace.n_clocks))
+    trace = recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
     _require_a_tick(spec, source, trace)
     shown, chosen, wanted = window(spec, trace.n_clocks), pick(engine), trace.n_clocks
     with outputs:

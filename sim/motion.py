@@ -20,16 +20,16 @@ FloatArray = NDArray[np.float64]
 
 # A unit is its factor and the power of ten to apply to the decimal number before it is rounded: 7us is exactly 7e-6.
 Units = dict[str, tuple[float, int]]
-_SPEED: Units = {"rad/s": (1.0, 0), "rev/s": (2 * math.pi, 0), "rpm": (math.pi / 30, 0)}
+SPEED: Units = {"rad/s": (1.0, 0), "rev/s": (2 * math.pi, 0), "rpm": (math.pi / 30, 0)}
 TIME: Units = {"s": (1.0, 0), "ms": (1.0, -3), "us": (1.0, -6)}
-_FREQUENCY: Units = {"Hz": (1.0, 0), "kHz": (1.0, 3)}
+FREQUENCY: Units = {"Hz": (1.0, 0), "kHz": (1.0, 3)}
 _ANGLE: Units = {"rad": (1.0, 0), "mrad": (1.0, -3), "deg": (math.pi / 180, 0)}
 
 _FIELDS: dict[str, dict[str, Units]] = {
-    "constant": {"SPEED": _SPEED, "TIME": TIME},
-    "ramp": {"FROM": _SPEED, "TO": _SPEED, "TIME": TIME},
-    "sine": {"AMPLITUDE": _SPEED, "FREQUENCY": _FREQUENCY, "TIME": TIME},
-    "trapezoid": {"SPEED": _SPEED, "ACCEL_TIME": TIME, "HOLD_TIME": TIME},
+    "constant": {"SPEED": SPEED, "TIME": TIME},
+    "ramp": {"FROM": SPEED, "TO": SPEED, "TIME": TIME},
+    "sine": {"AMPLITUDE": SPEED, "FREQUENCY": FREQUENCY, "TIME": TIME},
+    "trapezoid": {"SPEED": SPEED, "ACCEL_TIME": TIME, "HOLD_TIME": TIME},
     "stop": {"TIME": TIME},
 }
 _FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items())
@@ -210,7 +210,7 @@ class Vibration:
             raise ValueError(f"vibration must be AMPLITUDE:FREQUENCY, not {text!r}")
         return Vibration(
             parse_number(amplitude, _ANGLE, "vibration amplitude"),
-            parse_number(frequency, _FREQUENCY, "vibration frequency"),
+            parse_number(frequency, FREQUENCY, "vibration frequency"),
         )
 
     def angle(self, t: ArrayLike) -> FloatArray:
@@ -268,7 +268,7 @@ def _parse_segment(text: str) -> list[_Segment]:
     values = []
     for (name, units), number in zip(fields.items(), numbers, strict=True):
         value = parse_number(number, units, f"{name} of {kind}")
-        if units is not _SPEED and value <= 0:
+        if units is not SPEED and value <= 0:
             raise ValueError(f"{name} of {kind} must be more than 0 {next(iter(units))}, not {number!r}")
         values.append(value)
     match kind, values:

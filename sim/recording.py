@@ -156,6 +156,12 @@ class PinTrace(_Lines):
         lines["tick_in"] = np.isin(clock, rises).astype(np.uint8)
         return PinTrace(clock, n_clocks=self.n_clocks, **lines)
 
+    def with_nominal_ticks(self, spec: TachometerSpec) -> "PinTrace":
+        """The same trace, with nominal external ticks if the core takes them and there are none."""
+        if not spec.max_tick_cycles or self.tick_in is not None:
+            return self
+        return self.with_tick_in(nominal_ticks(spec, self.n_clocks))
+
 
 def nominal_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
     """Clocks at which an external tick rises that is exactly as long as nominal, in step with the core's reset."""

@@ -25,13 +25,13 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("flag", ["--help", "-h"])
 def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, flag)
-    for command in ("plan", "generate", "simulate", "replay", "compare", "figures"):
+    for command in ("plan", "generate", "simulate", "replay", "compare", "sweep", "figures"):
         assert f"\n  {command} " in text
     assert max(map(len, text.splitlines())) <= 80
 
 
 CORE = """
-    --ppr --decoding --clock --tick --max-time --external-tick --max-tick-period --method --unit --frac-bits --lsb
+    --ppr --decoding --clock --tick --max-time --external-tick --max-tick-period --unit --frac-bits --lsb
     --velocity-width --cancel --no-cancel --max-speed --position-width --filter --index --index-reset
 """.split()
 DEFAULTS = ("48MHz", "20us", "10ms", "count/tick", "16 in count/tick, else 10 or as many as there can be", "4")
@@ -49,6 +49,11 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
             [*"--motion --vibration --seed".split(), *FAULTS, *OUTPUTS],
             ["Motion", "Encoder faults", "Outputs"],
         ),
+        (
+            "sweep",
+            [*"FILE --vary --methods --engine --workers --scheduler --results --axes --metric --seed".split(), *FAULTS],
+            ["Sweep", "Machines", "Motion", "Encoder faults", "Outputs"],
+        ),
         ("replay", ["CAPTURE", "--a", "--b", "--z", "--tick-in", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),
     ],
 )
@@ -57,7 +62,7 @@ def test_every_option_is_explained(
 ) -> None:
     text = shown(capsys, command, "--help")
     words = text.replace(",", " ").split()
-    for option in CORE + options:
+    for option in [*CORE, *options, *(["--method"] if command != "sweep" else [])]:
         assert option in words
     for group in ["Encoder", "Timing", "Core", *groups, "Examples"]:
         assert f"{group}:\n" in text
@@ -73,7 +78,7 @@ from tachometry.cli.main import main
 try:
     main(["simulate", "--help"])
 finally:
-    heavy = {"numpy", "amaranth", "matplotlib", "rich"} & set(sys.modules)
+    heavy = {"numpy", "amaranth", "matplotlib", "rich", "distributed", "pyarrow"} & set(sys.modules)
     assert not heavy, heavy
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

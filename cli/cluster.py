@@ -1,0 +1,118 @@
+"""Where the points of a sweep run: processes of this machine, or the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import signal
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from tachometry.sim.sweep import Point, Row
+
+_PATIENCE = "10s"  # until a scheduler has answered
+_AT_ONCE = 1000  # points that are sent to the scheduler together
+
+
+def require() -> None:
+    """See that the extra is there: distributed and pyarrow."""
+    for name in ("distributed", "pyarrow"):
+        try:
+            __import__(name)
+        except ImportError:
+            raise click.ClickException(
+                f"a sweep needs the extra `sweep`: {name} is not installed: pip install '.[sweep]'"
+            ) from None
+
+
+@contextmanager
+def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+    """A client of a scheduler, or, without an address, of so many processes here, by default one for each core.
+
+    Raises
+    ------
+    OSError
+        If the scheduler does not answer.
+    """
+    from distributed import Client, LocalCluster
+
+    with ExitStack() as stack:
+        stack.callback(logging.disable, logging.root.manager.disable)
+        logging.disable()  # what goes wrong comes as an exception
+        if scheduler is not None:
+            try:
+                client = stack.enter_context(Client(scheduler, timeout=_PATIENCE))
+            except (OSError, ValueError, TypeError) as error:
+                raise OSError(f"--scheduler {scheduler} does not answer: {error}") from None
+            if not client.scheduler_info()["workers"]:
+                click.echo(f"tachometry: {scheduler} has no workers yet: waiting for them", err=True)
+        else:
+            try:
+                with _deaf_to_interrupts():
+                    local = LocalCluster(
+                        n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                    )
+            except RuntimeError as error:
+                raise OSError(f"cannot start the processes of a sweep: {error.__cause__ or error}") from None
+            client = stack.enter_context(Client(stack.enter_context(local)))
+        yield client
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """What is started in the meantime takes no notice of Ctrl-C: this process ends it in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
+    """Rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
+
+    Raises
+    ------
+    ValueError
+        If a point cannot be run.
+    OSError
+        If a worker lacks what a point needs, or is none of the same version.
+    """
+    from distributed import KilledWorker, as_completed
+
+    from tachometry.sim.sweep import code_digest
+
+    def run(code: str, packed: bytes) -> Row:  # travels as it is: a scheduler and workers need not know it
+        from tachometry.sim.sweep import run_packed
+
+        return run_packed(code, packed)
+
+    packed = [pickle.dumps(point) for point in points.values()]
+    codes = [code_digest()] * len(packed)
+    futures = client.map(run, codes, packed, key=list(points), batch_size=_AT_ONCE, pure=False)
+    # Nothing else may hold futures: a worker keeps the row of one that is held, and where it dies, runs it again.
+    arrived = as_completed(futures, with_results=True, raise_errors=False)
+    del futures
+    for future, found in arrived:
+        if future.status == "finished":
+            yield found
+            continue
+        error = found[1] if future.status == "error" else found
+        if isinstance(error, ImportError):
+            raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
+        if isinstance(error, KilledWorker):
+            point = points[error.task]
+            raise OSError(f"no worker outlives the point of {point.method} on {point.text}: {error}")
+        if future.status == "cancelled":
+            raise OSError(f"the scheduler has gone: {error}")
+        raise error

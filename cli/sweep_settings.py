@@ -1,0 +1,191 @@
+"""What a sweep is given: options and axes, of a file and of the command line, as texts by the names of the options."""
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+Text = str | None  # None: without the option
+
+_NUMBER = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/]*)"
+_RANGE = re.compile(rf"{_NUMBER}\s*\.\.\s*{_NUMBER}\s*:\s*(\d{{1,6}})\s*(log)?")
+_MOST = 100_000  # values of an axis
+_DIGITS = 4  # of values between the ends of a logarithmic range
+# Powers of ten of units that can be turned into each other exactly.
+_SCALES = ({"s": 0, "ms": -3, "us": -6, "ns": -9}, {"Hz": 0, "kHz": 3, "MHz": 6, "GHz": 9}, {"rad": 0, "mrad": -3})
+_LISTS = ("methods", "axes")
+
+
+@dataclass
+class Settings:
+    """Options by their names, without dashes, and axes with their values.
+
+    Parameters
+    ----------
+    fixed : dict of str to str
+        Texts as on the command line; `yes` or `no` of a flag.
+    vary : dict of str to list
+        Values of each axis in order; None stands for leaving the option out.
+    """
+
+    fixed: dict[str, str] = field(default_factory=dict)
+    vary: dict[str, list[Text]] = field(default_factory=dict)
+
+    def over(self, other: "Settings") -> "Settings":
+        """These, and what they leave open of others; axes in the order of the others."""
+        fixed = {name: text for name, text in other.fixed.items() if name not in self.vary}
+        vary = {name: values for name, values in other.vary.items() if name not in self.fixed}
+        return Settings(fixed | self.fixed, vary | self.vary)
+
+    def first(self) -> dict[str, Text]:
+        """Everything, of axes their first value."""
+        return self.fixed | {name: values[0] for name, values in self.vary.items()}
+
+
+def of_command_line(raw: Mapping[str, Any], options: Mapping[str, click.Option]) -> Settings:
+    """Settings of what click's parser has found, by the names of its parameters."""
+    fixed = {}
+    for name, option in options.items():
+        if name != "vary" and (given := raw.get(option.name or "")) is not None:
+            fixed[name] = _text(given)
+    vary: dict[str, list[Text]] = {}
+    for text in raw.get("vary") or ():
+        name, equals, values = text.partition("=")
+        if not equals:
+            raise ValueError(f"vary must be NAME=VALUES, not {text!r}")
+        if name.strip() in vary:
+            raise ValueError(f"vary must be given once for {name.strip()}")
+        vary[name.strip()] = _values(name.strip(), values.split(","), options)
+    return _checked(Settings(fixed, vary))
+
+
+def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
+    """Settings of a TOML file: keys are names of options, and axes stand in its table `vary`.
+
+    Raises
+    ------
+    ValueError
+        If it is not of this form, with its name.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} must be TOML: {error}") from None
+    try:
+        vary = content.pop("vary", {})
+        if not isinstance(vary, dict):
+            raise ValueError(f"vary must be a table of axes, not {vary!r}")
+        allowed = [name for name in options if name != "vary"]
+        for name in content:
+            if name not in allowed:
+                raise ValueError(f"keys must be of {', '.join(allowed)}, and [vary], not {name!r}")
+        fixed = {name: _of_toml(name, value) for name, value in content.items()}
+        axes = {name: _values(name, _items(name, value), options) for name, value in vary.items()}
+        return _checked(Settings(fixed, axes))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def arguments(texts: Mapping[str, Text], options: Mapping[str, click.Option]) -> list[str]:
+    """The same as words of a command line."""
+    words = []
+    for name, text in texts.items():
+        option = options[name]
+        if text is None:
+            continue
+        if not option.is_flag:
+            words.append(f"{option.opts[0]}={text}")
+        elif yes(name, text):
+            words.append(option.opts[0])
+        else:
+            words += option.secondary_opts[:1]
+    return words
+
+
+def yes(name: str, text: str) -> bool:
+    """What the text of a flag says."""
+    try:
+        return bool(click.BOOL.convert(text, None, None))
+    except click.BadParameter:
+        raise ValueError(f"{name} must be yes or no, not {text!r}") from None
+
+
+def _checked(settings: Settings) -> Settings:
+    for name in settings.vary:
+        if name in settings.fixed:
+            raise ValueError(f"{name} must be given or varied, not both")
+    return settings
+
+
+def _text(value: Any) -> str:
+    return ("no", "yes")[value] if isinstance(value, bool) else str(value)
+
+
+def _of_toml(name: str, value: Any) -> str:
+    if isinstance(value, list) and name in _LISTS:
+        return ",".join(_of_toml(name, item) for item in value)
+    if not isinstance(value, str | int | float):
+        instead = ": a list belongs into [vary]" if isinstance(value, list) else ""
+        raise ValueError(f"{name} must be a text, a number, true or false, not {value!r}{instead}")
+    return _text(value)
+
+
+def _items(name: str, value: Any) -> list[str]:
+    if isinstance(value, list):
+        return [_of_toml(name, item) for item in value]
+    return _of_toml(name, value).split(",")
+
+
+def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]) -> list[Text]:
+    """Values of an axis: items are values, `none`, or ranges."""
+    option = options.get(name)
+    found: list[Text] = []
+    for item in (item.strip() for item in items):
+        if not item:
+            raise ValueError(f"values of {name} must be separated by one comma, and none may be empty")
+        if match := _RANGE.fullmatch(item):
+            found += _range(name, item, match, whole=option is not None and option.type is not click.FLOAT)
+        elif re.match(rf"{_NUMBER}\s*\.\.", item):
+            raise ValueError(f"a range of {name} must be LO..HI:N, or LO..HI:Nlog, not {item!r}")
+        else:
+            found.append(None if item == "none" and option is not None else item)
+    if not found:
+        raise ValueError(f"{name} must have values to be varied")
+    if len(found) > _MOST:
+        raise ValueError(f"{name} must have at most {_MOST} values, not {len(found)}")
+    return list(dict.fromkeys(found))
+
+
+def _range(name: str, item: str, match: re.Match[str], whole: bool) -> list[str]:
+    """Values from LO to HI, evenly spaced or as their logarithms are; whole numbers between plain whole numbers."""
+    low, high, count, log = Fraction(match[1]), Fraction(match[3]), int(match[5]), match[6]
+    unit = match[2] or match[4]
+    if match[4] != unit:
+        scale = next((scale for scale in _SCALES if unit in scale and match[4] in scale), None)
+        if scale is None:
+            raise ValueError(f"a range of {name} must have one unit, not {item!r}")
+        high *= Fraction(10) ** (scale[match[4]] - scale[unit])
+    if not 2 <= count <= _MOST:
+        raise ValueError(f"a range of {name} must have 2 to {_MOST} values, not {item!r}")
+    if low >= high or (log and low <= 0):
+        raise ValueError(f"a range of {name} must go up{', from more than 0' * bool(log)}, not {item!r}")
+    if log:
+        ratio = float(high / low)
+        inner = [Fraction(f"{float(low) * ratio ** (k / (count - 1)):.{_DIGITS}g}") for k in range(1, count - 1)]
+    else:
+        inner = [low + (high - low) * k / (count - 1) for k in range(1, count - 1)]
+    every = [low, *inner, high]
+    if whole and not unit and low.denominator == high.denominator == 1:
+        every = [Fraction(round(value)) for value in every]
+    return [f"{_decimal(value)}{unit}" for value in every]
+
+
+def _decimal(value: Fraction) -> str:
+    return str(value.numerator) if value.denominator == 1 else f"{float(value):.9g}"
