@@ -33,7 +33,7 @@ def require() -> None:
 
 
 @contextmanager
-def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
     """A client of a scheduler, or, without an address, of so many processes here, by default one for each core.
 
     Raises
@@ -57,7 +57,7 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             try:
                 with _deaf_to_interrupts():
                     local = LocalCluster(
-                        n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                        n_workers=jobs, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
                     )
             except RuntimeError as error:
                 raise OSError(f"cannot start the processes of a sweep: {error.__cause__ or error}") from None
@@ -84,9 +84,9 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
     Raises
     ------
     ValueError
-        If a point cannot be run.
+        At the end, if a point cannot be run.
     OSError
-        If a worker lacks what a point needs, or is none of the same version.
+        The same, if a worker lacks what it needs; at once, if one has another version, or the scheduler goes.
     """
     from distributed import KilledWorker, as_completed
 
@@ -103,16 +103,21 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
     # Nothing else may hold futures: a worker keeps the row of one that is held, and where it dies, runs it again.
     arrived = as_completed(futures, with_results=True, raise_errors=False)
     del futures
+    failed: list[Exception] = []
     for future, found in arrived:
         if future.status == "finished":
             yield found
             continue
         error = found[1] if future.status == "error" else found
+        if future.status == "cancelled":
+            raise OSError(f"the scheduler has gone: {error}")
         if isinstance(error, ImportError):
             raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
         if isinstance(error, KilledWorker):
             point = points[error.task]
-            raise OSError(f"no worker outlives the point of {point.method} on {point.text}: {error}")
-        if future.status == "cancelled":
-            raise OSError(f"the scheduler has gone: {error}")
-        raise error
+            error = OSError(f"no worker outlives the point of {point.method} on {point.text}: {error}")
+        failed.append(error)
+    if len(failed) > 1:
+        raise type(failed[0])(f"{failed[0]}; {len(failed)} points could not be run")
+    if failed:
+        raise failed[0]

@@ -61,7 +61,7 @@ _SAME_NAME = (
     "engine",
     "vary",
     "axes",
-    "workers",
+    "jobs",
     "results",
 )
 _OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}

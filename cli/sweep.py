@@ -100,7 +100,7 @@ Examples:
     help="Run the hardware, too, as simulate does, in lockstep with the golden model. [default: the golden model, "
     "which it equals bit for bit]",
 )
-@option("Machines", "--workers", type=int, metavar="N", help="Processes on this machine. [default: one for each core]")
+@option("Machines", "--jobs", type=int, metavar="N", help="Processes on this machine. [default: one for each core]")
 @option(
     "Machines",
     "--scheduler",
@@ -129,7 +129,7 @@ def sweep(
     methods: str,
     start: str | None,
     engine: str | None,
-    workers: int | None,
+    jobs: int | None,
     scheduler: str | None,
     results: Path | None,
     plot: Path | None,
@@ -155,10 +155,10 @@ def sweep(
     earliest = 0.0 if start is None else float(parse_time("from", start))
     if earliest < 0:
         raise ValueError(f"from must be at least 0, not {start}")
-    if workers is not None and scheduler is not None:
-        raise ValueError("workers must not be given together with --scheduler")
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers must be at least 1, not {workers}")
+    if jobs is not None and scheduler is not None:
+        raise ValueError("jobs must not be given together with --scheduler")
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs must be at least 1, not {jobs}")
 
     from tachometry.cli.sweep_points import points_of
     from tachometry.cli.sweep_report import print_sweep
@@ -176,7 +176,7 @@ def sweep(
     with outputs, Results(results, list(found.points), found.values) as kept:
         begun = time.monotonic()
         missing = kept.missing
-        _run(kept, found, missing, scheduler, workers, results)
+        _run(kept, found, missing, scheduler, jobs, results)
         if (path := outputs.get("--plot")) is not None:
             from tachometry.sim.sweep_plot import save_heat_maps
 
@@ -193,7 +193,7 @@ def _run(
     found: Points,
     missing: list[str],
     scheduler: str | None,
-    workers: int | None,
+    jobs: int | None,
     results: Path | None,
 ) -> None:
     """Run the points that are missing; Ctrl-C ends it early."""
@@ -208,7 +208,7 @@ def _run(
     n_done = len(found.points) - len(missing)
     try:
         with (
-            cluster.cluster(scheduler, workers) as client,
+            cluster.cluster(scheduler, jobs) as client,
             progress_bar("sweeping", len(missing), *columns) as report,
         ):
             arriving = cluster.rows(client, {point: found.points[point] for point in missing})

@@ -51,7 +51,7 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
         ),
         (
             "sweep",
-            [*"FILE --vary --methods --engine --workers --scheduler --results --axes --metric --seed".split(), *FAULTS],
+            [*"FILE --vary --methods --engine --jobs --scheduler --results --axes --metric --seed".split(), *FAULTS],
             ["Sweep", "Machines", "Motion", "Encoder faults", "Outputs"],
         ),
         ("replay", ["CAPTURE", "--a", "--b", "--z", "--tick-in", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),
