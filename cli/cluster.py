@@ -57,7 +57,10 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
             try:
                 with _deaf_to_interrupts():
                     local = LocalCluster(
-                        n_workers=jobs, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                        n_workers=jobs,
+                        threads_per_worker=1,
+                        dashboard_address="127.0.0.1:0",
+                        silence_logs=logging.CRITICAL,
                     )
             except RuntimeError as error:
                 raise OSError(f"cannot start the processes of a sweep: {error.__cause__ or error}") from None

@@ -33,7 +33,7 @@ def rows(path: Path) -> list[dict[str, Any]]:
 def scheduler() -> Iterator[list[str]]:
     """A scheduler with a worker, in threads of this process."""
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
     ) as local:
         yield ["--scheduler", local.scheduler_address]
 
