@@ -41,6 +41,7 @@ class Results:
         self._schema = _schema(values)
         self._table = self._schema.empty_table()
         self._new: list[Row] = []
+        self._saved = True
         self._due = time.monotonic() + _PATIENCE
         self._lock: FileLock | None = None
         self._journal: IO[str] | None = None
@@ -100,6 +101,7 @@ class Results:
             If it cannot be written.
         """
         self._new.append(row)
+        self._saved = False
         if self._journal is not None:
             self._journal.write(f"{json.dumps(row)}\n")
             self._journal.flush()
@@ -114,7 +116,7 @@ class Results:
         OSError
             If it cannot be written.
         """
-        if not self._new:
+        if self._saved:
             return
         self._table = _joined([self._table, pa.Table.from_pylist(self._new, schema=self._schema)])
         self._new = []
@@ -123,6 +125,7 @@ class Results:
             self._write()
             self._begin_journal()
             self._due = time.monotonic() + max(_PATIENCE, _SHARE * (time.monotonic() - begun))
+        self._saved = True
 
     def _write(self) -> None:
         assert self._path is not None
@@ -148,7 +151,7 @@ class Results:
     def _release(self) -> None:
         if self._journal is not None:
             self._journal.close()
-            if not self._new:
+            if self._saved:
                 Path(self._journal.name).unlink(missing_ok=True)
         if self._lock is not None:
             Path(self._lock.lock_file).unlink(missing_ok=True)
