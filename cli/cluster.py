@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 
 _PATIENCE = "10s"  # until a scheduler has answered
 _AT_ONCE = 1000  # points that are sent to the scheduler together
+# Dask has its workers give all memory back at once, which takes longer than a point itself: they keep so many bytes.
+_MEMORY = {
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 25,
+}
 
 
 def require() -> None:
@@ -41,6 +46,7 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
     OSError
         If the scheduler does not answer.
     """
+    import dask
     from distributed import Client, LocalCluster
 
     with ExitStack() as stack:
@@ -55,7 +61,7 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
                 click.echo(f"tachometry: {scheduler} has no workers yet: waiting for them", err=True)
         else:
             try:
-                with _deaf_to_interrupts():
+                with _deaf_to_interrupts(), dask.config.set(_MEMORY):
                     local = LocalCluster(
                         n_workers=jobs,
                         threads_per_worker=1,
