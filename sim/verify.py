@@ -13,7 +13,7 @@ from tachometry.sim.results import Mismatch, Run, compare
 from tachometry.sim.stress import stress
 from tachometry.spec import TachometerSpec
 
-_EDGES, _MOST_EDGES = 300, 20_000  # at a speed, of a motion
+_EDGES, _MOST_EDGES = 300, 50_000  # at a speed, of a motion
 # Some thousand times slower than the others, it runs a thousandth of their clocks.
 _SLOW, _SLOW_SHARE, _SLOW_LEAST = "pysim", 1000, 10_000
 
