@@ -59,9 +59,10 @@ formal: $(VENV)/.formal ## properties of the exported core, proven by induction,
 mutate: $(VENV)/.formal ## how many wrong cores the tests' motions notice, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m mutation
 
-bench: $(VENV)/.test ## speed of the golden models and of the engines, in one run, written to docs/bench.md
+bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, in one run, written to docs/bench.md
 	$(BIN)/python bench/golden.py -o docs/bench.md
 	$(BIN)/python bench/engines.py -o docs/bench.md
+	$(BIN)/python bench/sweep.py -o docs/bench.md
 
 verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks
 	$(BIN)/tachometry verify --clocks 1000000000 -o build/verify

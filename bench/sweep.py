@@ -1,0 +1,88 @@
+"""Points per second of `tachometry sweep`: part of docs/bench.md."""
+
+import argparse
+import os
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from engines import markdown, show
+
+from tachometry.cli import cluster
+from tachometry.cli.sweep import sweep
+from tachometry.cli.sweep_options import POINT_OPTIONS, by_name
+from tachometry.cli.sweep_points import points_of
+from tachometry.cli.sweep_settings import of_file
+from tachometry.sim.sweep import Point, run_point
+
+FILE = Path(__file__).parents[1] / "docs" / "sweep.toml"
+COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]
+
+_HEADING = "\n## Sweeps\n"
+_PAGE = """
+The points of [sweep.toml](sweep.toml), 200 ms each by the golden model: one after the other without Dask, then in
+processes of `tachometry sweep`. The start is until workers are there, each of which then imports numpy; it is not in
+points/s, but all is in processor time, that of the scheduler too.
+
+{table}
+"""
+
+
+def all_points() -> dict[str, Point]:
+    """Those of the file."""
+    settings = of_file(FILE, by_name(sweep) | POINT_OPTIONS)
+    return points_of(settings, settings.fixed["methods"], 0.05, None).points
+
+
+def measure(where: str, run: Callable[[], Iterable[object]]) -> list[str]:
+    """The row of the table; the first thing that `run` gives is that it has begun, all others are points."""
+    before, begun = os.times(), time.monotonic()
+    arriving = iter(run())
+    next(arriving)
+    started = time.monotonic()
+    n_points = sum(1 for _ in arriving)
+    took, after = time.monotonic() - started, os.times()
+    processor = sum(after[:4]) - sum(before[:4])
+    return [
+        where,
+        str(n_points),
+        f"{started - begun:.1f} s",
+        f"{n_points / took:.0f}",
+        f"{n_points / processor:.0f}",
+    ]
+
+
+def table(jobs: Iterable[int]) -> list[list[str]]:
+    """All rows."""
+    points = all_points()
+
+    def plain() -> Iterable[object]:
+        yield None
+        yield from map(run_point, points.values())
+
+    def processes(n: int) -> Iterable[object]:
+        with cluster.cluster(None, n) as client:
+            yield None
+            yield from cluster.rows(client, points)
+
+    rows = [measure("this process", plain)]
+    return rows + [measure(f"`--jobs {n}`", lambda n=n: processes(n)) for n in jobs]  # type: ignore[misc]
+
+
+def main() -> None:
+    """Measure, print, and replace this part of the page if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/bench.md")
+    output = parser.parse_args().output
+    rows = table(sorted({1, os.cpu_count() or 1}))
+    show(COLUMNS, rows)
+    if output is None:
+        return
+    before = output.read_text(encoding="utf-8").split(_HEADING)[0] if output.exists() else "# Speed\n"
+    beside = output.with_name(f".{output.name}.part")
+    beside.write_text(before + _HEADING + _PAGE.format(table=markdown(COLUMNS, rows)), encoding="utf-8")
+    beside.replace(output)
+
+
+if __name__ == "__main__":
+    main()
