@@ -108,7 +108,9 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
 
     packed = [pickle.dumps(point) for point in points.values()]
     codes = [code_digest()] * len(packed)
-    futures = client.map(run, codes, packed, key=list(points), batch_size=_AT_ONCE, pure=False)
+    # Keys of one kind: what the scheduler does for a task grows with the number of kinds.
+    keys = [("point", digest) for digest in points]
+    futures = client.map(run, codes, packed, key=keys, batch_size=_AT_ONCE, pure=False)
     # Nothing else may hold futures: a worker keeps the row of one that is held, and where it dies, runs it again.
     arrived = as_completed(futures, with_results=True, raise_errors=False)
     del futures
@@ -123,7 +125,7 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
         if isinstance(error, ImportError):
             raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
         if isinstance(error, KilledWorker):
-            point = points[error.task]
+            point = points[error.task[1]]
             error = OSError(f"no worker outlives the point of {point.method} on {point.text}: {error}")
         failed.append(error)
     if len(failed) > 1:

@@ -17,10 +17,7 @@ if TYPE_CHECKING:
     from tachometry.cli.sweep_points import Points
     from tachometry.sim.sweep_results import Results
 
-_HEADS = (
-    *("method", "points", "error/V median", "worst", "RMS median (rad/s)", "worst"),
-    *("delay median", "T_m median", "worst", "updates/s"),
-)
+_HEADS = (*("method", "points", "error/V", "worst", "RMS (rad/s)", "worst", "delay", "T_m", "worst", "updates/s"),)
 
 
 def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, results: Path | None) -> int:
@@ -30,10 +27,10 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
         *("mismatches", "clocks"),
     )
     checked = [wrong for wrong in columns["mismatches"] if wrong is not None]
-    heads = (*_HEADS, *(["mismatches"] if checked else []))
+    heads = (*_HEADS, *(["differ"] if checked else []))
     table = Table(box=None, pad_edge=False, header_style="")
     for head in heads:
-        table.add_column(head, justify="left" if head == heads[0] else "right")
+        table.add_column(head, justify="left" if head == heads[0] else "right", no_wrap=True)
     for method in dict.fromkeys(columns["method"]):
         rows = [k for k, name in enumerate(columns["method"]) if name == method]
         of = {name: [values[k] for k in rows if values[k] is not None] for name, values in columns.items()}
@@ -51,7 +48,7 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
         table.add_row(*map(Text, cells))
     console = stdout_console()
     console.print(table)
-    console.print()
+    console.print("\nMedians of all points, and the worst. error/V: RMS error over RMS of the true speed.")
     for name, reason in found.left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
     n_points = len(found.points)
