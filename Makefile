@@ -56,7 +56,7 @@ test: $(VENV)/.test lint icarus ## lint, types and all tests
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m formal
 
-mutate: $(VENV)/.formal ## how many wrong cores the tests' motions notice, see docs/verification.md
+mutate: $(VENV)/.test ## how many wrong cores the tests' motions notice, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m mutation
 
 bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, in one run, written to docs/bench.md

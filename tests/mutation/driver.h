@@ -2,15 +2,15 @@
 // CXXRTL's text and functions of the ports: `pins` sets the inputs from a byte, `outputs` writes a number for each
 // output, `strobes` says whether one of them that strobes is high.
 
+#define ENTRY extern "C" __attribute__((visibility("default")))
+
 constexpr int64_t NEVER = -1;
 
 struct Job {
   int64_t n_clocks;
   const uint8_t *pins;  // of each clock, a bit each, the lowest is the reset
   int64_t n_mutants;  // their selectors are 1 … n_mutants
-  int64_t *killed;  // clock of each mutant's death, or NEVER
-  int64_t *port;  // number of the output that it was seen at
-  int64_t *between;  // clock in which an output first differed where no strobe was high, or NEVER
+  int64_t *killed;  // clock in which a strobe, or any output with a strobe, differed; or NEVER
   int64_t *rows;  // clock and outputs of the core without a mutant, in every clock with a strobe
   int64_t n_rows, capacity;
 };
@@ -28,14 +28,14 @@ static void edge(Top &top) {
   top.commit();
 }
 
-extern "C" __attribute__((visibility("default"))) void mutation_run(Job *job) {
+ENTRY void mutation_run(Job *job) {
   std::vector<std::unique_ptr<Top>> tops;
   std::vector<int> alive;
   for (int k = 0; k <= job->n_mutants; k++) {
     tops.emplace_back(new Top);
     select(*tops[k], k);
     if (k) alive.push_back(k);
-    if (k) job->killed[k - 1] = job->between[k - 1] = NEVER;
+    if (k) job->killed[k - 1] = NEVER;
   }
   for (int64_t clock = 0; clock < job->n_clocks; clock++) {
     int64_t right[N_OUTPUTS], wrong[N_OUTPUTS];
@@ -56,16 +56,10 @@ extern "C" __attribute__((visibility("default"))) void mutation_run(Job *job) {
       pins(top, job->pins[clock]);
       settle(top);
       outputs(top, wrong);
-      int differs = 0;
-      while (differs < N_OUTPUTS && right[differs] == wrong[differs]) differs++;
-      if (differs < N_OUTPUTS) {
-        if (strobe || strobes(top)) {
-          job->killed[number - 1] = clock;
-          job->port[number - 1] = differs;
-          tops[number].reset();
-          continue;
-        }
-        if (job->between[number - 1] == NEVER) job->between[number - 1] = clock;
+      if ((strobe || strobes(top)) && memcmp(right, wrong, sizeof right)) {
+        job->killed[number - 1] = clock;
+        tops[number].reset();
+        continue;
       }
       edge(top);
       alive[left++] = number;

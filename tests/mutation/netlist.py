@@ -96,14 +96,18 @@ def mutants(netlist: str, number: int, folder: Path) -> tuple[str, list[Mutant]]
     return (folder / "flat.il").read_text(), found[:number]
 
 
-def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
-    """One netlist with an input `SELECTOR`, which makes it the mutant of the group that it counts from 1; 0: none."""
-    (folder / "flat.il").write_text(flat)
-    lines = [
+def selected(group: list[Mutant]) -> list[str]:
+    """Commands of Yosys: the input `SELECTOR` makes the netlist the mutant that it counts from 1, or none."""
+    return [
         mutant.command.replace("mutate ", f"mutate -ctrl {SELECTOR} {WIDTH} {number} ", 1)
         for number, mutant in enumerate(group, 1)
     ]
-    yosys(
-        "\n".join(["read_rtlil flat.il", *lines, "splitnets -driver", "opt_clean", "write_rtlil group.il", ""]), folder
-    )
+
+
+def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
+    """One netlist with a group of mutants."""
+    (folder / "flat.il").write_text(flat)
+    # A net of which one bit is mutated would seem to depend on itself.
+    script = ["read_rtlil flat.il", *selected(group), "splitnets -driver", "opt_clean", "write_rtlil group.il", ""]
+    yosys("\n".join(script), folder)
     return (folder / "group.il").read_text()

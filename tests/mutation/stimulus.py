@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.recording import LINES, PinTrace
 from tachometry.sim.stress import stress
 from tachometry.spec import TachometerSpec
 
-_EDGES = 100  # of a motion, at each of its speeds
+_EDGES = 60  # of a motion, at each of its speeds
+_RATTLE = 40_000  # clocks
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
 
@@ -32,52 +33,83 @@ class Stimulus:
     starts: list[int]
 
 
-def noise(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """Lines that change at random, at rates of their own that change now and then."""
-    n_clocks = 40 * spec.timing.tick_cycles * spec.timing.max_ticks
-    n_parts = 20
-    level = np.zeros((4, n_clocks), dtype=np.uint8)
-    for line in level:
-        rate = np.repeat(rng.choice((*_RATES, 0.0), n_parts), -(-n_clocks // n_parts))[:n_clocks]
-        line[:] = np.cumsum(rng.random(n_clocks) < rate) % 2
-    return _trace(spec, level)
+def noise_lines(rng: np.random.Generator, n_clocks: int, n_lines: int, n_parts: int = 20) -> NDArray[np.uint8]:
+    """Levels of lines that change at random, at rates of their own that change now and then."""
+    rate = np.repeat(rng.choice((*_RATES, 0.0), (n_lines, n_parts)), -(-n_clocks // n_parts), axis=1)[:, :n_clocks]
+    changes = np.cumsum(rng.random((n_lines, n_clocks)) < rate, axis=1)
+    return ((changes + rng.integers(2, size=(n_lines, 1))) % 2).astype(np.uint8)
+
+
+def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20) -> PinTrace:
+    """Such lines."""
+    return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts))
+
+
+def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
+    """Some edges fast, some slow, back and forth, in no order."""
+    cycles, parts = spec.timing.tick_cycles, 40
+    gaps = np.array([1, 1, 2, 3, cycles, 3 * cycles, cycles * spec.timing.max_ticks // 2]) * (1 + spec.filter_clocks)
+    edges = rng.integers(1, 12, parts)
+    clock = np.cumsum(np.repeat(rng.choice(gaps, parts), edges))
+    quarter = np.cumsum(np.repeat(rng.choice([1, 1, -1], parts), edges)) % 4
+    n_clocks = int(clock[-1]) + 1
+    quarter = np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")]
+    z, tick = noise_lines(rng, n_clocks, 2)
+    return _trace(spec, np.array([np.isin(quarter, [1, 2]), np.isin(quarter, [2, 3]), z, tick], dtype=np.uint8))
+
+
+def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
+    """Lines that change in nearly every clock, until the filter's count of them is at its end, and a tick that does."""
+    changes = rng.random((4, _RATTLE if spec.filter_clocks else _RATTLE // 20)) < np.array([[0.9], [0.9], [0.9], [1]])
+    return _trace(spec, (np.cumsum(changes, axis=1) % 2).astype(np.uint8))
 
 
 def _trace(spec: TachometerSpec, level: NDArray[np.uint8]) -> PinTrace:
     """The trace with these levels of A, B, Z and the tick, as far as they are there."""
-    names = [name for name, there in zip(("a", "b", "z", "tick_in"), _there(spec), strict=True) if there]
-    rows = level[list(np.flatnonzero(_there(spec)))]
+    names = _lines(spec)
+    rows = level[[LINES.index(name) for name in names]]
     clock = np.flatnonzero(np.append(True, (rows[:, 1:] != rows[:, :-1]).any(axis=0)))
     return PinTrace(clock, n_clocks=level.shape[1], **dict(zip(names, rows[:, clock], strict=True)))
 
 
-def _there(spec: TachometerSpec) -> tuple[bool, ...]:
-    return True, True, spec.index, spec.max_tick_cycles is not None
+def _lines(spec: TachometerSpec) -> list[str]:
+    """Inputs that are no clock and no reset, in the order of the ports."""
+    return [port.name for port in spec.ports if port.name in LINES]
 
 
 def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
-    """Motions and noise in turns, at least `n_clocks` of them."""
+    """Motions, bursts and noise in turns, at least `n_clocks` of them."""
     rng = np.random.default_rng(seed)
     pins: list[NDArray[np.uint8]] = []
     traces: list[PinTrace] = []
     starts: list[int] = []
     done = 0
+    shaken = False
+    longest = spec.longest_tick * spec.timing.max_ticks
     while done < n_clocks:
-        trace = stress(spec, int(rng.integers(1 << 30)), _EDGES) if len(traces) % 2 else noise(spec, rng)
-        trace = trace.until(trace.n_clocks)
-        if not spec.index:
-            trace = PinTrace(trace.clock, trace.a, trace.b, trace.n_clocks, tick_in=trace.tick_in)
+        if done > n_clocks // 4 and not shaken:
+            trace, shaken = rattle(spec, rng), True
+        elif len(traces) % 8 in (0, 4):
+            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES)
+        elif len(traces) % 8 == 1:
+            trace = noise(spec, rng, 40 * longest)
+        elif len(traces) % 8 == 2:
+            trace = bursts(spec, rng)
+        else:  # soon after a reset
+            trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
         # Some end early: the next reset comes in the middle.
-        if rng.random() < 0.5:
-            trace = trace.until(int(rng.integers(1, trace.n_clocks)))
+        early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
+        trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
         resets = int(rng.choice([1, 1, 2, 5]))
         level = np.zeros(trace.n_clocks, dtype=np.uint8)
         level[trace.clock] = 1
         row = np.cumsum(level) - 1
-        played = sum((line[row] << np.uint8(bit) for bit, line in enumerate(trace.lines.values(), 1)), np.uint8(0))
+        played = np.zeros_like(level)
+        for bit, name in enumerate(_lines(spec), 1):
+            played |= trace.lines[name][row] << np.uint8(bit)
         reset = rng.integers(0, 256, resets).astype(np.uint8) | np.uint8(1)
         starts.append(done + resets)
-        pins += [reset, played.astype(np.uint8)]
+        pins += [reset, played]
         traces.append(trace)
         done += resets + trace.n_clocks
     return Stimulus(np.concatenate(pins), traces, starts)

@@ -1,0 +1,57 @@
+"""The short form of `make mutate`: some mutants of one core, and what it says when they are not noticed."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import mutation.__main__ as command
+import mutation.score
+import numpy as np
+import pytest
+from mutation.cases import CASES
+from mutation.stimulus import Stimulus, stimulus
+
+from tachometry.sim.recording import PinTrace
+from tachometry.spec import TachometerSpec
+
+CASE = replace(next(case for case in CASES if case.name == "mt, in ticks"), mutants=40)
+CLOCKS = 50_000
+
+
+def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
+    """A reset, and then nothing."""
+    pins = np.zeros(n_clocks, dtype=np.uint8)
+    pins[0] = 1
+    names = ["a", "b", "tick_in"]
+    low = {name: np.zeros(1, dtype=np.uint8) for name in names}
+    return Stimulus(pins, [PinTrace(np.zeros(1, dtype=np.int64), n_clocks=n_clocks - 1, **low)], [1])
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
+    monkeypatch.setattr(command, "CASES", [CASE])
+    monkeypatch.setattr(mutation.score, "CLOCKS", CLOCKS)
+    return monkeypatch
+
+
+def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["mt"])
+    total = capsys.readouterr().out.splitlines()[-1]
+    assert total.startswith("| mt | 40 |"), total
+    assert total.endswith("| 100.0 % |"), total
+
+
+def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    small.setattr(mutation.score, "stimulus", standstill)
+    small.setattr(mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
+    assert not command.main([])
+    survivors = capsys.readouterr().out.partition("survivors of mt, in ticks:\n")[2].splitlines()
+    assert len(survivors) > 10
+    assert all(line.startswith("  hdl/") or "amaranth/lib/cdc.py" in line for line in survivors), survivors
+
+
+def test_golden_model_is_held_against_the_core() -> None:
+    played = stimulus(CASE.spec, 1000)
+    wrong = replace(played, traces=[replace(trace, a=trace.a ^ 1) for trace in played.traces])
+    with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match="mt, in ticks, from clock"):
+        mutation.score.judge(CASE, pool, wrong)
