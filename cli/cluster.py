@@ -128,7 +128,9 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
             point = points[error.task[1]]
             error = OSError(f"no worker outlives the point of {point.method} on {point.text}: {error}")
         failed.append(error)
-    if len(failed) > 1:
-        raise type(failed[0])(f"{failed[0]}; {len(failed)} points could not be run")
     if failed:
-        raise failed[0]
+        first = failed[0]
+        kind = next((kind for kind in (ValueError, OSError) if isinstance(first, kind)), None)
+        if kind is None:
+            raise first
+        raise kind(f"{first}; {len(failed)} of {len(points)} points could not be run")

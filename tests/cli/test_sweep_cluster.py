@@ -71,7 +71,7 @@ def kept(result: Path) -> list[str]:
 
 
 def wait_for(there: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 120
     while not there():
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -93,7 +93,7 @@ def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
         victim = str(next(iter(client.run(os.getpid).values())))
         before = points_in(kept(result))
         os.kill(int(victim), signal.SIGKILL)
-        out, err = sweep.communicate(timeout=60)
+        out, err = sweep.communicate(timeout=120)
     assert (sweep.returncode, err) == (0, "")
     assert f"{POINTS} points, {POINTS} of them run in " in out
     points = pq.read_table(result)["point"].to_pylist()
@@ -104,7 +104,7 @@ def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
     # Only what the killed worker had not handed over ran again, or what Dask did not know yet to be in our hands.
     again = {point for point, times in executed.items() if times > 1}
     assert again <= set(trace.of(victim))
-    assert 1 <= len(again) <= 5
+    assert len(again) <= 5
 
 
 def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
     sweep = begun(result, trace=traces[0])
     wait_for(lambda: len(kept(result)) >= 10)
     os.killpg(sweep.pid, signal.SIGINT)
-    out, err = sweep.communicate(timeout=60)
+    out, err = sweep.communicate(timeout=120)
     first = pq.read_table(result)["point"].to_pylist()
     told = f"tachometry: interrupted after {len(first)} of {POINTS} points, kept in {result}\n"
     assert (sweep.returncode, out, err) == (130, "", told)
@@ -122,14 +122,14 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
     sweep = begun(result, trace=traces[1])
     wait_for(lambda: len(kept(result)) >= 10)
     os.kill(sweep.pid, signal.SIGKILL)
-    sweep.communicate(timeout=60)
+    sweep.communicate(timeout=120)
     second = points_in(kept(result))
     assert pq.read_table(result)["point"].to_pylist() == first
     with result.with_name(".r.parquet.new").open("a") as file:
         file.write('{"point": "half a li')  # as a kill might leave it
 
     sweep = begun(result, trace=traces[2])
-    out, err = sweep.communicate(timeout=60)
+    out, err = sweep.communicate(timeout=120)
     assert (sweep.returncode, err) == (0, "")
     left = POINTS - len(first) - len(second)
     assert f"{POINTS} points, {left} of them run in " in out
@@ -144,7 +144,7 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
 
     # The same, but for nothing in between.
     whole = tmp_path / "whole.parquet"
-    begun(whole, "--jobs", "1").communicate(timeout=60)
+    begun(whole, "--jobs", "1").communicate(timeout=120)
     assert whole.read_bytes() == result.read_bytes()
 
 
@@ -159,4 +159,5 @@ def test_a_point_that_no_worker_outlives(tmp_path: Path) -> None:
     done = subprocess.run(words, env=os.environ | more, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("tachometry: error: no worker outlives the point of m on constant:5:50ms: ")
+    assert done.stderr.endswith("; 1 of 1 points could not be run\n")
     assert done.stderr.count("\n") == 1

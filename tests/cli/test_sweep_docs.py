@@ -1,8 +1,14 @@
 """docs/sweep.md says of every column, and shows the file that is there."""
 
 import re
+import shlex
 from pathlib import Path
 
+import click
+
+from tachometry.cli.sweep import sweep
+from tachometry.cli.sweep_options import POINT_OPTIONS, by_name
+from tachometry.cli.sweep_settings import of_command_line, of_file
 from tachometry.sim.sweep import COLUMNS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -17,3 +23,15 @@ def test_every_column_is_told_with_its_unit() -> None:
 
 def test_the_file_is_shown_as_it_is() -> None:
     assert f"```toml\n{(DOCS / 'sweep.toml').read_text()}```" in PAGE
+
+
+def test_the_options_beside_it_mean_the_same() -> None:
+    options = by_name(sweep) | POINT_OPTIONS
+    command = re.search(r"^    tachometry sweep (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
+    assert command is not None
+    words = shlex.split(command[1].replace("\\\n", ""))
+    raw, _, _ = sweep.make_parser(click.Context(sweep)).parse_args(words)
+    file = of_file(DOCS / "sweep.toml", options)
+    for output in ("results", "plot"):
+        del file.fixed[output]
+    assert of_command_line(raw, options) == file
