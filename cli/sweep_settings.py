@@ -114,7 +114,7 @@ def yes(name: str, text: str) -> bool:
     try:
         return bool(click.BOOL.convert(text, None, None))
     except click.BadParameter:
-        raise ValueError(f"{name} must be yes or no, not {text!r}") from None
+        raise ValueError(f"--{name} must be yes or no, not {text!r}") from None
 
 
 def _checked(settings: Settings) -> Settings:

@@ -59,7 +59,9 @@ class Results:
         if self._path is None:
             return self
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(self._path.with_name(f".{self._path.name}.lock"), timeout=0)
+        beside = self._path.with_name(f".{self._path.name}.lock")
+        beside.touch()  # which says it if it cannot be
+        lock = FileLock(beside, timeout=0)
         try:
             lock.acquire()
         except Timeout:

@@ -126,5 +126,5 @@ def test_the_command_line_replaces_what_is_in_the_file() -> None:
 
 
 def test_flags_are_yes_or_no() -> None:
-    with pytest.raises(ValueError, match=r"^index must be yes or no, not 'maybe'$"):
+    with pytest.raises(ValueError, match=r"^--index must be yes or no, not 'maybe'$"):
         arguments({"index": "maybe"}, OPTIONS)
