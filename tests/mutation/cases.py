@@ -71,6 +71,7 @@ CASES = [
     _case("t", "in ticks", 5, 12, 2, timer="tick", unit="rad/s", frac_bits=5, velocity_bits=8, **_FRONT),
     _case("mt", "in clocks", 7, 5, 3, bounds=True, age=True),
     _case("mt", "in ticks", 5, 12, 2, timer="tick", max_tick_cycles=7, decoding=1),
-    _case("rairan", "adaptive", 3, 8, 2, adaptive=Fraction(1, 4), bounds=True, age=True),
-    _case("rairan", "n2, low pass", 5, 6, 2, estimate="n2", frac_bits=8, lowpass=Fraction(1, 2), **_FRONT),
+    _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),
+    _case("rairan", "n2", 5, 6, 2, 340, estimate="n2", **_FRONT),
+    _case("rairan", "to the letter", 3, 6, 2, 340, estimate="n1", paper_exact=True),
 ]

@@ -83,7 +83,7 @@ def run(
     Returns
     -------
     killed : int64 array, shape (n_mutants,)
-        Clock in which a strobe or, with a strobe, any output differed from that of the core; −1: never.
+        Clock in which an output differed from that of the core; −1: never.
     rows : int64 array, shape (n, 1 + n_outputs)
         Clock and outputs of the core in every clock with a strobe, `n_rows` of them at most.
     """
