@@ -159,8 +159,6 @@ def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFi
 def test_amaranth_is_not_loaded(tmp_path: Path) -> None:
     code = f"""
 import sys
-from support.command import run
-
 from tachometry.cli.main import main
 try:
     main(["plan", "--ppr", "9", "--plot", {str(tmp_path / "p.png")!r}])
