@@ -68,6 +68,11 @@ class MTachometer(TachometerSpec):
         return self.average.bit_length()
 
     @property
+    def remembered_clocks(self) -> int:
+        # The place in the memory may have to begin anew.
+        return (self.average + 1) * self.longest_tick
+
+    @property
     def serial(self) -> bool:
         return self.shift is None and self.has_room(self.numerator_width + 3)
 

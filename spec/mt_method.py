@@ -64,5 +64,10 @@ class MTTachometer(TimedTachometer):
         return self.min_periods + self.max_periods
 
     @property
+    def remembered_periods(self) -> int:
+        # The window that is open, whose length may wrap, up to a count; and the next.
+        return (1 << self.interval_width) + self.max_periods + self.max_interval + 2
+
+    @property
     def parameters(self) -> dict[str, Any]:
         return super().parameters | {"min_time": self._min_time}

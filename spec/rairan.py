@@ -233,6 +233,11 @@ class RairanTachometer(TachometerSpec):
         return clocks <= self.update_spacing
 
     @property
+    def remembered_clocks(self) -> int:
+        # Cdt, which may wrap, up to a count; one up to the next, which opens a window, and that.
+        return ((1 << self.interval_width) + 2 * self.timing.max_ticks + 3) * self.timing.tick_cycles << self.max_shift
+
+    @property
     def serial(self) -> bool:
         return False
 

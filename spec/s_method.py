@@ -71,6 +71,11 @@ class STachometer(TachometerSpec):
         return signed_width(self.max_numerator)
 
     @property
+    def remembered_clocks(self) -> int:
+        # The window that is open, whose length may wrap, and the next.
+        return ((1 << self.interval_width) + self.timing.max_ticks + 1) * self.longest_tick
+
+    @property
     def serial(self) -> bool:
         """Whether ticks are far enough apart for one adder to form the velocity step by step."""
         return self.has_room(self._serial_latency)

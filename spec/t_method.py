@@ -21,6 +21,11 @@ class TTachometer(TimedTachometer):
         return self.max_periods
 
     @property
+    def remembered_periods(self) -> int:
+        # The time since the last count, which may wrap; and the next.
+        return (1 << self.max_periods.bit_length()) + self.max_periods + 1
+
+    @property
     def max_quotient(self) -> int:
         return self.timer_periods
 

@@ -9,7 +9,7 @@ from tachometry.spec.encoder import Encoder
 from tachometry.spec.low_pass import MAX_EXTRA_BITS, LowPass
 from tachometry.spec.option import options_of
 from tachometry.spec.timing import MAX_TICK_CYCLES, Timing
-from tachometry.spec.units import Speed
+from tachometry.spec.units import Speed, ceil_log2
 from tachometry.spec.velocity_output import NATIVE, UNITS, VelocityOutput, per_count
 
 MAX_NATIVE_FRAC_BITS = 24
@@ -21,12 +21,6 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 def signed_width(limit: int) -> int:
     """Bits of a two's complement number that holds -limit … +limit."""
     return limit.bit_length() + 1
-
-
-def _ceil_log2(number: Fraction) -> int:
-    """The least k for which 2^k is at least `number`."""
-    k = number.numerator.bit_length() - number.denominator.bit_length()  # off by one at most
-    return k + 1 if number > Fraction(2) ** k else k if number > Fraction(2) ** (k - 1) else k - 1
 
 
 @dataclass(frozen=True)
@@ -150,14 +144,14 @@ class TachometerSpec:
             return 4, MAX_NATIVE_FRAC_BITS
         # The greatest speed must be at least one LSB, and one count per tick at most 2^22.
         count = per_count(unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
-        return 1 - _ceil_log2(count * self.max_count), MAX_NATIVE_FRAC_BITS - 2 - _ceil_log2(count)
+        return 1 - ceil_log2(count * self.max_count), MAX_NATIVE_FRAC_BITS - 2 - ceil_log2(count)
 
     @property
     def native_frac_bits(self) -> int:
         """Fraction bits of the velocity in counts per tick, of which one in another unit is made."""
         if self.unit == NATIVE:
             return self.frac_bits
-        return max(4, _ceil_log2(self._lsb_per_count) + 2)
+        return max(4, ceil_log2(self._lsb_per_count) + 2)
 
     @property
     def native_width(self) -> int:
@@ -318,6 +312,11 @@ class TachometerSpec:
     def tick_to_velocity(self) -> int:
         """Clocks from `tick` to `velocity_valid`."""
         return self.datapath_latency + self.low_pass_latency + self.output_latency
+
+    @property
+    def remembered_clocks(self) -> int:
+        """Clocks of right counts after which the method remembers nothing from before."""
+        raise NotImplementedError
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

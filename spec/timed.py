@@ -79,6 +79,16 @@ class TimedTachometer(TachometerSpec):
         return max(self.timing.max_ticks * self.timer_periods, self.division_periods)
 
     @property
+    def remembered_periods(self) -> int:
+        """Timer periods up to the end of a measurement that began after an upset, or of a silence."""
+        raise NotImplementedError
+
+    @property
+    def remembered_clocks(self) -> int:
+        # And a division that has nothing to do with it.
+        return self.remembered_periods * (self.longest_tick if self.on_lattice else 1) + self.division_clocks
+
+    @property
     def max_interval(self) -> int:
         """Longest measurement in timer periods."""
         raise NotImplementedError

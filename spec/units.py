@@ -14,6 +14,12 @@ _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Z
 PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 
 
+def ceil_log2(number: Fraction) -> int:
+    """The least k for which 2^k is at least `number`."""
+    k = number.numerator.bit_length() - number.denominator.bit_length()  # off by one at most
+    return k + 1 if number > Fraction(2) ** k else k if number > Fraction(2) ** (k - 1) else k - 1
+
+
 def _quantity(what: str, text: str, units: dict[str, object]) -> tuple[Fraction, str]:
     match = _QUANTITY.fullmatch(text.strip())
     if match is None or match[2] not in units:

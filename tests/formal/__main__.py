@@ -63,7 +63,8 @@ def main(chosen: list[str]) -> bool:
         for wrong, future in zip(mutants, refuted, strict=True):
             result = future.result()
             fine &= result.verdict == "refuted"
-            change = f"{wrong.box.__name__}: `{wrong.right.strip()}` → `{wrong.wrong.strip()}`"
+            right, changed = (" ".join(text.split()) for text in (wrong.right, wrong.wrong))
+            change = f"{wrong.box.__name__}: `{right}` → `{changed}`"
             _row(wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
     without = set() if chosen else proven - {wrong.refuted for wrong in mutants}
     if without:

@@ -1,5 +1,6 @@
 """What is proven of which core."""
 
+from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -36,7 +37,12 @@ _FRONT_PROBES = {
     "core_count": "pulse_counter.count",
 }
 _WINDOW_PROBES = {"core_left": "sampling_clock.left"}
-_FILTER_PROBES = {"core_held_a": "conditioner.filter_a.held", "core_held_b": "conditioner.filter_b.held"}
+_FILTER_PROBES = {
+    "core_held_a": "conditioner.filter_a.held",
+    "core_held_b": "conditioner.filter_b.held",
+    "core_a": "conditioner.filter_a.filtered",
+    "core_b": "conditioner.filter_b.filtered",
+}
 _METHOD_PROBES = {
     "core_count": "pulse_counter.count",
     "core_m_s": "datapath.interval.m_s",
@@ -169,6 +175,8 @@ _RAIRAN_PROBES = {
     "core_in_step": "datapath.counters.in_step",
     "core_rest": "datapath.counters.rest",
     "core_beyond": "datapath.counters.beyond",
+    "core_forced": "datapath.counters.forced",
+    "core_stalled": "datapath.counters.stalled",
 }
 
 
@@ -189,7 +197,7 @@ def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof
         "VELOCITY_WIDTH": spec.velocity_width,
         "FRAC_BITS": spec.frac_bits,
     }
-    return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES, depth=7)
+    return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES, depth=10)
 
 
 _TIMED_PROBES = {
@@ -260,6 +268,17 @@ def timed(
     return Proof(name, spec, "timed", parameters, probes, depth=4)
 
 
+def after_upset(name: str, proof: Proof, lemma: str, without: str = "") -> Proof:
+    """From any state of the flip-flops the properties hold again, and the one `lemma` that ties what the checker takes
+    from the core.
+
+    Neither core nor checker is reset, so what holds in one clock after any state holds in all that follow.
+    """
+    parameters = proof.parameters | ({} if proof.checker == "m_method" else {"UPSET": 1})
+    without = f"lemma_* */{lemma} %d" + f" */{without}" * bool(without)
+    return replace(proof, name=name, parameters=parameters, depth=1, recovers=True, without=without)
+
+
 PROOFS = [
     front("x4, 960 clocks", core(960, max_count=20)),
     front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
@@ -293,4 +312,13 @@ PROOFS = [
     timed("M/T", MTTachometer, 2, 1),
     timed("T in ticks", TTachometer, 2, 2, 12, timer="tick"),
     timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),
+    after_upset("upset, x4, filter 3", front("", core(3, filter_clocks=3)), "lemma_held", "p1_* */p2_*"),
+    after_upset("upset, eq. (21)", method("", small(tick_cycles=1)), "lemma_core"),
+    after_upset("upset, carried", method("", small(tick_cycles=1, max_ticks=5), max_table=4), "lemma_core"),
+    after_upset("upset, M of 4", m_method("", small_m(4)), "lemma_bounded"),
+    after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags"),
+    after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer", "pt_sinks */pt_bound */pt_flag */pt_range"),
+    after_upset(
+        "upset, M/T", timed("", MTTachometer, 2, 1), "lemma_length", "pt_sinks */pt_bound */pt_flag */pt_range"
+    ),
 ]

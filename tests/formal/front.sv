@@ -8,7 +8,8 @@ module front #(
     parameter TICK_LATENCY = 2,
     parameter MAX_COUNT = 4,
     parameter COUNT_WIDTH = 4,
-    parameter POSITION_WIDTH = 8
+    parameter POSITION_WIDTH = 8,
+    parameter UPSET = 0           // the phases of the window and of the filter are those of the core, which may have any
 ) (
     input clk, input rst, input a, input b
 );
@@ -40,6 +41,8 @@ module front #(
       reg [2*FILTER-1:0] recent = 0;  // the levels before stage1
       wire [2*FILTER+1:0] levels = {recent, stage1};
       wire [$clog2(FILTER < 2 ? 2 : FILTER)-1:0] core_held_a, core_held_b;
+      wire core_a, core_b;
+      wire [1:0] passed = UPSET ? {core_a, core_b} : filtered;
       reg [1:0] held, run;
       reg [7:0] held_a, held_b;  // for how many clocks before this one the level has differed
       integer k;
@@ -48,16 +51,16 @@ module front #(
         run = clocks < 3 ? 0 : 2'b11;
         {held_a, held_b} = 0;
         for (k = 0; k < FILTER; k = k + 1) begin
-          held = held & (levels[2*k+:2] ^ filtered);
-          run = run & (recent[2*k+:2] ^ filtered);
+          held = held & (levels[2*k+:2] ^ passed);
+          run = run & (recent[2*k+:2] ^ passed);
           held_a = held_a + run[1];
           held_b = held_b + run[0];
         end
-        lemma_held: assert (held_a == core_held_a && held_b == core_held_b);
+        lemma_held: assert (held_a == core_held_a && held_b == core_held_b && filtered == {core_a, core_b});
       end
       always @(posedge clk) begin
         recent <= levels;
-        filtered <= rst ? 0 : clocks < 3 ? stage1 : filtered ^ held;
+        filtered <= rst ? 0 : clocks < 3 ? stage1 : passed ^ held;
       end
       assign level = filtered;
     end
@@ -75,7 +78,8 @@ module front #(
 
   // Windows of T clocks from reset on, and all counts by x4, of which x2 and x1 are a half and a quarter.
   reg [$clog2(T):0] clock = 0;
-  wire last = clock == T - 1;
+  wire [$clog2(T):0] elapsing;
+  wire last = elapsing == T - 1;
   reg signed [W-1:0] open = 0, sum = 0;
   reg signed [P+1:0] quarters = 0;
   reg skipped = 0, wrong = 0, overflown = 0;  // illegal transitions: odd number of them, any of them
@@ -84,7 +88,7 @@ module front #(
   always @(posedge clk) begin
     past <= rst ? 0 : phase;
     first <= rst ? 0 : ready ? first : phase;
-    clock <= rst || last ? 0 : clock + 1;
+    clock <= rst || last ? 0 : elapsing + 1;
     open <= rst || last ? 0 : open + step;
     sum <= rst ? 0 : open + step;
     quarters <= rst ? 0 : ready ? quarters + quarter : $signed({1'b0, phase});
@@ -117,8 +121,10 @@ module front #(
   generate
     if (T > 1) begin : window
       wire signed [$clog2(T - 1):0] core_left;
+      wire signed [$clog2(T)+1:0] shown = T - 2 - core_left;
+      assign elapsing = UPSET ? $unsigned(shown) : clock;
       always @* lemma_window: assert (core_left == T - 2 - elapsed);
-    end
+    end else assign elapsing = clock;
   endgenerate
   wire [READY-1:0] thermometer = (1 << clocks) - 1;
   always @* begin

@@ -46,7 +46,7 @@ module m_method #(
     if (rst) {past, ticks} <= 0;
     else if (tick) begin
       past <= m_e;
-      if (ticks != N) ticks <= ticks + 1;
+      ticks <= ticks < N ? ticks + 1 : N;
     end
 
   // As late as the core shows them.

@@ -14,7 +14,8 @@ module method #(
     parameter CARRIED = 0,        // the table of the carried reciprocal has that many entries; 0: all looked up
     parameter C = 8,              // what it divides
     parameter SERIAL = 0,         // carried, and its scaler does a step a clock
-    parameter AGE = 0             // there is an age
+    parameter AGE = 0,            // there is an age
+    parameter UPSET = 0           // whether an update is due and what b is are taken from the core, which may have any state
 ) (
     input clk, input rst, input a, input b
 );
@@ -39,8 +40,9 @@ module method #(
   reg [I-1:0] m_s = 1;
   wire [COUNT_WIDTH*(MAX_TICKS+1)-1:0] m_e = {past, pulse_count};
   wire signed [COUNT_WIDTH-1:0] previous = past[0+:COUNT_WIDTH];
-  wire alteration = pulse_count != previous && pulse_count != offset;
-  wire full = m_s == MAX_TICKS;
+  wire signed [COUNT_WIDTH-1:0] usual = UPSET ? core_offset : offset;
+  wire alteration = pulse_count != previous && pulse_count != usual;
+  wire full = (UPSET ? core_m_s : m_s) == MAX_TICKS;
   wire update = tick && (alteration || full);
   always @(posedge clk)
     if (rst) begin
@@ -49,7 +51,7 @@ module method #(
       m_s <= 1;
     end else if (tick) begin
       past <= m_e;
-      if (!alteration) offset <= pulse_count;
+      offset <= alteration ? usual : pulse_count;
       m_s <= alteration ? 1 : full ? KEPT + 1 : m_s + 1;
     end
 
@@ -109,10 +111,20 @@ module method #(
       held <= outputs;
     end
 
+  // What is shown: this update, or the last one.
+  reg signed [S-1:0] last_sum = 0;
+  reg [I-1:0] last_m_s = 0;  // 0: none
+  reg last_forced = 0, last_empty = 0;
+  wire signed [S-1:0] shown_sum = velocity_valid ? sum_ : last_sum;
+  wire [I-1:0] shown_m_s = velocity_valid ? m_s_ : last_m_s;
+  wire shown_forced = velocity_valid ? forced_ : last_forced, shown_empty = velocity_valid ? empty_ : last_empty;
+  always @(posedge clk)
+    {last_sum, last_m_s, last_forced, last_empty} <= rst ? 0 : {shown_sum, shown_m_s, shown_forced, shown_empty};
+
   // 2^f x + 1/2 = (2^f sum + m_s) / (2 m_s), rounded down.
-  wire signed [S+FRAC_BITS:0] wanted = (sum_ <<< FRAC_BITS) + $signed({1'b0, m_s_});
-  wire signed [S+FRAC_BITS:0] have = 2 * $signed({1'b0, m_s_}) * velocity;
-  wire signed [I+1:0] divisor = $signed({1'b0, m_s_, 1'b0});
+  wire signed [S+FRAC_BITS:0] wanted = (shown_sum <<< FRAC_BITS) + $signed({1'b0, shown_m_s});
+  wire signed [S+FRAC_BITS:0] have = 2 * $signed({1'b0, shown_m_s}) * velocity;
+  wire signed [I+1:0] divisor = $signed({1'b0, shown_m_s, 1'b0});
 
   // Lemmas: what the induction needs to know of the state.
   reg [$clog2(T):0] clock = 0;
@@ -127,7 +139,7 @@ module method #(
   always @* begin
     lemma_clock: assert (clock < T);
     lemma_count: assert (core_count <= most && -core_count <= most);
-    lemma_bounded: assert (bounded && offset <= MAX_COUNT && -offset <= MAX_COUNT);
+    lemma_bounded: assert (bounded && (UPSET || (offset <= MAX_COUNT && -offset <= MAX_COUNT)));
     lemma_core: assert (core_m_s == m_s && core_longest == full && core_previous == previous && core_offset == offset);
     lemma_opening: assert (core_opening == opening);
     lemma_m_s: assert (m_s >= 1 && m_s <= MAX_TICKS && m_s == since + 1 + (after_forced ? KEPT : 0));
@@ -166,13 +178,13 @@ module method #(
   endgenerate
   always @* begin
     p4_update: assert (velocity_valid == update_);
-    p4_interval: assert (!velocity_valid || (interval == m_s_ && forced == forced_));
+    p4_interval: assert (interval == shown_m_s && forced == shown_forced);
     p4_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_TICKS));
     p4_latest: assert (since_update < MAX_TICKS - (was_forced ? KEPT : 0));
     p4_held: assert (velocity_valid || outputs == held);
     p5_numerator: assert (sum == reduced);
-    p5_velocity: assert (!velocity_valid || (have <= wanted && wanted < have + divisor));
-    p7_stalled: assert (!velocity_valid || stalled == (forced && empty_));
+    p5_velocity: assert ((have <= wanted && wanted < have + divisor) || (shown_m_s == 0 && velocity == 0));
+    p7_stalled: assert (stalled == (forced && shown_empty));
     p7_falls: assert (!(was_stalled && tick_ && pulse_count_ != 0) || (velocity_valid && !stalled));
   end
 endmodule

@@ -37,6 +37,18 @@ class Mutant:
     steps: int = 24
 
 
+# A sum that is carried along keeps what an upset has done to it.
+RECURSIVE_SUM = (
+    """self.total.eq(through - self._earlier(m, before, last))]
+        with m.If(self.tick):
+            m.d.sync += before.eq(through)
+""",
+    """self.total.eq(through)]
+        with m.If(self.tick):
+            m.d.sync += before.eq(through - self._earlier(m, self.m_e, last))
+""",
+)
+
 MUTANTS = [
     Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
     Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
@@ -96,7 +108,7 @@ MUTANTS = [
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
     Mutant("M of 4", "pm_stalled", MovingSum, "(quiet >= last)", "(quiet >= last - 1)"),
     Mutant("M of 3", "pm_bounds", MDatapath, "numerator.eq(total + bounds.get(name, 0))", "numerator.eq(total)"),
-    Mutant("M of 4", "pm_known", MDatapath, "known.append(seen == spec.average)", "known.append(seen != 0)"),
+    Mutant("M of 4", "pm_known", MDatapath, "known.append(seen >= spec.average)", "known.append(seen != 0)"),
     Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
     Mutant("Rairán", "pr_tick", Counters, "start = cycles - 2", "start = cycles - 1"),
     Mutant("Rairán", "pr_update", Counters, "pulse & (late | due) | turns", "pulse & late | turns"),
@@ -138,4 +150,16 @@ MUTANTS = [
         "velocity_valid.eq(update & ~forced)",
         32,
     ),
+    Mutant("upset, x4, filter 3", "p3_count", GlitchFilter, "held.eq(held + 1)", "held.eq(held + (held != 3))"),
+    Mutant(
+        "upset, eq. (21)",
+        "p4_latest",
+        IntervalAccumulator,
+        "self.m_s.eq(self.m_s + 1)",
+        "self.m_s.eq(self.m_s + (self.m_s <= self._max_ticks))",
+    ),
+    Mutant("upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(self.m == preset):", "with m.If(0):"),
+    Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),
+    Mutant("upset, Rairán", "pr_estimate", RairanDatapath, "shown = update | stalled", "shown = update"),
+    Mutant("upset, T", "pt_interval", Divider, "steps.eq(steps - 1)", "steps.eq(steps - (steps < self._steps))"),
 ]

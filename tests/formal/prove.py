@@ -11,10 +11,14 @@ from unittest.mock import patch
 
 from tachometry.hdl import export
 from tachometry.spec import TachometerSpec
+from tachometry.spec.recovery import recovery_clocks
 
 _SECONDS = 280
 
 # The induction starts in any defined state: reset values, pins and `rst` are defined, so all that follows is.
+# After an upset: no flip-flop has its reset value but the counter of the checker.
+_UPSET = "setattr -unset init w:* w:*upset_clocks* %d"
+
 _SCRIPT = """\
 read_verilog -defer -sv -formal {top}.sv delay.sv
 read_verilog {name}.v
@@ -31,9 +35,10 @@ memory_map -formal
 async2sync
 chformal -lower
 {delete}
+{upset}
 opt -full
 tee -q -o {name}.names select -list t:$assert
-sat -tempinduct {how} -maxsteps {steps} -prove-asserts -set-init-def -set-def-inputs {top}
+sat {how} -maxsteps {steps} -prove-asserts -set-init-def -set-def-inputs {top}
 """
 
 
@@ -57,6 +62,9 @@ class Proof:
         Assertions that are left out, as a pattern of Yosys.
     max_table : int or None
         Stands in for `MAX_TABLE`, so that small cores carry their reciprocal as large ones do.
+    recovers : bool
+        Instead of the induction, which another proof does: from any state, not that of a reset, the assertions hold for
+        `depth` clocks after the spec's `recovery_clocks`.
     """
 
     name: str
@@ -67,6 +75,7 @@ class Proof:
     depth: int
     without: str = ""
     max_table: int | None = None
+    recovers: bool = False
 
     def exported(self) -> str:
         """The Verilog of the core, as the mutants of this moment have it."""
@@ -112,9 +121,13 @@ def solve(proof: Proof, verilog: str, folder: Path, name: str, only: str = "", s
         name=name,
         top=proof.checker,
         parameters=" ".join(f"-chparam {key} {value}" for key, value in proof.parameters.items()),
-        probes="\n".join(f"connect -set \\{wire} {_path(verilog, path)}" for wire, path in proof.probes.items()),
+        probes="\n".join(
+            f"connect -nounset -set \\{wire} {_path(verilog, path)}" for wire, path in proof.probes.items()
+        ),
         delete=left_out and f"delete {left_out}",
-        how="-tempinduct-baseonly" if only else f"-tempinduct-def -initsteps {proof.depth - 1}",
+        upset=_UPSET if proof.recovers else "",
+        how=(f"-seq {recovery_clocks(proof.spec)} " if proof.recovers else "")
+        + ("-tempinduct-baseonly" if only or proof.recovers else f"-tempinduct-def -initsteps {proof.depth - 1}"),
         steps=steps or proof.depth,
     )
     (folder / f"{name}.ys").write_text(script)
@@ -130,7 +143,7 @@ def solve(proof: Proof, verilog: str, folder: Path, name: str, only: str = "", s
     names = sorted(cell.rpartition("/")[2] for cell in names)
     if not names:
         verdict = f"error: see {folder / name}.log"
-    elif "Induction step proven: SUCCESS!" in run.stdout and not only:
+    elif not only and ("proved base case" if proof.recovers else "Induction step proven") in run.stdout:
         verdict = "proven"
     elif "model found for base case: FAIL!" in run.stdout:
         verdict = "refuted"

@@ -6,7 +6,8 @@ module rairan #(
     parameter MAX_TICKS = 4,
     parameter MAX_COUNT = 2,
     parameter VELOCITY_WIDTH = 7,
-    parameter FRAC_BITS = 4
+    parameter FRAC_BITS = 4,
+    parameter UPSET = 0           // the phase of dt and the direction are those of the core, which may have any
 ) (
     input clk, input rst, input a, input b
 );
@@ -24,44 +25,47 @@ module rairan #(
   wire [$clog2(MAX_COUNT<3?2:MAX_COUNT)-1:0] core_more;
   wire [$clog2(MAX_TICKS+1)-1:0] core_dt;
   wire [$clog2((MAX_TICKS>MAX_COUNT?MAX_TICKS:MAX_COUNT)+1)-1:0] core_n;
-  wire core_any, core_high, core_backward, core_moved, core_late, core_in_step, core_rest, core_beyond;
+  wire core_forced, core_stalled, core_any, core_high, core_backward, core_moved, core_late, core_in_step, core_rest, core_beyond;
 
   reg [W-1:0] clock = 0, c_ep = 0, c_dt = 0, n_ep = 0, n_dt = 1, idle = 0;
   reg moved = 0, back = 0, in_step = 0;
   wire count = core_step != 0, backward = core_step < 0;
-  wire turns = count && moved && backward != back;
+  wire has_moved = UPSET ? core_moved : moved, was_back = UPSET ? core_backward : back;
+  wire signed [W:0] shown_clock = T - 2 - core_left;
+  wire [W-1:0] elapsing = UPSET ? $unsigned(shown_clock) : clock;
+  wire turns = count && has_moved && backward != was_back;
   wire late = count && !turns && c_dt != 0;
-  wire ends = !turns && !late && clock == T - 1;
+  wire ends = !turns && !late && elapsing == T - 1;
   wire [W-1:0] held = c_ep > MAX_COUNT ? MAX_COUNT : c_ep;
   wire [W-1:0] waited = in_step ? c_dt + 1 : c_dt;
-  reg update, alone, rests;
+  reg update, alone, rests, was_alone = 0, was_rest = 0;
   reg [W-1:0] ep, dt;
   always @* begin
-    {update, alone, rests} = 0;
+    {update, alone, rests} = {1'b0, was_alone, was_rest};
     ep = n_ep;
     dt = n_dt;
-    if (turns) {update, ep, dt} = {1'b1, {W{1'b0}}, {{W-1{1'b0}}, 1'b1}};
+    if (turns) {update, alone, rests, ep, dt} = {3'b100, {W{1'b0}}, {{W-1{1'b0}}, 1'b1}};
     else if (late) begin
       if (c_dt >= 2 || n_ep < 2) begin
-        update = 1;
+        {update, alone, rests} = 3'b100;
         ep = 1;
         dt = c_dt;
       end
     end else if (ends) begin
       if (held >= 2) begin
-        update = 1;
+        {update, alone, rests} = 3'b100;
         ep = held;
         dt = 1;
       end else if (count || (held == 1 && n_ep >= 2)) begin
-        update = 1;
+        {update, alone, rests} = 3'b100;
         ep = 1;
         dt = 1;
-      end else if (c_dt == MAX_TICKS - 1) begin
-        {update, alone, rests} = 3'b111;
+      end else if (c_dt >= MAX_TICKS - 1) begin
+        {update, alone, rests} = {c_dt != MAX_TICKS, 2'b11};
         ep = 0;
         dt = 1;
-      end else if (c_dt != MAX_TICKS && waited * n_ep > n_dt) begin
-        {update, alone} = 2'b11;
+      end else if (waited * n_ep > n_dt) begin
+        {update, alone, rests} = 3'b110;
         ep = 1;
         dt = waited;
       end
@@ -69,22 +73,27 @@ module rairan #(
   end
   always @(posedge clk)
     if (rst) begin
-      {clock, c_ep, c_dt, n_ep, idle, moved, back, in_step} <= 0;
+      {clock, c_ep, c_dt, n_ep, idle, moved, back, in_step, was_alone, was_rest} <= 0;
       n_dt <= 1;
     end else begin
-      clock <= turns || late || ends ? 0 : clock + 1;
+      clock <= turns || late || ends ? 0 : elapsing + 1;
       c_ep <= turns || late || (ends && count) ? 1 : ends ? 0 : c_ep + count;
-      c_dt <= count ? 0 : ends && c_dt != MAX_TICKS ? c_dt + 1 : c_dt;
-      if (count) {moved, back, in_step} <= {1'b1, backward, turns || late || ends};
+      c_dt <= count ? 0 : !ends ? c_dt : c_dt < MAX_TICKS ? c_dt + 1 : MAX_TICKS;
+      {moved, back} <= count ? {1'b1, backward} : {has_moved, was_back};
+      if (count) in_step <= turns || late || ends;
       n_ep <= ep;
       n_dt <= dt;
-      idle <= count ? 0 : idle == MAX_TICKS * T ? idle : idle + 1;
+      {was_alone, was_rest} <= {alone, rests};
+      idle <= count ? 0 : idle < MAX_TICKS * T ? idle + 1 : MAX_TICKS * T;
     end
 
   // As late as the core shows them.
   wire update_, alone_, rests_, back_, tick_, more_;
-  wire [W-1:0] ep_, dt_, idle_, n_ep_;
-  delay #(3 + 2 * W, 4) delays (clk, rst, {update, alone, rests, ep, dt}, {update_, alone_, rests_, ep_, dt_});
+  wire [W-1:0] ep_, idle_, n_ep_;
+  wire [W-1:0] less_, dt_ = less_ + 1'd1;  // after reset Ndt1 is 1
+  delay #(3 + 2 * W, 4) delays (
+      clk, rst, {update, alone, rests, ep, dt - 1'd1}, {update_, alone_, rests_, ep_, less_}
+  );
   delay #(2 * W + 1, 3) delayed_registers (clk, rst, {back, idle, n_ep}, {back_, idle_, n_ep_});
   delay #(2, 2) delayed_ends (clk, rst, {ends, ends && c_ep > MAX_COUNT}, {tick_, more_});
 
@@ -102,11 +111,13 @@ module rairan #(
     lemma_count: assert (core_any == (c_ep != 0) && core_more == (held == 0 ? 0 : held - 1));
     lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0) && core_rest == (c_dt == MAX_TICKS));
     lemma_in_dt: assert (c_dt == 0 || c_ep == 0);
-    lemma_flags: assert (core_moved == moved && core_backward == back && core_in_step == in_step);
+    lemma_flags: assert (core_moved == moved && core_backward == back
+        && (c_dt == MAX_TICKS || core_in_step == in_step));
     lemma_beyond: assert (core_beyond == (c_ep > MAX_COUNT));
     lemma_n: assert (core_high == (n_ep >= 2) && core_n == (n_ep >= 2 ? n_ep - 1 : n_ep == 0 ? 0 : n_dt));
     lemma_pair: assert (n_dt >= 1 && n_dt <= MAX_TICKS && n_ep <= MAX_COUNT && (n_ep == 1 || n_dt == 1));
     lemma_held: assert (n_ep_ != 0 || velocity == 0);
+    lemma_rest: assert (core_forced == was_alone && core_stalled == was_rest && (!was_rest || n_ep == 0));
     lemma_waits: assert (c_dt == MAX_TICKS ? n_ep == 0 : idle <= c_dt * T + clock);
   end
   always @* begin
@@ -114,8 +125,8 @@ module rairan #(
     pr_range: assert (c_dt <= MAX_TICKS && core_dt <= MAX_TICKS && core_more < MAX_COUNT && core_left >= -1
         && core_more + core_any == (c_ep > MAX_COUNT ? MAX_COUNT : c_ep));
     pr_update: assert (velocity_valid == update_);
-    pr_estimate: assert (!velocity_valid || (n_ep1 == ep_ && n_dt1 == dt_ && forced == alone_ && stalled == rests_));
-    pr_velocity: assert (!velocity_valid || (ep_ == 0 ? velocity == 0 : have <= wanted && wanted < have + 2 * q));
+    pr_estimate: assert (n_ep1 == ep_ && n_dt1 == dt_ && forced == alone_ && stalled == rests_);
+    pr_velocity: assert (ep_ == 0 ? velocity == 0 : have <= wanted && wanted < have + 2 * q);
     pr_rest: assert (idle_ < MAX_TICKS * T || velocity == 0);
     pr_flag: assert (!more_ || overflow);
   end

@@ -16,7 +16,8 @@ module timed #(
     parameter INTEGER_BITS = 3,
     parameter INTERVAL_WIDTH = 5,
     parameter FRAC_BITS = 4,
-    parameter DIVISION_CLOCKS = 11
+    parameter DIVISION_CLOCKS = 11,
+    parameter UPSET = 0           // when a silence or a window is over and a division may begin is taken from the core
 ) (
     input clk, input rst, input a, input b
 );
@@ -60,24 +61,26 @@ module timed #(
 
   // Clocks since the last count, after reset as if for ever; timer periods since the last count or forced 0.
   reg [W-1:0] idle = LONG + B, age = 1, length = 1;
+  wire [W-1:0] waited = UPSET ? core_age : age, lasted;
   reg was_negative = 0;
+  wire last_negative = UPSET ? core_negative : was_negative;
   wire opened = idle < LONG;
-  wire overdue = period && !count && age == MAX_PERIODS;
+  wire overdue = period && !count && waited == MAX_PERIODS;
   always @(posedge clk)
     if (rst) begin
       idle <= LONG + B;
       age <= 1;
       was_negative <= 0;
     end else begin
-      idle <= count ? 0 : idle == LONG + B ? idle : idle + 1;
+      idle <= count ? 0 : idle < LONG + B ? idle + 1 : LONG + B;
       if (period) age <= count || overdue ? 1 : age + 1;
-      if (count) was_negative <= negative;
+      was_negative <= count ? negative : last_negative;
     end
 
   // The window of M/T: its length, and its way so far, in counts.
   reg signed [W-1:0] way = 0;
-  wire signed [W-1:0] pair = MT && LATTICE ? size : negative != was_negative ? 0 : negative ? -1 : 1;
-  wire closes = MT && count && opened && length > MIN_PERIODS;
+  wire signed [W-1:0] pair = MT && LATTICE ? size : negative != last_negative ? 0 : negative ? -1 : 1;
+  wire closes = MT && count && opened && lasted > MIN_PERIODS;
   always @(posedge clk)
     if (rst) begin
       way <= 0;
@@ -92,9 +95,10 @@ module timed #(
   reg measuring = 0, silent = 0, still = 0, many_now = 0;
   reg signed [I+Q:0] distance = 0;
   reg [I-1:0] times = 1;
-  wire free = since == 0 || since == B || !measuring;
+  wire free = UPSET ? !core_measuring || !(core_running || core_rounds) : since == 0 || since == B || !measuring;
+  wire idles = UPSET ? !(core_running || core_rounds || core_compared) : since == 0;
   wire measured = MT ? closes : count && free && (opened || many);
-  wire sinks = tick && !count && !overdue && since == 0;
+  wire sinks = tick && !count && !overdue && idles;
   wire signed [W-1:0] pairs = MT ? way + pair : many ? (negative ? -1 : 1) : pair;
   always @(posedge clk)
     if (rst) since <= 0;
@@ -123,7 +127,7 @@ module timed #(
       {due, held, past} <= 0;
       spacing <= B;
     end else begin
-      spacing <= velocity_valid ? 1 : spacing == B ? B : spacing + 1;
+      spacing <= velocity_valid ? 1 : spacing < B ? spacing + 1 : B;
       due <= since == B;
       {due_measuring, due_silent, due_still, due_many} <= {measuring, silent, still, many_now};
       due_distance <= distance;
@@ -132,9 +136,24 @@ module timed #(
       past <= velocity;
     end
 
+  // What is shown: the one that was due at the last update; where there is one due that makes none, that.
+  reg was_silent = 0, was_still = 0, was_many = 0;
+  reg signed [I+Q:0] was_distance = 0;
+  reg [I-1:0] was_times = 0;  // 0: none
+  wire shown_silent = due ? due_silent : was_silent, shown_still = due ? due_still : was_still;
+  wire shown_many = due ? due_many : was_many, kept = due && !velocity_valid;
+  wire signed [I+Q:0] shown_distance = due ? due_distance : was_distance;
+  wire [I-1:0] shown_times = due ? due_times : was_times;
+  always @(posedge clk)
+    if (rst) {was_silent, was_still, was_many, was_distance, was_times} <= 0;
+    else if (!kept) begin
+      {was_silent, was_still, was_many} <= {shown_silent, shown_still, shown_many};
+      {was_distance, was_times} <= {shown_distance, shown_times};
+    end
+
   // 2^f x + 1/2 = (2^(f+1) distance + times) / (2 times), rounded down, and the largest that can be shown.
-  wire signed [N+I+2:0] wanted = (due_distance <<< (FRAC_BITS + 1)) + $signed({1'b0, due_times});
-  wire signed [N+I+2:0] divisor = $signed({1'b0, due_times, 1'b0}), have = divisor * velocity;
+  wire signed [N+I+2:0] wanted = (shown_distance <<< (FRAC_BITS + 1)) + $signed({1'b0, shown_times});
+  wire signed [N+I+2:0] divisor = $signed({1'b0, shown_times, 1'b0}), have = divisor * velocity;
   localparam signed [V-1:0] LIMIT = MAX_COUNT << FRAC_BITS;
   wire fits = !SATURATES || (wanted < divisor * (LIMIT + 1) && wanted >= -divisor * LIMIT);
   wire signed [N+1:0] shown = !SATURATES ? core_rounded : core_rounded > LIMIT ? LIMIT
@@ -152,7 +171,7 @@ module timed #(
   wire signed [N+I+2:0] found = twice * core_rounded;
   wire signed [W+3:0] most = MAX_QUOTIENT * times, farthest = (LATTICE ? MAX_COUNT : 1) * (length - 1);
   reg [$clog2(T):0] phase = PHASES;  // of the timer period, 1 to PHASES; waits for the first tick
-  always @(posedge clk) phase <= rst ? PHASES : period ? 1 : phase == PHASES ? PHASES : phase + 1;
+  always @(posedge clk) phase <= rst ? PHASES : period ? 1 : phase < PHASES ? phase + 1 : PHASES;
   always @* begin
     lemma_idle: assert (idle <= LONG + B && age >= 1 && age <= MAX_PERIODS);
     lemma_age: assert (!opened || (LATTICE ? idle + 1 == (age - 1) * T + phase : age == idle + 1));
@@ -165,7 +184,7 @@ module timed #(
     lemma_kept: assert (since == 0 || (core_measuring == measuring && core_forced == silent && core_stalled == still
         && core_by == times));
     lemma_asked: assert (since == 0 || (times >= 1 && distance <= most && -distance <= most));
-    lemma_times: assert (times <= MAX_PERIODS + (MT ? MIN_PERIODS : 0));
+    lemma_times: assert (since == 0 || times <= MAX_PERIODS + (MT ? MIN_PERIODS : 0));
     lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
     lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
     lemma_left: assert (!core_running || core_left == ((distance << j) & ((1 << Q) - 1)));
@@ -191,8 +210,10 @@ module timed #(
       wire signed [$clog2(T-1):0] core_window;
       reg [$clog2(T):0] clock = 0;
       reg ticked = 0;
+      wire signed [$clog2(T)+1:0] shown_clock = T - 2 - core_window;
+      wire [$clog2(T):0] elapsing = UPSET ? $unsigned(shown_clock) : clock;
       always @(posedge clk) begin
-        clock <= rst || clock == T - 1 ? 0 : clock + 1;
+        clock <= rst || elapsing == T - 1 ? 0 : elapsing + 1;
         ticked <= !rst && (ticked || tick);
       end
       always @* begin
@@ -206,6 +227,7 @@ module timed #(
       wire [I-1:0] core_length;
       wire core_late;
       wire signed [I+Q:0] core_way;
+      assign lasted = UPSET ? core_length : length;
       always @* begin
         lemma_length: assert (length >= 1 && (!opened || (length <= MIN_PERIODS + age && core_length == length
             && core_late == (length > MIN_PERIODS))));
@@ -214,21 +236,22 @@ module timed #(
         lemma_way: assert (!opened || (core_way == P * way && way <= farthest && -way <= farthest));
         lemma_window_free: assert (since == 0 || !measuring || since >= (length - 1) * PHASES + phase);
       end
-    end
+    end else assign lasted = length;
   endgenerate
   always @* begin
     pt_update: assert (due && due_measuring ? velocity_valid : !velocity_valid || due);
     pt_spacing: assert (!velocity_valid || spacing >= B);
-    pt_interval: assert (!velocity_valid || (interval == due_times && forced == due_silent));
+    pt_interval: assert (kept || (interval == shown_times && forced == shown_silent));
     pt_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_PERIODS + (MT ? MIN_PERIODS : 0)));
-    pt_velocity: assert (!velocity_valid || (SATURATES && beyond) || (have <= wanted && wanted < have + divisor));
-    pt_flag: assert (!velocity_valid || beyond == (FLAGS && (!fits || due_many)));
-    pt_saturated: assert (fits || !velocity_valid || velocity == (due_distance < 0 ? -LIMIT : LIMIT));
+    pt_velocity: assert (kept || (SATURATES && beyond) || (have <= wanted && wanted < have + divisor)
+        || (shown_times == 0 && velocity == 0));
+    pt_flag: assert (kept || shown_times == 0 || beyond == (FLAGS && (!fits || shown_many)));
+    pt_saturated: assert (fits || kept || shown_times == 0 || velocity == (shown_distance < 0 ? -LIMIT : LIMIT));
     pt_sinks: assert (!velocity_valid || due_measuring || (forced && !stalled
         && (past < 0 ? velocity <= 0 && velocity > past : velocity >= 0 && velocity < past)));
     pt_bound: assert (!due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
     pt_rest: assert (idle < LONG + B || velocity == 0);
-    pt_stalled: assert (!velocity_valid || stalled == due_still);
+    pt_stalled: assert (kept || stalled == shown_still);
     pt_held: assert (velocity_valid || outputs == held);
   end
 endmodule
