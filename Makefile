@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test verify formal mutate bench size lint clean
+.PHONY: help venv demo figures compare icarus test verify formal mutate upset bench size lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -55,6 +55,9 @@ test: $(VENV)/.test lint icarus ## lint, types and all tests
 
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m formal
+
+upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, see docs/verification.md
+	PYTHONPATH=tests $(BIN)/python -m upset
 
 mutate: $(VENV)/.test ## how many wrong cores the tests' motions notice, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m mutation

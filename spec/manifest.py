@@ -4,6 +4,7 @@ import re
 from dataclasses import asdict
 from typing import Any
 
+from tachometry.spec.recovery import recovery_clocks
 from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END, TachometerSpec
 
 _KEYWORDS = frozenset(
@@ -45,6 +46,7 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
     """
     if name in {port.name for port in spec.ports}:
         raise ValueError(f"name must not be that of a port, which {name!r} is")
+    recovery = recovery_clocks(spec)
     return {
         "module": check_module_name(name),
         "method": spec.method,
@@ -67,6 +69,7 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             "tick_to_velocity": spec.tick_to_velocity,
             **({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if spec.max_tick_cycles else {}),
         },
+        **({} if recovery is None else {"recovery_cycles": recovery}),
         **(
             {"external_tick_cycles": {"min": spec.min_tick_cycles, "max": spec.max_tick_cycles}}
             if spec.max_tick_cycles

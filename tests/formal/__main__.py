@@ -13,6 +13,8 @@ from formal.mutants import MUTANTS, Mutant
 from formal.prove import Proof, Result, prepare, solve
 from support.mutant import mutant
 
+from tachometry.spec.recovery import recovery_clocks
+
 _FOLDER = Path("build/formal")
 
 
@@ -56,7 +58,8 @@ def main(chosen: list[str]) -> bool:
             result = future.result()
             fine &= result.verdict == "proven"
             proven.update(name for name in result.names if name.startswith("p"))
-            _row(proof.name, _properties(result), f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
+            begin = f"any state, {recovery_clocks(proof.spec)} clocks" if proof.recovers else f"{result.depth} clocks"
+            _row(proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict)
         print()
         _row("core", "property", "mutant", "refuted in", "seconds", "verdict")
         _row(*["---"] * 6)

@@ -162,4 +162,5 @@ MUTANTS = [
     Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),
     Mutant("upset, Rairán", "pr_estimate", RairanDatapath, "shown = update | stalled", "shown = update"),
     Mutant("upset, T", "pt_interval", Divider, "steps.eq(steps - 1)", "steps.eq(steps - (steps < self._steps))"),
+    Mutant("upset, M/T", "pt_update", MTDatapath, "length.eq(length + 1)", "length.eq(length + ~length.all())"),
 ]
