@@ -3,7 +3,8 @@
 import json
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, Self
 
@@ -42,6 +43,7 @@ class Results:
         self._table = self._schema.empty_table()
         self._new: list[Row] = []
         self._saved = True
+        self._n_kept = 0  # rows on disk
         self._due = time.monotonic() + _PATIENCE
         self._lock: FileLock | None = None
         self._journal: IO[str] | None = None
@@ -70,11 +72,13 @@ class Results:
         try:
             if self._path.exists():
                 self._table = _joined([self._table, _read(self._path)])
+                self._n_kept = len(self._table)
             if (journal := self._path.with_name(f".{self._path.name}.new")).exists():
                 there = set(self._table["point"].to_pylist())
                 left = [row for row in _read_journal(journal) if row["point"] not in there]
                 more = dict.fromkeys(name for row in left for name in row if name not in COLUMNS)
                 self._table = _joined([self._table, pa.Table.from_pylist(left, schema=_schema(more))])
+                self._n_kept = len(self._table)
                 self._write()
             self._begin_journal()
         except BaseException:
@@ -105,8 +109,10 @@ class Results:
         self._new.append(row)
         self._saved = False
         if self._journal is not None:
-            self._journal.write(f"{json.dumps(row)}\n")
-            self._journal.flush()
+            with self._writing(Path(self._journal.name)):
+                self._journal.write(f"{json.dumps(row)}\n")
+                self._journal.flush()
+            self._n_kept += 1
         if time.monotonic() >= self._due:
             self.save()
 
@@ -125,6 +131,7 @@ class Results:
         if self._path is not None:
             begun = time.monotonic()
             self._write()
+            self._saved = True
             self._begin_journal()
             self._due = time.monotonic() + max(_PATIENCE, _SHARE * (time.monotonic() - begun))
         self._saved = True
@@ -135,29 +142,52 @@ class Results:
         order = [place.get(point, len(place)) for point in self._table["point"].to_pylist()]
         table = self._table.take(pc.array_sort_indices(pa.array(order, pa.int64())))
         beside = self._path.with_name(f".{self._path.name}.part")
-        with beside.open("wb") as file:
-            pq.write_table(table, file)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(self._path)
+        try:
+            with self._writing(self._path):
+                with beside.open("wb") as file:
+                    pq.write_table(table, file)
+                    file.flush()
+                    os.fsync(file.fileno())
+                beside.replace(self._path)
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+        self._n_kept = len(table)
 
     def _begin_journal(self) -> None:
         """An empty journal; the old one's rows are in the file."""
         assert self._path is not None
+        self._close_journal()
+        path = self._path.with_name(f".{self._path.name}.new")
+        with self._writing(path):
+            self._journal = path.open("w", encoding="ascii")
+            self._journal.write(f"{code_digest()}\n")
+            self._journal.flush()
+
+    def _close_journal(self) -> None:
         if self._journal is not None:
-            self._journal.close()
-        self._journal = self._path.with_name(f".{self._path.name}.new").open("w", encoding="ascii")
-        self._journal.write(f"{code_digest()}\n")
-        self._journal.flush()
+            with suppress(OSError):  # of a line that could not be written, which has been told
+                self._journal.close()
+
+    @contextmanager
+    def _writing(self, path: Path) -> Iterator[None]:
+        """Tell which file could not be written, and what there is all the same."""
+        try:
+            yield
+        except OSError as error:
+            rows = "row is" if self._n_kept == 1 else "rows are"
+            kept = f"; {self._n_kept} {rows} kept, and the same command goes on from there" if self._n_kept else ""
+            raise OSError(f"cannot write {path}: {error.strerror or error}{kept}") from error
 
     def _release(self) -> None:
-        if self._journal is not None:
-            self._journal.close()
-            if self._saved:
+        try:
+            self._close_journal()
+            if self._journal is not None and self._saved:
                 Path(self._journal.name).unlink(missing_ok=True)
-        if self._lock is not None:
-            Path(self._lock.lock_file).unlink(missing_ok=True)
-            self._lock.release()
+        finally:
+            if self._lock is not None:
+                Path(self._lock.lock_file).unlink(missing_ok=True)
+                self._lock.release()
 
     def columns(self, *names: str) -> dict[str, list[Any]]:
         """Columns of this sweep's points that have a row, in order."""
@@ -185,10 +215,10 @@ def _read(path: Path) -> pa.Table:
 
 
 def _read_journal(path: Path) -> list[Row]:
-    """Rows of a journal; the last line may not be whole."""
-    made_by, *lines = path.read_text(encoding="ascii").split("\n")[:-1]
-    if lines:
-        _check_code(path, made_by)
+    """Rows of a journal after its first line, the code; the last line may not be whole, even if it is the first."""
+    whole = path.read_text(encoding="ascii").split("\n")[:-1]
+    if lines := whole[1:]:
+        _check_code(path, whole[0])
     return [json.loads(line) for line in lines]
 
 

@@ -1,5 +1,8 @@
 """Results of a sweep on disk."""
 
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +109,7 @@ def test_a_file_that_cannot_be_written_leaves_the_journal(tmp_path: Path, monkey
         raise OSError("disk full")
 
     monkeypatch.setattr(pq, "write_table", full)
-    with pytest.raises(OSError, match=r"^disk full$"), Results(path, ["a"]) as results:
+    with pytest.raises(OSError, match=r"^cannot write .*: disk full; 1 row is kept, "), Results(path, ["a"]) as results:
         results.add(row("a"))
     monkeypatch.undo()
     assert not path.exists()
@@ -114,6 +117,48 @@ def test_a_file_that_cannot_be_written_leaves_the_journal(tmp_path: Path, monkey
     with Results(path, ["a"]) as results:
         assert results.missing == []
     assert names(path) == ["a"]
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """What goes beyond so many bytes of a file cannot be written, as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_disk_that_is_full_in_the_middle(tmp_path: Path) -> None:
+    path = tmp_path / "r.parquet"
+    message = r"^cannot write .*/r\.parquet: .*; 2 rows are kept, and the same command goes on from there$"
+    results = Results(path, list("abc")).__enter__()
+    for name in "ab":
+        results.add(row(name))
+    with files_up_to((tmp_path / ".r.parquet.new").stat().st_size + 99):
+        with pytest.raises(OSError, match=r"^cannot write .*/\.r\.parquet\.new: .*; 2 rows are kept, "):
+            results.add(row("c"))
+        with pytest.raises(OSError, match=message):
+            results.__exit__()
+    assert [file.name for file in tmp_path.iterdir()] == [".r.parquet.new"]
+    with Results(path, list("abc")) as results:
+        assert results.missing == ["c"]
+    assert names(path) == ["a", "b"]
+
+
+def test_a_disk_that_is_full_at_the_start(tmp_path: Path) -> None:
+    path = tmp_path / "r.parquet"
+    with files_up_to(9), pytest.raises(OSError, match=r"^cannot write .*/\.r\.parquet\.new: [^;]*$"):
+        Results(path, ["a"]).__enter__()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("text", ["", "0123"])
+def test_a_journal_without_a_whole_line(text: str, tmp_path: Path) -> None:
+    (tmp_path / ".r.parquet.new").write_text(text)
+    with Results(tmp_path / "r.parquet", ["a"]) as results:
+        assert results.missing == ["a"]
 
 
 def test_one_sweep_at_a_time(tmp_path: Path) -> None:
