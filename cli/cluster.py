@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import pickle
 import signal
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from tachometry.sim.sweep import Point, Row
 
-_PATIENCE = "10s"  # until a scheduler has answered
+_PATIENCE = 10.0  # seconds until a scheduler has answered
 _AT_ONCE = 1000  # points that are sent to the scheduler together
 # Dask has its workers give all memory back at once, which takes longer than a point itself: they keep so many bytes.
 _MEMORY = {
@@ -54,6 +55,7 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
         logging.disable()  # what goes wrong comes as an exception
         if scheduler is not None:
             try:
+                asyncio.run(_greet(scheduler))
                 client = stack.enter_context(Client(scheduler, timeout=_PATIENCE))
             except (OSError, ValueError, TypeError) as error:
                 raise OSError(f"--scheduler {scheduler} does not answer: {error}") from None
@@ -72,6 +74,19 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
                 raise OSError(f"cannot start the processes of a sweep: {error.__cause__ or error}") from None
             client = stack.enter_context(Client(stack.enter_context(local)))
         yield client
+
+
+async def _greet(scheduler: str) -> None:
+    """See that a scheduler answers: a client has no patience's end where one accepts and says nothing."""
+    from distributed import Security
+    from distributed.comm import connect
+
+    arguments = Security().get_connection_args("client")
+    try:
+        comm = await asyncio.wait_for(connect(scheduler, timeout=_PATIENCE, **arguments), _PATIENCE)
+    except TimeoutError:
+        raise OSError(f"nothing within {_PATIENCE:g} s") from None
+    await comm.close()
 
 
 @contextmanager

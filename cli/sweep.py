@@ -218,8 +218,9 @@ def _run(
                 if report is not None:
                     report(done)
     except KeyboardInterrupt:
-        where = "" if results is None else f", kept in {results}"
-        click.echo(f"tachometry: interrupted after {n_done} of {len(found.points)} points{where}", err=True)
+        where = f", kept in {results}" if results is not None and n_done else ""
+        points = "point" if len(found.points) == 1 else "points"
+        click.echo(f"tachometry: interrupted after {n_done} of {len(found.points)} {points}{where}", err=True)
         raise click.exceptions.Exit(INTERRUPTED) from None
 
 

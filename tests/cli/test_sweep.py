@@ -1,6 +1,7 @@
 """`tachometry sweep`: what it runs, keeps, tells and draws."""
 
 import re
+import socket
 import sys
 import threading
 from collections.abc import Iterator
@@ -174,7 +175,7 @@ def test_what_cannot_be_is_told_in_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tachometry.cli.cluster._PATIENCE", "200ms")
+    monkeypatch.setattr("tachometry.cli.cluster._PATIENCE", 0.2)
     Path("s.toml").write_text(BASE)
     assert run("s.toml", *options) == 2
     captured = capsys.readouterr()
@@ -183,6 +184,28 @@ def test_what_cannot_be_is_told_in_one_line(
     assert captured.err.count("\n") == 1
     assert message in captured.err
     assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
+
+
+def test_a_scheduler_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tachometry.cli.cluster._PATIENCE", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        assert run(*CORE, *MOTION, *AXES, "--scheduler", address) == 2
+    assert capsys.readouterr().err == (
+        f"tachometry: error: --scheduler {address} does not answer: nothing within 0.2 s\n"
+    )
+
+
+def test_an_interrupt_before_there_is_a_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tachometry.cli.cluster.cluster", interrupted)
+    assert run(*CORE, *MOTION, *AXES, "--results", tmp_path / "r.parquet") == 130
+    assert capsys.readouterr().err == "tachometry: interrupted after 0 of 8 points\n"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_is_not_there_or_no_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
