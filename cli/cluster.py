@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tachometry.cli.options import plural
+
 if TYPE_CHECKING:
     from distributed import Client
 
@@ -148,4 +150,4 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
         kind = next((kind for kind in (ValueError, OSError) if isinstance(first, kind)), None)
         if kind is None:
             raise first
-        raise kind(f"{first}; {len(failed)} of {len(points)} points could not be run")
+        raise kind(f"{first}; {len(failed)} of {plural(len(points), 'point')} could not be run")

@@ -101,6 +101,11 @@ class GroupedCommand(click.Command):
                 formatter.write_dl(records, col_max=26)
 
 
+def plural(number: int, what: str) -> str:
+    """So many of a thing."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Command]:
     """Decorator for an option in a group; defaults are shown."""
     return click.option(*names, cls=Option, group=group, show_default=True, **attributes)

@@ -7,6 +7,7 @@ from fractions import Fraction
 from rich.table import Table
 from rich.text import Text
 
+from tachometry.cli.options import plural
 from tachometry.cli.report import print_rows, stdout_console
 from tachometry.sim.plan import Plan, standstill
 from tachometry.spec import Speed, TachometerSpec
@@ -25,7 +26,7 @@ _TOLD: dict[str, tuple[Callable[[TachometerSpec], str], str]] = {
     "t": (lambda spec: f"eq. (9), times in {spec.parameters['timer']}s", "count"),
     "mt": (lambda spec: f"eq. (13), times in {spec.parameters['timer']}s", "count"),
     "rairan": (lambda spec: f"Rairan 2013, {spec.parameters['estimate']}", "count"),
-    "m": (lambda spec: f"eq. (6), mean of {_plural(spec.parameters['average'], 'tick')}", "tick"),
+    "m": (lambda spec: f"eq. (6), mean of {plural(spec.parameters['average'], 'tick')}", "tick"),
 }
 
 
@@ -100,7 +101,7 @@ def _configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ("method", f"{spec.method.upper()}, {told(spec)}"),
         ("encoder", counts),
         ("clock", f"{timing.clock_hz:,} Hz"),
-        ("tick", f"{_time(timing.tick_seconds)} ({_plural(timing.tick_cycles, 'clock')})"),
+        ("tick", f"{_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
         ("maximum time", f"{_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
         ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
@@ -111,7 +112,7 @@ def _configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports if port.name in _WIDE)),
         *([] if memory is None else [("reciprocal", _memory(*memory))]),
-        *((name, f"{_plural(n, 'clock')} ({_time(spec.seconds(n))})") for name, n in latencies.items()),
+        *((name, f"{plural(n, 'clock')} ({_time(spec.seconds(n))})") for name, n in latencies.items()),
         ("standstill", _standstill(spec)),
     ]
 
@@ -123,15 +124,11 @@ def _memory(kind: str, entries: int, width: int) -> str:
 def _standstill(spec: TachometerSpec) -> str:
     rest = standstill(spec)
     time = _time(rest * spec.timing.tick_seconds)
-    return f"reads 0 at most {time} ({_plural(rest, 'tick')}) after the last count's tick"
+    return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
 
 
 def _rad_per_s(unit: str) -> float:
     return Speed(Fraction(1), unit).rad_per_s
-
-
-def _plural(number: int, what: str) -> str:
-    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def _number(value: float, form: str) -> str:

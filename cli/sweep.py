@@ -10,7 +10,7 @@ import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.motion_options import FORMS, tables_of
-from tachometry.cli.options import INTERRUPTED, GroupedCommand, option, output
+from tachometry.cli.options import INTERRUPTED, GroupedCommand, option, output, plural
 from tachometry.cli.sweep_options import POINT_OPTIONS, by_name
 from tachometry.cli.sweep_settings import Settings, arguments, of_command_line, of_file
 from tachometry.spec.units import parse_time
@@ -219,8 +219,7 @@ def _run(
                     report(done)
     except KeyboardInterrupt:
         where = f", kept in {results}" if results is not None and n_done else ""
-        points = "point" if len(found.points) == 1 else "points"
-        click.echo(f"tachometry: interrupted after {n_done} of {len(found.points)} {points}{where}", err=True)
+        click.echo(f"tachometry: interrupted after {n_done} of {plural(len(found.points), 'point')}{where}", err=True)
         raise click.exceptions.Exit(INTERRUPTED) from None
 
 

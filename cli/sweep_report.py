@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
+from tachometry.cli.options import plural
 from tachometry.cli.report import stdout_console
 from tachometry.spec.units import format_time
 
@@ -51,10 +52,10 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
     console.print("\nMedians of all points, and the worst. error/V: RMS error over RMS of the true speed.")
     for name, reason in found.left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
-    n_points = len(found.points)
+    n_points = plural(len(found.points), "point")
     rate = f", {n_run} of them run in {_time(seconds)}, {n_run / seconds:.3g} a second" if n_run else ", none run anew"
     where = "" if results is None else f"; rows in {results}"
-    console.print(Text(f"{n_points} points{rate}{where}"), soft_wrap=True)
+    console.print(Text(f"{n_points}{rate}{where}"), soft_wrap=True)
     if checked:
         console.print(_verdict(sum(checked), len(checked), sum(columns["clocks"])))
     return sum(checked)
@@ -62,8 +63,8 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
 
 def _verdict(n_wrong: int, n_points: int, n_clocks: int) -> Text:
     if n_wrong:
-        return Text(f"FAIL: hardware and golden model differ in {n_wrong} values", style="bold red")
-    told = f"PASS: hardware and golden model agree in every bit of {n_points} points, {n_clocks} clocks"
+        return Text(f"FAIL: hardware and golden model differ in {plural(n_wrong, 'value')}", style="bold red")
+    told = f"PASS: hardware and golden model agree in every bit of {plural(n_points, 'point')}, {n_clocks} clocks"
     return Text(told, style="bold green")
 
 

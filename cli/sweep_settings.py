@@ -85,7 +85,7 @@ def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
         allowed = [name for name in options if name != "vary"]
         for name in content:
             if name not in allowed:
-                raise ValueError(f"keys must be of {', '.join(allowed)}, and [vary], not {name!r}")
+                raise ValueError(f"{name!r} is no key of a sweep: keys must be of {', '.join(allowed)}, and [vary]")
         fixed = {name: _of_toml(name, value) for name, value in content.items()}
         axes = {name: _values(name, _items(name, value), options) for name, value in vary.items()}
         return _checked(Settings(fixed, axes))
@@ -176,8 +176,14 @@ def _range(name: str, item: str, match: re.Match[str], whole: bool) -> list[str]
         raise ValueError(f"a range of {name} must have 2 to {_MOST} values, not {item!r}")
     if low >= high or (log and low <= 0):
         raise ValueError(f"a range of {name} must go up{', from more than 0' * bool(log)}, not {item!r}")
+    try:
+        ratio = float(high / low) if log else 1.0
+        _ = float(low), float(high)
+    except OverflowError:
+        raise ValueError(
+            f"a range of {name} must be of numbers, and factors between, below 1e308, not {item!r}"
+        ) from None
     if log:
-        ratio = float(high / low)
         inner = [Fraction(f"{float(low) * ratio ** (k / (count - 1)):.{_DIGITS}g}") for k in range(1, count - 1)]
     else:
         inner = [low + (high - low) * k / (count - 1) for k in range(1, count - 1)]

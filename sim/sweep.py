@@ -106,7 +106,7 @@ class Point:
     Raises
     ------
     ValueError
-        If the motion is shorter than a tick.
+        If the motion is shorter than a tick, or no two ticks of it are compared.
     """
 
     method: str
@@ -123,6 +123,10 @@ class Point:
         if self.motion.duration * self.spec.timing.clock_hz < needed:
             least = format_time(self.spec.seconds(needed))
             raise ValueError(f"motion must last at least {needed} clocks of --clock ({least}), a tick and its latency")
+        duration = self.motion.duration
+        if self.earliest and duration - self.earliest < 2 * float(self.spec.timing.tick_seconds):
+            lasts = format_time(Fraction(f"{duration:.6g}"))
+            raise ValueError(f"motion must last two ticks or more beyond --from, longer than {lasts}")
 
     @functools.cached_property
     def digest(self) -> str:

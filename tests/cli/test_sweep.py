@@ -120,6 +120,10 @@ def test_the_hardware_in_lockstep(
         "PASS: hardware and golden model agree in every bit of 2 points, 4000 clocks\n"
     )
     assert [(row["engine"], row["mismatches"]) for row in rows(tmp_path / "r.parquet")] == [("pysim", 0)] * 2
+    assert run(*("speed=5" if word == "speed=5,50" else word for word in line), *scheduler) == 0
+    told = capsys.readouterr().out
+    assert "\n1 point, none run anew; " in told
+    assert "in every bit of 1 point, 2000 clocks" in told
     monkeypatch.setattr(sweep, "compare", lambda *_: (3, []))
     assert run(*line, *scheduler, "--seed", "1") == 1
     assert "FAIL: hardware and golden model differ in 6 values" in capsys.readouterr().out
@@ -156,6 +160,10 @@ BAD = [
     (["--frobnicate"], "No such option"),
     (["--vary", "speed=1", "--tick", "1ms", "--plot", "x.png"], "--vary must be given together with --plot"),
     (["--axes", "speed,seed", "--plot", "x.png"], "--axes must be one or two of speed, tick, not 'speed,seed'"),
+    (["--from", "1s"], "--motion must last two ticks or more beyond --from, longer than 100ms (method s, speed=5rad/s"),
+    (["--vary", "speed=1..1e999:3log"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
+    (["--vary", "speed=1..1e999:3"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
+    (["--vary", "speed=1e-200..1e200:3log"], "numbers, and factors between, below 1e308, not '1e-200..1e200:3log'"),
     (["--from", "-1s"], "--from must be at least 0, not -1s"),
     (["--jobs", "0"], "--jobs must be at least 1, not 0"),
     (["--jobs", "2", "--scheduler", "tcp://x:1"], "--jobs must not be given together with --scheduler"),
@@ -213,7 +221,7 @@ def test_a_file_that_is_not_there_or_no_sweep(tmp_path: Path, capsys: pytest.Cap
     assert capsys.readouterr().err == f"tachometry: error: {tmp_path / 'no.toml'}: No such file or directory\n"
     (tmp_path / "s.toml").write_text("cpr = 3")
     assert run(tmp_path / "s.toml") == 2
-    assert capsys.readouterr().err.startswith(f"tachometry: error: {tmp_path / 's.toml'}: keys must be of methods, ")
+    assert capsys.readouterr().err.startswith(f"tachometry: error: {tmp_path / 's.toml'}: 'cpr' is no key of a sweep: ")
 
 
 def test_what_fails_on_the_way_is_told_and_the_rest_is_kept(

@@ -104,8 +104,8 @@ bounds = [true, false]
     ("text", "message"),
     [
         ("ppr = ", "must be TOML: Invalid value"),
-        ("cpr = 500", "keys must be of methods, from, "),
-        ("cpr = 500", ", illegal, seed, and [vary], not 'cpr'"),
+        ("cpr = 500", ": 'cpr' is no key of a sweep: keys must be of methods, from, "),
+        ("cpr = 500", ", illegal, seed, and [vary]"),
         ("tick = [1, 2]", "tick must be a text, a number, true or false, not [1, 2]: a list belongs into [vary]"),
         ("tick = 1979-05-27", "tick must be a text, a number, true or false, not datetime.date"),
         ("vary = 3", "vary must be a table of axes, not 3"),

@@ -67,8 +67,6 @@ def test_options_in_units() -> None:
 def test_what_cannot_be_told_is_empty() -> None:
     rest = run_point(replace(POINT, motion=parse_motion("stop:100ms")))
     assert (rest["rms_error_rad_s"], rest["relative_error"], rest["delay_s"]) == (0, None, None)
-    late = run_point(replace(POINT, earliest=1.0))
-    assert (late["rms_error_rad_s"], late["true_rms_rad_s"], late["relative_error"]) == (None, None, None)
     timed = MTTachometer(encoder=Encoder(100), timing=TIMING, bound_decay=False)
     none = run_point(replace(POINT, spec=timed, motion=parse_motion("stop:5ms")))
     assert (none["updates"], none["mean_time_s"], none["max_error_rad_s"]) == (0, None, None)
@@ -105,6 +103,13 @@ def test_what_a_point_is_known_by(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_motion_shorter_than_a_tick() -> None:
     with pytest.raises(ValueError, match=r"^motion must last at least 1002 clocks of --clock \(1\.002ms\), a tick "):
         replace(POINT, motion=parse_motion("stop:1ms"))
+
+
+def test_a_motion_that_ends_before_it_is_compared() -> None:
+    duration = POINT.motion.duration
+    replace(POINT, earliest=duration - 2.5e-3)
+    with pytest.raises(ValueError, match=r"^motion must last two ticks or more beyond --from, longer than 400ms$"):
+        replace(POINT, earliest=duration - 1.5e-3)
 
 
 def test_only_the_same_code_runs_a_point() -> None:
