@@ -53,4 +53,7 @@ def _clock(what: str, text: str, spec: TachometerSpec) -> int:
     """The clock in which an instant lies."""
     if text.isdecimal():
         return int(text)
-    return int(parse_time(what, text) * spec.timing.clock_hz)
+    seconds = parse_time(what, text)
+    if seconds < 0:
+        raise ValueError(f"{what} must be at least 0, not {text}")
+    return int(seconds * spec.timing.clock_hz)

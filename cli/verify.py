@@ -105,7 +105,7 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
                     report(len(found))
     except KeyboardInterrupt:
         interrupted = True
-    failed = _print(found, chosen, used)
+    failed = _print(found, chosen, used, whole=not interrupted)
     if interrupted:
         click.echo(f"tachometry: interrupted after {len(found)} of {len(cores)} configurations", err=True)
     return 1 if failed else INTERRUPTED if interrupted else 0
@@ -175,8 +175,8 @@ def _progress(n_cores: int) -> AbstractContextManager[Callable[[float], None] | 
 _HEADS = ("method", "engine", "configurations", "motions", "clocks", "ticks", "updates", "mismatches", "seconds")
 
 
-def _print(found: list[_Result], methods: list[str], engines: list[str]) -> bool:
-    """Print the table and the verdict; whether anything differs."""
+def _print(found: list[_Result], methods: list[str], engines: list[str], *, whole: bool) -> bool:
+    """Print the table and the verdict, if it is about the whole; whether anything differs."""
     from rich.table import Table
     from rich.text import Text
 
@@ -207,5 +207,6 @@ def _print(found: list[_Result], methods: list[str], engines: list[str]) -> bool
             f"PASS: {', '.join(engines)} and golden models agree in every bit of {total['updates']:.0f} updates and "
             f"{total['ticks']:.0f} ticks"
         )
-    console.print(Text(verdict, style="bold red" if failed else "bold green"))
+    if failed or whole:
+        console.print(Text(verdict, style="bold red" if failed else "bold green"))
     return failed

@@ -27,10 +27,24 @@ class NoCompiler(OSError):
 
 
 def find_compiler() -> tuple[str, ...] | None:
-    """The compiler that `CXX` names, or the system's, or that of the package ziglang; None if there is none."""
-    for words in (shlex.split(os.environ.get("CXX", "")), ["c++"], ["g++"], ["clang++"]):
-        if words and shutil.which(words[0]):
-            return tuple(words)
+    """The compiler that `CXX` names, or the system's, or that of the package ziglang; None if there is none.
+
+    Raises
+    ------
+    NoCompiler
+        If there is none by the name of `CXX`.
+    """
+    if given := os.environ.get("CXX", "").strip():
+        try:
+            words = shlex.split(given)
+        except ValueError:  # an open quotation
+            words = [given]
+        if not shutil.which(words[0]):
+            raise NoCompiler(f"CXX must name a C++ compiler that is there, not {given!r}")
+        return tuple(words)
+    for name in ("c++", "g++", "clang++"):
+        if shutil.which(name):
+            return (name,)
     return (sys.executable, "-m", "ziglang", "c++") if importlib.util.find_spec("ziglang") else None
 
 
@@ -80,14 +94,39 @@ def compile_library(source: str, folder: Path, *more: str | Path) -> Path:
     """A shared library of a C++ text, in `folder`; `more` are options, and files to be compiled or linked with it."""
     (folder / "model.cc").write_text(source, encoding="utf-8")
     command = [*compiler(), *FLAGS, "-shared", "-o", "model.so", "model.cc", *more]
-    run(command, f"{compiler()[-1]} cannot compile the core", folder)
+    run(command, f"{' '.join(compiler())} cannot compile the core", folder)
+    if not (folder / "model.so").exists():
+        raise OSError(f"{' '.join(compiler())} made no library of the core")
     return folder / "model.so"
 
 
+@functools.cache
+def _own_folder() -> "tempfile.TemporaryDirectory[str]":
+    return tempfile.TemporaryDirectory(prefix="tachometry-")
+
+
 def cache_folder() -> Path:
-    """Where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache."""
+    """Where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache; it is made if need be.
+
+    Where there is none that can be written, a folder that ends with this process.
+
+    Raises
+    ------
+    OSError
+        If TACHOMETRY_CACHE names one that cannot be written.
+    """
     given = os.environ.get("TACHOMETRY_CACHE")
-    return Path(given) if given else platformdirs.user_cache_path("tachometry")
+    folder = Path(given) if given else platformdirs.user_cache_path("tachometry")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        writable = os.access(folder, os.W_OK | os.X_OK)
+    except OSError:
+        writable = False
+    if writable:
+        return folder
+    if given:
+        raise OSError(f"TACHOMETRY_CACHE must be a folder that can be written, not {given!r}")
+    return Path(_own_folder().name)
 
 
 def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
@@ -106,7 +145,6 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     folder = cache_folder()
     if (found := _intact(folder, key)) is not None:
         return found
-    folder.mkdir(parents=True, exist_ok=True)
     _prune(folder)
     with tempfile.TemporaryDirectory(prefix=".building-", dir=folder, ignore_cleanup_errors=True) as name:
         made = make(Path(name))

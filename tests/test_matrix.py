@@ -27,7 +27,9 @@ def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     assert count == 0, first
     # All that the configuration can show has happened.
     updates = actual.updates
-    assert np.count_nonzero(~updates.forced) > 100
+    # Long windows and what waits for the filter give few updates.
+    few = {"--min-time", "--lowpass"} & {*words}
+    assert np.count_nonzero(~updates.forced) > (5 if few else 100)
     if "--paper-exact" not in words:
         assert spec.method == "m" or np.count_nonzero(updates.forced) > 1
         assert updates.stalled.any()

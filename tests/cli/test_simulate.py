@@ -256,6 +256,7 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
         ("--motion stop:1s --counts {new}/../file/c.csv", "file/c.csv: Not a directory"),
         ("--motion stop:1s --trace {new}/c.csv --counts {new}/..", "--counts must be a file, which {folder} is not"),
         ("--motion stop:1s --trace /dev/null", "--trace must be a file, which /dev/null is not"),
+        ("--motion stop:1s --vcd {new}/v.vcd --vcd-from=-1ms", "--vcd-from must be at least 0, not -1ms"),
         ("--motion stop:1s --vcd-from 1ms", "--vcd must be given together with --vcd-from and --vcd-to"),
         (
             "--motion stop:1s --vcd {new}/v.vcd --vcd-from 5ms --vcd-to 90",

@@ -63,6 +63,33 @@ def test_a_build_that_fails_leaves_nothing(folder: Path) -> None:
     assert not list(folder.iterdir())
 
 
+def test_without_a_cache_that_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a container with a read-only home."""
+    monkeypatch.setenv("TACHOMETRY_CACHE", "/proc/cache")
+    with pytest.raises(OSError, match="TACHOMETRY_CACHE must be a folder that can be written, not '/proc/cache'"):
+        cached("one", ".bin", Maker())
+    monkeypatch.delenv("TACHOMETRY_CACHE")
+    monkeypatch.setattr("platformdirs.user_cache_path", lambda name: Path("/proc/cache"))
+    make = Maker()
+    assert cached("one", ".bin", make) == cached("one", ".bin", make)
+    assert make.calls == 1
+
+
+@pytest.mark.parametrize(
+    ("compiler", "message"),
+    [
+        ("/nonexistent", r"CXX must name a C\+\+ compiler that is there, not '/nonexistent'"),
+        ("c++ 'x", 'CXX must name a C\\+\\+ compiler that is there, not "c\\+\\+ \'x"'),
+        ("true -x", "true -x made no library"),
+        ("c++ -bogus", r"c\+\+ -bogus cannot compile the core: .*bogus"),
+    ],
+)
+def test_compilers_that_are_none(compiler: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CXX", compiler)
+    with pytest.raises(OSError, match=message):
+        compile_library("int x;", tmp_path)
+
+
 def test_builds_at_the_same_time(folder: Path) -> None:
     """Each is given a whole file, whoever is first, and other processes find it."""
     found: list[bytes] = []
