@@ -50,9 +50,9 @@ All ten seconds, {clocks:,} clocks, by cxxrtl, compared with the golden model in
 
 {whole}
 
-The ratio is that of the clocks: a golden model's time goes with edges, ticks and updates. It is a hundred and more where
-an update is made of whole ticks; with T, M/T and Rairán's method every count is looked at, most of them make an update,
-and a chain of windows, each beginning where one before ended, has to be followed.
+A golden model's time goes with edges, ticks and updates, not with clocks. It is a hundredth and less where updates are
+made of whole ticks; with T, M/T and Rairán's method every count is looked at, most of them make an update, and a chain
+of windows, each beginning where one before ended, has to be followed.
 
 What makes it fast, each with what stands above it, on the S method:
 

@@ -28,28 +28,32 @@ def main(chosen: list[str]) -> bool:
         sys.exit(2)
     scores: list[Score] = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        _row("core", "mutants", "killed", "equivalent", "survivors", "seconds")
-        _row("---", *["---:"] * 5)
+        _row("core", "mutants", "killed", "equivalent", "in words", "survivors", "seconds")
+        _row("---", *["---:"] * 6)
         for case in CASES:
             if not chosen or case.method in chosen:
                 start = time.monotonic()
                 score = judge(case, pool)
                 scores.append(score)
                 seconds = f"{time.monotonic() - start:.0f}"
-                _row(case.name, score.mutants, score.killed, score.equivalent, len(score.survivors), seconds)
+                _row(
+                    *(case.name, score.mutants, score.killed, score.equivalent),
+                    *(score.in_words, len(score.survivors), seconds),
+                )
     print()
-    _row("method", "mutants", "killed", "equivalent", "survivors", "score")
-    _row("---", *["---:"] * 5)
+    _row("method", "mutants", "killed", "equivalent", "in words", "survivors", "score")
+    _row("---", *["---:"] * 6)
     fine = True
     for method in METHODS:
         of_method = [score for score in scores if score.case.method == method]
         if not of_method:
             continue
-        mutants, killed = (sum(getattr(score, name) for score in of_method) for name in ("mutants", "killed"))
-        equivalent = sum(score.equivalent for score in of_method)
-        fine &= killed >= LEAST * (mutants - equivalent)
-        share = f"{100 * killed / (mutants - equivalent):.1f} %"
-        _row(method, mutants, killed, equivalent, mutants - killed - equivalent, share)
+        mutants, killed, equivalent, words = (
+            sum(getattr(score, name) for score in of_method) for name in ("mutants", "killed", "equivalent", "in_words")
+        )
+        wrong = mutants - equivalent - words
+        fine &= killed >= LEAST * wrong
+        _row(method, mutants, killed, equivalent, words, wrong - killed, f"{100 * killed / wrong:.1f} %")
     for score in scores:
         if score.survivors:
             print(f"\nsurvivors of {score.case.name}:")

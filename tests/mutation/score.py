@@ -12,6 +12,7 @@ from mutation.equivalent import equivalent
 from mutation.netlist import GROUP, Mutant, exported, mutants
 from mutation.simulate import library, run
 from mutation.stimulus import Stimulus, stimulus
+from mutation.words import in_words
 from numpy.typing import NDArray
 
 from tachometry.sim import golden
@@ -22,12 +23,13 @@ CLOCKS = 400_000  # of the stimulus
 
 @dataclass(frozen=True)
 class Score:
-    """Of a core: numbers of mutants, and those that are neither killed nor known to be equivalent."""
+    """Of a core: numbers of mutants, of equivalent ones as proven and as words say, and the others that live."""
 
     case: Case
     mutants: int
     killed: int
     equivalent: int
+    in_words: int
     survivors: list[Mutant]
 
 
@@ -59,8 +61,9 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
     for first in range(0, len(left), GROUP):
         with tempfile.TemporaryDirectory() as folder:
             alike += equivalent(case, flat, left[first : first + GROUP], played.pins, Path(folder), pool)
-    survivors = [mutant for mutant, same in zip(left, alike, strict=True) if not same]
-    return Score(case, len(found), sum(killed), sum(alike), survivors)
+    unproven = [mutant for mutant, same in zip(left, alike, strict=True) if not same]
+    survivors = [mutant for mutant in unproven if not in_words(case.name, mutant)]
+    return Score(case, len(found), sum(killed), sum(alike), len(unproven) - len(survivors), survivors)
 
 
 def _hold(case: Case, played: Stimulus, rows: NDArray) -> None:
