@@ -12,11 +12,9 @@ ROOT = Path(__file__).parent.parent.parent
 _CARRIED = "read in the clock after a tick only, which sets it; a reset clears what reads"
 
 IN_WORDS = {
-    (
-        "carried = Signal()",
-        "S[0] const0",
-    ): "read in the clock after a tick only, which sets it; a reset clears what reads",
-    ("offset = Signal.like(self.m_e)", "B[0] const1"): (
+    ("s, carried, serial", "carried = Signal()", "S[0] const0"): _CARRIED,
+    ("s, carried, bounds", "carried = Signal()", "S[0] const0"): _CARRIED,
+    ("s, table", "offset = Signal.like(self.m_e)", "B[0] const1"): (
         "the first window is not ready to count before its end, so that the first pulse number is 0, and becomes the "
         "offset whatever that was"
     ),
