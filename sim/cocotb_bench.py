@@ -123,5 +123,5 @@ def test_in_simulator() -> None:
 if __name__ == "__main__":
     try:
         test_in_simulator()
-    except AssertionError as error:
+    except (AssertionError, ValueError) as error:  # ValueError: no such simulator
         sys.exit(f"{FILE.name}: {error}")

@@ -39,16 +39,20 @@ def generate(folder: Path, *words: str) -> int:
     return stop.value.code
 
 
-def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
-    """What the bench says, empty if it passes; tachometry is not there."""
+def run(folder: Path, simulator: str, *more: str) -> subprocess.CompletedProcess[str]:
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "COCOTB"))}
-    done = subprocess.run(
+    return subprocess.run(
         [sys.executable, *more, folder / "test_spindle.py"],
         cwd=folder,
         env=environment | {"SIM": simulator, "CXXFLAGS": "-O0"},
         capture_output=True,
         text=True,
     )
+
+
+def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
+    """What the bench says, empty if it passes; tachometry is not there."""
+    done = run(folder, simulator, *more)
     said = done.stdout + done.stderr
     assert done.returncode in (0, 1), said
     assert ("PASS=1 FAIL=0" in said) == (done.returncode == 0), said
@@ -61,6 +65,13 @@ def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
 def test_passes_in_icarus(case: str, tmp_path: Path) -> None:
     assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
     assert play(tmp_path) == ""
+
+
+def test_unknown_simulator_is_told_in_a_line(tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split()) == 0
+    done = run(tmp_path, "modelsim")
+    assert done.returncode == 1
+    assert re.fullmatch(r"test_spindle\.py: Simulator 'modelsim' is not [^\n]*icarus[^\n]*\n", done.stderr)
 
 
 def test_passes_in_pytest(tmp_path: Path) -> None:

@@ -13,8 +13,6 @@ from formal.mutants import MUTANTS, Mutant
 from formal.prove import Proof, Result, prepare, solve
 from support.mutant import mutant
 
-from tachometry.spec.recovery import recovery_clocks
-
 _FOLDER = Path("build/formal")
 
 
@@ -58,7 +56,8 @@ def main(chosen: list[str]) -> bool:
             result = future.result()
             fine &= result.verdict == "proven"
             proven.update(name for name in result.names if name.startswith("p"))
-            begin = f"any state, {recovery_clocks(proof.spec)} clocks" if proof.recovers else f"{result.depth} clocks"
+            begin = f"any state, {proof.recovers} clocks" if proof.recovers else f"{result.depth} clocks"
+            begin = f"given, {begin}" if proof.given else begin
             _row(proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict)
         print()
         _row("core", "property", "mutant", "refuted in", "seconds", "verdict")

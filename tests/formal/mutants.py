@@ -162,5 +162,14 @@ MUTANTS = [
     Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),
     Mutant("upset, Rairán", "pr_estimate", RairanDatapath, "shown = update | stalled", "shown = update"),
     Mutant("upset, T", "pt_interval", Divider, "steps.eq(steps - 1)", "steps.eq(steps - (steps < self._steps))"),
-    Mutant("upset, M/T", "pt_update", MTDatapath, "length.eq(length + 1)", "length.eq(length + ~length.all())"),
+    Mutant("upset, M/T: given", "pt_update", MTDatapath, "length.eq(length + 1)", "length.eq(length + ~length.all())"),
+    Mutant("upset, M/T: way", "lemma_way", MTDatapath, "way.eq(Mux(opens, 0, total))", "way.eq(Mux(ends, 0, total))"),
+    Mutant(
+        "upset, M/T: since",
+        "lemma_fresh",
+        QuotientVelocity,
+        "compared & (measuring | nearer)",
+        "compared & nearer",
+    ),
+    Mutant("upset, M/T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
 ]

@@ -11,13 +11,12 @@ from unittest.mock import patch
 
 from tachometry.hdl import export
 from tachometry.spec import TachometerSpec
-from tachometry.spec.recovery import recovery_clocks
 
 _SECONDS = 280
 
 # The induction starts in any defined state: reset values, pins and `rst` are defined, so all that follows is.
-# After an upset: no flip-flop has its reset value but the counter of the checker.
-_UPSET = "setattr -unset init w:* w:*upset_clocks* %d"
+# After an upset: no flip-flop has its reset value but those of the checker that know what has been since.
+_UPSET = "setattr -unset init w:* w:*fresh* %d"
 
 _SCRIPT = """\
 read_verilog -defer -sv -formal {top}.sv delay.sv
@@ -34,11 +33,12 @@ memory -nomap
 memory_map -formal
 async2sync
 chformal -lower
+{given}
 {delete}
 {upset}
 opt -full
 tee -q -o {name}.names select -list t:$assert
-sat {how} -maxsteps {steps} -prove-asserts -set-init-def -set-def-inputs {top}
+sat {how} -maxsteps {steps} -prove-asserts -set-assumes -set-init-def -set-def-inputs {top}
 """
 
 
@@ -58,13 +58,18 @@ class Proof:
         Wires of the checker by what they show: paths of signals in the core.
     depth : int
         Clocks of the induction.
+    only : str
+        Assertions that are proven, all if empty; patterns of Yosys, as in the next two.
     without : str
-        Assertions that are left out, as a pattern of Yosys.
+        Those of them that are left out.
+    given : str
+        Those that are assumed: another proof has them from any state on. So the induction begins in any state of which
+        they hold, not that of a reset.
     max_table : int or None
         Stands in for `MAX_TABLE`, so that small cores carry their reciprocal as large ones do.
-    recovers : bool
-        Instead of the induction, which another proof does: from any state, not that of a reset, the assertions hold for
-        `depth` clocks after the spec's `recovery_clocks`.
+    recovers : int
+        If not 0, and instead of the induction: from any state, not that of a reset, the assertions hold for `depth`
+        clocks after so many.
     """
 
     name: str
@@ -73,9 +78,11 @@ class Proof:
     parameters: dict[str, int]
     probes: dict[str, str]
     depth: int
+    only: str = ""
     without: str = ""
+    given: str = ""
     max_table: int | None = None
-    recovers: bool = False
+    recovers: int = 0
 
     def exported(self) -> str:
         """The Verilog of the core, as the mutants of this moment have it."""
@@ -106,6 +113,11 @@ def _path(verilog: str, path: str) -> str:
     return ".".join(["\\core", *real.split(".")[1:], signal])
 
 
+def _cells(patterns: str) -> str:
+    first, *others = (f"*/{pattern}" for pattern in patterns.split())
+    return " ".join([first, *(f"{other} %u" for other in others)])
+
+
 def prepare(folder: Path) -> None:
     """A folder with the checkers: Yosys sees nothing outside it."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -116,7 +128,10 @@ def prepare(folder: Path) -> None:
 def solve(proof: Proof, verilog: str, folder: Path, name: str, only: str = "", steps: int = 0) -> Result:
     """Prove all assertions by induction; or look for a trace of at most `steps` clocks that violates the one `only`."""
     (folder / f"{name}.v").write_text(verilog)
-    left_out = f"t:$assert */{only} %d" if only else f"*/{proof.without}" if proof.without else ""
+    proven = only or proof.only
+    left_out = [f"delete t:$assert {_cells(proven)} %d"] if proven else []
+    left_out += [f"delete t:$assert {_cells(proof.without)} %i"] if proof.without else []
+    upset = proof.recovers or proof.given
     script = _SCRIPT.format(
         name=name,
         top=proof.checker,
@@ -124,9 +139,10 @@ def solve(proof: Proof, verilog: str, folder: Path, name: str, only: str = "", s
         probes="\n".join(
             f"connect -nounset -set \\{wire} {_path(verilog, path)}" for wire, path in proof.probes.items()
         ),
-        delete=left_out and f"delete {left_out}",
-        upset=_UPSET if proof.recovers else "",
-        how=(f"-seq {recovery_clocks(proof.spec)} " if proof.recovers else "")
+        given=proof.given and f"chformal -assert2assume {_cells(proof.given)}",
+        delete="\n".join(left_out),
+        upset=_UPSET if upset else "",
+        how=(f"-seq {proof.recovers} " if proof.recovers else "")
         + ("-tempinduct-baseonly" if only or proof.recovers else f"-tempinduct-def -initsteps {proof.depth - 1}"),
         steps=steps or proof.depth,
     )

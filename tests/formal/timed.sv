@@ -17,7 +17,8 @@ module timed #(
     parameter INTERVAL_WIDTH = 5,
     parameter FRAC_BITS = 4,
     parameter DIVISION_CLOCKS = 11,
-    parameter UPSET = 0           // when a silence or a window is over and a division may begin is taken from the core
+    parameter UPSET = 0,          // when a silence or a window is over and a division may begin is taken from the core
+    parameter SETTLED = -1        // clocks after which a division has begun after an upset; -1: any has
 ) (
     input clk, input rst, input a, input b
 );
@@ -151,6 +152,21 @@ module timed #(
       {was_distance, was_times} <= {shown_distance, shown_times};
     end
 
+  // Which of them began, after an upset, when what is given held; after a reset those too that there are not.
+  reg [7:0] fresh_clocks = 0;
+  reg fresh_division = SETTLED < 0, fresh_due = SETTLED < 0, fresh_before = SETTLED < 0, fresh_past = SETTLED < 0;
+  wire fresh_now = fresh_clocks == SETTLED, fresh = due ? fresh_due : fresh_before;
+  always @(posedge clk) begin
+    if (!fresh_now) fresh_clocks <= fresh_clocks + 1;
+    if (fresh_now && (rst || overdue || measured || sinks)) fresh_division <= 1;
+    fresh_due <= fresh_division;
+    if (fresh_now && rst) {fresh_before, fresh_past} <= 2'b11;
+    else begin
+      if (!kept) fresh_before <= fresh;
+      fresh_past <= fresh;
+    end
+  end
+
   // 2^f x + 1/2 = (2^(f+1) distance + times) / (2 times), rounded down, and the largest that can be shown.
   wire signed [N+I+2:0] wanted = (shown_distance <<< (FRAC_BITS + 1)) + $signed({1'b0, shown_times});
   wire signed [N+I+2:0] divisor = $signed({1'b0, shown_times, 1'b0}), have = divisor * velocity;
@@ -181,25 +197,26 @@ module timed #(
     lemma_free: assert (since == 0 || !measuring || since >= (age - 1) * PHASES + phase);
     lemma_running: assert (core_running == (since >= 1 && since <= N + 1) && core_rounds == (since == N + 2)
         && core_compared == (since == B));
-    lemma_kept: assert (since == 0 || (core_measuring == measuring && core_forced == silent && core_stalled == still
+    lemma_kept: assert (!fresh_division || since == 0 || (core_measuring == measuring && core_forced == silent && core_stalled == still
         && core_by == times));
-    lemma_asked: assert (since == 0 || (times >= 1 && distance <= most && -distance <= most));
-    lemma_times: assert (since == 0 || times <= MAX_PERIODS + (MT ? MIN_PERIODS : 0));
+    lemma_asked: assert (!fresh_division || since == 0 || (times >= 1 && distance <= most && -distance <= most));
+    lemma_times: assert (!fresh_division || since == 0 || times <= MAX_PERIODS + (MT ? MIN_PERIODS : 0));
     lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
     lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
     lemma_left: assert (!core_running || core_left == ((distance << j) & ((1 << Q) - 1)));
     lemma_steps: assert (!core_running || core_steps == N - 1 - $signed({1'b0, j}));
-    lemma_remainder: assert (!core_running || (core_remainder < $signed({1'b0, times})
+    lemma_remainder: assert (!fresh_division || !core_running || (core_remainder < $signed({1'b0, times})
         && core_remainder >= -$signed({1'b0, times})));
-    lemma_quotient: assert (!core_running || taken == core_remainder + passed);
-    lemma_rounded: assert (since < N + 2 || (found <= asked && asked < found + twice));
-    lemma_sinks: assert (since == 0 || measuring || (distance == (velocity < 0 ? -P : P) && silent));
-    lemma_sunk: assert (!due || due_measuring || (due_distance == (past < 0 ? -P : P) && due_silent));
+    lemma_quotient: assert (!fresh_division || !core_running || taken == core_remainder + passed);
+    lemma_rounded: assert (!fresh_division || since < N + 2 || (found <= asked && asked < found + twice));
+    lemma_sinks: assert (!fresh_division || since == 0 || measuring || (distance == (velocity < 0 ? -P : P) && silent));
+    lemma_sunk: assert (!fresh_due || !due || due_measuring || (due_distance == (past < 0 ? -P : P) && due_silent));
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
-    lemma_still: assert (since == 0 || measuring || !still || velocity == 0);
-    lemma_due_still: assert (!due || due_measuring || !due_still || past == 0);
-    lemma_limit: assert (velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+2-:V]));
+    lemma_still: assert (!fresh_past || since == 0 || measuring || !still || velocity == 0);
+    lemma_due_still: assert (!fresh_past || !due || due_measuring || !due_still || past == 0);
+    lemma_fresh: assert (fresh && fresh_past);
+    lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+2-:V]));
   end
   generate
     if (FLAGS) begin : flag
@@ -241,17 +258,17 @@ module timed #(
   always @* begin
     pt_update: assert (due && due_measuring ? velocity_valid : !velocity_valid || due);
     pt_spacing: assert (!velocity_valid || spacing >= B);
-    pt_interval: assert (kept || (interval == shown_times && forced == shown_silent));
-    pt_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_PERIODS + (MT ? MIN_PERIODS : 0)));
-    pt_velocity: assert (kept || (SATURATES && beyond) || (have <= wanted && wanted < have + divisor)
+    pt_interval: assert (!fresh || kept || (interval == shown_times && forced == shown_silent));
+    pt_range: assert (!fresh || !velocity_valid || (interval >= 1 && interval <= MAX_PERIODS + (MT ? MIN_PERIODS : 0)));
+    pt_velocity: assert (!fresh || kept || (SATURATES && beyond) || (have <= wanted && wanted < have + divisor)
         || (shown_times == 0 && velocity == 0));
-    pt_flag: assert (kept || shown_times == 0 || beyond == (FLAGS && (!fits || shown_many)));
-    pt_saturated: assert (fits || kept || shown_times == 0 || velocity == (shown_distance < 0 ? -LIMIT : LIMIT));
-    pt_sinks: assert (!velocity_valid || due_measuring || (forced && !stalled
+    pt_flag: assert (!fresh || kept || shown_times == 0 || beyond == (FLAGS && (!fits || shown_many)));
+    pt_saturated: assert (!fresh || fits || kept || shown_times == 0 || velocity == (shown_distance < 0 ? -LIMIT : LIMIT));
+    pt_sinks: assert (!fresh_past || !fresh_due || !velocity_valid || due_measuring || (forced && !stalled
         && (past < 0 ? velocity <= 0 && velocity > past : velocity >= 0 && velocity < past)));
-    pt_bound: assert (!due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
+    pt_bound: assert (!fresh_due || !due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
     pt_rest: assert (idle < LONG + B || velocity == 0);
-    pt_stalled: assert (kept || stalled == shown_still);
+    pt_stalled: assert (!fresh || kept || stalled == shown_still);
     pt_held: assert (velocity_valid || outputs == held);
   end
 endmodule
