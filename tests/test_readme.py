@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -45,6 +46,22 @@ def test_every_shell_command(tmp_path: Path) -> None:
 
 def test_make_demo_is_what_the_test_runs() -> None:
     assert "BIN=$(BIN) sh docs/demo.sh" in (ROOT / "Makefile").read_text()
+
+
+def test_demo_without_a_compiler(tmp_path: Path) -> None:
+    """Neither that of the system nor ziglang's."""
+    (tmp_path / "docs").symlink_to(ROOT / "docs")
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for tool in ("sh", "cmp"):
+        (tools / tool).symlink_to(str(shutil.which(tool)))
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['ziglang'] = None\n")
+    environment = {name: value for name, value in os.environ.items() if name != "CXX"}
+    environment |= {"BIN": str(Path(sys.executable).parent), "PATH": str(tools), "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(["sh", "docs/demo.sh"], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "pysim" in done.stdout + done.stderr
+    assert (tmp_path / "build" / "demo" / "ramp.csv").stat().st_size > 0
 
 
 def test_python_examples(capsys: pytest.CaptureFixture[str]) -> None:
