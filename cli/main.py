@@ -1,6 +1,8 @@
 """The command `tachometry`."""
 
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Sequence
 from typing import NoReturn
@@ -53,6 +55,9 @@ cli.add_command(verify)
 
 def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit; what goes wrong is told in one line on stderr, never by a traceback."""
+    if threading.current_thread() is threading.main_thread():
+        # Ends as Ctrl-C does: what is done is kept, and nothing is left behind.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = _run(sys.argv[1:] if args is None else args)
     except KeyboardInterrupt:

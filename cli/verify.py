@@ -151,6 +151,12 @@ def _check(core: _Configuration, *, engines: list[str], clocks: int, seed: int, 
     return _Result(core.method, outcomes, failures)
 
 
+def _heed_only_the_pool() -> None:
+    """In a process of the pool: Ctrl-C is heard by this one, which ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
 @contextmanager
 def _each(
     check: Callable[[_Configuration], _Result], cores: list[_Configuration], n_jobs: int
@@ -159,8 +165,7 @@ def _each(
     if n_jobs == 1:
         yield map(check, cores)
         return
-    # Ctrl-C is heard here, and ends the others.
-    with Pool(n_jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    with Pool(n_jobs, _heed_only_the_pool) as pool:
         yield pool.imap_unordered(check, cores)
 
 

@@ -307,8 +307,10 @@ def test_ctrl_c_in_the_simulation(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-@pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
-def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("engine", "end"), [("pysim", signal.SIGINT), ("cxxrtl", signal.SIGINT), ("cxxrtl", signal.SIGTERM)]
+)
+def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signal.Signals, tmp_path: Path) -> None:
     options = [*CORE, "--motion", "constant:20:1000s", "--engine", engine, *all_outputs(tmp_path / "new")]
     process = subprocess.Popen(
         [*COMMAND, "simulate", *options],
@@ -321,7 +323,7 @@ def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, tmp_path: 
         file.stat().st_size > 200_000 for file in tmp_path.glob("new/.tachometry-*/new/v.vcd")
     ):
         time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(end)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     told = re.fullmatch(r"tachometry: interrupted after (\d+) of 20000000 clocks\n", err)
