@@ -14,7 +14,7 @@ from mutation.stimulus import Stimulus, stimulus
 from tachometry.sim.recording import PinTrace
 from tachometry.spec import TachometerSpec
 
-CASE = replace(next(case for case in CASES if case.name == "mt, in ticks"), mutants=40)
+CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=40)
 CLOCKS = 50_000
 
 
@@ -22,8 +22,7 @@ def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
     """A reset, and then nothing."""
     pins = np.zeros(n_clocks, dtype=np.uint8)
     pins[0] = 1
-    names = ["a", "b", "tick_in"]
-    low = {name: np.zeros(1, dtype=np.uint8) for name in names}
+    low = {name: np.zeros(1, dtype=np.uint8) for name in ("a", "b")}
     return Stimulus(pins, [PinTrace(np.zeros(1, dtype=np.int64), n_clocks=n_clocks - 1, **low)], [1])
 
 
@@ -45,7 +44,7 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
     small.setattr(mutation.score, "stimulus", standstill)
     small.setattr(mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
     assert not command.main([])
-    survivors = capsys.readouterr().out.partition("survivors of mt, in ticks:\n")[2].splitlines()
+    survivors = capsys.readouterr().out.partition("survivors of mt, in clocks:\n")[2].splitlines()
     assert len(survivors) > 10
     assert all(line.startswith("  hdl/") or "amaranth/lib/cdc.py" in line for line in survivors), survivors
 
@@ -53,5 +52,5 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
 def test_golden_model_is_held_against_the_core() -> None:
     played = stimulus(CASE.spec, 1000)
     wrong = replace(played, traces=[replace(trace, a=trace.a ^ 1) for trace in played.traces])
-    with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match="mt, in ticks, from clock"):
+    with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match="mt, in clocks, from clock"):
         mutation.score.judge(CASE, pool, wrong)

@@ -59,7 +59,7 @@ _FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_reset": True
 # Ticks of an odd number of clocks: inverters in a loop would cancel over an even one.
 CASES = [
     _case("s", "table", 3, 6, 1, 340, age=True),
-    _case("s", "carried, serial", 15, 10, 2, 340, max_table=4, **_FRONT),
+    _case("s", "carried, serial", 15, 16, 2, 340, max_table=8, frac_bits=6, **_FRONT),
     _case("s", "carried, bounds", 3, 9, 1, 340, max_table=4, bounds=True, cancel=False),
     _case("m", "of 3", 3, 2, 2, average=3, bounds=True, age=True),
     _case(
@@ -68,9 +68,9 @@ CASES = [
         lowpass=Fraction(1, 2),
     ),
     _case("t", "in clocks", 7, 5, 3, bounds=True, age=True),
-    _case("t", "in ticks", 5, 12, 2, timer="tick", unit="rad/s", frac_bits=5, velocity_bits=8, **_FRONT),
+    _case("t", "in ticks", 5, 44, 2, timer="tick", unit="rad/s", frac_bits=5, velocity_bits=8, **_FRONT),
     _case("mt", "in clocks", 7, 5, 3, bounds=True, age=True),
-    _case("mt", "in ticks", 5, 12, 2, timer="tick", max_tick_cycles=7, decoding=1),
+    _case("mt", "in ticks", 9, 12, 1, timer="tick", max_tick_cycles=11, decoding=1),
     _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),
     _case("rairan", "n2", 5, 6, 2, 340, estimate="n2", **_FRONT),
     _case("rairan", "to the letter", 3, 6, 2, 340, estimate="n1", paper_exact=True),

@@ -1,15 +1,18 @@
-"""Which survivors cannot be told from the core at all, proven by Yosys' SAT solver.
+"""Which survivors cannot be told from the core at all, proven by ABC in Yosys.
 
-The netlist is cut at its flip-flops. A mutant has the core's flip-flops, but for those that it was seen to set
-differently: of these it has its own. Proven by induction over k clocks, from reset values and from any state: all
-outputs are equal, and so is what goes into the flip-flops that the two share, wherefore they may share them; and the
-lemmas of the case hold, which are about the core's registers.
+The netlist is cut at its flip-flops. Core and mutant run side by side from their initial values, whatever the pins and
+`rst` do, and ABC (`dprove`: correspondence of signals, then property directed reachability) proves that all outputs are
+equal in every clock. At first a mutant has the core's flip-flops, but for those that it was seen to set differently: of
+these it has its own. Proven with the outputs is then that what goes into the shared ones is equal, wherefore they may
+be shared, and the lemmas of the case, which are about the core's registers. What is left is tried once more with
+nothing shared, and without lemmas.
 """
 
 import ctypes
 import json
 import re
 import shutil
+import tempfile
 from collections import defaultdict
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -61,20 +64,25 @@ ENTRY void mutation_watch(
   }}
 }}
 """
+# What ABC says is lost, so it writes its verdict to a file. Undefined bits are 0, as in CXXRTL.
 _SOLVE = """\
-log mutant {number}
 design -load all
-read_verilog -formal miter_{number}.v
+read_verilog miter_{number}.v
 hierarchy -top miter
 proc
 flatten
-opt
-chformal -lower
-opt
-sat -tempinduct -prove-asserts -set-assumes -maxsteps {steps} -timeout {seconds} miter
+setundef -zero
+opt -full
+techmap
+opt -full
+dffunmap
+simplemap
+opt_clean
+write_rtlil left_{number}.il
+abc -dff -script +strash;dprove,-j,-V,0,-T,{seconds};write_status,verdict_{number}
 """
-_STEPS = 20  # clocks of the induction
-_SECONDS = 10  # for each of its steps
+_PROVEN = "snl_UNSAT"
+_SECONDS = 20  # for a mutant
 _WATCHED = 20_000  # clocks in which mutants are watched
 _TOGETHER = 8  # mutants for one run of Yosys
 
@@ -181,26 +189,36 @@ def _lemmas(case: Case, cut: Opened) -> list[str]:
     return [lemma for lemma in named if "_q_?" not in lemma]
 
 
-def _miter(case: Case, cut: Opened, number: int, differ: NDArray[np.bool_]) -> str:
-    """Core and mutant, with the registers that they share and those that they do not."""
-    inputs = [port.name for port in case.spec.ports if port.direction == "input" and port.name != "clk"]
-    outputs = [port for port in case.spec.ports if port.direction == "output"]
-    lines = [f"module miter(input clk, {', '.join(f'input {name}' for name in inputs)});", "reg begun = 0;"]
+def _miter(spec: TachometerSpec, cut: Opened, number: int, differ: NDArray[np.bool_], more: list[str]) -> str:
+    """Core and mutant, with the registers that they share and those that they do not, and whether anything is wrong."""
+    pins = [port.name for port in spec.ports if port.direction == "input" and port.name != "clk"]
+    outputs = [port for port in spec.ports if port.direction == "output"]
+    inputs, lines = [f"input {name}" for name in ("clk", *pins)], ["reg begun = 0;"]
     lines += ["always @(posedge clk) begun <= 1;"]
     links: dict[str, list[str]] = {"core": [], "mutant": []}
-    equal, assumed = [], []
+    equal = []
     place = 0
+
+    def held(name: str, d: str, k: int, register: Register) -> None:
+        """A register, which begins with any value if that is not known."""
+        bits = f"[{register.width - 1}:0]"
+        known = register.init.replace("x", "0")
+        lines.extend([f"reg {bits} {name}_held = {register.width}'b{known};", f"wire {bits} {name};"])
+        lines.append(f"always @(posedge clk) {name}_held <= {d};")
+        lines.append(
+            f"assign {name} = {f'begun ? {name}_held : first_{k}' if 'x' in register.init else f'{name}_held'};"
+        )
+
     for k, register in enumerate(cut.registers):
         own = differ[place : place + register.width]
         place += register.width
         last = register.width - 1
-        known = f" = {register.width}'b{register.init}" if "x" not in register.init else ""
-        lines += [f"wire [{last}:0] core_d_{k}, mutant_d_{k};", f"reg [{last}:0] core_q_{k}{known};"]
-        lines += [f"always @(posedge clk) core_q_{k} <= core_d_{k};"]
+        if "x" in register.init:
+            inputs.append(f"input [{last}:0] first_{k}")
+        lines += [f"wire [{last}:0] core_d_{k}, mutant_d_{k};"]
+        held(f"core_q_{k}", f"core_d_{k}", k, register)
         if own.any():
-            lines += [f"reg [{last}:0] own_{k}{known};", f"always @(posedge clk) own_{k} <= mutant_d_{k};"]
-            if not known:
-                assumed.append(f"own_{k} == core_q_{k}")
+            held(f"own_{k}", f"mutant_d_{k}", k, register)
         bits = ", ".join(f"{'own' if own[bit] else 'core_q'}_{k}[{bit}]" for bit in range(last, -1, -1))
         lines += [f"wire [{last}:0] mutant_q_{k} = {{{bits}}};"]
         shared = [bit for bit in range(last, -1, -1) if not own[bit]]
@@ -213,12 +231,19 @@ def _miter(case: Case, cut: Opened, number: int, differ: NDArray[np.bool_]) -> s
         lines += [f"wire [{port.width - 1}:0] core_{port.name}, mutant_{port.name};"]
         equal.append(f"core_{port.name} == mutant_{port.name}")
     for (side, link), selector in zip(links.items(), (0, number), strict=True):
-        link += [f".{name}({name})" for name in inputs if name != "rst"] + [".rst(rst)", f".{SELECTOR}({selector})"]
+        link += [f".{name}({name})" for name in pins] + [f".{SELECTOR}({selector})"]
         link += [f".{port.name}({side}_{port.name})" for port in outputs]
         lines += [f"top {side} ({', '.join(link)});"]
-    equal += _lemmas(case, cut)
-    lines += ["always @* begin", *(f"  if (!begun) assume({term});" for term in assumed)]
-    return "\n".join([*lines, *(f"  assert({term});" for term in equal), "end", "endmodule", ""])
+    right = " && ".join(f"({term})" for term in [*equal, *more])
+    head = f"module miter({', '.join(inputs)}, output wrong);"
+    return "\n".join([head, *lines, f"assign wrong = !({right});", "endmodule", ""])
+
+
+def _holds(verdict: Path, left: Path) -> bool:
+    """What ABC says, which is not asked if nothing is left of what differs."""
+    if verdict.exists():
+        return verdict.read_text().startswith(_PROVEN)
+    return "connect \\wrong 1'0" in left.read_text()
 
 
 def equivalent(
@@ -230,16 +255,24 @@ def equivalent(
     text = folder / "cut.il"
     text.write_text(cut.text)
 
-    def proven(first: int) -> list[bool]:
-        own = folder / f"from_{first}"
-        own.mkdir()
+    more = _lemmas(case, cut)
+
+    def proven(numbers: list[int]) -> set[int]:
+        own = Path(tempfile.mkdtemp(dir=folder))
         shutil.copy(text, own)
         script = ["read_rtlil cut.il", "design -save all"]
-        for number in range(first, min(first + _TOGETHER, len(group) + 1)):
-            (own / f"miter_{number}.v").write_text(_miter(case, cut, number, differ[number - 1]))
-            script.append(_SOLVE.format(number=number, steps=_STEPS, seconds=_SECONDS))
-        said = yosys("\n".join(script), own)
-        parts = re.split(r"^mutant \d+$", said, flags=re.MULTILINE)[1:]
-        return ["Induction step proven: SUCCESS!" in part for part in parts]
+        for number in numbers:
+            (own / f"miter_{number}.v").write_text(_miter(case.spec, cut, number, differ[number - 1], more))
+            script.append(_SOLVE.format(number=number, seconds=_SECONDS))
+        yosys("\n".join(script), own)
+        return {number for number in numbers if _holds(own / f"verdict_{number}", own / f"left_{number}.il")}
 
-    return [verdict for part in pool.map(proven, range(1, len(group) + 1, _TOGETHER)) for verdict in part]
+    alike: set[int] = set()
+    for together in (_TOGETHER, 1):
+        left = [number for number in range(1, len(group) + 1) if number not in alike]
+        parts = [left[first : first + together] for first in range(0, len(left), together)]
+        alike = alike.union(*pool.map(proven, parts))
+        # Some set a register that they share only later.
+        differ[:] = True
+        more.clear()
+    return [number in alike for number in range(1, len(group) + 1)]

@@ -46,15 +46,21 @@ def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts
 
 
 def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """Some edges fast, some slow, back and forth, in no order."""
+    """Some edges as fast as the filter lets them, some slow, back and forth, in no order; silences; regular ticks."""
     cycles, parts = spec.timing.tick_cycles, 40
-    gaps = np.array([1, 1, 2, 3, cycles, 3 * cycles, cycles * spec.timing.max_ticks // 2]) * (1 + spec.filter_clocks)
-    edges = rng.integers(1, 12, parts)
-    clock = np.cumsum(np.repeat(rng.choice(gaps, parts), edges))
+    longest = cycles * spec.timing.max_ticks
+    gaps = np.array([1, 1, 2, 3, cycles, 3 * cycles, longest // 2]) * max(1, (1 + spec.filter_clocks) // 2)
+    edges = rng.integers(1, rng.choice([12, 100], parts, p=[0.9, 0.1]))
+    apart = rng.choice(gaps, parts)
+    silent = rng.random(parts) < 0.3
+    edges[silent] = rng.integers(1, 4, silent.sum())
+    apart[silent] = rng.integers(1, longest * 5 // 4, silent.sum())
+    clock = np.cumsum(np.repeat(apart, edges))
     quarter = np.cumsum(np.repeat(rng.choice([1, 1, -1], parts), edges)) % 4
     n_clocks = int(clock[-1]) + 1
     quarter = np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")]
-    z, tick = noise_lines(rng, n_clocks, 2)
+    (z,) = noise_lines(rng, n_clocks, 1)
+    tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.longest_tick + 2) == 0
     return _trace(spec, np.array([np.isin(quarter, [1, 2]), np.isin(quarter, [2, 3]), z, tick], dtype=np.uint8))
 
 

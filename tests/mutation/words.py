@@ -1,4 +1,4 @@
-"""Survivors that are no other cores, as words say where the induction does not reach.
+"""Survivors that are no other cores, as words say where the proof does not reach.
 
 By the core, the line of the HDL, and what the mutant does to what Yosys made of it: B is the value that a reset gives,
 S whether there is one.
@@ -9,17 +9,23 @@ from pathlib import Path
 from mutation.netlist import Mutant
 
 ROOT = Path(__file__).parent.parent.parent
-_CARRIED = "read in the clock after a tick only, which sets it; a reset clears what reads"
+_NO_COUNT = (
+    "read in the sign of a distance, once a count has set it, and where the velocity sinks: it is 0 until then, and "
+    "what the time allows is no less"
+)
 
 IN_WORDS = {
-    ("s, carried, serial", "carried = Signal()", "S[0] const0"): _CARRIED,
-    ("s, carried, bounds", "carried = Signal()", "S[0] const0"): _CARRIED,
-    ("s, table", "offset = Signal.like(self.m_e)", "B[0] const1"): (
-        "the first window is not ready to count before its end, so that the first pulse number is 0, and becomes the "
-        "offset whatever that was"
+    ("t, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
+    ("t, in clocks", '"was_negative": Out(1),', "B[0] inv"): _NO_COUNT,
+    ("t, in clocks", "quotient.sink.eq(self.tick & ~timer.count),", "Y[0] const1"): (
+        "a count measures but while a measurement is divided, when nothing sinks, and if there was none in the maximum "
+        "time: then the velocity is 0, what the time allows is no less, and a measurement takes the divider anyway"
     ),
-    ("s, carried, serial", "clocks_since_reset = Signal(4 if self._filter_clocks else 3)", "B[2] const1"): (
-        "ready for one clock, in which the filter and the decoder still hold the levels of the reset: no step"
+    ("t, in ticks", "above.eq(value > Const(limit, value.shape())),", "B[2] inv"): (
+        "the limit of the output is 127, or 123; velocities are 2^5·2π/m, and of these 201 and 100 are next to it"
+    ),
+    ("mt, in clocks", "change = Signal(signed(max(len(shown), spec.native_width) + 1))", "change[6] const0"): (
+        "read where the velocity sinks, whether it does at all: from −48 at most to no more than 0, less than 64"
     ),
 }
 
