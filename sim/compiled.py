@@ -75,13 +75,23 @@ class Design:
 
 
 class CompiledEngine(ABC):
-    """An engine that loads a shared library with the core."""
+    """An engine that loads a shared library with the core, which it looks up once for each spec."""
 
     name: str
+
+    def __init__(self) -> None:
+        self._libraries: dict[TachometerSpec, Path] = {}
 
     @abstractmethod
     def library(self, design: Design) -> Path:
         """The compiled design, with the entries of driver.h."""
+
+    def _kept(self, design: Design) -> Path:
+        if design.watched is not None:
+            return self.library(design)
+        if design.spec not in self._libraries:
+            self._libraries[design.spec] = self.library(design)
+        return self._libraries[design.spec]
 
     def run(
         self,
@@ -96,7 +106,7 @@ class CompiledEngine(ABC):
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
         design = Design(spec, pins, watched)
-        play = _Play(self.library(design), design, trace, window or (0, trace.n_clocks))
+        play = _Play(self._kept(design), design, trace, window or (0, trace.n_clocks))
         interrupt = None
         with ExitStack() as stack:
             waveform = None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
+from tachometry.sim.engine import Engine
 from tachometry.sim.engines import pick
 from tachometry.sim.recording import PinTrace
 from tachometry.sim.results import Mismatch, Run, compare
@@ -88,6 +89,7 @@ def verify(spec: TachometerSpec, engines: Sequence[str], n_clocks: int, seed: in
         By the engine.
     """
     outcomes = {engine: Outcome() for engine in engines}
+    used = {engine: pick(engine) for engine in engines}
     few = max(n_clocks // _SLOW_SHARE, _SLOW_LEAST)
     for number, whole in motions(spec, seed, n_clocks):
         expected: dict[int, Run] = {}
@@ -98,13 +100,13 @@ def verify(spec: TachometerSpec, engines: Sequence[str], n_clocks: int, seed: in
             trace = whole.until(min(most, whole.n_clocks))
             if trace.n_clocks not in expected:
                 expected[trace.n_clocks] = golden.run(spec, trace)
-            _add(outcome, spec, engine, number, trace, expected[trace.n_clocks])
+            _add(outcome, spec, used[engine], number, trace, expected[trace.n_clocks])
     return outcomes
 
 
-def _add(outcome: Outcome, spec: TachometerSpec, engine: str, seed: int, trace: PinTrace, expected: Run) -> None:
+def _add(outcome: Outcome, spec: TachometerSpec, engine: Engine, seed: int, trace: PinTrace, expected: Run) -> None:
     begun = time.perf_counter()
-    actual = pick(engine).run(spec, trace)
+    actual = engine.run(spec, trace)
     outcome.seconds += time.perf_counter() - begun
     count, first = compare(expected, actual)
     outcome.n_motions += 1
