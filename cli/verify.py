@@ -213,5 +213,5 @@ def _print(found: list[_Result], methods: list[str], engines: list[str], *, whol
             f"{total['ticks']:.0f} ticks"
         )
     if failed or whole:
-        console.print(Text(verdict, style="bold red" if failed else "bold green"))
+        console.print(Text(verdict, style="bold red" if failed else "bold green"), soft_wrap=True)
     return failed
