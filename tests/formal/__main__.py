@@ -33,6 +33,11 @@ def _properties(result: Result) -> str:
 
 def main(chosen: list[str]) -> bool:
     """Whether all was as it should be; prints the tables."""
+    known = [proof.name for proof in PROOFS]
+    unknown = sorted(set(chosen) - set(known))
+    if unknown:
+        print(f"proof must be one of {'; '.join(known)}, not {unknown[0]}", file=sys.stderr)
+        sys.exit(2)
     prepare(_FOLDER)
     proofs = {proof.name: proof for proof in PROOFS if not chosen or proof.name in chosen}
     mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs]
