@@ -11,6 +11,8 @@ import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
+from pages import write
+
 from tachometry.cli.main import main as tachometry
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "compare.md"
@@ -171,5 +173,5 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    write(PAGE, page())
     sys.stdout.write(f"written: {PAGE}\n")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pages import write
 
 from tachometry.sim import golden
 from tachometry.sim.encoder import Encoding, VirtualEncoder
@@ -177,9 +178,9 @@ def picture() -> str:
 
 def main() -> None:
     """Write both."""
-    (DOCS / "encoder.svg").write_text(picture(), encoding="utf-8")
+    write(DOCS / "encoder.svg", picture())
     page = DOCS / "encoder.md"
-    page.write_text(TABLE.sub(lambda _: table(), page.read_text("utf-8")), encoding="utf-8")
+    write(page, TABLE.sub(lambda _: table(), page.read_text("utf-8")))
 
 
 if __name__ == "__main__":

@@ -17,8 +17,7 @@ import numpy as np
 from amaranth.back import cxxrtl as amaranth_cxxrtl
 from amaranth.back import rtlil
 from golden import BEGIN, MOTION, part_of
-from rich.console import Console
-from rich.table import Table
+from pages import markdown, show, write_from
 
 from tachometry.hdl import Tachometer
 from tachometry.sim import build, golden
@@ -36,7 +35,7 @@ SLOW = 30_000  # clocks of pysim
 FAST = 12_000_000  # clocks of the others
 REPEATS = 2
 
-_HEADING = "\n## Engines\n"
+_HEADING = "## Engines"
 _PAGE = """
 The same motion through `--engine`: pysim has {slow:,} clocks of it, the compiled engines {fast:,}, the bare loop the
 same: a C++ loop around the same CXXRTL module, without debug information, that plays the same changes with `step()`
@@ -227,24 +226,6 @@ def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[l
     return [[name, f"{part.n_clocks / each:.3g}"] for name, each in took.items()]
 
 
-def markdown(columns: list[str], rows: list[list[str]]) -> str:
-    """A table."""
-    lines = [columns, ["---", *["---:"] * (len(columns) - 1)], *rows]
-    return "\n".join(f"| {' | '.join(row)} |" for row in lines)
-
-
-def show(columns: list[str], rows: list[list[str]]) -> None:
-    """The same on the terminal."""
-    table = Table(box=None, header_style="")
-    for column in columns:
-        table.add_column(column, justify="left" if column == columns[0] else "right")
-    for row in rows:
-        table.add_row(*row)
-    console = Console()
-    console.print(table)
-    console.print()
-
-
 def main() -> None:
     """Measure, print, and replace this part of the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -271,10 +252,7 @@ def main() -> None:
         whole=markdown(WHOLE_COLUMNS, entire),
         steps=markdown(STEP_COLUMNS, loop),
     )
-    before = output.read_text(encoding="utf-8").split(_HEADING)[0] if output.exists() else "# Speed\n"
-    beside = output.with_name(f".{output.name}.part")
-    beside.write_text(before + _HEADING + part, encoding="utf-8")
-    beside.replace(output)
+    write_from(output, _HEADING, part)
 
 
 if __name__ == "__main__":

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
+from pages import markdown, show, write
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
 from tachometry.sim import golden
 from tachometry.sim.encoder import VirtualEncoder
@@ -125,15 +125,10 @@ def main() -> None:
     results = [
         measure(name, spec, trace) for name, spec in track(cores().items(), "Cores", console=Console(stderr=True))
     ]
-    table = Table(box=None, header_style="")
-    for column in COLUMNS:
-        table.add_column(column, justify="left" if column == "core" else "right")
-    for result in results:
-        table.add_row(*result.cells)
-    Console().print(table)
+    rows = [result.cells for result in results]
+    show(COLUMNS, rows)
     if output is None:
         return
-    rows = [COLUMNS, ["---", *["---:"] * (len(COLUMNS) - 1)], *(result.cells for result in results)]
     page = HEAD.format(
         seconds=trace.n_clocks / 48e6,
         motion=MOTION,
@@ -141,14 +136,12 @@ def main() -> None:
         ticks=results[0].ticks,
         edges=len(trace.clock) - 1,
         simulated=SIMULATED,
-        table="\n".join(f"| {' | '.join(row)} |" for row in rows),
+        table=markdown(COLUMNS, rows),
         python=f"Python {platform.python_version()}",
         machine=platform.machine(),
         cores=os.cpu_count(),
     )
-    beside = output.with_name(f".{output.name}.part")
-    beside.write_text(page, encoding="utf-8")
-    beside.replace(output)
+    write(output, page)
 
 
 if __name__ == "__main__":

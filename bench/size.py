@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import rich.table
+from pages import write
 from rich.console import Console
 from rich.progress import track
 
@@ -341,14 +342,6 @@ def page(measured: Sequence[Table], tools: Mapping[str, str]) -> str:
     return PAGE_HEAD.format(used=used) + "\n".join(table.markdown() for table in [*measured, PEERS])
 
 
-def write_atomically(file: Path, text: str) -> None:
-    """Replace a file at once: a reader sees the old or the new one."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    new = file.with_name(f".{file.name}.new")
-    new.write_text(text)
-    new.replace(file)
-
-
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     """The options of the command."""
     parser = argparse.ArgumentParser(description="Measure size and speed of the cores on three FPGAs.")
@@ -381,7 +374,7 @@ def run(options: argparse.Namespace) -> int:
     for table in [*measured, *split]:
         console.print(table.rich())
     if options.output:
-        write_atomically(options.output, page(measured, tools))
+        write(options.output, page(measured, tools))
         console.print(f"written: {options.output}")
     return int(any("missed" in row for row in bar_table(results).rows))
 

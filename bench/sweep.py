@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from engines import markdown, show
+from pages import markdown, show, write_from
 
 from tachometry.cli import cluster
 from tachometry.cli.sweep import sweep
@@ -18,7 +18,7 @@ from tachometry.sim.sweep import Point, run_point
 FILE = Path(__file__).parents[1] / "docs" / "sweep.toml"
 COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]
 
-_HEADING = "\n## Sweeps\n"
+_HEADING = "## Sweeps"
 _PAGE = """
 The points of [sweep.toml](sweep.toml), 200 ms each by the golden model: one after the other without Dask, then in
 processes of `tachometry sweep`. The start is until workers are there, each of which then imports numpy; it is not in
@@ -80,12 +80,8 @@ def main() -> None:
     output = parser.parse_args().output
     rows = table(sorted({1, os.cpu_count() or 1}))
     show(COLUMNS, rows)
-    if output is None:
-        return
-    before = output.read_text(encoding="utf-8").split(_HEADING)[0] if output.exists() else "# Speed\n"
-    beside = output.with_name(f".{output.name}.part")
-    beside.write_text(before + _HEADING + _PAGE.format(table=markdown(COLUMNS, rows)), encoding="utf-8")
-    beside.replace(output)
+    if output is not None:
+        write_from(output, _HEADING, _PAGE.format(table=markdown(COLUMNS, rows)))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tachometry.hdl import Tachometer
 from tachometry.sim.engine import Interrupted, driven_pins
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.recording import PinTrace, packed
 from tachometry.sim.results import STROBES, Run, observed
 from tachometry.sim.watched import WORD, Watched
 from tachometry.sim.waveform import Waveform
@@ -139,9 +139,7 @@ class _Play:
         self._rows = np.empty((_CAPACITY, self._columns), dtype=np.int64)
         self._shown = np.empty((_CAPACITY if design.n_words else 0, 1 + design.n_words), dtype=np.int64)
         self._at = np.ascontiguousarray(trace.clock, dtype=np.int64)
-        self._level = np.zeros(len(trace.clock), dtype=np.uint8)
-        for bit, pin in enumerate(design.pins):
-            self._level |= trace.lines[pin.name] << np.uint8(bit)
+        self._level = packed([trace.lines[pin.name] for pin in design.pins])
 
     def rows(self) -> NDArray[np.int64]:
         """Clock and outputs in every clock with a strobe that is done."""

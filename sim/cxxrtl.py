@@ -89,13 +89,32 @@ class Cxxrtl(CompiledEngine):
         return build.cached(key, ".so", make)
 
 
+class State:
+    """What a text of CXXRTL keeps from clock to clock.
+
+    Attributes
+    ----------
+    flip_flops : dict of str to int
+        Bits by name.
+    memories : dict of str to (int, int)
+        Bits of a word, and words.
+    written : list of str
+        Memories that can be written.
+    """
+
+    def __init__(self, text: str) -> None:
+        wires = re.findall(r"^\twire<(\d+)> (\w+);", text, re.MULTILINE)
+        memories = re.findall(r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};", text, re.MULTILINE)
+        self.flip_flops = {name: int(width) for width, name in wires}
+        self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
+        self.written = [name for name in self.memories if f"{name}.commit(" in text]
+
+
 def model_of(design: Design, text: str) -> str:
     """The struct `Model` for what CXXRTL has written."""
     if "bool converged = true;" not in text:
         raise NotImplementedError("a core must settle in one evaluation")
-    wires = re.findall(r"^\twire<\d+> (\w+);", text, re.MULTILINE)
-    memories = re.findall(r"^\tmemory<\d+> (\w+) ", text, re.MULTILINE)
-    written = [name for name in memories if f"{name}.commit(" in text]
+    state = State(text)
     pins = [mangled(pin.name) for pin in design.pins]
     return _MODEL.format(
         pins=" ".join(f"top.{pin} = value<1>{{unsigned(level >> {bit} & 1)}};" for bit, pin in enumerate(pins)),
@@ -108,13 +127,13 @@ def model_of(design: Design, text: str) -> str:
             f"words[{k}] = now(top.{mangled(f'shown_{k}')}).get<uint32_t>();" for k in range(design.n_words)
         ),
         edge=" ".join(
-            [f"top.{wire}.curr = top.{wire}.next;" for wire in wires]
-            + ["observer observer;"] * bool(written)
-            + [f"top.{memory}.commit(observer);" for memory in written]
+            [f"top.{wire}.curr = top.{wire}.next;" for wire in state.flip_flops]
+            + ["observer observer;"] * bool(state.written)
+            + [f"top.{memory}.commit(observer);" for memory in state.written]
         ),
         take=" ".join(
-            [f"top.{wire}.curr = top.{wire}.next = from.top.{wire}.curr;" for wire in wires]
+            [f"top.{wire}.curr = top.{wire}.next = from.top.{wire}.curr;" for wire in state.flip_flops]
             + [f"top.{pin} = from.top.{pin};" for pin in pins]
-            + [f"std::swap(top.{memory}.data, from.top.{memory}.data);" for memory in memories]
+            + [f"std::swap(top.{memory}.data, from.top.{memory}.data);" for memory in state.memories]
         ),
     )

@@ -14,12 +14,10 @@ from tachometry.sim import imperfections
 from tachometry.sim.crossings import Disc, IntArray, find_crossings
 from tachometry.sim.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY, Bounce
 from tachometry.sim.motion import FloatArray, Motion, Vibration
-from tachometry.sim.recording import Recording
+from tachometry.sim.recording import Recording, quadrature
 
 MAX_EDGES = 200_000_000
 MAX_PULSES_PER_REV = 1 << 26
-
-_LEVELS = np.array([0, 1, 3, 2], dtype=np.uint8)  # A + 2 B in the quarters
 
 
 @dataclass(frozen=True)
@@ -177,7 +175,7 @@ class VirtualEncoder:
 
     def _lines(self, time: FloatArray, quarter: IntArray, duration: float) -> tuple[Recording, int, int]:
         """What the lines make of quarters that begin at some times, and how many edges came together or were lost."""
-        level, n_lost, n_illegal = _LEVELS[quarter & 3], 0, 0
+        level, n_lost, n_illegal = quadrature(quarter), 0, 0
         if self.lost:
             level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
         row = np.flatnonzero(np.append(True, level[1:] != level[:-1]))

@@ -18,6 +18,22 @@ from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
 LINES = ("a", "b", "z", "tick_in")
 
 
+_QUADRATURE = np.array([0, 1, 3, 2], dtype=np.uint8)
+
+
+def quadrature(quarter: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """A + 2 B in the quarters of a period, counted forwards from the one in which both are low."""
+    return _QUADRATURE[quarter & 3]
+
+
+def packed(lines: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """A number for each row, with a bit for each line, the first lowest."""
+    level = np.zeros_like(lines[0])
+    for bit, line in enumerate(lines):
+        level |= line << np.uint8(bit)
+    return level
+
+
 class _Lines:
     a: NDArray[np.uint8]
     b: NDArray[np.uint8]
@@ -33,10 +49,7 @@ class _Lines:
     @property
     def level(self) -> NDArray[np.uint8]:
         """A number for each row, with a bit for each of `lines`, the first lowest."""
-        level = np.zeros_like(self.a)
-        for bit, line in enumerate(self.lines.values()):
-            level |= line << np.uint8(bit)
-        return level
+        return packed(list(self.lines.values()))
 
 
 def _split(level: NDArray[np.uint8], lines: Sequence[str]) -> dict[str, NDArray[np.uint8]]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.recording import PinTrace, quadrature
 from tachometry.spec import TachometerSpec
 from tachometry.spec.timed import TimedTachometer
 
@@ -34,12 +34,13 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     gaps.append(np.full(edges, 1.3 * longest / edges))
     turns.append(np.full(4 * edges, rng.choice([1, -1])))
     clock = np.cumsum(np.maximum(1, np.rint(np.concatenate(gaps))).astype(np.int64))
-    quarter = np.append(0, np.cumsum(np.concatenate(turns))) % 4
+    level = quadrature(np.append(0, np.cumsum(np.concatenate(turns))))
     clock = np.append(0, clock)
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
-    a, b = np.isin(quarter, [1, 2]).astype(np.uint8), np.isin(quarter, [2, 3]).astype(np.uint8)
     rest = 22 if isinstance(spec, TimedTachometer) else 17
-    trace = PinTrace(clock, a, b, int(clock[-1]) + rest * longest // 10 + 40 * cycles + 300, z)
+    trace = PinTrace(
+        clock, level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + rest * longest // 10 + 40 * cycles + 300, z
+    )
     if spec.max_tick_cycles is None:
         return trace
     apart = np.full(trace.n_clocks // cycles + 1, cycles)

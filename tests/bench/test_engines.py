@@ -1,8 +1,5 @@
 """The benchmark of the engines measures what it says."""
 
-import sys
-from pathlib import Path
-
 import pytest
 from support.script import load
 
@@ -11,7 +8,6 @@ from tachometry.sim.motion import parse_motion
 from tachometry.sim.recording import PinTrace
 from tachometry.spec import Encoder, STachometer, Timing
 
-sys.path.append(str(Path(__file__).parents[2] / "bench"))  # it takes the motion from its neighbour
 bench = load("engines")
 SPEC = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"))
 

@@ -227,14 +227,6 @@ def test_every_table_is_rectangular() -> None:
         assert table.rich().row_count == len(table.rows)
 
 
-def test_page_is_replaced_as_a_whole(tmp_path: Path) -> None:
-    file = tmp_path / "docs" / "size.md"
-    for text in ("old", "new"):
-        size.write_atomically(file, text)
-    assert file.read_text() == "new"
-    assert [found.name for found in file.parent.iterdir()] == ["size.md"]
-
-
 @pytest.mark.parametrize(
     ("words", "output"), [("", size.PAGE), ("--only x1 paper", None), ("--only x1 -o a.md", Path("a.md"))]
 )

@@ -1,13 +1,10 @@
 """The benchmark of sweeps measures what it says."""
 
-import sys
 from itertools import islice
-from pathlib import Path
 
 import pytest
 from support.script import load
 
-sys.path.append(str(Path(__file__).parents[2] / "bench"))  # it takes the tables from its neighbour
 bench = load("sweep")
 
 

@@ -12,12 +12,9 @@ from formal.cases import PROOFS
 from formal.mutants import MUTANTS, Mutant
 from formal.prove import Proof, Result, prepare, solve
 from support.mutant import mutant
+from support.report import chosen, row
 
 _FOLDER = Path("build/formal")
-
-
-def _row(*cells: object) -> None:
-    print("| " + " | ".join(str(cell).replace("|", r"\|") for cell in cells) + " |", flush=True)
 
 
 def _exported(proof: Proof, wrong: Mutant | None = None) -> str:
@@ -31,15 +28,11 @@ def _properties(result: Result) -> str:
     return ", ".join(f"`{name}`" for name in result.names if name.startswith("p"))
 
 
-def main(chosen: list[str]) -> bool:
+def main(words: list[str]) -> bool:
     """Whether all was as it should be; prints the tables."""
-    known = [proof.name for proof in PROOFS]
-    unknown = sorted(set(chosen) - set(known))
-    if unknown:
-        print(f"proof must be one of {'; '.join(known)}, not {unknown[0]}", file=sys.stderr)
-        sys.exit(2)
+    names = chosen("proof", words, (proof.name for proof in PROOFS))
     prepare(_FOLDER)
-    proofs = {proof.name: proof for proof in PROOFS if not chosen or proof.name in chosen}
+    proofs = {proof.name: proof for proof in PROOFS if proof.name in names}
     mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs]
     # Mutants exist one at a time, so they are exported before anything runs, and after all modules have been loaded.
     right_texts = [_exported(proof) for proof in proofs.values()]
@@ -55,25 +48,25 @@ def main(chosen: list[str]) -> bool:
             pool.submit(solve, proofs[wrong.proof], text, _FOLDER, f"mutant{number}", wrong.refuted, wrong.steps)
             for number, (wrong, text) in enumerate(zip(mutants, wrong_texts, strict=True))
         ]
-        _row("core", "properties", "induction", "seconds", "verdict")
-        _row(*["---"] * 5)
+        row("core", "properties", "induction", "seconds", "verdict")
+        row(*["---"] * 5)
         for proof, future in zip(proofs.values(), right, strict=True):
             result = future.result()
             fine &= result.verdict == "proven"
             proven.update(name for name in result.names if name.startswith("p"))
             begin = f"any state, {proof.recovers} clocks" if proof.recovers else f"{result.depth} clocks"
             begin = f"given, {begin}" if proof.given else begin
-            _row(proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict)
+            row(proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict)
         print()
-        _row("core", "property", "mutant", "refuted in", "seconds", "verdict")
-        _row(*["---"] * 6)
+        row("core", "property", "mutant", "refuted in", "seconds", "verdict")
+        row(*["---"] * 6)
         for wrong, future in zip(mutants, refuted, strict=True):
             result = future.result()
             fine &= result.verdict == "refuted"
             right, changed = (" ".join(text.split()) for text in (wrong.right, wrong.wrong))
             change = f"{wrong.box.__name__}: `{right}` → `{changed}`"
-            _row(wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
-    without = set() if chosen else proven - {wrong.refuted for wrong in mutants}
+            row(wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
+    without = set() if words else proven - {wrong.refuted for wrong in mutants}
     if without:
         print(f"\nwithout a mutant: {', '.join(sorted(without))}")
     return fine and not without

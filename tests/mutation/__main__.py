@@ -10,39 +10,33 @@ from concurrent.futures import ThreadPoolExecutor
 
 from mutation.cases import CASES
 from mutation.score import Score, judge
+from support.report import chosen, row
 
 from tachometry.spec import METHODS
 
 LEAST = 0.99  # of the mutants that are not equivalent
 
 
-def _row(*cells: object) -> None:
-    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
-
-
-def main(chosen: list[str]) -> bool:
+def main(words: list[str]) -> bool:
     """Whether enough mutants of every method were killed; prints the tables."""
-    unknown = sorted(set(chosen) - set(METHODS))
-    if unknown:
-        print(f"method must be one of {', '.join(METHODS)}, not {unknown[0]}", file=sys.stderr)
-        sys.exit(2)
+    methods = chosen("method", words, METHODS)
     scores: list[Score] = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        _row("core", "mutants", "killed", "equivalent", "in words", "survivors", "seconds")
-        _row("---", *["---:"] * 6)
+        row("core", "mutants", "killed", "equivalent", "in words", "survivors", "seconds")
+        row("---", *["---:"] * 6)
         for case in CASES:
-            if not chosen or case.method in chosen:
+            if case.method in methods:
                 start = time.monotonic()
                 score = judge(case, pool)
                 scores.append(score)
                 seconds = f"{time.monotonic() - start:.0f}"
-                _row(
+                row(
                     *(case.name, score.mutants, score.killed, score.equivalent),
                     *(score.in_words, len(score.survivors), seconds),
                 )
     print()
-    _row("method", "mutants", "killed", "equivalent", "in words", "survivors", "score")
-    _row("---", *["---:"] * 6)
+    row("method", "mutants", "killed", "equivalent", "in words", "survivors", "score")
+    row("---", *["---:"] * 6)
     fine = True
     for method in METHODS:
         of_method = [score for score in scores if score.case.method == method]
@@ -53,7 +47,7 @@ def main(chosen: list[str]) -> bool:
         )
         wrong = mutants - equivalent - words
         fine &= killed >= LEAST * wrong
-        _row(method, mutants, killed, equivalent, words, wrong - killed, f"{100 * killed / wrong:.1f} %")
+        row(method, mutants, killed, equivalent, words, wrong - killed, f"{100 * killed / wrong:.1f} %")
     for score in scores:
         if score.survivors:
             print(f"\nsurvivors of {score.case.name}:")

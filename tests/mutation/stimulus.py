@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.recording import LINES, PinTrace
+from tachometry.sim.recording import LINES, PinTrace, packed, quadrature
 from tachometry.sim.stress import stress
 from tachometry.spec import TachometerSpec
 
@@ -56,12 +56,12 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     edges[silent] = rng.integers(1, 4, silent.sum())
     apart[silent] = rng.integers(1, longest * 5 // 4, silent.sum())
     clock = np.cumsum(np.repeat(apart, edges))
-    quarter = np.cumsum(np.repeat(rng.choice([1, 1, -1], parts), edges)) % 4
+    quarter = np.cumsum(np.repeat(rng.choice([1, 1, -1], parts), edges))
     n_clocks = int(clock[-1]) + 1
-    quarter = np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")]
+    level = quadrature(np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")])
     (z,) = noise_lines(rng, n_clocks, 1)
     tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.longest_tick + 2) == 0
-    return _trace(spec, np.array([np.isin(quarter, [1, 2]), np.isin(quarter, [2, 3]), z, tick], dtype=np.uint8))
+    return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
 
 
 def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
@@ -110,9 +110,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         level = np.zeros(trace.n_clocks, dtype=np.uint8)
         level[trace.clock] = 1
         row = np.cumsum(level) - 1
-        played = np.zeros_like(level)
-        for bit, name in enumerate(_lines(spec), 1):
-            played |= trace.lines[name][row] << np.uint8(bit)
+        played = packed([trace.lines[name] for name in _lines(spec)])[row] << np.uint8(1)
         reset = rng.integers(0, 256, resets).astype(np.uint8) | np.uint8(1)
         starts.append(done + resets)
         pins += [reset, played]

@@ -5,10 +5,13 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+FOLDER = Path(__file__).parents[2] / "bench"
+sys.path.append(str(FOLDER))  # they take from their neighbours
+
 
 def load(name: str) -> ModuleType:
     """bench/NAME.py as a module."""
-    file = Path(__file__).parents[2] / "bench" / f"{name}.py"
+    file = FOLDER / f"{name}.py"
     described = importlib.util.spec_from_file_location(f"bench_{name}", file)
     assert described is not None
     assert described.loader is not None

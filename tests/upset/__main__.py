@@ -10,13 +10,10 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.progress import track
+from support.report import chosen, row
 from upset.campaign import Campaign, by_register, upsets
 
 from tachometry.spec import METHODS
-
-
-def _row(*cells: object) -> None:
-    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
 
 
 def _ticks(campaign: Campaign, clocks: int) -> str:
@@ -26,23 +23,23 @@ def _ticks(campaign: Campaign, clocks: int) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     """Print the table; 1 if an upset was seen for longer than the bound."""
     parser = argparse.ArgumentParser(prog="upset", description="Upset flip-flops of every method's core.")
-    parser.add_argument("methods", nargs="*", choices=[*METHODS, []], help=f"some of: {', '.join(METHODS)}")
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help=f"some of: {', '.join(METHODS)}")
     parser.add_argument("--upsets", type=int, default=12_000, metavar="N", help="of each method (%(default)s)")
     options = parser.parse_args(words)
     if options.upsets < 1:
         parser.error(f"--upsets must be at least 1, not {options.upsets}")
     console, done = Console(stderr=True), []
-    chosen = [method for method in METHODS if not options.methods or method in options.methods]
-    for method in track(chosen, "upsets", console=console, transient=True, disable=not console.is_terminal):
+    methods = chosen("method", options.methods, METHODS)
+    for method in track(methods, "upsets", console=console, transient=True, disable=not console.is_terminal):
         start = time.monotonic()
         done.append((upsets(method, options.upsets), time.monotonic() - start))
-    _row("method", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
-    _row("---", *["---:"] * 8, "---")
+    row("method", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
+    row("---", *["---:"] * 8, "---")
     for campaign, seconds in done:
         seen = sorted(campaign.clocks[campaign.clocks > 0].tolist()) or [0]
         bits = f"{campaign.bits.n_flip_flops}"
         memory = len(campaign.bits) - campaign.bits.n_flip_flops
-        _row(
+        row(
             campaign.spec.method,
             f"{bits} and {memory} of memory" if memory else bits,
             len(campaign.clocks),

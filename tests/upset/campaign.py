@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from upset.simulate import Bits, Upsettable
 
 from tachometry.sim import golden
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.recording import PinTrace, quadrature
 from tachometry.sim.results import Run
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
 from tachometry.spec.recovery import recovery_clocks
@@ -53,10 +53,8 @@ def motion(n_cycles: int, seed: int) -> PinTrace:
                 clocks.append(now)
                 turns.append(int(np.sign(speed)))
         now += TICK_CYCLES * rng.uniform(MAX_TICKS + 2, MAX_TICKS + 8)
-    quarter = np.cumsum(turns) % 4
-    clock = np.round(clocks).astype(np.int64)
-    a, b = np.isin(quarter, [1, 2]).astype(np.uint8), np.isin(quarter, [2, 3]).astype(np.uint8)
-    return PinTrace(clock, a, b, int(now))
+    level = quadrature(np.cumsum(turns))
+    return PinTrace(np.round(clocks).astype(np.int64), level & 1, level >> 1, int(now))
 
 
 def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:

@@ -1,7 +1,6 @@
 """A core whose flip-flops are upset, compiled: upsets go in as arrays, what is shown after them comes out."""
 
 import ctypes
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import version as version_of
@@ -13,9 +12,9 @@ from numpy.typing import NDArray
 
 from tachometry.sim import build
 from tachometry.sim.compiled import Design
-from tachometry.sim.cxxrtl import headers, model_of, translate
+from tachometry.sim.cxxrtl import State, headers, model_of, translate
 from tachometry.sim.engine import driven_pins
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.recording import PinTrace, packed
 from tachometry.spec import TachometerSpec
 
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
@@ -68,9 +67,9 @@ class Upsettable:
         self._trace = trace
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         text = translate(netlist)
-        memories = re.findall(r"^\tmemory<(\d+)> (\w+)  ?\{ (\d+)u \};", text, re.MULTILINE)
-        written = [(name, int(width), int(depth)) for width, name, depth in memories if f"{name}.commit(" in text]
-        wires = [(name, int(width)) for width, name in re.findall(r"^\twire<(\d+)> (\w+);", text, re.MULTILINE)]
+        state = State(text)
+        wires = list(state.flip_flops.items())
+        written = [(name, *state.memories[name]) for name in state.written]
         self.bits = Bits(wires, [(name, width * depth) for name, width, depth in written])
         source = design.source(text + model_of(design, text)) + _state(wires, written) + _DRIVER
         compiler = build.compiler()
@@ -98,9 +97,7 @@ class Upsettable:
         columns = 2 + len(self._design.outputs)
         rows = np.empty((max(_ROWS // columns, length), columns), dtype=np.int64)
         at = np.ascontiguousarray(self._trace.clock)
-        level = np.zeros(len(at), dtype=np.uint8)
-        for place, pin in enumerate(self._design.pins):
-            level |= self._trace.lines[pin.name] << np.uint8(place)
+        level = packed([self._trace.lines[pin.name] for pin in self._design.pins])
         done = 0
         while done < len(clock):
             clocks, bits = np.ascontiguousarray(clock[done:]), np.ascontiguousarray(bit[done:])
