@@ -1,6 +1,8 @@
 """Mutants: the source of a box with one thing wrong, to show that a test would notice."""
 
+import importlib
 import inspect
+import pkgutil
 import sys
 import types
 from collections.abc import Iterator
@@ -9,6 +11,8 @@ from typing import Any
 
 import pytest
 
+import tachometry.hdl
+
 
 @contextmanager
 def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
@@ -16,6 +20,8 @@ def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
 
     The text must stand in the source of its module exactly once.
     """
+    for found in pkgutil.iter_modules(tachometry.hdl.__path__):  # one loaded within would keep the mutant
+        importlib.import_module(f"tachometry.hdl.{found.name}")
     module = sys.modules[box.__module__]
     source = inspect.getsource(module)
     assert source.count(right) == 1, f"{right!r} stands {source.count(right)} times in {module.__name__}"
