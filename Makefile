@@ -54,13 +54,13 @@ test: $(VENV)/.test lint icarus ## lint, types and all tests
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
-	PYTHONPATH=tests $(BIN)/python -m formal
+	PYTHONPATH=tests $(BIN)/python -m proofs.formal
 
 upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, see docs/verification.md
-	PYTHONPATH=tests $(BIN)/python -m upset
+	PYTHONPATH=tests $(BIN)/python -m proofs.upset
 
 mutate: $(VENV)/.test ## how many wrong cores the tests' motions notice, see docs/verification.md
-	PYTHONPATH=tests $(BIN)/python -m mutation
+	PYTHONPATH=tests $(BIN)/python -m proofs.mutation
 
 bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, in one run, written to docs/bench.md
 	$(BIN)/python bench/golden.py -o docs/bench.md

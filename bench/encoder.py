@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from pages import write
 
 from tachometry.sim import golden
-from tachometry.sim.encoder import Encoding, VirtualEncoder
+from tachometry.sim.encoder.imperfections import Bounce
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.golden.front_end import decode
-from tachometry.sim.imperfections import Bounce
-from tachometry.sim.motion import parse_motion
-from tachometry.sim.results import Run
-from tachometry.sim.tables import HeldVelocity, held_velocity, velocity_error
+from tachometry.sim.signals.run import Run
+from tachometry.sim.signals.tables import HeldVelocity, held_velocity, velocity_error
 from tachometry.spec import Encoder, STachometer, Timing
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"

@@ -20,15 +20,16 @@ from golden import BEGIN, MOTION, part_of
 from pages import markdown, show, write_from
 
 from tachometry.hdl import Tachometer
-from tachometry.sim import build, golden
-from tachometry.sim.compiled import Design
-from tachometry.sim.cxxrtl import headers, model_of, translate
-from tachometry.sim.encoder import VirtualEncoder
-from tachometry.sim.engine import Engine, driven_pins
-from tachometry.sim.engines import pick
-from tachometry.sim.motion import Vibration, parse_motion
-from tachometry.sim.recording import PinTrace
-from tachometry.sim.results import Run, compare
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import Vibration, parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines import build
+from tachometry.sim.engines.compiled import Design
+from tachometry.sim.engines.cxxrtl import headers, model_of, translate
+from tachometry.sim.engines.engine import Engine, driven_pins
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run, compare
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
 
 SLOW = 30_000  # clocks of pysim

@@ -18,11 +18,11 @@ from rich.console import Console
 from rich.progress import track
 
 from tachometry.sim import golden
-from tachometry.sim.encoder import VirtualEncoder
-from tachometry.sim.motion import Vibration, parse_motion
-from tachometry.sim.pysim import PySim
-from tachometry.sim.recording import PinTrace
-from tachometry.sim.results import compare
+from tachometry.sim.encoder.motion import Vibration, parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import compare
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
 
 MOTION = "ramp:0:300rad/s:4s+ramp:300rad/s:-300rad/s:4s+sine:5rad/s:1Hz:1s+stop:1s"

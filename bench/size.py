@@ -23,7 +23,8 @@ from pages import write
 from rich.console import Console
 from rich.progress import track
 
-from tachometry.cli.synthesis import (
+from tachometry.hdl import export
+from tachometry.sim.studies.size import (
     CORE,
     TARGETS,
     Measurement,
@@ -33,7 +34,6 @@ from tachometry.cli.synthesis import (
     synthesis,
     versions,
 )
-from tachometry.hdl import export
 from tachometry.spec import (
     Encoder,
     MTachometer,

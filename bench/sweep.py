@@ -8,12 +8,12 @@ from pathlib import Path
 
 from pages import markdown, show, write_from
 
-from tachometry.cli import cluster
-from tachometry.cli.sweep import sweep
-from tachometry.cli.sweep_options import POINT_OPTIONS, by_name
-from tachometry.cli.sweep_points import points_of
-from tachometry.cli.sweep_settings import of_file
-from tachometry.sim.sweep import Point, run_point
+from tachometry.cli.commands.sweep import sweep
+from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
+from tachometry.cli.sweeping.points import points_of
+from tachometry.cli.sweeping.settings import of_file
+from tachometry.sim.studies import cluster
+from tachometry.sim.studies.sweep import Point, run_point
 
 FILE = Path(__file__).parents[1] / "docs" / "sweep.toml"
 COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]

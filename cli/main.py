@@ -9,14 +9,14 @@ from typing import NoReturn
 
 import click
 
-from tachometry.cli.compare import compare
-from tachometry.cli.figures import figures
-from tachometry.cli.generate import generate
-from tachometry.cli.options import INTERRUPTED, in_terms_of_options
-from tachometry.cli.plan import plan
-from tachometry.cli.simulate import replay, simulate
-from tachometry.cli.sweep import sweep
-from tachometry.cli.verify import verify
+from tachometry.cli.commands.compare import compare
+from tachometry.cli.commands.figures import figures
+from tachometry.cli.commands.generate import generate
+from tachometry.cli.commands.plan import plan
+from tachometry.cli.commands.simulate import replay, simulate
+from tachometry.cli.commands.sweep import sweep
+from tachometry.cli.commands.verify import verify
+from tachometry.cli.options.option import INTERRUPTED, in_terms_of_options
 
 
 @click.group(

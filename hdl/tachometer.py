@@ -1,29 +1,24 @@
 """The whole core."""
 
-from importlib import import_module
 from typing import Any
 
 from amaranth import Cat, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.conditioner import InputConditioner
-from tachometry.hdl.decoder import QuadratureDecoder
-from tachometry.hdl.external_tick import ExternalTick
-from tachometry.hdl.index_capture import IndexCapture
-from tachometry.hdl.low_pass import LowPass
-from tachometry.hdl.position_counter import PositionCounter
-from tachometry.hdl.pulse_counter import PulseCounter
-from tachometry.hdl.sampling_clock import SamplingClock
-from tachometry.hdl.update_age import UpdateAge
-from tachometry.hdl.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
+from tachometry.hdl.front_end.conditioner import InputConditioner
+from tachometry.hdl.front_end.decoder import QuadratureDecoder
+from tachometry.hdl.front_end.external_tick import ExternalTick
+from tachometry.hdl.front_end.index_capture import IndexCapture
+from tachometry.hdl.front_end.position_counter import PositionCounter
+from tachometry.hdl.front_end.pulse_counter import PulseCounter
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.methods import DATAPATHS
+from tachometry.hdl.output.low_pass import LowPass
+from tachometry.hdl.output.update_age import UpdateAge
+from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.spec import TachometerSpec
 from tachometry.spec.tachometer import BOUNDS
-
-
-def datapath(spec: TachometerSpec) -> Any:
-    """The datapath of the spec's method."""
-    return import_module(f"tachometry.hdl.{spec.module}").Datapath(spec)
 
 
 class Tachometer(wiring.Component):
@@ -60,7 +55,7 @@ class Tachometer(wiring.Component):
         )
         self.position_counter = PositionCounter(spec.position_width)
         self.index_capture = IndexCapture(spec.position_width) if spec.index else None
-        self.datapath = datapath(spec)
+        self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: Any = (
             self.datapath
             if spec.own_ticks

@@ -1,11 +1,11 @@
 """What is to be built: frozen objects that hardware, golden models, manifest and documents all read."""
 
 from tachometry.spec.encoder import Encoder
-from tachometry.spec.m_method import MTachometer
-from tachometry.spec.mt_method import MTTachometer
-from tachometry.spec.rairan import RairanTachometer
-from tachometry.spec.s_method import STachometer
-from tachometry.spec.t_method import TTachometer
+from tachometry.spec.methods.m import MTachometer
+from tachometry.spec.methods.mt import MTTachometer
+from tachometry.spec.methods.rairan import RairanTachometer
+from tachometry.spec.methods.s import STachometer
+from tachometry.spec.methods.t import TTachometer
 from tachometry.spec.tachometer import Port, TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed

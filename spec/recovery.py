@@ -1,6 +1,6 @@
 """How long an upset can be seen."""
 
-from tachometry.spec.rairan import RairanTachometer
+from tachometry.spec.methods.rairan import RairanTachometer
 from tachometry.spec.tachometer import TachometerSpec
 
 

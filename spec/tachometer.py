@@ -6,11 +6,11 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from tachometry.spec.encoder import Encoder
-from tachometry.spec.low_pass import MAX_EXTRA_BITS, LowPass
+from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS, LowPass
+from tachometry.spec.formats.velocity_output import NATIVE, UNITS, VelocityOutput, per_count
 from tachometry.spec.option import options_of
 from tachometry.spec.timing import MAX_TICK_CYCLES, Timing
 from tachometry.spec.units import Speed, ceil_log2
-from tachometry.spec.velocity_output import NATIVE, UNITS, VelocityOutput, per_count
 
 MAX_NATIVE_FRAC_BITS = 24
 TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
@@ -90,9 +90,8 @@ class TachometerSpec:
     bounds: bool = False
     lowpass: Fraction | None = None
 
-    # Name of the method, and of the modules that hold its datapath (in hdl/) and its golden model (in sim/golden/).
+    # Name of the method.
     method: ClassVar[str]
-    module: ClassVar[str]
     # Whether the method ends the ticks itself, by what it counts.
     own_ticks: ClassVar[bool] = False
     # Whether there are no more updates once one is `stalled`.

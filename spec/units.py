@@ -62,6 +62,11 @@ def format_time(seconds: Fraction) -> str:
     return f"{float(seconds):.9g}s"
 
 
+def plural(number: int, what: str) -> str:
+    """So many of a thing."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 @dataclass(frozen=True)
 class Speed:
     """An angular speed with its unit, kept exactly as it was given.

@@ -11,7 +11,7 @@ ALLOWED = {
     "spec": {"spec"},
     "hdl": {"hdl", "spec"},
     "sim": {"sim", "hdl", "spec"},
-    "sim/golden": {"spec", "sim.golden", "sim.recording", "sim.results"},
+    "sim/golden": {"spec", "sim.golden", "sim.signals"},
     "cli": {"cli", "sim", "hdl", "spec"},
 }
 

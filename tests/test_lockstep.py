@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.lockstep import EVENTS, lockstep
 
-from tachometry.sim.pysim import PySim
+from tachometry.sim.engines.pysim import PySim
 from tachometry.spec import METHODS
 
 SEEDS = {"s": range(200)} | {method: range(100) for method in METHODS if method != "s"}

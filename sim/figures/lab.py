@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 from tachometry.sim import golden
-from tachometry.sim.encoder import Encoding, VirtualEncoder
-from tachometry.sim.motion import Motion, Vibration, parse_motion
-from tachometry.sim.pysim import PySim
-from tachometry.sim.results import Mismatch, Run, compare
+from tachometry.sim.encoder.motion import Motion, Vibration, parse_motion
+from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.run import Mismatch, Run, compare
 from tachometry.spec import TachometerSpec
 
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.encoder import Encoding
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
-from tachometry.sim.motion import FloatArray
-from tachometry.sim.results import Run
+from tachometry.sim.signals.run import Run
 from tachometry.sim.theory import (
     rairan_eq04_max_error,
     rairan_eq05_n2,

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.figures.drawing import GOLDEN, reduced
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result, percent
-from tachometry.sim.motion import FloatArray
 from tachometry.sim.theory import tsuji_eq18_resolution, unit_velocity
 from tachometry.sim.theory.performance import (
     Performance,

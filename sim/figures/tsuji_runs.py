@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-from tachometry.sim.encoder import Encoding
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
 from tachometry.sim.figures.tsuji_methods import AVERAGE, COUNTS, TICK, UNIT, lattice_mt
-from tachometry.sim.golden.s_method import alterations
-from tachometry.sim.motion import FloatArray
-from tachometry.sim.results import Run
-from tachometry.sim.tables import held_velocity
+from tachometry.sim.golden.methods.s import alterations
+from tachometry.sim.signals.run import Run
+from tachometry.sim.signals.tables import held_velocity
 from tachometry.sim.theory import tsuji_eq18_resolution
 from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
 

@@ -1,22 +1,22 @@
 """Golden models: exact integers over whole recordings, from the papers and the spec alone."""
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.golden.low_pass import filtered
+from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
-from tachometry.sim.recording import PinTrace
-from tachometry.sim.results import Run
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run
 from tachometry.spec import TachometerSpec
 
 
 def model(spec: TachometerSpec) -> Any:
     """The golden model of the spec's method."""
-    return import_module(f"tachometry.sim.golden.{spec.module}").Model(spec)
+    return MODELS[spec.method](spec)
 
 
 def run(spec: TachometerSpec, trace: PinTrace) -> Run:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.recording import PinTrace
-from tachometry.sim.results import Index, Ticks
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Index, Ticks
 from tachometry.spec import TachometerSpec
 
 # Where a pair of levels stands in the forward cycle 00, 10, 11, 01 of (A, B).

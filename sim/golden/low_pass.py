@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tachometry.sim.results import Ticks, Updates
+from tachometry.sim.signals.run import Ticks, Updates
 from tachometry.spec import TachometerSpec
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.results import Ticks, Updates
+from tachometry.sim.signals.run import Ticks, Updates
 from tachometry.spec import TachometerSpec
 from tachometry.spec.tachometer import BOUNDS
 

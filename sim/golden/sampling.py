@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
 from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
 

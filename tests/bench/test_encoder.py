@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from support.script import load
 
-from tachometry.sim.encoder import VirtualEncoder
+from tachometry.sim.encoder.virtual import VirtualEncoder
 
 encoder = load("encoder")
 PAGE = (encoder.DOCS / "encoder.md").read_text("utf-8")

@@ -3,9 +3,9 @@
 import pytest
 from support.script import load
 
-from tachometry.sim.encoder import VirtualEncoder
-from tachometry.sim.motion import parse_motion
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import Encoder, STachometer, Timing
 
 bench = load("engines")

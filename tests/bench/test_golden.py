@@ -5,10 +5,10 @@ import pytest
 from support.script import load
 
 from tachometry.sim import golden
-from tachometry.sim.encoder import VirtualEncoder
-from tachometry.sim.motion import parse_motion
-from tachometry.sim.pysim import PySim
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import METHODS
 
 bench = load("golden")

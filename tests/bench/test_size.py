@@ -6,8 +6,8 @@ import pytest
 from support.compiled import lint
 from support.script import load
 
-from tachometry.cli import synthesis
 from tachometry.hdl import export
+from tachometry.sim.studies import size as synthesis
 from tachometry.spec import Encoder, STachometer, Timing
 
 size = load("size")

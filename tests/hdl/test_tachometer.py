@@ -10,8 +10,8 @@ from amaranth.lib.wiring import Component, In, Out
 from amaranth.sim import Simulator
 
 from tachometry.hdl import Tachometer
-from tachometry.sim.pysim import PySim
-from tachometry.sim.recording import PinTrace
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import Encoder, STachometer, Timing
 
 QUARTERS = [(0, 0), (1, 0), (1, 1), (0, 1)]

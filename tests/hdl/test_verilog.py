@@ -8,7 +8,7 @@ from support.lockstep import random_case
 from support.verilog import run_in_icarus, run_in_verilator
 
 from tachometry.sim import golden
-from tachometry.sim.results import Run, compare
+from tachometry.sim.signals.run import Run, compare
 
 CASES = [
     ("s", 3),

@@ -6,8 +6,8 @@ from fractions import Fraction
 import pytest
 
 from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.manifest import manifest
-from tachometry.spec.reciprocal import Reciprocal
 from tachometry.spec.units import parse_frequency
 
 TIMING = Timing(48_000_000, 960, 500)

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tachometry.sim.capture import CaptureError, read_capture
-from tachometry.sim.recording import PinTrace, Recording
+from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.read import read_capture
+from tachometry.sim.signals.recording import PinTrace, Recording
 
 MEGAHERTZ = 1_000_000
 

@@ -5,9 +5,9 @@ from pathlib import Path
 from amaranth.back import rtlil
 from amaranth.lib import wiring
 
-from tachometry.sim.build import FLAGS, compiler, run
-from tachometry.sim.cxxrtl import headers, translate
-from tachometry.sim.verilator import verilate
+from tachometry.sim.engines.build import FLAGS, compiler, run
+from tachometry.sim.engines.cxxrtl import headers, translate
+from tachometry.sim.engines.verilator import verilate
 
 
 def build(component: wiring.Component, main: str, folder: Path) -> Path:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.results import Ticks
+from tachometry.sim.signals.run import Ticks
 
 SUBCOUNTS = 1 << 20  # in a count
 

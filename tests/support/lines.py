@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.encoder import Encoding, VirtualEncoder
-from tachometry.sim.motion import Vibration, parse_motion
-from tachometry.sim.recording import Recording
+from tachometry.sim.encoder.motion import Vibration, parse_motion
+from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.sim.signals.recording import Recording
 
 PPR = 1000
 PITCH = 2 * math.pi / (4 * PPR)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.encoder import Encoding, VirtualEncoder
-from tachometry.sim.engine import Engine
-from tachometry.sim.golden.s_method import alterations
-from tachometry.sim.motion import Vibration, parse_motion
-from tachometry.sim.recording import PinTrace
-from tachometry.sim.results import Run, compare
+from tachometry.sim.encoder.motion import Vibration, parse_motion
+from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.sim.engines.engine import Engine
+from tachometry.sim.golden.methods.s import alterations
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run, compare
 from tachometry.spec import (
     METHODS,
     Encoder,
@@ -25,7 +25,7 @@ from tachometry.spec import (
     TachometerSpec,
     Timing,
 )
-from tachometry.spec.timed import TimedTachometer
+from tachometry.spec.methods.timed import TimedTachometer
 
 PULSES_PER_REV = 100
 CLOCK_HZ = 1_000_000

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import tachometry.hdl
+from tachometry.hdl.methods import DATAPATHS
 
 
 @contextmanager
@@ -20,8 +21,8 @@ def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
 
     The text must stand in the source of its module exactly once.
     """
-    for found in pkgutil.iter_modules(tachometry.hdl.__path__):  # one loaded within would keep the mutant
-        importlib.import_module(f"tachometry.hdl.{found.name}")
+    for found in pkgutil.walk_packages(tachometry.hdl.__path__, "tachometry.hdl."):  # one loaded within would keep it
+        importlib.import_module(found.name)
     module = sys.modules[box.__module__]
     source = inspect.getsource(module)
     assert source.count(right) == 1, f"{right!r} stands {source.count(right)} times in {module.__name__}"
@@ -33,6 +34,9 @@ def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
                 for name, value in list(vars(user).items()):
                     if value is box:
                         patch.setattr(user, name, getattr(changed, box.__name__))
+        for method, datapath in DATAPATHS.items():
+            if datapath is box:
+                patch.setitem(DATAPATHS, method, getattr(changed, box.__name__))
         yield
 
 

@@ -12,10 +12,10 @@ from amaranth.lib.wiring import In, Out
 from numpy.typing import NDArray
 
 from support.compiled import build
-from tachometry.hdl.carried_reciprocal import CarriedReciprocal
-from tachometry.hdl.reciprocal import Reciprocal
-from tachometry.hdl.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
-from tachometry.hdl.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
+from tachometry.hdl.arithmetic.reciprocal import Reciprocal
+from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec import STachometer
 
 

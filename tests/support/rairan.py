@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.rairan import Model
-from tachometry.sim.results import Updates
+from tachometry.sim.golden.methods.rairan import Model
+from tachometry.sim.signals.run import Updates
 from tachometry.spec import Encoder, RairanTachometer, Timing
 
 DELAY = 4  # clocks from a step to `velocity_valid`

@@ -1,4 +1,4 @@
-"""What the commands of the tests print and are told: `python -m formal`, `mutation`, `upset`."""
+"""What the commands of the tests print and are told: `python -m proofs.formal`, `mutation`, `upset`."""
 
 import sys
 from collections.abc import Iterable

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from fractions import Fraction
-from importlib import import_module
 from typing import Any
 
 from support.sequences import rounded
 from support.simulate import clock_by_clock
+from tachometry.hdl.methods import DATAPATHS
 from tachometry.spec import METHODS, Encoder, Timing
-from tachometry.spec.timed import TimedTachometer
+from tachometry.spec.methods.timed import TimedTachometer
 
 OUTPUTS = ["velocity_valid", "velocity", "interval", "forced", "stalled"]
 TICK, MAX_TICKS, FRAC_BITS = 20, 20, 8
@@ -37,8 +37,7 @@ def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list
         else:
             row["step"] = counts.get(clock, 0)
         rows.append(row)
-    module = import_module(f"tachometry.hdl.{spec.module}")
-    seen = clock_by_clock(module.Datapath(spec), rows, OUTPUTS)
+    seen = clock_by_clock(DATAPATHS[spec.method](spec), rows, OUTPUTS)
     held = dict.fromkeys(OUTPUTS, 0)
     for row in seen:  # from update to update all outputs stay
         held = row if row["velocity_valid"] else held

@@ -7,9 +7,9 @@ import numpy as np
 
 from support.compiled import lint
 from tachometry.hdl import export
-from tachometry.sim.recording import PinTrace
-from tachometry.sim.results import STROBES, Run, observed
-from tachometry.sim.verilator import Verilator
+from tachometry.sim.engines.verilator import Verilator
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import STROBES, Run, observed
 from tachometry.spec import Port, TachometerSpec
 
 # The bench reads a line (clock, level of each pin) for every change, and writes a row (clock, value of each output) for

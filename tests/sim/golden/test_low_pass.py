@@ -10,11 +10,12 @@ import pytest
 from support.mutant import caught, mutant
 
 from tachometry.sim import golden
-from tachometry.sim.encoder import VirtualEncoder
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.golden.low_pass import filtered
-from tachometry.sim.motion import parse_motion
-from tachometry.sim.results import Ticks, Updates
-from tachometry.spec import Encoder, RairanTachometer, Speed, STachometer, Timing, low_pass
+from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.spec import Encoder, RairanTachometer, Speed, STachometer, Timing
+from tachometry.spec.formats import low_pass
 
 TICK = 128  # clocks, longer than the filter takes
 FINE = 120  # bits

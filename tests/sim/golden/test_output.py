@@ -8,7 +8,7 @@ import pytest
 
 from tachometry.sim.golden.output import in_unit
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.results import Updates
+from tachometry.sim.signals.run import Updates
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.units import PI
 

@@ -1,0 +1,125 @@
+"""`tachometry figures`: the papers' figures anew, and whether they agree with what the papers say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.option import GroupedCommand, option, output_folder
+
+if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
+    from tachometry.sim.figures import Entry, Lab, Result
+
+_FIGURES = "Figures"
+_KINDS = ("svg", "png", "csv")
+_SUMMARY = "claims.csv"
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Draw the papers' figures anew, and tell which agree.",
+    epilog="""\b
+Examples:
+  tachometry figures
+  tachometry figures --only tsuji7,tsuji8 -o build/resolution""",
+)
+@option(
+    _FIGURES,
+    "--only",
+    default="all",
+    metavar="LIST",
+    help="Names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12 (Tsuji 2009), rairan2, rairan3, "
+    "rairan5, rairan7 (Rairán 2013).",
+)
+@option(
+    _FIGURES,
+    "--hdl/--no-hdl",
+    default=True,
+    help="Simulate the hardware beside the golden models of tsuji12, rairan5 and rairan7: most of the time.",
+)
+@output_folder(
+    "build/figures",
+    help="Folder of the .svg, .png and .csv of each figure, and of claims.csv, which has a row per claim.",
+)
+def figures(only: str, hdl: bool, directory: Path) -> int:
+    """Draw the papers' figures anew, and tell which agree.
+
+    Each is computed from the equations and the golden models, and held against what its paper says of it: the table at
+    the end tells what came out. See docs/figures.md.
+
+    Equal options give equal files. Exit status 1 if hardware and golden model differ.
+    """
+    from tachometry.cli.reports.run import progress_bar
+    from tachometry.sim.figures import Lab
+    from tachometry.sim.figures.drawing import write_claims, write_data, write_figure
+
+    chosen = _chosen(only)
+    names = [f"{entry.name}.{kind}" for entry in chosen for kind in _KINDS] + [_SUMMARY]
+    results: dict[str, Result] = {}
+    labs: dict[str, Lab] = {}
+    with (
+        Outputs({name: directory / name for name in names}) as outputs,
+        progress_bar("drawing", sum(entry.seconds for entry in chosen)) as report,
+    ):
+        before = 0.0
+        for entry in chosen:
+            lab = labs[entry.name] = Lab(hdl, _within(report, before, entry))
+            result = results[entry.name] = entry.compute(lab)
+            for kind in ("svg", "png"):
+                write_figure(outputs[f"{entry.name}.{kind}"], result)
+            write_data(outputs[f"{entry.name}.csv"], result)
+            before += entry.seconds
+            if report is not None:
+                report(before)
+        write_claims(outputs[_SUMMARY], results)
+    _print(results, labs, directory)
+    return 1 if any(lab.mismatches for lab in labs.values()) else 0
+
+
+def _chosen(only: str) -> list[Entry]:
+    from tachometry.sim.figures import FIGURES
+
+    names = list(FIGURES) if only.strip() == "all" else list(dict.fromkeys(name.strip() for name in only.split(",")))
+    for name in names:
+        if name not in FIGURES:
+            raise ValueError(f"only must be of {', '.join(FIGURES)}, or all, not {name!r}")
+    return [FIGURES[name] for name in names]
+
+
+def _within(report: Callable[[float], None] | None, before: float, entry: Entry) -> Callable[[float], None] | None:
+    """What a figure's lab reports to: the share of the figure that is done."""
+    return None if report is None else lambda share: report(before + share * entry.seconds)
+
+
+def _print(results: dict[str, Result], labs: dict[str, Lab], directory: Path) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from tachometry.cli.reports.run import stdout_console
+
+    table = Table(box=None, pad_edge=False, header_style="")
+    for head in ("figure", "paper", "agrees", "hardware"):
+        table.add_column(head, no_wrap=True)
+    for name, result in results.items():
+        agreeing, lab = sum(claim.agrees for claim in result.claims), labs[name]
+        table.add_row(
+            Text(name),
+            Text(result.source),
+            Text("yes" if result.agrees else f"in {agreeing} of {len(result.claims)} claims"),
+            Text(f"{lab.mismatches} mismatches in {lab.locked} clocks" if lab.locked else "-"),
+        )
+    console = stdout_console()
+    console.print(table)
+    for name, result in results.items():
+        for claim in result.claims:
+            if not claim.agrees:
+                console.print(Text(f"\n{name}: the paper says: {claim.paper}. Found: {claim.found}."))
+    for name, lab in labs.items():
+        for mismatch in lab.first:
+            console.print(Text(f"{name}: first mismatch in {mismatch}", style="bold red"))
+    agreeing = sum(result.agrees for result in results.values())
+    console.print(Text(f"\n{agreeing} of {len(results)} figures agree with all that the papers say; see {directory}."))

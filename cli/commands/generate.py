@@ -1,0 +1,91 @@
+"""`tachometry generate`: the core as Verilog, and a testbench for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.core import core_options
+from tachometry.cli.options.motion import FORMS, optional_motion_options
+from tachometry.cli.options.option import GroupedCommand, option
+from tachometry.spec import TachometerSpec
+from tachometry.spec.manifest import check_module_name
+
+if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
+    from tachometry.sim.encoder.virtual import Encoding
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Write a core as Verilog, with its manifest and FuseSoC file.",
+    epilog=f"""{FORMS}
+
+\b
+Examples:
+  tachometry generate --ppr 500 -o build
+  tachometry generate --ppr 2048 --clock 100MHz --tick 50us \\
+      --max-speed 6000rpm --name spindle -o rtl
+  tachometry generate --ppr 500 --clock 1MHz --tick 100us --max-time 5ms \\
+      --testbench cocotb -o sim""",
+)
+@core_options
+@option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
+@option(
+    "Files",
+    "--output",
+    "-o",
+    "directory",
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="DIR",
+    help="Directory to write to; made if it does not exist, files in it are overwritten.",
+)
+@option(
+    "Files",
+    "--testbench",
+    type=click.Choice(["cocotb"]),
+    help="Also a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. Without a "
+    "--motion the shaft goes fast and slow, to and fro, and stops, fitted to the core.",
+)
+@optional_motion_options
+def generate(
+    spec: TachometerSpec,
+    name: str,
+    directory: Path,
+    testbench: str | None,
+    record: Callable[[TachometerSpec], Encoding] | None,
+    tables: list[Path],
+) -> int:
+    """Write a core as Verilog, with its manifest and FuseSoC file.
+
+    \b
+    DIR/NAME.v     Verilog-2001 for any tool
+    DIR/NAME.json  manifest: ports, widths, units, latencies, every option
+    DIR/NAME.core  FuseSoC core file (CAPI2)
+    with --testbench cocotb also DIR/test_NAME.py and DIR/NAME_vectors.json
+
+    Equal options give equal files, byte for byte, on every machine.
+    """
+    check_module_name(name)
+    if record is not None and testbench is None:
+        raise ValueError("motion must be given together with --testbench")
+    files = [f"{name}.{suffix}" for suffix in ("v", "json", "core")]
+    if testbench:
+        files += [f"test_{name}.py", f"{name}_vectors.json"]
+    with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
+        from tachometry.hdl import export
+
+        texts = export(spec, name)
+        if testbench:
+            from tachometry.sim.testbench.vectors import cocotb_bench
+
+            texts |= cocotb_bench(spec, name, None if record is None else record(spec).recording)
+        for file, text in texts.items():
+            outputs[file].write_text(text, encoding="utf-8", newline="\n")
+    for file in files:
+        click.echo(click.format_filename(directory / file))
+    return 0

@@ -1,0 +1,144 @@
+"""`tachometry plan`: what a core can measure, before it is generated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.core import core_and_make_options
+from tachometry.cli.options.methods import Methods, named_methods
+from tachometry.cli.options.option import GroupedCommand, option, output
+from tachometry.spec import Speed, TachometerSpec
+from tachometry.spec.formats.velocity_output import NATIVE
+
+if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from tachometry.sim.studies.plan import Plan
+
+_ROWS = 12
+_SLOWEST = 1e-9  # counts per tick; keeps every number printable
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Tell what a core can measure: resolution and time over speed.",
+    epilog="""\b
+Examples:
+  tachometry plan --ppr 500 --max-speed 400rad/s
+  tachometry plan --ppr 500 --methods all --plot methods.png
+  tachometry plan --ppr 2048 --clock 100MHz --tick 50us --max-time 20ms \\
+      --speeds 1:6000rpm --plot plan.pdf --csv plan.csv""",
+)
+@core_and_make_options
+@option(
+    "Range",
+    "--speeds",
+    metavar="LO:HI",
+    help="Speeds of the tables, in rad/s (default), rev/s or rpm; a LO without unit has that of HI. "
+    "[default: one count in the maximum time to --max-speed, or to ten counts per tick]",
+)
+@option(
+    "Range",
+    "--methods",
+    metavar="LIST",
+    help="Methods to be put beside each other: all, or names with commas between, with options as in m:average=10.",
+)
+@output("--plot", suffixes=(".png", ".pdf"), help="Figure of resolution and measurement time; .png or .pdf.")
+@output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")
+def plan(
+    spec: TachometerSpec,
+    make: Callable[[str, dict[str, Any]], TachometerSpec],
+    speeds: str | None,
+    methods: str | None,
+    plot: Path | None,
+    csv: Path | None,
+) -> int:
+    """Tell what a core can measure, before it is generated.
+
+    Prints what the configuration makes of the core, and what it measures at constant speeds of an ideal encoder: mean
+    interval m_s, measurement time T_m and resolution Q_V of its method (Tsuji 2009, eqs. 4 to 20; Rairán 2013). With
+    --methods, the same of several methods beside each other, and Q_V/V and Q_V T_m. It is computed, nothing is
+    simulated.
+
+    Equal options give equal files.
+    """
+    targets = {what: path for what, path in (("--plot", plot), ("--csv", csv)) if path is not None}
+    outputs = Outputs(targets)
+    low, high, unit = _range(spec, speeds)
+    named = None if methods is None else named_methods(methods, make)
+
+    import numpy as np
+
+    from tachometry.cli.reports.plan import print_plan, print_plans
+    from tachometry.sim.studies.plan import dense_speeds, plan_at, write_plan, write_plans
+
+    rows = np.geomspace(low, high, _ROWS)
+    with outputs:
+        if targets:
+            speed = dense_speeds(spec, low, high)
+            dense, all_dense = plan_at(spec, speed), _plans(named, speed)
+        if path := outputs.get("--csv"):
+            write_plans(path, all_dense) if all_dense else write_plan(path, dense)
+        if path := outputs.get("--plot"):
+            from tachometry.sim.plots.plan import save_plan_plot, save_plans_plot
+
+            if all_dense:
+                save_plans_plot(path, spec, all_dense, unit)
+            else:
+                save_plan_plot(path, spec, dense, unit)
+    print_plan(spec, plan_at(spec, rows), unit)
+    if named is not None:
+        print_plans(_plans(named, rows), named.left_out, unit)
+    return 0
+
+
+def _plans(named: Methods | None, speed: NDArray[np.float64]) -> dict[str, Plan]:
+    """Plans of all methods at these speeds, rad/s; none without a list."""
+    from tachometry.sim.studies.plan import plan_at
+
+    specs = {} if named is None else named.specs
+    return {name: plan_at(spec, speed) for name, spec in specs.items() if spec is not None}
+
+
+def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
+    """Least and greatest speed in rad/s, and the unit to show speeds in."""
+    if text is None:
+        from tachometry.sim.studies.plan import default_range
+
+        unit = "rad/s" if spec.max_speed is None else spec.max_speed.unit
+        return *default_range(spec), unit if spec.unit == NATIVE else spec.unit
+    low, _, high = (part.strip() for part in text.partition(":"))
+    try:
+        last = Speed.parse(_with_unit(high, "rad/s"))
+        first = Speed.parse(_with_unit(low, last.unit))
+    except ValueError as error:
+        raise ValueError(f"speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not {text!r}") from error
+    counts = last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
+    if counts > spec.max_count or last.rad_per_s > spec.greatest_speed * (1 + 1e-12):
+        greatest = spec.greatest_speed / _rad_per_s(last.unit)
+        raise ValueError(
+            f"speeds must be at most {spec.greatest_speed / spec.unit_velocity:.6g} counts per tick "
+            f"({greatest:.6g}{last.unit}), "
+            f"the most that this core measures, not {text!r}"
+        )
+    if first.rad_per_s < _SLOWEST * spec.unit_velocity:
+        least = _SLOWEST * spec.unit_velocity / _rad_per_s(first.unit)
+        raise ValueError(f"speeds must be at least {least:.6g}{first.unit}, not {text!r}")
+    if first.rad_per_s >= last.rad_per_s:
+        raise ValueError(f"speeds must be LO:HI with LO less than HI, not {text!r}")
+    return first.rad_per_s, last.rad_per_s, last.unit
+
+
+def _with_unit(number: str, unit: str) -> str:
+    return number + unit if number.endswith(tuple("0123456789.")) else number
+
+
+def _rad_per_s(unit: str) -> float:
+    return Speed(Fraction(1), unit).rad_per_s

@@ -1,0 +1,241 @@
+"""`tachometry sweep`: many cores on many motions, on all processors."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.motion import FORMS, tables_of
+from tachometry.cli.options.option import INTERRUPTED, GroupedCommand, option, output
+from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
+from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
+from tachometry.spec.units import parse_time, plural
+
+if TYPE_CHECKING:  # numpy, pyarrow and Dask are slow to import, and --help needs none of them
+    from tachometry.cli.sweeping.points import Points
+    from tachometry.sim.studies.sweep_results import Results
+
+# What a heat map can show: the column, what it is, and whether colours go by its logarithm.
+METRICS = {
+    "relative-error": ("relative_error", "RMS error over true speed", True),
+    "rms-error": ("rms_error_rad_s", "RMS error (rad/s)", True),
+    "max-error": ("max_error_rad_s", "greatest error (rad/s)", True),
+    "delay": ("delay_s", "delay (s)", False),
+    "mean-time": ("mean_time_s", "mean measurement time (s)", True),
+    "worst-time": ("worst_time_s", "longest measurement time (s)", True),
+    "updates": ("updates_per_s", "updates per second", True),
+    "mismatches": ("mismatches", "mismatches", False),
+}
+
+
+class _Command(GroupedCommand):
+    """A command whose options may stand in a file, too, and may be varied: then the first value stands for all."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        own = super().get_params(ctx)
+        return [*own, *(option for option in POINT_OPTIONS.values() if option not in own)]
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        raw, _, _ = self.make_parser(ctx).parse_args(list(args))
+        asked = self.get_help_option(ctx)
+        if asked is not None and raw.get(asked.name or ""):
+            return super().parse_args(ctx, args)
+        options = by_name(self) | POINT_OPTIONS
+        file = raw.get("file")
+        settings = of_command_line(raw, options)
+        if isinstance(file, str):
+            settings = settings.over(of_file(Path(file), options))
+        ctx.obj = settings
+        first = {name: text for name, text in settings.first().items() if name in options}
+        words = [*arguments(first, options), *([file] if isinstance(file, str) else [])]
+        return super().parse_args(ctx, words)
+
+
+@click.command(
+    cls=_Command,
+    short_help="Run methods over ranges of options and speeds, on all processors.",
+    epilog=f"""{FORMS}
+
+\b
+Examples:
+  tachometry sweep docs/sweep.toml
+  tachometry sweep --ppr 500 --motion "constant:{{speed}}:200ms" \\
+      --vary speed=1rad/s..1000rad/s:20log --vary tick=10us,20us,50us \\
+      --methods s,mt --results sweep.parquet --plot sweep.png
+  tachometry sweep docs/sweep.toml --vary seed=1..10:10 \\
+      --scheduler tcp://host:8786""",
+)
+@click.argument("file", required=False, type=click.Path(path_type=Path))
+@option(
+    "Sweep",
+    "--vary",
+    multiple=True,
+    metavar="NAME=VALUES",
+    help="An axis: the name of an option of cores, methods, motion or encoder, or a name in braces within --motion. "
+    "Values with commas between; LO..HI:N are N of them, evenly spaced, LO..HI:Nlog as their logarithms are; none "
+    "is without the option. May be given several times: all combinations are run.",
+)
+@option(
+    "Sweep",
+    "--methods",
+    default="all",
+    metavar="LIST",
+    help="Names with commas between, with options as in m:average=10.",
+)
+@option(
+    "Sweep",
+    "--from",
+    "start",
+    metavar="TIME",
+    help="Leave out errors before this time, in s, ms, us or ns. [default: until there is a value]",
+)
+@option(
+    "Sweep",
+    "--engine",
+    type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"]),
+    help="Run the hardware, too, as simulate does, in lockstep with the golden model. [default: the golden model, "
+    "which it equals bit for bit]",
+)
+@option("Machines", "--jobs", type=int, metavar="N", help="Processes on this machine. [default: one for each core]")
+@option(
+    "Machines",
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Workers of a Dask scheduler instead, such as tcp://host:8786, with the same version of tachometry.",
+)
+@output(
+    "--results",
+    suffixes=(".parquet",),
+    help="Parquet with a row per point. Points that are in it already do not run again.",
+)
+@output("--plot", suffixes=(".png", ".pdf"), help="Heat map over two axes, a panel per method; .png or .pdf.")
+@option("Outputs", "--axes", metavar="X,Y", help="Axes of the heat map. [default: the first two]")
+@option(
+    "Outputs",
+    "--metric",
+    type=click.Choice(list(METRICS)),
+    default="relative-error",
+    metavar="METRIC",
+    help=f"What the heat map shows, the median over all other axes: {', '.join(METRICS)}.",
+)
+@click.pass_obj
+def sweep(
+    settings: Settings,
+    file: Path | None,
+    methods: str,
+    start: str | None,
+    engine: str | None,
+    jobs: int | None,
+    scheduler: str | None,
+    results: Path | None,
+    plot: Path | None,
+    axes: str | None,
+    metric: str,
+    **_: Any,
+) -> int:
+    """Run methods over ranges of options and speeds, on all processors.
+
+    FILE is a sweep in TOML: keys are the options of this command, and a table [vary] has the axes. What is given on the
+    command line replaces it.
+
+    Every method is run at every combination of the values of the axes, each point on a virtual encoder of its own, by
+    the golden model of the core, and compared with the shaft's speed. An option that only some methods have is for
+    these. Points run in processes of this machine, or on a cluster.
+
+    Ctrl-C ends the sweep; what is done is in --results, and the same command goes on from there. Exit status 1 if
+    hardware and golden model differ. Needs the extra `sweep`.
+    """
+    from tachometry.sim.studies import cluster
+
+    cluster.require()
+    earliest = 0.0 if start is None else float(parse_time("from", start))
+    if earliest < 0:
+        raise ValueError(f"from must be at least 0, not {start}")
+    if jobs is not None and scheduler is not None:
+        raise ValueError("jobs must not be given together with --scheduler")
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs must be at least 1, not {jobs}")
+
+    from tachometry.cli.reports.sweep import print_sweep
+    from tachometry.cli.sweeping.points import points_of
+    from tachometry.sim.engines.pick import pick
+    from tachometry.sim.studies.sweep_results import Results
+
+    if engine == "auto":
+        engine = pick(engine).name
+    found = points_of(settings, methods, earliest, engine)
+    shown = {} if plot is None else _axes(axes, found)
+    inputs = [*([] if file is None else [file]), *_tables(settings)]
+    every = {"--results": results, "--plot": plot}
+    Outputs({what: path for what, path in every.items() if path is not None}, inputs=inputs)
+    outputs = Outputs({} if plot is None else {"--plot": plot})
+    with outputs, Results(results, list(found.points), found.values) as kept:
+        begun = time.monotonic()
+        missing = kept.missing
+        _run(kept, found, missing, scheduler, jobs, results)
+        if (path := outputs.get("--plot")) is not None:
+            from tachometry.sim.plots.sweep import save_heat_maps
+
+            column, what, log = METRICS[metric]
+            columns = kept.columns("point", "method", column)
+            at = [found.at[point] for point in columns["point"]]
+            save_heat_maps(path, columns["method"], at, columns[column], shown, what, log)
+        n_wrong = print_sweep(kept, found, len(missing), time.monotonic() - begun, results)
+    return 1 if n_wrong else 0
+
+
+def _run(
+    kept: Results,
+    found: Points,
+    missing: list[str],
+    scheduler: str | None,
+    jobs: int | None,
+    results: Path | None,
+) -> None:
+    """Run the points that are missing; Ctrl-C ends it early."""
+    from rich.progress import MofNCompleteColumn, TextColumn
+
+    from tachometry.cli.reports.run import PerSecond, progress_bar
+    from tachometry.sim.studies import cluster
+
+    if not missing:
+        return
+    columns = (MofNCompleteColumn(), TextColumn("points"), PerSecond("points"))
+    n_done = len(found.points) - len(missing)
+    try:
+        with (
+            cluster.cluster(scheduler, jobs) as client,
+            progress_bar("sweeping", len(missing), *columns) as report,
+        ):
+            arriving = cluster.rows(client, {point: found.points[point] for point in missing})
+            for done, row in enumerate(arriving, 1):
+                kept.add(row)
+                n_done += 1
+                if report is not None:
+                    report(done)
+    except KeyboardInterrupt:
+        where = f", kept in {results}" if results is not None and n_done else ""
+        click.echo(f"tachometry: interrupted after {n_done} of {plural(len(found.points), 'point')}{where}", err=True)
+        raise click.exceptions.Exit(INTERRUPTED) from None
+
+
+def _tables(settings: Settings) -> list[Path]:
+    motions = settings.vary.get("motion") or [settings.fixed.get("motion")]
+    return [table for motion in motions if motion is not None for table in tables_of(motion)]
+
+
+def _axes(text: str | None, found: Points) -> dict[str, list[str]]:
+    """Axes of the heat map with their values: across, and upwards if there are two."""
+    varied = {name: values for name, values in found.axes.items() if len(values) > 1}
+    if not varied:
+        raise ValueError("vary must be given together with --plot, with two values or more")
+    if text is None:
+        return dict(list(varied.items())[:2])
+    names = [name.strip() for name in text.split(",")]
+    if len(names) > 2 or len(set(names)) < len(names) or not set(names) <= set(varied):
+        raise ValueError(f"axes must be one or two of {', '.join(varied)}, not {text!r}")
+    return {name: varied[name] for name in names}

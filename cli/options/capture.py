@@ -1,0 +1,63 @@
+"""Options of captures: which channels are the encoder's lines."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tachometry.cli.options.option import all_of, option
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import parse_frequency
+
+if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
+    from tachometry.sim.signals.recording import Recording
+
+_CAPTURE = "Capture"
+
+_OPTIONS = [
+    option(_CAPTURE, "--a", metavar="CHANNEL", help="Line A: name of the channel, or its number from 0."),
+    option(
+        _CAPTURE,
+        "--b",
+        metavar="CHANNEL",
+        help="Line B. Without both options: the channels named A and B, else the first two.",
+    ),
+    option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index. With --index: z, if it is not given."),
+    option(
+        _CAPTURE,
+        "--tick-in",
+        metavar="CHANNEL",
+        help="The external tick. With --external-tick: tick_in, if it is not given.",
+    ),
+    option(
+        _CAPTURE,
+        "--samplerate",
+        metavar="FREQUENCY",
+        help="Samplerate, in Hz (plain number), kHz, MHz or GHz, of a .sr file that does not tell it.",
+    ),
+]
+
+
+def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: handed to the command as `read`, which reads a capture for a spec."""
+
+    @functools.wraps(command)
+    def build(
+        *, a: str | None, b: str | None, z: str | None, tick_in: str | None, samplerate: str | None, **others: Any
+    ) -> Any:
+        def read(capture: Path, spec: TachometerSpec) -> Recording:
+            from tachometry.sim.captures.read import read_capture
+
+            index = "z" if z is None and spec.index else z
+            tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
+            return read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), index, tick)
+
+        return command(read=read, **others)
+
+    return all_of(_OPTIONS, build)
+
+
+def _samplerate(text: str) -> float:
+    return float(parse_frequency("samplerate", int(text) if text.isdecimal() else text))

@@ -1,0 +1,59 @@
+"""Options of the simulation: what runs the hardware, and which part of it the waveform shows."""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from tachometry.cli.options.option import all_of, option
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import parse_time
+
+_SIMULATION = "Simulation"
+
+_ENGINE_OPTIONS = [
+    option(
+        _SIMULATION,
+        "--engine",
+        type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"]),
+        default="auto",
+        help="pysim is Amaranth's simulator, some 10,000 clocks a second; cxxrtl is compiled, some 10,000,000 and "
+        "more, needs a C++ compiler, and some seconds when a core is new. auto is cxxrtl with a compiler, else "
+        "pysim. verilator is compiled from the exported Verilog.",
+    ),
+    option(_SIMULATION, "--vcd-from", metavar="TIME", help="Where --vcd begins; a plain number is clocks."),
+    option(_SIMULATION, "--vcd-to", metavar="TIME", help="Where it ends."),
+]
+
+
+def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: handed to the command as `engine`, a name, and `window`, a function of spec and number of clocks.
+
+    The function gives the first clock of the waveform and the one after the last; ValueError if there is none.
+    """
+
+    @functools.wraps(command)
+    def collect(*, vcd_from: str | None, vcd_to: str | None, **others: Any) -> Any:
+        def window(spec: TachometerSpec, n_clocks: int) -> tuple[int, int]:
+            begin = 0 if vcd_from is None else _clock("vcd_from", vcd_from, spec)
+            end = n_clocks if vcd_to is None else min(_clock("vcd_to", vcd_to, spec), n_clocks)
+            if begin >= end:
+                raise ValueError(f"vcd_from must be before --vcd-to and the end of the run, clock {end}, not {begin}")
+            return begin, end
+
+        if (vcd_from is not None or vcd_to is not None) and "--vcd" not in others["targets"]:
+            raise ValueError("vcd must be given together with --vcd-from and --vcd-to")
+        return command(window=window, **others)
+
+    return all_of(_ENGINE_OPTIONS, collect)
+
+
+def _clock(what: str, text: str, spec: TachometerSpec) -> int:
+    """The clock in which an instant lies."""
+    if text.isdecimal():
+        return int(text)
+    seconds = parse_time(what, text)
+    if seconds < 0:
+        raise ValueError(f"{what} must be at least 0, not {text}")
+    return int(seconds * spec.timing.clock_hz)

@@ -1,0 +1,80 @@
+"""Lists of methods, such as `s,m:average=10`, and what is left out of `all`."""
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+from typing import Any
+
+from tachometry.cli.options.core import method_options_of_text
+from tachometry.cli.options.option import in_terms_of_options
+from tachometry.spec import METHODS, TachometerSpec
+
+
+@dataclass(frozen=True)
+class Methods:
+    """What a list of methods names.
+
+    Parameters
+    ----------
+    specs : dict of str to TachometerSpec or None
+        By name, in order; None for what is no method of a core.
+    left_out : dict of str to str
+        Methods of `all` that cannot be with these options, and why.
+    """
+
+    specs: dict[str, TachometerSpec | None]
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+def named_methods(
+    text: str, make: Callable[[str, dict[str, Any]], TachometerSpec], others: Collection[str] = ()
+) -> Methods:
+    """The methods of a list with commas, `all` being every method and all `others`.
+
+    Parameters
+    ----------
+    text : str
+        Of names, a core's with options after a colon: `m:average=10`.
+    make : callable
+        See `core_options.common_options`.
+    others : collection of str
+        Names that are no methods of cores.
+
+    Raises
+    ------
+    ValueError
+        If a name is not known, or a method that is named cannot be with its options.
+    """
+    if text.strip() == "all":
+        specs: dict[str, TachometerSpec | None] = {}
+        left_out = {}
+        make(next(iter(METHODS)), {})  # what is wrong for all is told at once
+        for name in METHODS:
+            try:
+                specs[name] = make(name, {})
+            except ValueError as error:
+                left_out[name] = in_terms_of_options(str(error))
+        return Methods(specs | dict.fromkeys(others), left_out)
+    specs = {}
+    for name, method, given in listed_methods(text, others):
+        specs[name] = None if method is None else make(method, given)
+    return Methods(specs)
+
+
+def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, dict[str, Any]]]:
+    """What is in a list with commas: each with its method, None of `others`, and what is given of its options.
+
+    Raises
+    ------
+    ValueError
+        If a name is not known.
+    """
+    found: list[tuple[str, str | None, dict[str, Any]]] = []
+    for name in (word.strip() for word in text.split(",")):
+        method, *words = name.split(":")
+        if method in METHODS:
+            found.append((name, method, method_options_of_text(method, words)))
+        elif name in others:
+            found.append((name, None, {}))
+        else:
+            raise ValueError(f"methods must be of {', '.join([*METHODS, *others])}, or all, not {name!r}")
+    return found

@@ -1,0 +1,186 @@
+"""Options of the virtual encoder: how the shaft moves, and what is wrong with the encoder."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tachometry.cli.options.option import all_of, option
+from tachometry.spec import TachometerSpec
+
+if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
+    from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+
+_MOTION, _FAULTS = "Motion", "Encoder faults"
+
+FORMS = """\b
+Motions, joined by + into one:
+  constant:SPEED:TIME
+  ramp:FROM:TO:TIME
+  sine:AMPLITUDE:FREQUENCY:TIME
+  trapezoid:SPEED:ACCEL_TIME:HOLD_TIME
+  stop:TIME
+  csv:FILE    alone: a table with the header time,angle_rad in s and rad
+Units: rad/s (default), rev/s, rpm; s (default), ms, us; Hz (default), kHz."""
+
+
+def _motion(required: bool) -> Callable[[Any], Any]:
+    return option(
+        _MOTION,
+        "--motion",
+        required=required,
+        metavar="MOTION",
+        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below.",
+    )
+
+
+_OPTIONS = [
+    option(
+        _MOTION,
+        "--vibration",
+        metavar="AMPL:FREQ",
+        help="Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz or kHz); part of the truth.",
+    ),
+    option(
+        _FAULTS,
+        "--jitter",
+        type=float,
+        default=0,
+        metavar="FRACTION",
+        help="Gaussian jitter of each edge in time: standard deviation over the gap to the nearer neighbour, below "
+        "0.5.",
+    ),
+    option(
+        _FAULTS,
+        "--nonuniformity",
+        type=float,
+        default=0,
+        metavar="FRACTION",
+        help="Edges of the disc are off by up to this many edge pitches, below 0.5, the same in every turn.",
+    ),
+    option(
+        _FAULTS,
+        "--phase-error",
+        type=float,
+        default=0,
+        metavar="DEGREES",
+        help="B's pulse comes this many electrical degrees later than 90 after A's, between -90 and 90.",
+    ),
+    option(
+        _FAULTS,
+        "--duty-error",
+        type=float,
+        default=0,
+        metavar="DEGREES",
+        help="Pulses of A and B are this many electrical degrees wider than 180, between -90 and 90.",
+    ),
+    option(
+        _FAULTS,
+        "--bounce",
+        metavar="COUNT:TIME",
+        help="Contact bounce, such as 3:500us (s, ms or us): after an edge the line falls back COUNT times within "
+        "TIME, or within half the way to the next edge.",
+    ),
+    option(
+        _FAULTS,
+        "--lost",
+        type=float,
+        default=0,
+        metavar="PROBABILITY",
+        help="Probability that a line misses a pulse: it stays low, and two edges are lost.",
+    ),
+    option(
+        _FAULTS,
+        "--illegal",
+        type=float,
+        default=0,
+        metavar="PROBABILITY",
+        help="Probability that an edge comes together with the next one: both lines change at once.",
+    ),
+    option(
+        _FAULTS, "--seed", type=int, default=0, metavar="N", help="Of all random numbers; equal seeds, equal files."
+    ),
+]
+
+
+def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the options of the virtual encoder, handed to the command as two arguments.
+
+    `record` gives what the encoder of a spec records of the motion; `tables` are the files that it reads.
+    """
+    return all_of([_motion(required=True), *_OPTIONS], _recording(command))
+
+
+def optional_motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the same, but without a motion `record` is None."""
+    return all_of([_motion(required=False), *_OPTIONS], _recording(command))
+
+
+def encoder_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the same, handed to the command as `motion`, a text, and `encoder`, a function of a spec."""
+    return all_of([_motion(required=True), *_OPTIONS], _encoding(command))
+
+
+def tables_of(motion: str) -> list[Path]:
+    """Files that a motion reads."""
+    kind, _, table = motion.strip().partition(":")
+    return [Path(table)] if kind == "csv" else []
+
+
+def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
+
+    @functools.wraps(command)
+    def build(*, motion: str | None, encoder: Callable[[TachometerSpec], VirtualEncoder], **others: Any) -> Any:
+        def record(spec: TachometerSpec) -> Encoding:
+            from tachometry.sim.encoder.motion import parse_motion
+
+            assert motion is not None
+            return encoder(spec).record(parse_motion(motion))
+
+        if motion is None:
+            return command(record=None, tables=[], **others)
+        return command(record=record, tables=tables_of(motion), **others)
+
+    return _encoding(build)
+
+
+def _encoding(command: Callable[..., Any]) -> Callable[..., Any]:
+
+    @functools.wraps(command)
+    def build(
+        *,
+        vibration: str | None,
+        jitter: float,
+        nonuniformity: float,
+        phase_error: float,
+        duty_error: float,
+        bounce: str | None,
+        lost: float,
+        illegal: float,
+        seed: int,
+        **others: Any,
+    ) -> Any:
+        def encoder(spec: TachometerSpec) -> VirtualEncoder:
+            from tachometry.sim.encoder.imperfections import Bounce
+            from tachometry.sim.encoder.motion import Vibration
+            from tachometry.sim.encoder.virtual import VirtualEncoder
+
+            return VirtualEncoder(
+                spec.encoder.pulses_per_rev,
+                vibration=None if vibration is None else Vibration.parse(vibration),
+                jitter=jitter,
+                nonuniformity=nonuniformity,
+                illegal=illegal,
+                seed=seed,
+                phase_error_deg=phase_error,
+                duty_error_deg=duty_error,
+                bounce=None if bounce is None else Bounce.parse(bounce),
+                lost=lost,
+                index=spec.index,
+            )
+
+        return command(encoder=encoder, **others)
+
+    return build

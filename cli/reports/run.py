@@ -1,0 +1,190 @@
+"""What a command tells the user: how far a simulation is, and what came of it."""
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from tachometry.cli.options.option import INTERRUPTED
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.signals.run import Mismatch, Run
+from tachometry.sim.signals.tables import held_velocity, velocity_error
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import format_time
+
+_PATIENCE = 2.0  # seconds of work without a bar
+_PLAIN_WIDTH = 100  # columns where there is no terminal
+
+
+@contextmanager
+def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[Callable[[float], None] | None]:
+    """A function to be called with how much of `total` is done.
+
+    It shows a bar on stderr as soon as the work is seen to take more than two seconds; None if stderr is no terminal.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    begun = time.monotonic()
+    with ExitStack() as stack:
+        bar = Progress(
+            TextColumn(verb),
+            BarColumn(),
+            *columns,
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        task = bar.add_task(verb, total=total)
+
+        def update(done: float) -> None:
+            if not bar.live.is_started and (time.monotonic() - begun) * total > _PATIENCE * done:
+                stack.enter_context(bar)
+            bar.update(task, completed=done)
+
+        yield update
+
+
+def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
+    """The same, of clocks that are simulated."""
+    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), PerSecond("clocks"))
+
+
+class PerSecond(ProgressColumn):
+    """How fast it goes."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__()
+        self._what = what
+
+    def render(self, task: Task) -> Text:
+        return Text("" if task.speed is None else f"{task.speed:.3g} {self._what}/s")
+
+
+def interrupted(n_clocks: int, wanted: int) -> int:
+    """Tell that a simulation has been ended early; the exit status."""
+    print(f"tachometry: interrupted after {n_clocks} of {wanted} clocks", file=sys.stderr)
+    return INTERRUPTED
+
+
+def print_summary(
+    spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int, first: list[Mismatch], engine: str
+) -> None:
+    """Print the table and the verdict on stdout."""
+    print_rows([("engine", engine), *summary(spec, run, truth, n_mismatches)])
+    console = stdout_console()
+    for mismatch in first:
+        console.print(Text(f"first mismatch in {mismatch}"))
+    console.print(_verdict(run, n_mismatches))
+
+
+def stdout_console() -> Console:
+    """Where to print: as wide as the terminal, or the same everywhere if there is none."""
+    return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
+
+
+def print_rows(rows: list[tuple[str, str]]) -> None:
+    """Print a table of names and values on stdout."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(Text(name), Text(value))
+    stdout_console().print(table)
+
+
+def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int) -> list[tuple[str, str]]:
+    """Rows of the table: what is told, and its value."""
+    updates = run.updates
+    n_overflows = int(np.count_nonzero(run.ticks.overflow))
+    rows = [
+        (
+            "simulated",
+            f"{run.n_clocks} clocks ({format_time(spec.seconds(run.n_clocks))}), {len(run.ticks.clock)} ticks",
+        ),
+        ("updates", f"{len(updates.clock)} ({np.count_nonzero(updates.forced)} of them forced)"),
+        ("mismatches", str(n_mismatches)),
+        *_counts(spec, run, truth),
+        ("errors flagged", _flagged(run, truth)),
+    ]
+    if truth is not None and truth.n_lost:
+        rows.append(("edges lost", f"{truth.n_lost} (pulses that the encoder missed: {truth.n_lost // 2})"))
+    if spec.filter_clocks:
+        rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
+    if spec.index:
+        last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
+        rows.append(("index", f"{len(run.index.clock)} times{last}"))
+    if spec.max_tick_cycles:
+        rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
+    if n_overflows:
+        rows.append(("overflow", f"{n_overflows} ticks: faster than --max-speed, velocity saturated"))
+    if n_saturated := int(np.count_nonzero(updates.velocity_overflow)):
+        rows.append(("velocity overflow", f"{n_saturated} updates: beyond --velocity-width, saturated"))
+    return rows + _errors(spec, run, truth)
+
+
+def counts_in(spec: TachometerSpec, run: Run, truth: Encoding) -> int:
+    """Counts that the shaft has made up to the pin sample that the last tick can hold."""
+    clock = int(run.ticks.clock[-1]) - spec.tick_latency - spec.pin_to_count
+    return int(truth.true_position(_sampled(max(clock, 0), spec.timing.clock_hz), spec.encoder.decoding))
+
+
+def _sampled(clock: int, clock_hz: int) -> float:
+    """The last instant that `Recording.place` puts at or before clock edge `clock`, in seconds."""
+    instant = clock / clock_hz
+    while instant * clock_hz > clock:
+        instant = math.nextafter(instant, 0)
+    while (later := math.nextafter(instant, math.inf)) * clock_hz <= clock:
+        instant = later
+    return instant
+
+
+def _counts(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tuple[str, str]]:
+    # An index that resets the position does not undo what has been counted.
+    out = int(run.ticks.pulse_count.sum() if spec.index_reset else run.ticks.position[-1])
+    if truth is None:
+        return [("counts in", "unknown"), ("counts out", str(out))]
+    into = counts_in(spec, run, truth)
+    half = 1 << (spec.position_width - 1)  # the position may have wrapped
+    lost = (out - into + half) % (2 * half) - half
+    difference = f" ({lost:+d})" if lost else ""
+    return [("counts in", str(into)), ("counts out", f"{out}{difference}")]
+
+
+def _flagged(run: Run, truth: Encoding | None) -> str:
+    if truth is None:
+        return str(len(run.errors))
+    hint = "; the others are edges within one clock" if len(run.errors) > truth.n_illegal else ""
+    return f"{len(run.errors)} (the encoder made {truth.n_illegal} illegal transitions{hint})"
+
+
+def _errors(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tuple[str, str]]:
+    name = "velocity error"
+    if truth is None:
+        return [(name, "unknown: a capture does not tell the true speed")]
+    error = velocity_error(held_velocity(spec, run), truth.true_speed)
+    if error is None:
+        return [(name, "unknown: there was no update")]
+    return [
+        (f"{name}, RMS", f"{error.rms:.6g} rad/s"),
+        (f"{name}, max", f"{error.max:.6g} rad/s"),
+        (f"{name}, mean", f"{error.mean:.6g} rad/s"),
+        ("", "of the held velocity against the shaft's, at every tick after the first update"),
+    ]
+
+
+def _verdict(run: Run, n_mismatches: int) -> Text:
+    if n_mismatches:
+        return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
+    return Text(
+        f"PASS: hardware and golden model agree in every bit of {len(run.updates.clock)} updates "
+        f"and {len(run.ticks.clock)} ticks",
+        style="bold green",
+    )

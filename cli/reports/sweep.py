@@ -1,0 +1,82 @@
+"""What `tachometry sweep` prints at its end."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+from rich.text import Text
+
+from tachometry.cli.reports.run import stdout_console
+from tachometry.spec.units import format_time, plural
+
+if TYPE_CHECKING:
+    from tachometry.cli.sweeping.points import Points
+    from tachometry.sim.studies.sweep_results import Results
+
+_HEADS = (*("method", "points", "error/V", "worst", "RMS (rad/s)", "worst", "delay", "T_m", "worst", "updates/s"),)
+
+
+def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, results: Path | None) -> int:
+    """Print a row per method, of all its points, and what was run; values in which the hardware was wrong."""
+    columns = kept.columns(
+        *("method", "relative_error", "rms_error_rad_s", "delay_s", "mean_time_s", "worst_time_s", "updates_per_s"),
+        *("mismatches", "clocks"),
+    )
+    checked = [wrong for wrong in columns["mismatches"] if wrong is not None]
+    heads = (*_HEADS, *(["differ"] if checked else []))
+    table = Table(box=None, pad_edge=False, header_style="")
+    for head in heads:
+        table.add_column(head, justify="left" if head == heads[0] else "right", no_wrap=True)
+    for method in dict.fromkeys(columns["method"]):
+        rows = [k for k, name in enumerate(columns["method"]) if name == method]
+        of = {name: [values[k] for k in rows if values[k] is not None] for name, values in columns.items()}
+        cells = (
+            method,
+            str(len(rows)),
+            *(_number(kind(of["relative_error"], default=None), 100, "%") for kind in (_median, max)),
+            *(_number(kind(of["rms_error_rad_s"], default=None)) for kind in (_median, max)),
+            _time(_median(of["delay_s"])),
+            _time(_median(of["mean_time_s"])),
+            _time(max(of["worst_time_s"], default=None)),
+            _number(_median(of["updates_per_s"])),
+            *([str(sum(of["mismatches"]))] if checked else []),
+        )
+        table.add_row(*map(Text, cells))
+    console = stdout_console()
+    console.print(table)
+    console.print("\nMedians of all points, and the worst. error/V: RMS error over RMS of the true speed.")
+    for name, reason in found.left_out.items():
+        console.print(Text(f"{name}: left out: {reason}"))
+    n_points = plural(len(found.points), "point")
+    rate = f", {n_run} of them run in {_time(seconds)}, {n_run / seconds:.3g} a second" if n_run else ", none run anew"
+    where = "" if results is None else f"; rows in {results}"
+    console.print(Text(f"{n_points}{rate}{where}"), soft_wrap=True)
+    if checked:
+        console.print(_verdict(sum(checked), len(checked), sum(columns["clocks"])))
+    return sum(checked)
+
+
+def _verdict(n_wrong: int, n_points: int, n_clocks: int) -> Text:
+    if n_wrong:
+        return Text(f"FAIL: hardware and golden model differ in {plural(n_wrong, 'value')}", style="bold red")
+    told = f"PASS: hardware and golden model agree in every bit of {plural(n_points, 'point')}, {n_clocks} clocks"
+    return Text(told, style="bold green")
+
+
+def _median(values: list[float], default: None = None) -> float | None:
+    return median(values) if values else default
+
+
+def _number(value: float | None, scale: float = 1, unit: str = "") -> str:
+    return "-" if value is None else f"{value * scale:.3g}{unit}"
+
+
+def _time(seconds: float | None) -> str:
+    """A time to three digits."""
+    if seconds is None:
+        return "-"
+    return ("-" if seconds < 0 else "") + format_time(Fraction(f"{abs(seconds):.3g}"))

@@ -1,0 +1,174 @@
+"""The points of a sweep: every method at every combination of the values of its axes."""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import product
+from typing import Any
+
+import click
+
+from tachometry.cli.options.core import method_options_of_text, methods_with
+from tachometry.cli.options.methods import listed_methods
+from tachometry.cli.options.option import in_terms_of_options
+from tachometry.cli.options.sweep import CORE, ENCODER, POINT_OPTIONS, by_name
+from tachometry.cli.sweeping.settings import Settings, Text, arguments
+from tachometry.sim.encoder.motion import FREQUENCY, SPEED, TIME, Units, parse_motion, parse_number
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.studies.sweep import COLUMNS, Point
+from tachometry.spec import METHODS, TachometerSpec
+
+Words = tuple[str, ...]
+
+_MOST = 1_000_000  # points
+_PLACE = re.compile(r"\{([^{}]*)\}")
+_UNITS: Units = SPEED | TIME | FREQUENCY
+
+
+@dataclass(frozen=True)
+class Points:
+    """The points of a sweep.
+
+    Parameters
+    ----------
+    points : dict of str to Point
+        By their digests, in order.
+    at : dict of str to dict
+        Where each is: values of the axes that its method has.
+    axes : dict of str to list of str
+        All values of each axis.
+    left_out : dict of str to str
+        Methods of `all` that cannot be everywhere, and why.
+    """
+
+    points: dict[str, Point]
+    at: dict[str, dict[str, str]]
+    axes: dict[str, list[str]]
+    left_out: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def values(self) -> list[str]:
+        """What is varied within the motion."""
+        return list(dict.fromkeys(name for point in self.points.values() for name in point.values))
+
+
+def points_of(settings: Settings, methods: str, earliest: float, engine: str | None) -> Points:
+    """All points of a sweep.
+
+    An option that not all methods have is for those that have it; `tick` is not for a method that has its `dt`.
+
+    Parameters
+    ----------
+    settings : Settings
+        Options of cores and encoder, and axes.
+    methods : str
+        See `listed_methods`, or `all`: then those that cannot be are left out.
+    earliest : float, seconds
+    engine : str or None
+
+    Raises
+    ------
+    ValueError
+        If an axis is not known, or a point cannot be.
+    """
+    everything = methods.strip() == "all"
+    listed = [(name, name, {}) for name in METHODS] if everything else listed_methods(methods)
+    _check_axes(settings, {method for _, method, _ in listed if method is not None})
+    own = [[name for name in settings.vary if _has(settings, str(method), name)] for _, method, _ in listed]
+    count = sum(math.prod(len(settings.vary[name]) for name in names) for names in own)
+    if count > _MOST:
+        raise ValueError(f"vary must give at most {_MOST} points, not {count}")
+    maker = _Maker(earliest, engine)
+    found = Points({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
+    for (name, method, given), names in zip(listed, own, strict=True):
+        assert method is not None
+        fixed = {key: text for key, text in settings.fixed.items() if _has(settings, method, key)}
+        for values in product(*(settings.vary[key] for key in names)):
+            at = dict(zip(names, values, strict=True))
+            try:
+                point = maker.point(name, method, given, fixed | at)
+            except (ValueError, click.UsageError) as error:
+                message = in_terms_of_options(
+                    error.format_message() if isinstance(error, click.UsageError) else str(error)
+                )
+                where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
+                message += f" (method {name}{', ' * bool(where)}{where})"
+                if everything and name != listed[0][0]:
+                    found.left_out.setdefault(name, message)
+                    continue
+                raise ValueError(message) from None
+            found.points.setdefault(point.digest, point)
+            found.at.setdefault(point.digest, {key: text or "none" for key, text in at.items()})
+    return found
+
+
+def _has(settings: Settings, method: str, name: str) -> bool:
+    """Whether an option is for a method."""
+    own_ticks = METHODS[method].own_ticks
+    if name == "dt":
+        return own_ticks
+    if name == "tick" and own_ticks:
+        return not ("dt" in settings.fixed or "dt" in settings.vary)
+    return not methods_with(name) or method in methods_with(name)
+
+
+def _check_axes(settings: Settings, methods: set[str]) -> None:
+    motions = settings.vary.get("motion") or [settings.fixed.get("motion")]
+    places = {name for motion in motions for name in _PLACE.findall(motion or "")}
+    for name in settings.vary:
+        if name not in POINT_OPTIONS and name not in places:
+            raise ValueError(
+                f"vary must be of {', '.join(POINT_OPTIONS)}, or of a name in braces within --motion, such as "
+                f"{{speed}}, not {name!r}"
+            )
+    for name in places:
+        if re.fullmatch(r"[a-z]\w*", name, re.ASCII) is None or name in POINT_OPTIONS or name in COLUMNS:
+            raise ValueError(f"motion must have names in braces that are no option or column, not {name!r}")
+        if name not in settings.vary:
+            raise ValueError(f"vary must have values for {{{name}}} of --motion, such as --vary {name}=1,2,5")
+    for name in (*settings.fixed, *settings.vary):
+        if (has := methods_with(name)) and not methods & set(has):
+            raise ValueError(f"{name} must be given with a method that has it: {', '.join(has)}")
+
+
+class _Maker:
+    """Makes points; what many of them share is made once."""
+
+    def __init__(self, earliest: float, engine: str | None) -> None:
+        self._earliest, self._engine = earliest, engine
+        self._spec, self._encoder, self._motion = cache(_spec), cache(_parsed_encoder), cache(parse_motion)
+
+    def point(self, name: str, method: str, given: Mapping[str, Any], texts: Mapping[str, Text]) -> Point:
+        """The point of a method, of whose options some are given, with texts of options and of names in the motion."""
+        own = {key: text for key, text in texts.items() if methods_with(key) and key not in given and text is not None}
+        given = dict(given) | method_options_of_text(method, [f"{key}={text}" for key, text in own.items()])
+        spec = self._spec(_words(texts, CORE), method, tuple(given.items()))
+        encoder, motion = self._encoder(_words(texts, ENCODER))
+        places = {key: texts[key] or "" for key in _PLACE.findall(motion)}
+        values = {key: parse_number(text, _UNITS, key) for key, text in places.items()}
+        motion = _PLACE.sub(lambda place: places[place[1]], motion)
+        moved = self._motion(motion)
+        return Point(name, spec, encoder(spec), moved, motion, values, self._earliest, self._engine)
+
+
+def _words(texts: Mapping[str, Text], command: click.Command) -> Words:
+    options = by_name(command)
+    return tuple(arguments({name: text for name, text in texts.items() if name in options}, options))
+
+
+def _spec(words: Words, method: str, given: tuple[tuple[str, Any], ...]) -> TachometerSpec:
+    make = _invoked(CORE, words)
+    spec: TachometerSpec = make(method, dict(given))
+    return spec
+
+
+def _parsed_encoder(words: Words) -> tuple[Callable[[TachometerSpec], VirtualEncoder], str]:
+    found: tuple[Callable[[TachometerSpec], VirtualEncoder], str] = _invoked(ENCODER, words)
+    return found
+
+
+def _invoked(command: click.Command, words: Words) -> Any:
+    with command.make_context("sweep", list(words)) as context:
+        return command.invoke(context)

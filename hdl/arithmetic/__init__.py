@@ -1,0 +1,1 @@
+"""Arithmetic that several datapaths share: reciprocals, scalers, dividers."""

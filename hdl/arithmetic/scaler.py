@@ -1,0 +1,147 @@
+"""base + N·q, rounded: the arithmetic that turns a reciprocal into a velocity.
+
+Both scalers form base·2^f + ⌊(N·q + E + 2^(k−1)) / 2^k⌋, which spec/formats/reciprocal.py shows to be correctly
+rounded, by adding q for every bit of N, the least significant first, and dropping a bit of the sum each time; the sign
+bit of N counts negative. The one takes a clock per bit and a single adder, the other an adder per bit and any update
+rate. Their latency is the same.
+"""
+
+from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.spec.formats.reciprocal import Reciprocal
+
+
+class _Scaler(wiring.Component):
+    """What both scalers share.
+
+    Latency: `done` is high as many clocks after `start` as N has bits, and three more.
+
+    Parameters
+    ----------
+    reciprocal : spec.reciprocal.Reciprocal
+    base_width, numerator_width : int
+        Bits of `base` and `numerator`, both signed.
+    tag_width : int
+        Bits that travel along with a value.
+    towards : int
+        Round to the nearest (0), down (−1) or up (1).
+
+    Members
+    -------
+    load : In(1)
+        `base`, `numerator` and `tag` are valid.
+    start : In(1)
+        And they are to be used; only together with `load`.
+    base, numerator, tag : In
+    q : In(reciprocal.width)
+        Reciprocal, valid in the clock after `start`.
+    done : Out(1)
+    velocity, tag_out : Out
+        Valid with `done`, and held until the next.
+    """
+
+    def __init__(
+        self, reciprocal: Reciprocal, *, base_width: int, numerator_width: int, tag_width: int, towards: int = 0
+    ) -> None:
+        self._steps = numerator_width
+        self._rounding = reciprocal.rounding(towards)
+        self._frac_bits = reciprocal.frac_bits
+        # What is left to drop when all bits of N are done.
+        self._surplus = reciprocal.scale_bits - numerator_width
+        self._total_shape = signed(reciprocal.width + 1)
+        super().__init__(
+            {
+                "load": In(1),
+                "start": In(1),
+                "base": In(signed(base_width)),
+                "numerator": In(signed(numerator_width)),
+                "tag": In(tag_width),
+                "q": In(reciprocal.width),
+                "done": Out(1),
+                "velocity": Out(signed(base_width + reciprocal.frac_bits)),
+                "tag_out": Out(tag_width),
+            }
+        )
+
+    def _result(self, base: Signal, total: Signal) -> ValueLike:
+        """The velocity, from a total of which a bit has been dropped for every bit of N."""
+        shape = self.velocity.shape()
+        # Both terms may be taken modulo the width of the sum, which is known to fit.
+        return (base << self._frac_bits) + Value.cast(total >> self._surplus)[: shape.width].as_signed()
+
+
+class SerialScaler(_Scaler):
+    """One bit of N a clock. `load` may come again as soon as `done` has."""
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        # Only what says that something is under way needs a reset; the rest is loaded before it is used.
+        running, adding, last, added = Signal(), Signal(), Signal(), Signal()
+        total = Signal(self._total_shape, reset_less=True)
+        bits = Signal(self._steps, reset_less=True)
+        step = Signal(range(self._steps + 1), reset_less=True)
+        base = Signal.like(self.base, reset_less=True)
+        tag = Signal.like(self.tag, reset_less=True)
+
+        # What is added next: q, nothing where a bit of N is 0, −q = ~q + 1 where its sign bit is 1.
+        sign = step == self._steps - 1
+        addend = Signal.like(self.q, reset_less=True)
+        borrow = Signal(reset_less=True)
+        m.d.sync += [
+            addend.eq(self.q ^ sign.replicate(len(self.q))),
+            borrow.eq(sign & bits[0]),
+            bits.eq(bits >> 1),
+            step.eq(step + 1),
+            adding.eq(running),
+            last.eq(running & sign),
+            added.eq(last),
+            self.done.eq(added),
+        ]
+        with m.If(~bits[0]):
+            m.d.sync += addend.eq(0)
+        with m.If(sign):
+            m.d.sync += running.eq(0)
+        with m.If(adding):
+            # The carry into the adder comes from an additional bit at its end.
+            sum_ = Cat(1, total).as_signed() + Cat(borrow, addend, borrow).as_signed()
+            m.d.sync += total.eq(sum_ >> 2)
+        with m.If(added):
+            m.d.sync += [self.velocity.eq(self._result(base, total)), self.tag_out.eq(tag)]
+        with m.If(self.load):
+            m.d.sync += [
+                total.eq(self._rounding),
+                bits.eq(self.numerator),
+                step.eq(0),
+                base.eq(self.base),
+                tag.eq(self.tag),
+                running.eq(self.start),
+            ]
+        return m
+
+
+class PipelinedScaler(_Scaler):
+    """An adder for every bit of N: `start` may be high in every clock."""
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+
+        def delay(*values: Signal) -> list[Signal]:
+            registers = [Signal.like(value) for value in values]
+            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
+            return registers
+
+        valid, bits, base, tag = delay(self.start, self.numerator, self.base, self.tag)
+        valid, bits, base, tag, q = delay(valid, bits, base, tag, self.q)
+        total: ValueLike = self._rounding
+        for step in range(self._steps):
+            sum_ = Signal(self._total_shape)
+            last = step == self._steps - 1
+            m.d.sync += sum_.eq(Mux(bits[step], total - q if last else total + q, total) >> 1)
+            total = sum_
+            valid, bits, base, tag, q = delay(valid, bits, base, tag, q)
+        m.d.sync += self.done.eq(valid)
+        with m.If(valid):
+            m.d.sync += [self.velocity.eq(self._result(base, total)), self.tag_out.eq(tag)]
+        return m

@@ -1,0 +1,1 @@
+"""From the pins to counts per tick and position."""

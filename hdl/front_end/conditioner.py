@@ -1,0 +1,68 @@
+"""From asynchronous pins to levels of the clock domain."""
+
+from amaranth import Cat, Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.front_end.glitch_filter import GlitchFilter
+
+
+class InputConditioner(wiring.Component):
+    """Brings the encoder's lines into the clock domain, and keeps glitches out of it.
+
+    Latency: a level that is sampled at clock edge c is at the output in clock c + 2 + `filter_clocks`.
+
+    Parameters
+    ----------
+    filter_clocks : int
+        Clocks for which a level must hold; 0 for no filter.
+    lines : tuple of str
+        Names of the lines.
+
+    Members
+    -------
+    a, b … : In(1)
+        Asynchronous pins, one for each line.
+    level_a, level_b … : Out(1)
+        Synchronised and filtered levels.
+    ready : Out(1)
+        High from the first clock in which the level before the present one is real as well.
+    swallowed_edges : Out(16)
+        Edges that the filter has kept out, two for each glitch; stays at 65534.
+    """
+
+    def __init__(self, filter_clocks: int = 0, lines: tuple[str, ...] = ("a", "b")) -> None:
+        self._filter_clocks = filter_clocks
+        self._lines = lines
+        super().__init__(
+            {name: In(1) for name in lines}
+            | {f"level_{name}": Out(1) for name in lines}
+            | {"ready": Out(1), "swallowed_edges": Out(16)}
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        # Two clocks for the synchroniser, one for the filter, one for the decoder's memory of the level before.
+        clocks_since_reset = Signal(4 if self._filter_clocks else 3)
+        m.d.sync += clocks_since_reset.eq((clocks_since_reset << 1) | 1)
+        m.d.comb += self.ready.eq(clocks_since_reset[-1])
+        swallowed = []
+        for name in self._lines:
+            level = Signal(name=f"synchronised_{name}") if self._filter_clocks else getattr(self, f"level_{name}")
+            m.submodules[f"sync_{name}"] = FFSynchronizer(getattr(self, name), level)
+            if self._filter_clocks:
+                m.submodules[f"filter_{name}"] = line = GlitchFilter(self._filter_clocks)
+                m.d.comb += [
+                    line.level.eq(level),
+                    line.load.eq(~clocks_since_reset[2]),
+                    getattr(self, f"level_{name}").eq(line.filtered),
+                ]
+                swallowed.append(line.swallowed)
+        if self._filter_clocks:
+            glitches, sum_ = Signal(15), Signal(16)
+            m.d.comb += [sum_.eq(glitches + sum(swallowed)), self.swallowed_edges.eq(Cat(0, glitches))]
+            m.d.sync += glitches.eq(sum_)
+            with m.If(sum_[-1]):
+                m.d.sync += glitches.eq(0x7FFF)
+        return m

@@ -1,0 +1,166 @@
+"""Velocity as a quotient of distance and time."""
+
+from amaranth import Module, Mux, Signal, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.divider import Divider
+from tachometry.hdl.front_end.pulse_counter import saturate
+from tachometry.hdl.output.members import update_members
+from tachometry.spec.methods.timed import TimedTachometer
+from tachometry.spec.tachometer import BOUNDS
+
+
+class QuotientVelocity(wiring.Component):
+    """Divides, rounds, and holds the result; in between it looks whether the velocity has to sink.
+
+    A measurement may begin when `free` is high. Where `sink` is high and nothing is divided, the greatest speed that
+    the time since the last count allows is: if that, rounded, is nearer to 0 than the velocity, it becomes the
+    velocity. A measurement that begins meanwhile takes the divider, and nothing sinks.
+
+    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after `measure` or `sink`.
+
+    Parameters
+    ----------
+    spec : TimedTachometer
+
+    Members
+    -------
+    measure : In(1)
+        Only if `free`; `dividend` is valid.
+    sink : In(1)
+        `divisor` is the time since the last count.
+    dividend : In(signed)
+        Distance in counts, times the timer periods in a tick.
+    divisor : In(spec.interval_width)
+        Time in timer periods.
+    forced_in, stalled_in, beyond_in : In(1)
+        Valid with `measure` and `sink`, as `divisor`.
+    free : Out(1)
+        No measurement is being divided.
+    less, more : In(1)
+        With `spec.bounds`: the distance may also have been a count less, or more.
+    known, was_negative : In(1)
+        With `spec.bounds`: there are bounds; sign of the last count.
+    velocity, velocity_valid, interval, forced, stalled, out_of_range : Out
+    velocity_lower, velocity_upper, bounds_valid : Out
+        As those of the datapath.
+    """
+
+    def __init__(self, spec: TimedTachometer) -> None:
+        self._spec = spec
+        self.divider = Divider(
+            divisor_width=spec.interval_width,
+            integer_bits=spec.max_quotient.bit_length(),
+            scale_bits=spec.native_frac_bits + 1,
+        )
+        self.bound_dividers = {
+            name: Divider(
+                divisor_width=(spec.max_interval + 1).bit_length(),
+                integer_bits=spec.max_bound.bit_length(),
+                scale_bits=spec.native_frac_bits,
+            )
+            for name in (BOUNDS if spec.bounds else ())
+        }
+        super().__init__(
+            {
+                "measure": In(1),
+                "sink": In(1),
+                "dividend": In(self.divider.dividend.shape()),
+                "divisor": In(spec.interval_width),
+                "forced_in": In(1),
+                "stalled_in": In(1),
+                "beyond_in": In(1),
+                "free": Out(1),
+                "out_of_range": Out(1),
+                **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
+                **update_members(spec),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec = self._spec
+        m.submodules.divider = divider = self.divider
+        measuring, rounds, compared = (Signal(name=name) for name in ("measuring", "rounds", "compared"))
+        # Not before the result of the last division is in `velocity`.
+        sinks = Signal()
+        if spec.decays:
+            m.d.comb += sinks.eq(self.sink & ~self.measure & ~divider.busy & ~rounds & ~compared)
+        backward = self.velocity[-1]
+        greatest = Mux(backward, -spec.timer_periods, spec.timer_periods)
+        m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(rounds & ~self.measure)]
+        m.d.comb += [
+            self.free.eq(~(measuring & (divider.busy | rounds))),
+            divider.start.eq(self.measure | sinks),
+            divider.divisor.eq(self.divisor),
+            divider.dividend.eq(Mux(self.measure, self.dividend, greatest) if spec.decays else self.dividend),
+        ]
+        forced, stalled, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "stalled", "beyond"))
+        with m.If(divider.start):
+            m.d.sync += [
+                measuring.eq(self.measure),
+                forced.eq(self.forced_in),
+                stalled.eq(self.stalled_in),
+                beyond.eq(self.beyond_in),
+            ]
+
+        # The last bit of the quotient is a half: it rounds.
+        rounded = Signal(signed(len(divider.quotient)), reset_less=True)
+        with m.If(divider.done):
+            m.d.sync += rounded.eq((divider.quotient + 1) >> 1)
+        shown, saturated = (
+            saturate(m, rounded, spec.max_count << spec.native_frac_bits) if spec.saturates else (rounded, 0)
+        )
+        change = Signal(signed(max(len(shown), spec.native_width) + 1))
+        m.d.comb += change.eq(shown - self.velocity)
+        nearer = Signal(reset_less=True)
+        m.d.sync += nearer.eq(Mux(backward, ~change[-1] & change.any(), change[-1]))
+        update = compared & (measuring | nearer) if spec.decays else compared
+        m.d.sync += self.velocity_valid.eq(update)
+        with m.If(update):
+            m.d.sync += [
+                self.velocity.eq(shown),
+                self.interval.eq(divider.by),
+                self.forced.eq(forced),
+                self.stalled.eq(stalled),
+                self.out_of_range.eq(beyond | saturated),
+            ]
+        if spec.bounds:
+            self._bounds(m, sinks, update)
+        return m
+
+    def _bounds(self, m: Module, sinks: Value, update: Value) -> None:
+        """Two more dividers, as long as the first, for the ends of what the velocity can have been."""
+        counted = Signal()
+        greatest = self._spec.timer_periods
+        m.d.comb += counted.eq(self.measure & ~self.forced_in)
+        known = Signal(reset_less=True)
+        with m.If(self.divider.start):
+            m.d.sync += known.eq(self.known)
+        for name, box in self.bound_dividers.items():
+            m.submodules[f"divider_{name}"] = box
+            upper = name == "velocity_upper"
+            # The upper bound is rounded up: as the negative of what is rounded down.
+            distance = -(self.dividend + self.more) if upper else self.dividend - self.less
+            # While it sinks, the shaft is no farther back than its last edge.
+            signs = self.velocity[-1], self.was_negative
+            still = sinks & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
+            end, none = Signal.like(box.dividend), Signal(reset_less=True)
+            m.d.comb += [
+                end.eq(Mux(counted, distance, Mux(still, 0, -greatest))),
+                box.start.eq(self.divider.start),
+                box.dividend.eq(end),
+                # The edges lie within a period before what shows them.
+                box.divisor.eq(self.divisor + Mux(counted, Mux(end[-1], -1, 1), 0)),
+            ]
+            with m.If(self.divider.start):
+                m.d.sync += none.eq(counted & end[-1] & (self.divisor == 1))
+            limit = -self._spec.bound_limit
+            lower = Signal.like(box.quotient, reset_less=True)
+            with m.If(box.done):
+                m.d.sync += lower.eq(Mux(none, limit, box.quotient))
+            with m.If(update):
+                m.d.sync += getattr(self, name).eq(-lower if upper else lower)
+        with m.If(update):
+            m.d.sync += self.bounds_valid.eq(known)

@@ -1,0 +1,1 @@
+"""From the measured velocity to the ports: filter, unit, age."""

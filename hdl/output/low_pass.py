@@ -1,0 +1,135 @@
+"""The low-pass filter for fluctuating measurement time."""
+
+from amaranth import Cat, Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.output.update_age import UpdateAge
+from tachometry.spec.formats import low_pass
+
+
+class LowPass(wiring.Component):
+    """y ← u + E·(y − u), E = e^(−G·m·T): eq. (22) of Tsuji 2009, with E from a table, a bit of it a clock.
+
+    m is the number of ticks since the update before: what is measured over overlapping windows is not filtered twice.
+    An update that comes while the filter works waits; one that comes while another waits takes its place and adds its
+    ticks.
+
+    Latency: `done` is high `spec.latency` clocks after `start`, if the filter was at rest.
+
+    Parameters
+    ----------
+    spec : spec.low_pass.LowPass
+    tag_width : int
+        Bits that travel along with a value.
+
+    Members
+    -------
+    tick : In(1)
+    start : In(1)
+        `native`, `clear` and `tag` are new.
+    native, tag : In
+    clear : In(1)
+        This is taken as it is, for whatever time.
+    done : Out(1)
+    velocity, tag_out : Out
+        Valid with `done`, and held until the next.
+    """
+
+    def __init__(self, spec: low_pass.LowPass, *, tag_width: int) -> None:
+        self._spec = spec
+        super().__init__(
+            {
+                "start": In(1),
+                "tick": In(1),
+                "native": In(signed(spec.native_width)),
+                "clear": In(1),
+                "tag": In(tag_width),
+                "done": Out(1),
+                "velocity": Out(signed(spec.native_width)),
+                "tag_out": Out(tag_width),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec = self._spec
+        extra, bits = spec.extra_bits, spec.factor_bits
+
+        # Ticks from the clock of the update before on.
+        elapsed = UpdateAge(spec.max_interval)
+        m.submodules.elapsed = elapsed
+        m.d.comb += [elapsed.tick.eq(self.tick), elapsed.update.eq(self.start)]
+
+        # The update that waits.
+        waiting, take = Signal(), Signal()
+        next_u, next_tag = Signal.like(self.native, reset_less=True), Signal.like(self.tag, reset_less=True)
+        next_interval, next_clear = Signal.like(elapsed.age, reset_less=True), Signal(reset_less=True)
+        with m.If(take):
+            m.d.sync += waiting.eq(0)
+        with m.If(self.start):
+            m.d.sync += [
+                waiting.eq(1),
+                next_u.eq(self.native),
+                next_tag.eq(self.tag),
+                next_clear.eq(self.clear),
+                # No overflow: those that wait have come since the filter began, fewer clocks ago than it can count.
+                next_interval.eq(elapsed.before + Mux(waiting & ~take, next_interval, 0)),
+            ]
+
+        # The state, in 2^−extra of an LSB, and what it differs by from the update.
+        working, adding, rounding = Signal(), Signal(), Signal()
+        u, tag = Signal.like(self.native, reset_less=True), Signal.like(self.tag, reset_less=True)
+        y = Signal(signed(spec.native_width + extra))
+        d = Signal(signed(spec.native_width + extra + 1), reset_less=True)
+        total = Signal.like(d, reset_less=True)
+        factor = Signal(bits, reset_less=True)
+        step = Signal(range(bits + 2), reset_less=True)
+        second = Signal(reset_less=True)
+        low, *high = self._factors(m, take, next_interval)
+        last = step == bits + 1
+        m.d.comb += take.eq(waiting & ~working & ~adding)
+        m.d.sync += [
+            step.eq(step + 1),
+            factor.eq(factor >> 1),
+            # The last addition rounds.
+            total.eq((Cat(step == bits, total).as_signed() + Cat(step == bits, Mux(factor[0], d, 0)).as_signed()) >> 2),
+            adding.eq(working & last & (second if high else 1)),
+            rounding.eq(adding),
+            self.done.eq(rounding),
+        ]
+        with m.If(step == 0):
+            m.d.sync += [factor.eq(Mux(second, high[0], low) if high else low), total.eq(0)]
+        with m.If(last):
+            m.d.sync += [step.eq(0), d.eq(total), second.eq(1)]
+            if high:
+                with m.If(second):
+                    m.d.sync += working.eq(0)
+            else:
+                m.d.sync += working.eq(0)
+        with m.If(take):
+            m.d.sync += [
+                working.eq(1),
+                step.eq(0),
+                second.eq(0),
+                u.eq(next_u),
+                tag.eq(next_tag),
+                d.eq(Mux(next_clear, 0, y - (next_u << extra))),
+            ]
+        with m.If(adding):
+            m.d.sync += y.eq((u << extra) + d)
+        with m.If(rounding):
+            m.d.sync += [self.velocity.eq((y + (1 << (extra - 1))) >> extra), self.tag_out.eq(tag)]
+        return m
+
+    def _factors(self, m: Module, take: Signal, interval: Signal) -> list[Signal]:
+        """E of each table, valid in the clock after `take` and held until the next."""
+        found, split = [], self._spec.low_bits
+        places = interval[:split], interval[split:]
+        for name, table, place in zip(("low", "high"), self._spec.tables, places, strict=False):
+            m.submodules[name] = memory = Memory(shape=self._spec.factor_bits, depth=len(table), init=table)
+            read = memory.read_port()
+            m.d.comb += [read.addr.eq(place), read.en.eq(take)]
+            found.append(read.data)
+        return found

@@ -1,0 +1,1 @@
+"""Captures of logic analysers and simulators, read and written."""

@@ -1,0 +1,64 @@
+"""Captures of any kind: sigrok sessions (`.sr`), text (`.csv`), waveforms (`.vcd`)."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+from tachometry.sim.captures.file import CaptureError, Channel
+from tachometry.sim.captures.sigrok import read_sr
+from tachometry.sim.captures.text import read_csv
+from tachometry.sim.captures.vcd import read_vcd
+from tachometry.sim.signals.recording import Recording
+
+
+class Reader(Protocol):
+    """A function that reads one kind of capture."""
+
+    def __call__(
+        self,
+        path: Path,
+        a: Channel | None,
+        b: Channel | None,
+        samplerate_hz: float | None,
+        others: Mapping[str, Channel],
+        /,
+    ) -> Recording: ...
+
+
+READERS: dict[str, Reader] = {".sr": read_sr, ".csv": read_csv, ".vcd": read_vcd}
+
+
+def read_capture(
+    path: str | os.PathLike[str],
+    a: Channel | None = None,
+    b: Channel | None = None,
+    samplerate_hz: float | None = None,
+    z: Channel | None = None,
+    tick_in: Channel | None = None,
+) -> Recording:
+    """Read the encoder lines from a capture; the suffix tells its kind.
+
+    Parameters
+    ----------
+    path : path
+        A sigrok session `.sr` (see `read_sr`), a text `.csv` (see `read_csv`) or a waveform `.vcd` (see `read_vcd`).
+    a, b : str, int or None
+        Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named A and B
+        (in any case) if there are both, else the first two.
+    samplerate_hz : float or None, Hz
+        Only for a `.sr` that has no samplerate.
+    z, tick_in : str, int or None
+        Channels of the index line and of the external tick, likewise; what is not given, the recording has not.
+
+    Raises
+    ------
+    CaptureError
+        If the suffix is another one, or as the reader of that kind says.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise CaptureError(f"a capture must be a .sr, .csv or .vcd file, not {path}")
+    others = {name: channel for name, channel in (("z", z), ("tick_in", tick_in)) if channel is not None}
+    return reader(path, a, b, samplerate_hz, others)

@@ -1,0 +1,284 @@
+"""sigrok sessions (`.sr`), as sigrok-cli and PulseView save them: read as a `Recording`, written from a `PinTrace`.
+
+The format is described at https://sigrok.org/wiki/File_format:Sigrok/v2. Both ways work chunk by chunk: memory grows
+with the edges and with one chunk, never with the length of the capture.
+"""
+
+import configparser
+import os
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, replacing
+from tachometry.sim.captures.run_zip import RunZip
+from tachometry.sim.signals.recording import PinTrace, Recording
+
+CHUNK = 4 << 20  # bytes, as sigrok cuts its own
+_CHANNELS = {"a": "A", "b": "B", "z": "Z", "tick_in": "TICK_IN"}
+UNIT_HZ = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
+# What zipfile raises for a damaged file: besides its own error, those of the layers below, by what is damaged.
+ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError)
+
+
+def read_sr(
+    path: str | os.PathLike[str],
+    a: Channel | None = None,
+    b: Channel | None = None,
+    samplerate_hz: float | None = None,
+    others: Mapping[str, Channel] = NONE,
+    *,
+    _piece: int = CHUNK,
+) -> Recording:
+    """Read two to four channels of a sigrok session, version 1 or 2.
+
+    Sample k is taken at k / samplerate; a change is dated at the first sample that shows it, and the duration is the
+    number of samples / samplerate. Change times are rounded down to float64 and the duration up, hence
+    `Recording.place` on a clock that is a multiple of the samplerate finds sample k at clock k * multiple, exactly.
+
+    Parameters
+    ----------
+    path : path
+    a, b : str, int or None
+        Name of the channel, else its number: N is sigrok's D<N>, bit N of a sample. When not given: the channels named
+        A and B if there are both, else the first two.
+    samplerate_hz : float or None, Hz
+        For a file that has no samplerate.
+    others : mapping of str to str or int
+        Channels of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
+
+    Raises
+    ------
+    CaptureError
+        If the file is missing, damaged or not a session, if it has no samples, for an unknown channel, or for a
+        samplerate that is missing or is not the one in the file.
+    """
+    path = Path(path)
+    if samplerate_hz is not None and not 0 < samplerate_hz < float("inf"):
+        raise CaptureError(f"samplerate must be above 0 Hz and finite, not {samplerate_hz} Hz")
+    with reading(path), _damage_named(path), zipfile.ZipFile(path) as archive:
+        session = _read_session(path, archive)
+        rate = _agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
+        bits = choose_channels(path, session.channels, a, b, others)
+        sample, level, n_samples = _changes(session, bits, _pieces(path, archive, session, _piece))
+    if n_samples == 0:
+        raise CaptureError(f"{path} must have at least one sample, not 0")
+    duration = float(_divide(np.array([n_samples]), rate, up=True)[0])
+    return Recording.of_level(_divide(sample, rate, up=False), level, duration, ("a", "b", *others))
+
+
+def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
+    """Write a trace as a sigrok session of version 2, channels A, B and the others that there are, one sample a clock.
+
+    Equal traces give equal files, byte for byte on any machine, whatever its zlib (see `run_zip`). Read back and placed
+    on the same clock, the file gives the same trace.
+
+    Parameters
+    ----------
+    path : path
+        Takes its new content only when all is written.
+    trace : PinTrace
+    clock_hz : int, Hz
+        Clock of the trace, hence the samplerate of the session.
+
+    Raises
+    ------
+    CaptureError
+        If the file cannot be written.
+    ValueError
+        If `clock_hz` or the number of clocks is below 1, or if the session would pass 4 GiB.
+    """
+    if clock_hz < 1:
+        raise ValueError(f"clock_hz must be at least 1, not {clock_hz}")
+    if trace.n_clocks < 1:
+        raise ValueError(f"n_clocks must be at least 1, not {trace.n_clocks}")
+    level = trace.level
+    with replacing(Path(path)) as file, RunZip(file) as archive:
+        archive.add_text("version", "2")
+        archive.add_text("metadata", _metadata(clock_hz, [_CHANNELS[name] for name in trace.lines]))
+        for number, first in enumerate(range(0, trace.n_clocks, _chunk), 1):
+            end = min(first + _chunk, trace.n_clocks)
+            row = int(np.searchsorted(trace.clock, first, "right")) - 1  # the row that holds at `first`
+            row_end = int(np.searchsorted(trace.clock, end, "left"))
+            starts = np.maximum(trace.clock[row:row_end], first)
+            archive.add_runs(f"logic-1-{number}", level[row:row_end], np.diff(starts, append=end))
+
+
+def _metadata(samplerate_hz: int, channels: list[str]) -> str:
+    # In the largest unit that leaves an integer: older sigroks do not read fractions.
+    unit, prefix = next(
+        (hz, p) for hz, p in ((10**9, "G"), (10**6, "M"), (10**3, "k"), (1, "")) if not samplerate_hz % hz
+    )
+    lines = [
+        "[global]",
+        "sigrok version=0.5.2",  # the libsigrok whose format this is
+        "",
+        "[device 1]",
+        "capturefile=logic-1",
+        f"total probes={len(channels)}",
+        f"samplerate={samplerate_hz // unit} {prefix}Hz",
+        "total analog=0",
+        *(f"probe{number}={name}" for number, name in enumerate(channels, 1)),
+        "unitsize=1",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+@dataclass(frozen=True)
+class _Session:
+    channels: dict[int, str]  # bit of a sample: name
+    unitsize: int  # bytes a sample
+    samplerate_hz: float | None
+    members: list[zipfile.ZipInfo]  # the samples, in order
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except CaptureError:
+        raise
+    except ZIP_ERRORS as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise CaptureError(
+            f"{path} must be a whole sigrok session (a zip file), but is cut or damaged: {reason}"
+        ) from error
+
+
+def _read_session(path: Path, archive: zipfile.ZipFile) -> _Session:
+    names = set(archive.namelist())
+    for needed in ("version", "metadata"):
+        if needed not in names:
+            raise CaptureError(f"{path} must be a sigrok session, but has no member {needed!r}")
+    version = archive.read("version").strip()
+    if version not in (b"1", b"2"):
+        raise CaptureError(f"version of sigrok session {path} must be 1 or 2, not {version.decode('latin-1')!r}")
+    ini = configparser.ConfigParser(interpolation=None, delimiters=("=",), comment_prefixes=("#",))
+    try:
+        ini.read_string("\n".join(archive.read("metadata").decode().splitlines()))
+    except (configparser.Error, UnicodeDecodeError) as error:
+        raise CaptureError(f"metadata of {path} must be an INI text: {' '.join(str(error).split())}") from error
+    devices = [ini[name] for name in ini.sections() if name.startswith("device ") and "capturefile" in ini[name]]
+    if not devices:
+        raise CaptureError(f"{path} must have logic samples, but its metadata names no capturefile")
+    device = devices[0]
+    unitsize = device.get("unitsize", "none").strip()
+    if unitsize not in set("12345678"):
+        raise CaptureError(f"unitsize of {path} must be 1 to 8 bytes, not {unitsize}")
+    probes = sorted((int(m[1]), name) for key, name in device.items() if (m := re.fullmatch(r"probe([0-9]{1,3})", key)))
+    for number, _ in probes:
+        if not 1 <= number <= 8 * int(unitsize):
+            raise CaptureError(f"probes of {path} must be 1 to {8 * int(unitsize)} (unitsize {unitsize}), not {number}")
+    channels = {number - 1: name.strip() or f"D{number - 1}" for number, name in probes}
+    members = _members(path, archive, device["capturefile"].strip())
+    return _Session(channels, int(unitsize), _parse_samplerate(path, device.get("samplerate")), members)
+
+
+def _members(path: Path, archive: zipfile.ZipFile, capturefile: str) -> list[zipfile.ZipInfo]:
+    if capturefile in archive.namelist():
+        members = [archive.getinfo(capturefile)]
+    else:
+        pattern = re.compile(re.escape(capturefile) + "-([0-9]+)")
+        chunks = {int(m[1]): info for info in archive.infolist() if (m := pattern.fullmatch(info.filename))}
+        if not chunks:
+            raise CaptureError(f"{path} must have logic samples, but has no member {capturefile} or {capturefile}-1")
+        for number in range(1, len(chunks) + 1):
+            if number not in chunks:
+                raise CaptureError(
+                    f"{len(chunks)} chunks of {path} must be {capturefile}-1 to {capturefile}-{len(chunks)}, "
+                    f"but {capturefile}-{number} is missing"
+                )
+        members = [chunks[number] for number in sorted(chunks)]
+    for info in members:
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise CaptureError(f"{info.filename} of {path} must be stored or deflated, not method {info.compress_type}")
+    return members
+
+
+def _parse_samplerate(path: Path, text: str | None) -> float | None:
+    """Parse `24 MHz`, `12.5kHz`, `1000000`; 0 is what sigrok writes when it knows none."""
+    if text is None or not text.strip():
+        return None
+    match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([kmg]?)(?:hz)?", text.strip().lower())
+    if not match:
+        raise CaptureError(f"samplerate of {path} must be a number and Hz, kHz, MHz or GHz, not {text!r}")
+    return float(Fraction(match[1]) * UNIT_HZ[match[2]]) or None
+
+
+def _agreed_samplerate(path: Path, in_file: float | None, given: float | None) -> float:
+    if in_file is not None and given is not None and in_file != given:
+        raise CaptureError(f"samplerate of {path} must be {in_file:.15g} Hz as the file has it, not {given:.15g} Hz")
+    rate = in_file if in_file is not None else given
+    if rate is None:
+        raise CaptureError(f"{path} has no samplerate: give it with --samplerate")
+    return rate
+
+
+def _pieces(path: Path, archive: zipfile.ZipFile, session: _Session, piece: int) -> Iterator[NDArray[np.uint8]]:
+    """Give the samples as arrays of shape (n, unitsize), about `piece` bytes at a time."""
+    n_bytes = max(piece // session.unitsize, 1) * session.unitsize
+    for info in session.members:
+        with archive.open(info) as member:
+            while data := member.read(n_bytes):
+                if len(data) % session.unitsize:
+                    raise CaptureError(
+                        f"length of {info.filename} in {path} must be a multiple of unitsize {session.unitsize}, "
+                        f"not {info.file_size} bytes"
+                    )
+                yield np.frombuffer(data, np.uint8).reshape(-1, session.unitsize)
+
+
+def _changes(
+    session: _Session, bits: tuple[int, ...], pieces: Iterator[NDArray[np.uint8]]
+) -> tuple[NDArray[np.int64], NDArray[np.uint8], int]:
+    """Give the samples that differ from the one before (the first always does), their levels, and the sample count."""
+    n_samples, before = 0, 255
+    sample, level = [], []
+    for data in pieces:
+        now = np.zeros(len(data), np.uint8)
+        for line, bit in enumerate(bits):
+            now |= (data[:, bit // 8] >> bit % 8 & 1) << line
+        changed = np.flatnonzero(now[1:] != now[:-1]) + 1
+        if now[0] != before:
+            changed = np.append(0, changed)
+        sample.append(changed + n_samples)
+        level.append(now[changed])
+        n_samples += len(now)
+        before = int(now[-1])
+    if not sample:
+        return np.zeros(0, np.int64), np.zeros(0, np.uint8), 0
+    return np.concatenate(sample).astype(np.int64), np.concatenate(level), n_samples
+
+
+def _divide(k: NDArray[np.int64], rate: float, *, up: bool) -> NDArray[np.float64]:
+    """Give k / rate as float64, rounded down or up, never to nearest.
+
+    To nearest, one quotient in twelve lies so far above that `ceil(k / rate * rate)` is k + 1. Rounded down, the
+    product with a multiple of the rate is at or below the integer that it should be, and rounding cannot pass that.
+    """
+    count = k.astype(np.float64)
+    quotient = count / rate
+    # Dekker's product: quotient * rate = product + rest, exactly; the sign of what differs from k tells the rounding.
+    product = quotient * rate
+    high, low = _halves(quotient)
+    rate_high, rate_low = _halves(np.full(1, rate))
+    rest = low * rate_low - (((product - high * rate_high) - low * rate_high) - high * rate_low)
+    excess = (product - count) + rest
+    wrong = excess < 0 if up else excess > 0
+    return np.where(wrong, np.nextafter(quotient, np.inf if up else 0.0), quotient)
+
+
+def _halves(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Split into two float64 of 26 bits each that add up to x, after Veltkamp."""
+    scaled = x * 134217729.0  # 2^27 + 1
+    high = scaled - (scaled - x)
+    return high, x - high

@@ -1,0 +1,162 @@
+"""What goes wrong between the edges of a disc and the lines of an encoder; `VirtualEncoder` says what each means.
+
+Everything is drawn from raw PCG64 words and evaluated with operations that IEEE 754 rounds exactly: equal inputs give
+equal bits on every machine. Each imperfection has random numbers of its own, as many for each edge of the shaft,
+whether that edge arrives or not: switching one on leaves the others as they were.
+
+Lines are a change list: row r tells the instant and the levels A + 2 B from then on, row 0 the levels at rest.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.encoder.motion import TIME, FloatArray, cos2pi, parse_number
+
+Rows = NDArray[np.intp]
+Levels = NDArray[np.uint8]
+
+# Streams of random numbers, children of the seed.
+NONUNIFORMITY, JITTER, ILLEGAL, LOST, BOUNCE = range(5)
+
+MAX_BOUNCES = 1000
+
+_CHUNK = 1 << 16
+_LN2 = 0.6931471805599453
+_CLIP = 0.49  # of the gap to a neighbour: two edges that move towards each other still keep their order
+
+
+@dataclass(frozen=True)
+class Bounce:
+    """Chatter of a contact: how often it falls back after an edge, and within what time.
+
+    Parameters
+    ----------
+    count : int, from 1 to `MAX_BOUNCES`
+    time_s : float, seconds, more than 0
+    """
+
+    count: int
+    time_s: float
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.count <= MAX_BOUNCES:
+            raise ValueError(f"bounce count must be from 1 to {MAX_BOUNCES}, not {self.count}")
+        if not 0 < self.time_s < math.inf:
+            raise ValueError(f"bounce time must be more than 0 s, not {self.time_s} s")
+
+    @staticmethod
+    def parse(text: str) -> "Bounce":
+        """Read COUNT:TIME, such as 3:500us (s, ms or us)."""
+        match = re.fullmatch(r"\s*(\d{1,9}):([^:]+)", text, re.ASCII)
+        if match is None:
+            raise ValueError(f"bounce must be COUNT:TIME, such as 3:500us, not {text!r}")
+        return Bounce(int(match[1]), parse_number(match[2], TIME, "bounce time"))
+
+
+def stream(seed: int, which: int) -> np.random.PCG64:
+    """The random numbers of one imperfection."""
+    return np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(which,)))
+
+
+def displaced_edges(phase_error_deg: float, duty_error_deg: float) -> FloatArray:
+    """Offsets of the edges 0 to 3 of each period, in pitches of 90 electrical degrees.
+
+    The centre of B's pulse moves by the phase error, the ends of both pulses by half the duty error, outwards.
+    """
+    half = duty_error_deg / 180
+    b = phase_error_deg / 90
+    return np.array([b + half, -half, b - half, half])  # B falls, A rises, B rises, A falls
+
+
+def jittered(time: FloatArray, duration: float, deviation: float, random: np.random.PCG64) -> FloatArray:
+    """Edges shifted in time; they keep their order, and stay within the recording."""
+    gap = np.diff(time, prepend=0.0, append=duration)
+    shift = np.clip(deviation * gaussian(random, len(time)), -_CLIP, _CLIP)
+    return time + shift * np.minimum(gap[:-1], gap[1:])
+
+
+def lose_pulses(level: Levels, probability: float, random: np.random.PCG64) -> tuple[Levels, int]:
+    """Keep a line low where it would have risen and fallen again; also the number of edges that are lost."""
+    drawn = uniform(random, len(level) - 1) < probability
+    seen, n_lost = level.copy(), 0
+    for line in (np.uint8(1), np.uint8(2)):
+        change = np.diff((level & line).astype(np.int8))
+        rise = np.flatnonzero(change > 0)
+        fall = np.flatnonzero(change < 0)[int(level[0] & line != 0) :]
+        rise = rise[: len(fall)]  # the pulses that begin and end within the recording
+        lost = drawn[rise]
+        covered = np.zeros(len(level), dtype=np.int8)
+        covered[rise[lost] + 1] = 1
+        covered[fall[lost] + 1] = -1
+        seen[np.cumsum(covered) > 0] &= ~line
+        n_lost += 2 * int(np.count_nonzero(lost))
+    return seen, n_lost
+
+
+def late_edges(level: Levels, row: Rows, probability: float, random: np.random.PCG64) -> NDArray[np.bool_]:
+    """Which of the rows `row`, those that change a line, come at the instant of the next of them."""
+    late = np.zeros(len(row), dtype=np.bool_)
+    drawn = (uniform(random, len(level) - 1) < probability)[row[1:-1] - 1]
+    drawn &= level[row[2:]] ^ level[row[:-2]] == 3  # the two edges are of different lines
+    index = np.arange(len(drawn))
+    last_undrawn = np.maximum.accumulate(np.where(drawn, -1, index))
+    late[1:-1] = drawn & ((index - last_undrawn) & 1 == 1)  # of edges drawn in a row every other one: pairs
+    return late
+
+
+def chattering(
+    time: FloatArray, level: Levels, row: Rows, duration: float, bounce: Bounce, random: np.random.PCG64
+) -> tuple[FloatArray, Levels]:
+    """Times and levels of the rows `row`, with the chatter after each of them that changes one line."""
+    n_changes = 2 * bounce.count
+    moment = np.sort(uniform(random, (len(time) - 1) * n_changes).reshape(-1, n_changes)[row[1:] - 1], axis=1)
+    time, level = time[row], level[row]
+    before, after = level[:-1, None], level[1:, None]
+    span = np.minimum(bounce.time_s, np.diff(time, append=duration)[1:, None] / 2)
+    times = np.hstack([time[1:, None], time[1:, None] + moment * span])
+    levels = np.hstack([after] + [before, after] * bounce.count)
+    arrives = np.hstack([np.ones_like(after, dtype=np.bool_), np.repeat(before ^ after != 3, n_changes, axis=1)])
+    return np.append(time[0], times[arrives]), np.append(level[0], levels[arrives])
+
+
+def gated_index(
+    time: FloatArray, level: Levels, slot_time: FloatArray, slot: NDArray[np.bool_]
+) -> tuple[FloatArray, Levels]:
+    """Times, and levels with 4 Z: high while the shaft is in the slot of the index and both lines are low."""
+    times = np.union1d(time, slot_time)
+    level = level[np.searchsorted(time, times, side="right") - 1]
+    slot = slot[np.searchsorted(slot_time, times, side="right") - 1]
+    level = np.where(slot & (level == 0), np.uint8(4), level)
+    changed = np.append(True, level[1:] != level[:-1])
+    return times[changed], level[changed]
+
+
+def uniform(random: np.random.PCG64, n: int) -> FloatArray:
+    """Uniform in [0, 1), from the raw words, which numpy promises never to change."""
+    return (random.random_raw(n) >> np.uint64(11)).astype(np.float64) * 2.0**-53
+
+
+def gaussian(random: np.random.PCG64, n: int) -> FloatArray:
+    """Standard normal (Box and Muller); numpy's own differs between versions and C libraries."""
+    normal = np.empty(n)
+    for begin in range(0, n, _CHUNK):
+        part = normal[begin : begin + _CHUNK]
+        u, v = uniform(random, 2 * len(part)).reshape(-1, 2).T
+        part[:] = np.sqrt(-2 * _log(1 - u)) * cos2pi(v)
+    return normal
+
+
+def _log(x: FloatArray) -> FloatArray:
+    """Natural logarithm, the same bits on every machine; |error| < 1e-15 max(1, |log x|)."""
+    mantissa, exponent = np.frexp(x)
+    low = mantissa < math.sqrt(0.5)
+    mantissa, exponent = np.where(low, 2 * mantissa, mantissa), exponent - low
+    s = np.asarray((mantissa - 1) / (mantissa + 1), dtype=np.float64)
+    series = np.zeros_like(s)
+    for n in range(19, 0, -2):
+        series = series * (s * s) + 2 / n
+    return s * series + exponent * _LN2

@@ -1,0 +1,49 @@
+"""A motion that visits what every core must survive."""
+
+import numpy as np
+
+from tachometry.sim.signals.recording import PinTrace, quadrature
+from tachometry.spec import TachometerSpec
+from tachometry.spec.methods.timed import TimedTachometer
+
+_SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
+
+
+def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
+    """Speeds about the unit velocity and its multiples, reversals, illegal transitions, creeping, standstill.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    seed : int
+    n_edges : int
+        At each of six speeds.
+    """
+    rng = np.random.default_rng(seed)
+    cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks
+    gaps, turns = [], []
+    for speed in _SPEEDS:
+        gap = max(1.0 + spec.filter_clocks, cycles * spec.encoder.decoding / 4 / speed)
+        jitter = rng.choice([0, 0.2])
+        sign = rng.choice([1, -1])
+        gaps.append(gap * (1 + jitter * rng.standard_normal(n_edges)))
+        turns.append(np.where(rng.random(n_edges) < 0.01, 2, sign))
+    # Longer than a measurement: forced updates, the count after them, a standstill.
+    edges = 4 // spec.encoder.decoding
+    gaps.append(np.full(3 * edges, 0.7 * longest / edges))
+    gaps.append(np.full(edges, 1.3 * longest / edges))
+    turns.append(np.full(4 * edges, rng.choice([1, -1])))
+    clock = np.cumsum(np.maximum(1, np.rint(np.concatenate(gaps))).astype(np.int64))
+    level = quadrature(np.append(0, np.cumsum(np.concatenate(turns))))
+    clock = np.append(0, clock)
+    z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
+    rest = 22 if isinstance(spec, TimedTachometer) else 17
+    trace = PinTrace(
+        clock, level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + rest * longest // 10 + 40 * cycles + 300, z
+    )
+    if spec.max_tick_cycles is None:
+        return trace
+    apart = np.full(trace.n_clocks // cycles + 1, cycles)
+    apart[500:1000] += rng.integers(-cycles // 2, cycles, len(apart[500:1000]))
+    apart[700:710] *= 4
+    return trace.with_tick_in(np.cumsum(np.maximum(apart, 2)))

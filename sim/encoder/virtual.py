@@ -1,0 +1,244 @@
+"""The virtual encoder: what the lines of an incremental encoder do while its shaft moves, and what is true meanwhile.
+
+The truth is computed from the shaft's angle, never from the lines, so that it can judge whatever reads the lines.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tachometry.sim.encoder import imperfections
+from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
+from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY, Bounce
+from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration
+from tachometry.sim.signals.recording import Recording, quadrature
+
+MAX_EDGES = 200_000_000
+MAX_PULSES_PER_REV = 1 << 26
+
+
+@dataclass(frozen=True)
+class _VibratingShaft:
+    motion: Motion
+    vibration: Vibration | None
+    start_angle_rad: float
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        return self.motion.breakpoints
+
+    @property
+    def max_frequency(self) -> FloatArray:
+        return np.maximum(self.motion.sine_frequency, self.vibration.frequency_hz if self.vibration else 0.0)
+
+    @property
+    def reach(self) -> float:
+        """Start angle and way travelled to and fro together, rad, or a little more."""
+        vibrated = 4 * self.vibration.amplitude_rad * self.vibration.frequency_hz if self.vibration else 0.0
+        start = abs(self.motion.start_angle[0] + self.start_angle_rad)
+        return float(start + self.motion.max_travel + vibrated * self.motion.duration)
+
+    def angle(self, t: ArrayLike) -> FloatArray:
+        angle = self.motion.angle(t) + self.start_angle_rad
+        return angle + self.vibration.angle(t) if self.vibration else angle
+
+    def speed(self, t: ArrayLike) -> FloatArray:
+        speed = self.motion.speed(t)
+        return speed + self.vibration.speed(t) if self.vibration else speed
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        acceleration = self.motion.acceleration(t)
+        return acceleration + self.vibration.acceleration(t) if self.vibration else acceleration
+
+
+@dataclass(frozen=True)
+class VirtualEncoder:
+    """An incremental encoder with the faults of real ones.
+
+    Forward is A before B: the quarters k mod 4 = 0, 1, 2, 3 show (A, B) = 00, 10, 11, 01. Edge k, between the quarters
+    k - 1 and k, lies at (k + offset[k mod 4 pulses_per_rev]) pitches of 2 pi / (4 pulses_per_rev) rad.
+
+    Parameters
+    ----------
+    pulses_per_rev : int
+        Lines of the disc: pulses of A per revolution.
+    vibration : Vibration or None
+        Of the shaft; it is part of the truth.
+    jitter : float, from 0 to less than 0.5
+        Standard deviation of the Gaussian shift in time of each edge, as a fraction of its gap to the nearer of its
+        neighbours (edges, start and end of the recording). Shifts are clipped at 0.49 gaps: edges keep their order.
+    nonuniformity : float, from 0 to less than 0.5
+        The disc's offsets are uniform between plus and minus this many pitches.
+    illegal : float, from 0 to 1
+        Probability that an edge is late and comes at the instant of the next one, so that both lines change at once.
+        An edge is not late if the one before it is, or if the next one is of the same line, as after a reversal.
+    start_angle_rad : float, rad
+        Added to the angle of the motion. At 0, a motion from angle 0 begins exactly on edge 0, which has been passed.
+    seed : int, at least 0
+        Of all random numbers. Each imperfection has a stream of its own.
+    phase_error_deg : float, electrical degrees, more than -90 and less than 90
+        The centre of B's pulse comes this much later, forwards, than a quarter period after the centre of A's.
+    duty_error_deg : float, electrical degrees, more than -90 and less than 90
+        The pulses of both lines are this much wider than 180, and the pauses narrower. Phase error, duty error and
+        nonuniformity (a pitch is 90 degrees, and both edges of a state may be off) must add up to less than 90: then
+        no state vanishes. They are of the disc, hence part of the truth.
+    bounce : Bounce or None
+        After an edge the line falls back and returns so many times, at random moments within the bounce time or half
+        the time to the next edge of either line, whichever is less. Edges that come together do not bounce.
+    lost : float, from 0 to 1
+        Probability that a line misses a pulse: it stays low, and two edges are lost. A pulse that begins before the
+        recording or ends after it is not missed.
+    index : bool
+        Whether there is an index line Z: high once a turn, in the quarter that begins at shaft angle 0, and gated as
+        usual: only while A and B are low.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+
+    pulses_per_rev: int
+    vibration: Vibration | None = None
+    jitter: float = 0.0
+    nonuniformity: float = 0.0
+    illegal: float = 0.0
+    start_angle_rad: float = 0.0
+    seed: int = 0
+    phase_error_deg: float = 0.0
+    duty_error_deg: float = 0.0
+    bounce: Bounce | None = None
+    lost: float = 0.0
+    index: bool = False
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.pulses_per_rev <= MAX_PULSES_PER_REV:
+            raise ValueError(f"pulses_per_rev must be from 1 to {MAX_PULSES_PER_REV}, not {self.pulses_per_rev}")
+        for name, value in (("jitter", self.jitter), ("nonuniformity", self.nonuniformity)):
+            if not 0 <= value < 0.5:
+                raise ValueError(f"{name} must be from 0 to less than 0.5, not {value}")
+        for name, value in (("illegal", self.illegal), ("lost", self.lost)):
+            if not 0 <= value <= 1:
+                raise ValueError(f"{name} must be from 0 to 1, not {value}")
+        for name, value in (("phase_error_deg", self.phase_error_deg), ("duty_error_deg", self.duty_error_deg)):
+            if not -90 < value < 90:
+                raise ValueError(f"{name} must be more than -90 and less than 90, not {value}")
+        errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * self.nonuniformity
+        if not errors < 90:
+            raise ValueError(
+                "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical "
+                f"degrees, not {errors:.6g}"
+            )
+        if not math.isfinite(self.start_angle_rad):
+            raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
+        if self.seed < 0:
+            raise ValueError(f"seed must be at least 0, not {self.seed}")
+
+    @cached_property
+    def disc(self) -> Disc:
+        """The edges of the disc."""
+        n_edges = 4 * self.pulses_per_rev
+        offset = np.zeros(1)
+        if self.nonuniformity > 0:
+            random = self._stream(NONUNIFORMITY)
+            offset = self.nonuniformity * (2 * imperfections.uniform(random, n_edges) - 1)
+        if self.phase_error_deg or self.duty_error_deg:
+            displaced = imperfections.displaced_edges(self.phase_error_deg, self.duty_error_deg)
+            offset = offset + np.tile(displaced, max(len(offset) // 4, 1))
+        return Disc(2 * math.pi / n_edges, offset)
+
+    def record(self, motion: Motion) -> "Encoding":
+        """Let the shaft move.
+
+        Raises
+        ------
+        ValueError
+            If that could be more than `MAX_EDGES` edges, those from angle 0 to the start included.
+        """
+        shaft = _VibratingShaft(motion, self.vibration, self.start_angle_rad)
+        n_edges = shaft.reach / self.disc.pitch_rad * (1 + 2 * self.bounce.count if self.bounce else 1)
+        if not n_edges <= MAX_EDGES:
+            raise ValueError(
+                f"motion must be of at most {MAX_EDGES} encoder edges, start angle {'and bounce ' * bool(self.bounce)}"
+                f"included, not {n_edges:.3g}"
+            )
+        time, quarter = find_crossings(shaft, self.disc)
+        if self.jitter:
+            time = imperfections.jittered(time, motion.duration, self.jitter, self._stream(JITTER))
+        time = np.append(0.0, time)
+        quarter = np.append(self.disc.quarter(shaft.angle(np.zeros(1))), quarter)
+        recording, n_illegal, n_lost = self._lines(time, quarter, motion.duration)
+        return Encoding(self, motion, recording, n_illegal, n_lost)
+
+    def _lines(self, time: FloatArray, quarter: IntArray, duration: float) -> tuple[Recording, int, int]:
+        """What the lines make of quarters that begin at some times, and how many edges came together or were lost."""
+        level, n_lost, n_illegal = quadrature(quarter), 0, 0
+        if self.lost:
+            level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
+        row = np.flatnonzero(np.append(True, level[1:] != level[:-1]))
+        if self.illegal:
+            late = imperfections.late_edges(level, row, self.illegal, self._stream(ILLEGAL))
+            row, n_illegal = row[~late], int(np.count_nonzero(late))
+        if self.bounce:
+            random = self._stream(BOUNCE)
+            times, level = imperfections.chattering(time, level, row, duration, self.bounce, random)
+        else:
+            times, level = time[row], level[row]
+        if self.index:
+            slot = quarter % (4 * self.pulses_per_rev) == 0
+            times, level = imperfections.gated_index(times, level, time, slot)
+        return Recording.of_level(times, level, duration, ("a", "b", "z")[: 2 + self.index]), n_illegal, n_lost
+
+    def _stream(self, which: int) -> np.random.PCG64:
+        return imperfections.stream(self.seed, which)
+
+
+@dataclass(frozen=True, eq=False)
+class Encoding:
+    """What an encoder recorded of a motion, and the truth about it.
+
+    Parameters
+    ----------
+    encoder : VirtualEncoder
+    motion : Motion
+    recording : Recording
+        The lines, in seconds.
+    n_illegal : int
+        Number of instants at which both lines change.
+    n_lost : int
+        Number of edges that are missing, two for each pulse.
+    """
+
+    encoder: VirtualEncoder
+    motion: Motion
+    recording: Recording
+    n_illegal: int
+    n_lost: int
+
+    def true_position(self, t: ArrayLike, decoding: int = 4) -> NDArray[np.int64]:
+        """Counts since time 0 that an ideal decoder of the disc would have at times `t` in seconds.
+
+        Decoding 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low. Vibration and what
+        is of the disc (nonuniformity, phase and duty error) are in it; jitter, bounce, lost pulses and illegal
+        transitions, which are faults of the lines, are not.
+        """
+        if decoding not in (1, 2, 4):
+            raise ValueError(f"decoding must be 1, 2 or 4, not {decoding}")
+        lead, shift = {4: (0, 0), 2: (1, 1), 1: (3, 2)}[decoding]
+        now, start = (self.encoder.disc.quarter(self._shaft.angle(time)) for time in (t, 0.0))
+        return ((now + lead) >> shift) - ((start + lead) >> shift)
+
+    def true_speed(self, t: ArrayLike) -> FloatArray:
+        """Speed of the shaft in rad/s, vibration included, at times `t` in seconds."""
+        return self._shaft.speed(t)
+
+    def motion_speed(self, t: ArrayLike) -> FloatArray:
+        """Speed of the motion in rad/s, without vibration, at times `t` in seconds."""
+        return self.motion.speed(t)
+
+    @property
+    def _shaft(self) -> _VibratingShaft:
+        return _VibratingShaft(self.motion, self.encoder.vibration, self.encoder.start_angle_rad)

@@ -1,0 +1,1 @@
+"""Engines: what runs the hardware. Only this package imports `tachometry.hdl`."""

@@ -1,0 +1,193 @@
+"""Engines that compile the core: a trace goes in as arrays, rows come out as arrays, and nothing in between is Python.
+
+Memory grows with edges, ticks and updates, never with clocks.
+"""
+
+import ctypes
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from amaranth.lib import wiring
+from numpy.typing import NDArray
+
+from tachometry.hdl import Tachometer
+from tachometry.sim.engines.engine import Interrupted, driven_pins
+from tachometry.sim.engines.probes import WORD, Watched
+from tachometry.sim.engines.waveform import Waveform
+from tachometry.sim.signals.recording import PinTrace, packed
+from tachometry.sim.signals.run import STROBES, Run, observed
+from tachometry.spec import Port, TachometerSpec
+
+DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
+
+_CALL = 0.05  # seconds that a call should take, so that progress is seen and Ctrl-C is heard
+_FIRST_CALL = 1000  # clocks
+_CAPACITY = 1 << 14  # rows
+
+
+@dataclass(frozen=True)
+class Design:
+    """What is to be compiled.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    pins : list of Port
+        Inputs, in the order of the bits of a level.
+    watched : Watched or None
+        The core with shown signals, if there are any to be shown.
+    """
+
+    spec: TachometerSpec
+    pins: list[Port]
+    watched: Watched | None = None
+
+    @property
+    def component(self) -> wiring.Component:
+        """The hardware, with the ports of the spec."""
+        return Tachometer(self.spec) if self.watched is None else self.watched
+
+    @property
+    def n_words(self) -> int:
+        """Number of outputs `shown_0`, `shown_1` …."""
+        return 0 if self.watched is None else self.watched.n_words
+
+    @property
+    def outputs(self) -> list[Port]:
+        """Outputs of the core, in order."""
+        return [port for port in self.spec.ports if port.direction == "output"]
+
+    @property
+    def strobes(self) -> list[str]:
+        """Names of those that make a row."""
+        return [port.name for port in self.outputs if port.name in STROBES]
+
+    def source(self, model: str) -> str:
+        """The driver behind a text with the struct `Model`."""
+        head = f"#define N_SHOWN {self.n_words}\n#define N_COLUMNS {1 + len(self.outputs)}\n"
+        return f"{head}#include <cstdint>\n{model}\n{DRIVER}"
+
+
+class CompiledEngine(ABC):
+    """An engine that loads a shared library with the core, which it looks up once for each spec."""
+
+    name: str
+
+    def __init__(self) -> None:
+        self._libraries: dict[TachometerSpec, Path] = {}
+
+    @abstractmethod
+    def library(self, design: Design) -> Path:
+        """The compiled design, with the entries of driver.h."""
+
+    def _kept(self, design: Design) -> Path:
+        if design.watched is not None:
+            return self.library(design)
+        if design.spec not in self._libraries:
+            self._libraries[design.spec] = self.library(design)
+        return self._libraries[design.spec]
+
+    def run(
+        self,
+        spec: TachometerSpec,
+        trace: PinTrace,
+        *,
+        vcd: Path | None = None,
+        window: tuple[int, int] | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> Run:
+        """See `Engine.run`."""
+        pins = driven_pins(spec, trace)
+        watched = None if vcd is None else Watched(spec)
+        design = Design(spec, pins, watched)
+        play = _Play(self._kept(design), design, trace, window or (0, trace.n_clocks))
+        interrupt = None
+        with ExitStack() as stack:
+            waveform = None
+            if vcd is not None and watched is not None:
+                waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, watched.widths))
+            try:
+                play.to_the_end(waveform, progress)
+            except KeyboardInterrupt as raised:
+                interrupt = raised
+            if waveform is not None:
+                waveform.close(min(play.done, play.window[1]))
+        run = observed(spec, play.done, play.rows())
+        if interrupt is not None:
+            raise Interrupted(run) from interrupt
+        return run
+
+
+class _Play:
+    """A trace that is played on a compiled design."""
+
+    def __init__(self, library: Path, design: Design, trace: PinTrace, window: tuple[int, int]) -> None:
+        self._library = ctypes.CDLL(str(library))
+        self._library.tachometer_new.restype = ctypes.c_void_p
+        self._trace = trace
+        self.window = window
+        self.done = 0
+        self._found: list[NDArray[np.int64]] = []
+        self._columns = 1 + len(design.outputs)
+        self._n_words = design.n_words
+        self._rows = np.empty((_CAPACITY, self._columns), dtype=np.int64)
+        self._shown = np.empty((_CAPACITY if design.n_words else 0, 1 + design.n_words), dtype=np.int64)
+        self._at = np.ascontiguousarray(trace.clock, dtype=np.int64)
+        self._level = packed([trace.lines[pin.name] for pin in design.pins])
+
+    def rows(self) -> NDArray[np.int64]:
+        """Clock and outputs in every clock with a strobe that is done."""
+        rows = np.concatenate([np.empty((0, self._columns), dtype=np.int64), *self._found])
+        return rows[rows[:, 0] < self.done]
+
+    def to_the_end(self, waveform: Waveform | None, progress: Callable[[int], None] | None) -> None:
+        """Run all clocks; `done` and `rows` are of what has been run, also after an interrupt."""
+        job = self._job()
+        model = ctypes.c_void_p(self._library.tachometer_new())
+        try:
+            clocks = _FIRST_CALL
+            while self.done < self._trace.n_clocks:
+                job.end = min(self.done + clocks, self._trace.n_clocks)
+                job.n_rows = job.n_shown = 0
+                begun = time.perf_counter()
+                self._library.tachometer_run(model, ctypes.byref(job))
+                self._found.append(self._rows[: job.n_rows].copy())
+                if waveform is not None:
+                    for clock, *words in self._shown[: job.n_shown].tolist():
+                        waveform.sample(clock, sum(word << WORD * k for k, word in enumerate(words)))
+                took = time.perf_counter() - begun
+                clocks = max(_FIRST_CALL, int((job.clock - self.done) * min(_CALL / max(took, 1e-6), 4)))
+                self.done = job.clock
+                if progress is not None:
+                    progress(self.done)
+        finally:
+            self._library.tachometer_delete(model)
+
+    def _job(self) -> Any:
+        long, pointer = ctypes.c_int64, ctypes.c_void_p
+
+        class Job(ctypes.Structure):
+            _fields_ = (
+                *(("clock", long), ("end", long), ("at", pointer), ("level", pointer)),
+                *(("n_changes", long), ("next", long), ("rows", pointer), ("n_rows", long), ("capacity", long)),
+                *(("shown", pointer), ("n_shown", long), ("shown_capacity", long)),
+                *(("shown_from", long), ("shown_to", long), ("last", ctypes.c_uint32 * (self._n_words + 1))),
+            )
+
+        return Job(
+            at=self._at.ctypes.data,
+            level=self._level.ctypes.data,
+            n_changes=len(self._at),
+            rows=self._rows.ctypes.data,
+            capacity=_CAPACITY,
+            shown=self._shown.ctypes.data,
+            shown_capacity=len(self._shown),
+            shown_from=self.window[0],
+            shown_to=self.window[1],
+        )

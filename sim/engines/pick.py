@@ -1,0 +1,48 @@
+"""The engines by name, and the choice between them."""
+
+from tachometry.sim.engines.build import compiler, find_compiler
+from tachometry.sim.engines.engine import Engine
+
+ENGINES = ("pysim", "cxxrtl", "verilator")
+
+
+def pick(name: str = "auto") -> Engine:
+    """The engine of a name; `auto` is cxxrtl where there is a C++ compiler, and pysim where there is none.
+
+    Raises
+    ------
+    ValueError
+        If there is no engine of that name.
+    OSError
+        If it lacks what it needs here, with a line that says what to install.
+    """
+    if name == "auto":
+        name = "pysim" if find_compiler() is None else "cxxrtl"
+    if name == "pysim":
+        from tachometry.sim.engines.pysim import PySim
+
+        return PySim()
+    if name == "cxxrtl":
+        from tachometry.sim.engines.cxxrtl import Cxxrtl
+
+        compiler()
+        return Cxxrtl()
+    if name == "verilator":
+        from tachometry.sim.engines.verilator import Verilator, home
+
+        compiler()
+        home()
+        return Verilator()
+    raise ValueError(f"engine must be one of auto, {', '.join(ENGINES)}, not {name!r}")
+
+
+def present() -> list[str]:
+    """Names of the engines that can be used here."""
+    found = []
+    for name in ENGINES:
+        try:
+            pick(name)
+        except OSError:
+            continue
+        found.append(name)
+    return found

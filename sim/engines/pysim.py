@@ -1,0 +1,144 @@
+"""Amaranth's own simulator: needs nothing else, and is slow."""
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from amaranth import Cat, Module, Signal, Value
+from amaranth.sim import Simulator
+from numpy.typing import NDArray
+
+from tachometry.hdl import Tachometer
+from tachometry.sim.engines.engine import Interrupted, driven_pins
+from tachometry.sim.engines.probes import shown
+from tachometry.sim.engines.waveform import Waveform
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import STROBES, Run, observed
+from tachometry.spec import TachometerSpec
+
+# The simulator counts in femtoseconds; a nanosecond per clock keeps every instant exact. Waveforms have true times.
+_PERIOD = 1e-9
+_CLOCKS_PER_CALL = 10_000
+
+
+async def drive(ctx: Any, trace: PinTrace, pins: Mapping[str, Signal], period: float) -> None:
+    """Let a trace play on signals, in a testbench of Amaranth's simulator that begins at time 0.
+
+    Parameters
+    ----------
+    ctx : simulator context
+    trace : PinTrace
+    pins : mapping of str to Signal
+        By the names of the lines: `a`, `b`, and `z` and `tick_in` if there are.
+    period : float, seconds
+        Of the simulated clock, whose edges lie in the middle of each period, as `Simulator.add_clock` has them.
+    """
+    now = 0
+    levels = (trace.lines[name].tolist() for name in pins)
+    for clock, *row in zip(trace.clock.tolist(), *levels, strict=True):
+        if clock > now:
+            await ctx.delay((clock - now) * period)
+            now = clock
+        for pin, level in zip(pins.values(), row, strict=True):
+            ctx.set(pin, level)
+
+
+class PySim:
+    """The engine that is always there."""
+
+    name = "pysim"
+
+    def run(
+        self,
+        spec: TachometerSpec,
+        trace: PinTrace,
+        *,
+        vcd: Path | None = None,
+        window: tuple[int, int] | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> Run:
+        """See `Engine.run`."""
+        core = Tachometer(spec)
+        top = Module()
+        top.submodules.core = core
+        outputs = [port for port in spec.ports if port.direction == "output"]
+        strobe = Signal()
+        top.d.comb += strobe.eq(Cat(getattr(core, port.name) for port in outputs if port.name in STROBES).any())
+        values = _packed(top, [getattr(core, port.name) for port in outputs])
+        seen = shown(core) if vcd is not None else {}
+        seen_values = _packed(top, list(seen.values()))
+        simulator = Simulator(top)
+        simulator.add_clock(_PERIOD)
+
+        async def bench(ctx: Any) -> None:
+            await drive(ctx, trace, {port.name: getattr(core, port.name) for port in driven_pins(spec, trace)}, _PERIOD)
+
+        simulator.add_testbench(bench)
+
+        rows: list[tuple[int, int]] = []
+
+        async def collect(ctx: Any) -> None:
+            clock = 0
+            async for _, _, any_strobe, packed in ctx.tick().sample(strobe, values):
+                if any_strobe:
+                    rows.append((clock, packed))
+                clock += 1
+
+        simulator.add_process(collect)
+
+        done, interrupt = 0, None
+        begin, end = window or (0, trace.n_clocks)
+        with ExitStack() as stack:
+            waveform = None
+            if vcd is not None:
+                widths = {name: (len(value), value.shape().signed) for name, value in seen.items()}
+                waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, widths))
+                _watch(simulator, waveform, seen_values, begin, end)
+            try:
+                while done < trace.n_clocks:
+                    after = min(done + _CLOCKS_PER_CALL, trace.n_clocks)
+                    simulator.run_until(after * _PERIOD)
+                    done = after
+                    if progress is not None:
+                        progress(done)
+            except KeyboardInterrupt as raised:
+                interrupt = raised
+            if waveform is not None:
+                waveform.close(min(done, end))
+
+        kept = [row for row in rows if row[0] < done]
+        run = observed(spec, done, _unpack(kept, [(port.width, port.signed) for port in outputs]))
+        if interrupt is not None:
+            raise Interrupted(run) from interrupt
+        return run
+
+
+def _packed(top: Module, values: list[Value]) -> Signal:
+    """One signal of many: the simulator compiles it, where it would interpret a `Cat` anew in every clock."""
+    packed = Signal(sum(map(len, values)))
+    top.d.comb += packed.eq(Cat(*values))
+    return packed
+
+
+def _watch(simulator: Simulator, waveform: Waveform, packed: Signal, begin: int, end: int) -> None:
+    async def watch(ctx: Any) -> None:
+        clock = 0
+        async for _, _, value in ctx.tick().sample(packed):
+            if begin <= clock < end:
+                waveform.sample(clock, value)
+            clock += 1
+
+    simulator.add_process(watch)
+
+
+def _unpack(rows: list[tuple[int, int]], shapes: list[tuple[int, bool]]) -> NDArray[np.int64]:
+    """Rows (clock, packed values) as columns; `shapes` gives width and signedness, least significant first."""
+    columns = [[clock for clock, _ in rows]]
+    shift = 0
+    for width, is_signed in shapes:
+        mask, sign = (1 << width) - 1, (1 << (width - 1)) if is_signed else 0
+        columns.append([(((packed >> shift) & mask) ^ sign) - sign for _, packed in rows])
+        shift += width
+    return np.array(columns, dtype=np.int64).reshape(len(columns), -1).T

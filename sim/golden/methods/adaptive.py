@@ -1,0 +1,51 @@
+"""Golden adaptive dt: which counts open windows, and how long dt is in each."""
+
+from bisect import bisect_left
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.spec import RairanTachometer
+from tachometry.spec.methods.adaptive import AdaptiveDt
+
+Ints = NDArray[np.int64]
+
+
+def next_shift(rule: AdaptiveDt, shift: int, n: int, *, high: bool, falling: bool) -> tuple[int, bool]:
+    """k of a window after one of dt·2^shift that measured Nep1 = n (high) or Ndt1 = n, and whether it falls to 0."""
+    wanted = rule.slow + (shift > 0)
+    seldom = n * wanted <= 1 << shift if high else n << shift >= wanted
+    enough = high and n >= rule.fewest
+    falls = seldom or (falling and not enough)
+    if falls or (high and n >= 2 * rule.fewest):
+        return max(shift - 1, 0), falls and shift > 1
+    return shift if enough else min(shift + 1, rule.max_shift), False
+
+
+def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tuple[Ints, Ints, Ints]:
+    """Nodes at which windows open, those at which they end, and k of each; a step per window, as k is a recursion.
+
+    Parameters
+    ----------
+    spec : RairanTachometer
+    start : int64 array, shape (n,)
+        Clocks of the nodes: of the reset, of the counts, and of the end.
+    next_turn : int64 array, shape (n,)
+        The first node from each on that is a count against the direction, or the end.
+    """
+    clock, turn, rule = start.tolist(), next_turn.tolist(), spec.adaptive_dt
+    end, node, shift, falling = len(clock) - 1, 0, 0, False
+    found: list[tuple[int, int, int]] = []
+    while node != end:
+        due = clock[node] + (spec.timing.tick_cycles << shift)
+        after = bisect_left(clock, due, node + 1, end)
+        then = min(after, turn[node + 1])
+        found.append((node, then, shift))
+        c_ep = min(after - max(node, 1), spec.max_count << shift)
+        waited = (clock[then] - clock[node] - 1) // (due - clock[node])
+        high = c_ep > 1 and waited <= 1
+        n = c_ep if high else min(max(waited, 1), spec.max_dt(shift))
+        shift, falling = (0, False) if then == turn[then] else next_shift(rule, shift, n, high=high, falling=falling)
+        node = then
+    nodes, thens, shifts = np.array(found, dtype=np.int64).T
+    return nodes, thens, shifts

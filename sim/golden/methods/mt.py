@@ -1,0 +1,60 @@
+"""Golden M/T method: eqs. (13) to (16) of Tsuji 2009, window by window."""
+
+import numpy as np
+
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, chain, enclosure, updates, with_silences
+from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.spec import MTTachometer
+
+
+class Model:
+    """Golden model of the M/T method.
+
+    Parameters
+    ----------
+    spec : MTTachometer
+    """
+
+    def __init__(self, spec: MTTachometer) -> None:
+        self._spec = spec
+
+    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
+        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+        spec = self._spec
+        assert steps is not None
+        counts = Counts.of(spec, ticks, steps, n_clocks)
+        n, period = len(counts.period), counts.period
+        # The first count after reset or a silence only opens.
+        first = (counts.gap > spec.max_periods) | (np.arange(n) == 0)
+        firsts = np.append(np.flatnonzero(first), n)
+        next_first = firsts[np.searchsorted(firsts, np.arange(n), side="right")]
+        closing = np.searchsorted(period, period + spec.min_periods, side="right")
+        ends = np.flatnonzero(chain(np.minimum(closing, next_first)))
+        opening, ends = ends[:-1], ends[1:]
+        opening, ends = opening[~first[ends]], ends[~first[ends]]
+        none = np.zeros(len(ends), dtype=np.bool_)
+        distance, time = self._distance(counts.size, opening, ends), period[ends] - period[opening]
+        # On the lattice, whole ticks are summed: if they differ, the way from edge to edge is a count more or less.
+        differ = (np.sign(counts.size[opening]) - np.sign(counts.size[ends])) // 2 * spec.on_lattice
+        least, most = enclosure(distance, time, less=np.maximum(-differ, 0), more=np.maximum(differ, 0))
+        found = Measurements(
+            clock=counts.clock(period[ends]),
+            distance=distance,
+            time=time,
+            forced=none,
+            stalled=none,
+            beyond=none,
+            least=least,
+            most=most,
+            known=~none,
+        )
+        return updates(spec, counts, with_silences(spec, counts, found), ticks, n_clocks)
+
+    def _distance(self, size: Ints, opening: Ints, closing: Ints) -> Ints:
+        """Counts from an opening to a closing one."""
+        through = np.cumsum(size)
+        if self._spec.on_lattice or self._spec.paper_exact:
+            return through[closing] - through[opening]
+        between = through[closing - 1] - through[opening]
+        return (size[opening] + 2 * between + size[closing]) // 2

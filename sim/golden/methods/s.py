@@ -1,0 +1,116 @@
+"""Golden S method: the sums of Tsuji 2009, eqs. (17) and (21), as they stand in the paper."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.spec import STachometer
+from tachometry.spec.tachometer import BOUNDS
+
+
+def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Pulse alterations of Tsuji 2009, Sec. V-A.
+
+    alt(i) = m_e(i) ≠ m_e(i−1) and m_e(i) ≠ b, b = the pulse number of the last tick without an alteration, and 0 before
+    the first tick.
+
+    While the number changes in every tick, only a tick that equals b does not alter, which leaves b as it is. So b is
+    the pulse number of the last tick that equals its predecessor, and nothing has to be followed tick by tick.
+
+    Parameters
+    ----------
+    m_e : int64 array, shape (n,)
+
+    Returns
+    -------
+    bool array, shape (n,)
+    """
+    numbers = np.concatenate([[0], m_e])  # m_e(−1) = b = 0
+    changes = np.concatenate([[False], numbers[1:] != numbers[:-1]])
+    steady = np.maximum.accumulate(np.where(changes, 0, np.arange(len(numbers))))
+    return (changes[1:] & (numbers[1:] != numbers[steady[:-1]])).astype(bool)
+
+
+def windows(
+    alteration: NDArray[np.bool_], max_ticks: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Closing tick i, length m_s and origin of every update.
+
+    A window closes at an alteration, which opens the next, or when it has grown to `max_ticks`: then it keeps its newer
+    half, ⌊max_ticks/2⌋ ticks. The first opens at tick −1.
+
+    Parameters
+    ----------
+    alteration : bool array, shape (n,)
+    max_ticks : int
+
+    Returns
+    -------
+    closing, m_s : int64 arrays, shape (u,)
+    forced : bool array, shape (u,)
+    """
+    at = np.flatnonzero(alteration)
+    opening = np.concatenate([[-1], at])
+    end = np.concatenate([at, [len(alteration)]])  # the first tick that cannot be forced any more
+    kept = max_ticks // 2
+    stride = max_ticks - kept
+    n_forced = np.maximum(0, (end - 1 - opening - max_ticks) // stride + 1)
+
+    nth = np.arange(n_forced.sum()) - np.repeat(np.cumsum(n_forced) - n_forced, n_forced)
+    forced_at = np.repeat(opening, n_forced) + max_ticks + nth * stride
+    # An alteration after k forced updates ends a window that they have moved on by k strides.
+    at_length = (at - opening[:-1] - n_forced[:-1] * stride).astype(np.int64)
+
+    closing = np.concatenate([at, forced_at])
+    m_s = np.concatenate([at_length, np.full(len(forced_at), max_ticks)])
+    forced = np.arange(len(closing)) >= len(at)
+    order = np.argsort(closing, kind="stable")
+    return closing[order], m_s[order], forced[order]
+
+
+class Model:
+    """Golden model of the S method.
+
+    Parameters
+    ----------
+    spec : STachometer
+    """
+
+    def __init__(self, spec: STachometer) -> None:
+        self._spec = spec
+
+    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
+        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+        spec, m_e = self._spec, ticks.pulse_count
+        i, m_s, forced = windows(alterations(m_e), spec.timing.max_ticks)
+        at = i + 1  # m_e(−1) = 0 comes first
+        numbers = np.concatenate([[0], m_e])
+        total = np.concatenate([[0], np.cumsum(numbers)])  # total[k] = sum of the first k numbers
+        if spec.cancel:
+            # Eq. (21), doubled: m_e(i−m_s) + 2·Σ_{j=1}^{m_s−1} m_e(i−j) + m_e(i), over 2·m_s.
+            numerator = numbers[at - m_s] + 2 * (total[at] - total[at - m_s + 1]) + numbers[at]
+        else:
+            # Eq. (17): Σ_{j=0}^{m_s−1} m_e(i−j), over m_s.
+            numerator = total[at + 1] - total[at - m_s + 1]
+        moving = np.concatenate([[0], np.cumsum(numbers != 0)])
+        clock = ticks.clock[i] + spec.tick_to_velocity
+        seen = clock < n_clocks
+
+        def quotient(counts: int, towards: int) -> NDArray[np.int64]:
+            whole = 2 if spec.cancel else 1
+            return round_quotient(
+                (numerator + whole * counts)[seen], (whole * m_s)[seen], spec.native_frac_bits, towards
+            )
+
+        more = {name: quotient(one, one) for name, one in BOUNDS.items() if spec.bounds}
+        return Updates(
+            clock=clock[seen],
+            velocity=quotient(0, 0),
+            interval=m_s[seen],
+            forced=forced[seen],
+            stalled=(forced & (moving[at + 1] == moving[at - m_s]))[seen],
+            velocity_overflow=np.zeros(np.count_nonzero(seen), dtype=np.bool_),
+            more=more | ({"bounds_valid": np.arange(len(i))[seen] > 0} if spec.bounds else {}),
+        )

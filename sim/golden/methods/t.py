@@ -1,0 +1,48 @@
+"""Golden T method: eq. (9) of Tsuji 2009, count by count."""
+
+import numpy as np
+
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.methods.timed import Counts, Measurements, chain, enclosure, updates, with_silences
+from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.spec import TTachometer
+
+
+class Model:
+    """Golden model of the T method.
+
+    Parameters
+    ----------
+    spec : TTachometer
+    """
+
+    def __init__(self, spec: TTachometer) -> None:
+        self._spec = spec
+
+    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
+        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+        spec = self._spec
+        assert steps is not None
+        counts = Counts.of(spec, ticks, steps, n_clocks)
+        sign, gap = np.sign(counts.size), counts.gap
+        many = np.abs(counts.size) > 1
+        same = np.append(False, sign[1:] == sign[:-1])[: len(sign)] | spec.paper_exact | many
+        none = np.zeros(len(sign), dtype=np.bool_)
+        distance, time = np.where(same, sign, 0), np.where(many, 1, gap)
+        least, most = enclosure(distance, time)
+        found = Measurements(
+            clock=counts.clock(counts.period),
+            distance=distance,
+            time=time,
+            forced=none,
+            stalled=none,
+            beyond=many,
+            least=least,
+            most=most,
+            known=~many,
+        )
+        opened = (gap <= spec.max_periods) & (np.arange(len(gap)) > 0)
+        asked = with_silences(spec, counts, found[opened | many])
+        # What comes while the divider is at work is not measured.
+        taken = asked[chain(np.searchsorted(asked.clock, asked.clock + spec.division_clocks))]
+        return updates(spec, counts, taken, ticks, n_clocks)

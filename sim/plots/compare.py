@@ -1,0 +1,69 @@
+"""The figure of a comparison: all velocities, and the error of each."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.plots.style import COLOURS, columns, place_panels, save_figure
+from tachometry.sim.studies.compare import Curve, Score, TrueSpeed
+from tachometry.spec import TachometerSpec
+
+
+def save_comparison(
+    path: Path,
+    spec: TachometerSpec,
+    curves: list[Curve],
+    scores: list[Score],
+    instants: FloatArray,
+    true_speed: TrueSpeed | None,
+) -> None:
+    """Draw a comparison into a file whose kind its suffix tells: `.png` or `.pdf`; equal ones give equal files."""
+    save_figure(path, lambda: _draw(spec, curves, scores, instants, true_speed))
+
+
+def _draw(
+    spec: TachometerSpec,
+    curves: list[Curve],
+    scores: list[Score],
+    instants: FloatArray,
+    true_speed: TrueSpeed | None,
+) -> Figure:
+    heights = {"velocity": 3.2} | ({curve.name: 0.8 for curve in curves} if true_speed else {})
+    figure, panels = place_panels(spec, heights, "Comparison")
+    truth = true_speed(instants) if true_speed else None
+    for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
+        held = curve.estimate.at(instants)
+        kept = columns(instants, held)
+        panels["velocity"].plot(
+            instants[kept],
+            held[kept],
+            color=colour,
+            linewidth=0.7,
+            drawstyle="steps-post",
+            label=curve.name,
+            zorder=2 - result.rms / 1e6 if result.rms is not None else 2 - place / 100,  # the noisiest behind
+        )
+        if truth is None:
+            continue
+        axes, error = panels[curve.name], held - truth
+        kept = columns(instants, error)
+        axes.axhline(0, color="0.6", linewidth=0.7)
+        axes.plot(instants[kept], error[kept], color=colour, linewidth=0.6)
+        axes.text(0.005, 0.86, curve.name, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
+        axes.text(0.995, 0.86, f"RMS {result.rms:.3g} rad/s", transform=axes.transAxes, ha="right", fontsize=7)
+    if truth is not None:
+        kept = columns(instants, truth)
+        panels["velocity"].plot(instants[kept], truth[kept], color="black", linewidth=0.9, label="shaft (true)")
+        # Most of all errors set the scale; what leaves the panel is a spike.
+        reach = np.percentile([result.max for result in scores if result.max is not None], 60)
+        for curve in curves:
+            panels[curve.name].set_ylim(-1.1 * reach, 1.1 * reach)
+    panels["velocity"].set_ylabel("velocity (rad/s)")
+    panels["velocity"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=12, fontsize=7)
+    last = list(panels.values())[-1]
+    below = "; below the velocities the errors in rad/s, at one scale" if true_speed else ""
+    last.set_xlabel(f"time (s){below}")
+    last.set_xlim(instants[0], instants[-1])
+    return figure

@@ -1,0 +1,75 @@
+"""The figure of a plan: resolution and measurement time over speed."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from tachometry.sim.plots.style import COLOURS, ESTIMATE, FORCED, place_panels, save_figure
+from tachometry.sim.studies.plan import Plan
+from tachometry.spec import Speed, TachometerSpec
+
+_HEIGHTS = {"resolution": 3.4, "time": 2.4}  # inches
+
+
+def save_plan_plot(path: Path, spec: TachometerSpec, plan: Plan, unit: str) -> None:
+    """Draw a plan into a file whose kind its suffix tells: `.png` or `.pdf`.
+
+    Parameters
+    ----------
+    path : Path
+    spec : TachometerSpec
+    plan : Plan
+        At speeds that increase.
+    unit : str
+        Of the speeds in the figure: `rad/s`, `rev/s` or `rpm`.
+    """
+    save_figure(path, lambda: _draw(spec, plan, unit))
+
+
+def save_plans_plot(path: Path, spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> None:
+    """The same of several methods at the same speeds: Q_V, Q_V/V, T_m and Q_V·T_m, a line for each."""
+    save_figure(path, lambda: _draw_all(spec, plans, unit))
+
+
+def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Figure:
+    figure, panels = place_panels(spec, dict.fromkeys(("resolution", "relative", "time", "product"), 2.2), "Methods")
+    per_unit = Speed.parse(f"1{unit}").rad_per_s
+    for (name, plan), colour in zip(plans.items(), COLOURS * len(plans), strict=False):
+        values = (plan.resolution / per_unit, 100 * plan.relative, plan.measurement_time, plan.product)
+        for axes, value in zip(panels.values(), values, strict=True):
+            axes.loglog(plan.speed / per_unit, value, color=colour, label=name)
+    labels = (f"$Q_V$ ({unit})", "$Q_V/V$ (%)", "$T_m$ (s)", "$Q_V T_m$ (rad)")
+    for axes, label in zip(panels.values(), labels, strict=True):
+        axes.axvline(spec.unit_velocity / per_unit, color="0.4", linestyle=":")
+        axes.set_ylabel(label)
+    panels["resolution"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=10)
+    panels["product"].set_xlabel(f"speed ({unit})")
+    panels["product"].set_xlim(plan.speed[0] / per_unit / 1.05, plan.speed[-1] / per_unit * 1.05)
+    return figure
+
+
+def _draw(spec: TachometerSpec, plan: Plan, unit: str) -> Figure:
+    figure, panels = place_panels(spec, _HEIGHTS)
+    resolution, time = panels["resolution"], panels["time"]
+    per_unit = Speed.parse(f"1{unit}").rad_per_s
+    speed, forced = plan.speed / per_unit, plan.forced
+    left, right = speed[0] / 1.05, speed[-1] * 1.05
+    marks = [("$ω_u$", spec.unit_velocity / per_unit, ":")]
+    if spec.max_speed is not None:
+        marks.append(("max_speed", spec.max_speed.rad_per_s / per_unit, "--"))
+    for axes, values in ((resolution, 100 * plan.resolution / plan.speed), (time, plan.measurement_time)):
+        axes.loglog(speed, values, color=ESTIMATE, label="alteration")
+        if forced.any():
+            axes.loglog(speed[forced], values[forced], ".", color=FORCED, markersize=2.5, label="forced")
+        for label, mark, style in marks:
+            if left <= mark <= right:
+                axes.axvline(mark, color="0.4", linestyle=style, label=label)
+    rounding = 100 * spec.rounding_lsb * spec.rad_per_s_per_lsb / plan.speed
+    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"{spec.rounding_lsb} LSB")
+    resolution.set_ylabel("$Q_V/V$ (%)")
+    resolution.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=5)
+    time.set_ylabel("$T_m$ (s)")
+    time.set_xlabel(f"speed ({unit})")
+    time.set_xlim(left, right)
+    return figure

@@ -1,0 +1,1 @@
+"""Signals as arrays: recordings, pin traces, runs, tables."""

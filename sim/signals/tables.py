@@ -1,0 +1,102 @@
+"""A run as tables: updates, ticks, and the held velocity with its error."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.signals.run import Run
+from tachometry.spec import TachometerSpec
+
+_ROWS = 1 << 16  # rows written at once
+
+
+@dataclass(frozen=True)
+class HeldVelocity:
+    """The velocity that the core shows, tick by tick, from the first update on.
+
+    Parameters
+    ----------
+    time : float64 array, shape (n,), seconds
+        Of each tick the clock in which an update that it causes is there.
+    velocity_rad_s : float64 array, shape (n,), rad/s
+    """
+
+    time: NDArray[np.float64]
+    velocity_rad_s: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class VelocityError:
+    """Held velocity less true speed, in rad/s, over all ticks from the first update on.
+
+    Parameters
+    ----------
+    rms, mean, max : float, rad/s
+        `max` is the largest magnitude.
+    """
+
+    rms: float
+    mean: float
+    max: float
+
+
+def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
+    """Velocity at the end of every tick; empty if there was no update."""
+    updates = run.updates
+    clock = run.ticks.clock + spec.tick_to_velocity
+    clock = clock[clock < run.n_clocks]
+    latest = np.searchsorted(updates.clock, clock, side="right") - 1
+    clock, latest = clock[latest >= 0], latest[latest >= 0]
+    velocity = updates.velocity[latest].astype(np.float64) * spec.rad_per_s_per_lsb
+    return HeldVelocity(clock.astype(np.float64) / spec.timing.clock_hz, velocity)
+
+
+def velocity_error(
+    held: HeldVelocity, true_speed: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> VelocityError | None:
+    """Statistics of a held velocity against the true speed (rad/s) at times (s); None if it is empty."""
+    if not len(held.time):
+        return None
+    error = held.velocity_rad_s - true_speed(held.time)
+    return VelocityError(
+        rms=float(np.sqrt(np.mean(error * error))), mean=float(np.mean(error)), max=float(np.max(np.abs(error)))
+    )
+
+
+def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
+    """Write a CSV with a row per update: when it came, which tick closed its window, and what it says.
+
+    Bounds and outputs of the method follow, raw, by the names of their ports.
+    """
+    updates = run.updates
+    tick = np.searchsorted(run.ticks.clock, updates.clock - spec.tick_to_velocity, side="right") - 1
+    columns = {
+        "clock": updates.clock,
+        "tick": tick,
+        "interval": updates.interval,
+        "forced": updates.forced.astype(np.int64),
+        "velocity_raw": updates.velocity,
+        "velocity_rad_s": updates.velocity * spec.rad_per_s_per_lsb,
+        **{name: column.astype(np.int64) for name, column in updates.more.items()},
+    }
+    write_csv(path, ",".join(columns), columns.values())
+
+
+def write_counts(path: Path, run: Run) -> None:
+    """Write a CSV with a row per tick: its number, its pulse number m_e and the position at its end."""
+    ticks = run.ticks
+    write_csv(path, "tick,pulse_count,position", (np.arange(len(ticks.clock)), ticks.pulse_count, ticks.position))
+
+
+def write_csv(path: Path, header: str, columns: Iterable[NDArray[np.generic]]) -> None:
+    """Write a CSV. Numbers are the shortest that read back as the same, equal on every machine."""
+    table = list(columns)
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.write(f"{header}\n")
+        for first in range(0, len(table[0]), _ROWS):
+            rows = zip(*(column[first : first + _ROWS].tolist() for column in table), strict=True)
+            file.writelines(chain.from_iterable((",".join(map(repr, row)), "\n") for row in rows))

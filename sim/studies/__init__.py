@@ -1,0 +1,1 @@
+"""Studies: what a core promises, and how well methods do on the same edges."""

@@ -1,0 +1,290 @@
+"""What others do with the same edges: float models of four methods in use, written from their published descriptions.
+
+Each reads the encoder once per control period, at period, 2 periods, ..., and gives a speed that holds until the next
+reading. Finite differences and the low-pass filter are as in SimpleFOC's documentation of its velocity filter, the
+timestamp method is that of LinuxCNC's hostmot2 driver (its manual page and driver), the mixed method that of
+SimpleFOC's encoder, and the tracking loop that of ODrive and of moteus. The models are at rest at time 0, at count 0.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.golden.front_end import decode
+from tachometry.sim.signals.recording import Recording
+
+IntArray = NDArray[np.int64]
+
+MOTEUS_3DB_RATIO = 2.48
+"""3 dB frequency over natural frequency of a critically damped tracking loop, as moteus rounds it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """The counts of an encoder, one by one.
+
+    Parameters
+    ----------
+    time : float64 array, shape (n,), seconds, from 0 to `duration`, not decreasing
+    step : int64 array, shape (n,), +1 or -1
+    duration : float, seconds
+        Length of the recording.
+    counts_per_rev : int
+    """
+
+    time: FloatArray
+    step: IntArray
+    duration: float
+    counts_per_rev: int
+
+    def __post_init__(self) -> None:
+        if len(self.time) != len(self.step) or np.any(np.abs(self.step) != 1):
+            raise ValueError("steps must be +1 or -1, one for each time")
+        bounded = np.concatenate([[0.0], self.time, [self.duration]])
+        if not np.all(np.diff(bounded) >= 0):
+            raise ValueError(f"times of steps must not decrease, from 0 to the duration, {self.duration} s")
+        if self.counts_per_rev < 1:
+            raise ValueError(f"counts_per_rev must be at least 1, not {self.counts_per_rev}")
+
+    @staticmethod
+    def of_recording(recording: Recording, counts_per_rev: int, decoding: int = 4) -> "Steps":
+        """What an ideal decoder counts; a change of both lines at once counts as none."""
+        step, _ = decode(recording.a, recording.b, decoding)
+        row = np.flatnonzero(step)
+        return Steps(recording.time[row + 1], step[row], recording.duration, counts_per_rev)
+
+    @property
+    def count_rad(self) -> float:
+        """Angle of one count, rad."""
+        return 2 * math.pi / self.counts_per_rev
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A measured speed.
+
+    Parameters
+    ----------
+    time : float64 array, shape (n,), seconds, increasing
+    velocity : float64 array, shape (n,), rad/s
+        Holds from `time` on, until the next one.
+    """
+
+    time: FloatArray
+    velocity: FloatArray
+
+    def at(self, t: ArrayLike) -> FloatArray:
+        """Speed in rad/s that holds at times `t` in seconds; 0 before the first."""
+        return np.append(0.0, self.velocity)[np.searchsorted(self.time, t, side="right")]
+
+
+class _Readings(NamedTuple):
+    time: FloatArray
+    counts: IntArray
+    changed_at: FloatArray  # time of the latest step, 0 before the first
+
+    @property
+    def difference(self) -> IntArray:
+        return np.diff(self.counts, prepend=0)
+
+
+def _read(steps: Steps, period_s: float) -> _Readings:
+    if not period_s > 0:
+        raise ValueError(f"control period must be more than 0 s, not {period_s} s")
+    n_periods = math.floor(steps.duration / period_s * (1 + 1e-12))
+    time = period_s * np.arange(1, n_periods + 1, dtype=np.float64)
+    seen = np.searchsorted(steps.time, time, side="right")
+    count = np.append(0, np.cumsum(steps.step))
+    return _Readings(time, count[seen], np.append(0.0, steps.time)[seen])
+
+
+def _clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
+    """What a clock shows at some times; a time within rounding of a clock edge is at the edge."""
+    if not 0 < clock_s < period_s:
+        raise ValueError(f"clock must be more than 0 s and shorter than the control period, not {clock_s} s")
+    return np.floor(seconds / clock_s + 1e-6).astype(np.int64)
+
+
+def _held(value: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
+    """Each value that is known, and in place of each other one the latest that is, or 0."""
+    latest = np.maximum.accumulate(np.where(known, np.arange(1, len(value) + 1), 0))
+    return np.append(0.0, value)[latest]
+
+
+def low_pass(value: ArrayLike, period_s: float, filter_s: float) -> FloatArray:
+    """First-order low-pass filter y = a y + (1 - a) x with a = filter_s / (filter_s + period_s), from y = 0."""
+    if filter_s < 0:
+        raise ValueError(f"time constant of the filter must be at least 0 s, not {filter_s} s")
+    a = filter_s / (filter_s + period_s)
+    added = (1 - a) * np.asarray(value, dtype=np.float64)
+    return np.array(list(accumulate(added.tolist(), lambda y, x: a * y + x)), dtype=np.float64)
+
+
+def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> Estimate:
+    """Counts of each period over the period, then a low-pass filter.
+
+    Parameters
+    ----------
+    steps : Steps
+    period_s : float, seconds
+    filter_s : float, seconds
+        Time constant of the filter; 0 for none. SimpleFOC's default is 5 ms.
+    """
+    readings = _read(steps, period_s)
+    raw = readings.difference * steps.count_rad / period_s
+    return Estimate(readings.time, low_pass(raw, period_s, filter_s))
+
+
+def timestamp_method(steps: Steps, period_s: float, timeout_s: float = 0.5, clock_s: float = 0.5e-6) -> Estimate:
+    """LinuxCNC's hostmot2: counts over the time between the latest counts, as two readings find them.
+
+    Without a new count the speed is bounded by one count since the latest, and is 0 from `timeout_s` on. After that,
+    and at the start, the first reading with a new count gives only a time to measure from. One count back, after a
+    measurement forward or the other way round, is taken for a shaft that rests on an edge: speed 0.
+
+    Parameters
+    ----------
+    steps : Steps
+    period_s : float, seconds
+        LinuxCNC's servo period is usually 1 ms.
+    timeout_s : float, seconds
+        `vel-timeout`, 0.5 s by default.
+    clock_s : float, seconds
+        Unit of the timestamps: about 0.5 us by default, 0.1 us with `hires-timestamp`.
+    """
+    readings = _read(steps, period_s)
+    now = _clocks(readings.time, clock_s, period_s)
+    new = readings.difference != 0
+    event = np.flatnonzero(new)
+    if not len(event):
+        return Estimate(readings.time, np.zeros(len(now)))
+    stamp = _clocks(readings.changed_at[event], clock_s, period_s)
+    moved = readings.difference[event]
+    waited = (now[event[1:] - 1] - stamp[:-1]) * clock_s
+    start = np.append(True, (np.diff(event) > 1) & (waited >= timeout_s))
+    moved_before = np.append(0, np.where(start, 0, moved)[:-1])
+    zero = start | ((np.abs(moved) == 1) & (moved * moved_before < 0))
+    elapsed = np.diff(stamp, prepend=stamp[0])
+    measured = ~zero & (elapsed > 0)
+    measurement = np.divide(moved, elapsed * clock_s, out=np.zeros(len(event)), where=measured)
+    measurement = _held(measurement, zero | measured)
+
+    latest = np.cumsum(new) - 1  # event of each reading, -1 before the first
+    speed = np.where(latest < 0, 0.0, measurement[latest])
+    age = np.where(new, 0.0, (now - stamp[latest]) * clock_s)
+    bound = np.divide(1.0, age, out=np.full(len(now), np.inf), where=age > 0)
+    speed = np.where(age >= timeout_s, 0.0, np.copysign(np.minimum(np.abs(speed), bound), speed))
+    return Estimate(readings.time, speed * steps.count_rad)
+
+
+def mixed_method(steps: Steps, period_s: float, timeout_s: float = 0.1, clock_s: float = 1e-6) -> Estimate:
+    """SimpleFOC's encoder: dN / (Ts + Th of the reading before - Th), held while there is no new count.
+
+    dN are the counts of the period Ts, Th is the age of the latest count at a reading. A measurement over less than
+    half a period is left out, and the speed is 0 once Th is more than `timeout_s`. SimpleFOC controls with what
+    `low_pass` makes of this, with a time constant of 5 ms by default.
+
+    Parameters
+    ----------
+    steps : Steps
+    period_s : float, seconds
+    timeout_s : float, seconds
+        0.1 s in SimpleFOC.
+    clock_s : float, seconds
+        Unit of the times of counts: 1 us in SimpleFOC.
+    """
+    readings = _read(steps, period_s)
+    now = _clocks(readings.time, clock_s, period_s)
+    age = now - _clocks(readings.changed_at, clock_s, period_s)
+    elapsed = np.diff(now, prepend=0) + np.append(0, age[:-1]) - age
+    measured = (readings.difference != 0) & (2 * elapsed > np.diff(now, prepend=0))
+    speed = np.divide(readings.difference, elapsed * clock_s, out=np.zeros(len(now)), where=measured)
+    timed_out = age * clock_s > timeout_s
+    speed = _held(np.where(timed_out, 0.0, speed), measured | timed_out)
+    return Estimate(readings.time, speed * steps.count_rad)
+
+
+def tracking_loop(
+    steps: Steps, period_s: float, bandwidth_rad_s: float = 1000.0, whole_counts: bool = True
+) -> Estimate:
+    """A critically damped second-order loop that follows the count: kp = 2 bandwidth, ki = kp^2 / 4.
+
+    At constant acceleration it shows the speed of 2 / bandwidth - period / 2 ago. moteus also limits the speed to an
+    eighth of a revolution per period, which is left out.
+
+    Parameters
+    ----------
+    steps : Steps
+    period_s : float, seconds
+        125 us in ODrive, 33 us in moteus.
+    bandwidth_rad_s : float, rad/s
+        Natural frequency: ODrive's `bandwidth`, 1000 by default, and 2 pi / `MOTEUS_3DB_RATIO` times moteus's
+        `pll_filter_hz`, 400 by default.
+    whole_counts : bool
+        As ODrive: the error is the count less the whole counts of the loop's position, and a speed below half of what
+        an error of one count adds in a period is set to 0. Otherwise as moteus: the error has its fraction.
+
+    Raises
+    ------
+    ValueError
+        If kp times the period is 1 or more: ODrive refuses such a loop as unstable.
+    """
+    kp, ki = 2 * bandwidth_rad_s, bandwidth_rad_s**2
+    if not 0 < kp * period_s < 1:
+        raise ValueError(f"twice the bandwidth times the control period must be less than 1, not {kp * period_s:.6g}")
+    readings = _read(steps, period_s)
+    least = 0.5 * period_s * ki if whole_counts else 0.0
+    position = speed = 0.0  # counts, counts/s
+    speeds = []
+    for count in readings.counts.tolist():
+        position += period_s * speed
+        error = count - (math.floor(position) if whole_counts else position)
+        position += period_s * kp * error
+        speed += period_s * ki * error
+        if abs(speed) < least:
+            speed = 0.0
+        speeds.append(speed)
+    return Estimate(readings.time, np.array(speeds) * steps.count_rad)
+
+
+def delay_seconds(time: FloatArray, velocity: FloatArray, true_speed: FloatArray, max_delay_s: float = 0.02) -> float:
+    """Delay of a measured speed: the shift of the true one that comes closest to it in the mean square.
+
+    Between samples by a parabola. The first and last `max_delay_s` of the measurement are left out.
+
+    Parameters
+    ----------
+    time : float64 array, shape (n,), seconds, evenly spaced, more than 2 `max_delay_s` long
+    velocity, true_speed : float64 arrays, shape (n,), the same unit
+        At these times; the true speed must not look alike twice within `max_delay_s`.
+    max_delay_s : float, seconds
+        Largest delay that is looked for, either way.
+
+    Raises
+    ------
+    ValueError
+        If the times are not so, or no shift within `max_delay_s` is closer than those beside it.
+    """
+    even = len(time) > 1 and np.allclose(np.diff(time), time[1] - time[0], rtol=1e-6, atol=0)
+    period = (time[-1] - time[0]) / (len(time) - 1) if even else math.inf
+    reach = math.ceil(max_delay_s / period)
+    n_compared = len(time) - 2 * reach
+    if not even or n_compared < 1:
+        raise ValueError(f"times must be evenly spaced and more than {2 * max_delay_s} s long")
+    mean = np.mean(true_speed)
+    truth, measured = true_speed - mean, velocity[reach : reach + n_compared] - mean
+    # The shift of row i is reach - i samples.
+    product = np.fft.irfft(np.fft.rfft(truth) * np.conj(np.fft.rfft(measured, len(truth))), len(truth))
+    energy = np.append(0.0, np.cumsum(truth**2))
+    distance = energy[n_compared:] - energy[:-n_compared] - 2 * product[: 2 * reach + 1]
+    best = int(np.argmin(distance))
+    before, least, after = distance[best - 1 : best + 2] if 0 < best < 2 * reach else (0.0, 0.0, 0.0)
+    curvature = before - 2 * least + after
+    if not curvature > 0:
+        raise ValueError(f"no delay within {max_delay_s} s stands out")
+    return float(period * (reach - best - 0.5 * (before - after) / curvature))

@@ -1,0 +1,155 @@
+"""Several methods on the same edges: what each makes of them, and how far it is from the truth."""
+
+import math
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies import baselines as rivals
+from tachometry.spec import TachometerSpec
+
+TrueSpeed = Callable[[FloatArray], FloatArray]
+
+_MOST_INSTANTS = 200_000
+_LONGEST_DELAY = 0.02  # seconds, that is looked for
+_ALIKE = 1e-9  # of a speed; a constant one has no delay
+
+
+def _simplefoc(steps: rivals.Steps) -> rivals.Estimate:
+    raw = rivals.mixed_method(steps, 1e-3)
+    return rivals.Estimate(raw.time, rivals.low_pass(raw.velocity, 1e-3, 5e-3))
+
+
+# What people use now: how it is described, and its float model with the settings that its project comes with.
+RIVALS: dict[str, tuple[str, Callable[[rivals.Steps], rivals.Estimate]]] = {
+    "difference": ("counts in 1 ms, 5 ms low-pass", partial(rivals.finite_difference, period_s=1e-3)),
+    "hostmot2": ("LinuxCNC: timestamps, 1 ms", partial(rivals.timestamp_method, period_s=1e-3)),
+    "simplefoc": ("SimpleFOC: mixed time and frequency, 1 ms, 5 ms low-pass", _simplefoc),
+    "odrive": ("ODrive: tracking loop, 1000 rad/s, 125 us", partial(rivals.tracking_loop, period_s=125e-6)),
+    "moteus": (
+        "moteus: tracking loop, 400 Hz, 33 us",
+        partial(
+            rivals.tracking_loop,
+            period_s=1 / 30e3,
+            bandwidth_rad_s=2 * math.pi * 400 / rivals.MOTEUS_3DB_RATIO,
+            whole_counts=False,
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """What a method shows.
+
+    Parameters
+    ----------
+    name, what : str
+    estimate : rivals.Estimate
+        Velocity in rad/s, held from each time (s) on.
+    measurement_time : float64 array, shape (n,), seconds
+        Of each update; empty where the method has none.
+    """
+
+    name: str
+    what: str
+    estimate: rivals.Estimate
+    measurement_time: FloatArray
+
+
+@dataclass(frozen=True)
+class Score:
+    """A curve against the truth; None is what cannot be told.
+
+    Parameters
+    ----------
+    name, what : str
+    updates_per_second : float
+    mean_time, worst_time : float or None, seconds
+        Measurement time.
+    rms, max : float or None, rad/s
+        Error of the held velocity.
+    delay : float or None, seconds
+        Shift of the true speed that comes closest.
+    """
+
+    name: str
+    what: str
+    updates_per_second: float
+    mean_time: float | None
+    worst_time: float | None
+    rms: float | None
+    max: float | None
+    delay: float | None
+
+
+def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
+    """What a core shows, by its golden model, which the hardware equals bit for bit."""
+    return run_curve(name, spec, golden.run(spec, trace.with_nominal_ticks(spec)))
+
+
+def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
+    """The same of a run."""
+    updates = run.updates
+    clock_hz = spec.timing.clock_hz
+    velocity = updates.velocity.astype(np.float64) * spec.rad_per_s_per_lsb
+    return Curve(
+        name,
+        f"{spec.method} method, tick {spec.timing.tick_cycles} clocks",
+        rivals.Estimate(updates.clock / clock_hz, velocity),
+        updates.interval.astype(np.float64) * (spec.interval_unit_cycles / clock_hz),
+    )
+
+
+def rival_curve(name: str, recording: Recording, counts_per_rev: int, decoding: int) -> Curve:
+    """What one of the `RIVALS` shows, with an ideal decoder.
+
+    Raises
+    ------
+    ValueError
+        If it is shorter than two of its periods.
+    """
+    what, model = RIVALS[name]
+    estimate = model(rivals.Steps.of_recording(recording, counts_per_rev, decoding))
+    if len(estimate.time) < 2:
+        raise ValueError(f"motion must last at least two control periods of {name}, not {recording.duration:.6g} s")
+    return Curve(name, what, estimate, np.empty(0))
+
+
+def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float, earliest: float = 0.0) -> FloatArray:
+    """Evenly spaced instants, a tick apart or more, from when every curve has begun, and `earliest` (s), to the end."""
+    begun = max((curve.estimate.time[0] for curve in curves if len(curve.estimate.time)), default=0.0)
+    begun = max(begun, earliest)
+    n = min(int((duration - begun) / tick_seconds), _MOST_INSTANTS)
+    return begun + (duration - begun) / max(n, 1) * np.arange(n, dtype=np.float64)
+
+
+def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueSpeed | None) -> Score:
+    """How good a curve is at some evenly spaced instants (s)."""
+    times = curve.measurement_time
+    rms = worst = delay = None
+    if true_speed is not None and len(instants):
+        held, truth = curve.estimate.at(instants), true_speed(instants)
+        error = held - truth
+        rms, worst = float(np.sqrt(np.mean(error * error))), float(np.max(np.abs(error)))
+        reach = min(_LONGEST_DELAY, (instants[-1] - instants[0]) / 4)
+        if np.ptp(truth) > _ALIKE * np.max(np.abs(truth)):
+            with suppress(ValueError):  # a motion that looks alike at several shifts
+                delay = rivals.delay_seconds(instants, held, truth, reach)
+    return Score(
+        curve.name,
+        curve.what,
+        len(curve.estimate.time) / duration,
+        float(np.mean(times)) if len(times) else None,
+        float(np.max(times)) if len(times) else None,
+        rms,
+        worst,
+        delay,
+    )

@@ -1,0 +1,269 @@
+"""A point of a sweep: a core on a motion, what it is known by, and the row of figures that comes of it."""
+
+import functools
+import hashlib
+import pickle
+import platform
+from dataclasses import dataclass, field
+from fractions import Fraction
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import Motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.build import digest
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.run import compare
+from tachometry.sim.studies.compare import common_instants, run_curve, score
+from tachometry.spec import TachometerSpec
+from tachometry.spec.option import options_of
+from tachometry.spec.units import format_time
+
+Row = dict[str, Any]
+
+# Every column of the results: its kind, and what is in it, with its unit. Empty is what is not there or cannot be told.
+COLUMNS: dict[str, tuple[str, str]] = {
+    "point": ("text", "digest of all that decides the row"),
+    "method": ("text", "as in `methods`"),
+    "motion": ("text", "as in `motion`, its values in place"),
+    "engine": ("text", "what ran the hardware beside the golden model"),
+    "mismatches": ("int", "values in which hardware and golden model differ"),
+    "clocks": ("int", "clocks of the core"),
+    "updates": ("int", "updates of the velocity"),
+    "forced_updates": ("int", "those by the maximum time alone"),
+    "updates_per_s": ("float", "1/s"),
+    "mean_time_s": ("float", "s, mean measurement time"),
+    "worst_time_s": ("float", "s, longest measurement time"),
+    "true_rms_rad_s": ("float", "rad/s, RMS of the true speed while it is compared"),
+    "rms_error_rad_s": ("float", "rad/s, RMS error of the held velocity"),
+    "max_error_rad_s": ("float", "rad/s, greatest error"),
+    "relative_error": ("float", "RMS error over RMS of the true speed"),
+    "delay_s": ("float", "s, shift of the true speed that comes closest"),
+    "ppr": ("int", "pulses per revolution"),
+    "decoding": ("int", "counts per pulse"),
+    "clock_hz": ("int", "Hz"),
+    "tick_s": ("float", "s; with Rairán's method dt"),
+    "max_time_s": ("float", "s"),
+    "max_tick_period_s": ("float", "s, of an external tick"),
+    "unit": ("text", "of the velocity"),
+    "frac_bits": ("int", "bits"),
+    "velocity_width": ("int", "bits"),
+    "max_speed_rad_s": ("float", "rad/s"),
+    "position_width": ("int", "bits"),
+    "filter": ("int", "clocks"),
+    "index": ("bool", "as the option"),
+    "index_reset": ("bool", "as the option"),
+    "age": ("bool", "as the option"),
+    "bounds": ("bool", "as the option"),
+    "lowpass_rad_s": ("float", "rad/s"),
+    "cancel": ("bool", "as the option"),
+    "average": ("int", "ticks"),
+    "timer": ("text", "as the option"),
+    "min_time_s": ("float", "s"),
+    "bound_decay": ("bool", "as the option"),
+    "paper_exact": ("bool", "as the option"),
+    "estimate": ("text", "as the option"),
+    "adaptive": ("float", "relative error"),
+    "vibration_rad": ("float", "rad, amplitude"),
+    "vibration_hz": ("float", "Hz"),
+    "jitter": ("float", "fraction of a gap"),
+    "nonuniformity": ("float", "edge pitches"),
+    "phase_error_deg": ("float", "electrical degrees"),
+    "duty_error_deg": ("float", "electrical degrees"),
+    "bounce_count": ("int", "per edge"),
+    "bounce_s": ("float", "s"),
+    "lost": ("float", "probability"),
+    "illegal": ("float", "probability"),
+    "seed": ("int", "as the option"),
+    "from_s": ("float", "s, errors before are left out"),
+}
+
+
+@dataclass(frozen=True)
+class Point:
+    """A core on a motion.
+
+    Parameters
+    ----------
+    method : str
+        What the method is called.
+    spec : TachometerSpec
+    encoder : VirtualEncoder
+    motion : Motion
+    text : str
+        The motion in words.
+    values : dict of str to float
+        What the sweep varies within the motion, in rad/s, s and Hz: a column each.
+    earliest : float, seconds
+        Errors before it are left out.
+    engine : str or None
+        What runs the hardware; None: the golden model alone, which it equals.
+
+    Raises
+    ------
+    ValueError
+        If the motion is shorter than a tick, or no two ticks of it are compared.
+    """
+
+    method: str
+    spec: TachometerSpec
+    encoder: VirtualEncoder
+    motion: Motion
+    text: str
+    values: dict[str, float] = field(default_factory=dict)
+    earliest: float = 0.0
+    engine: str | None = None
+
+    def __post_init__(self) -> None:
+        needed = self.spec.longest_tick + self.spec.tick_latency
+        if self.motion.duration * self.spec.timing.clock_hz < needed:
+            least = format_time(self.spec.seconds(needed))
+            raise ValueError(f"motion must last at least {needed} clocks of --clock ({least}), a tick and its latency")
+        duration = self.motion.duration
+        if self.earliest and duration - self.earliest < 2 * float(self.spec.timing.tick_seconds):
+            lasts = format_time(Fraction(f"{duration:.6g}"))
+            raise ValueError(f"motion must last two ticks or more beyond --from, longer than {lasts}")
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Digest of all that decides the row, the code that makes it included."""
+        motion = [array.tobytes() for array in vars(self.motion).values()]
+        rest = (self.method, self.spec, self.encoder, self.values, self.earliest, self.engine)
+        return digest(code_digest(), motion, *rest)
+
+
+class OtherCode(ImportError):
+    """A worker has another version."""
+
+
+@functools.cache
+def code_digest() -> str:
+    """Digest of all code that rows depend on: the results of equal code are the same."""
+    found = hashlib.sha256()
+    for layer in ("spec", "hdl", "sim"):
+        module = find_spec(f"tachometry.{layer}")  # not imported: the golden models need no Amaranth
+        assert module is not None
+        assert module.origin is not None
+        folder = Path(module.origin).parent
+        for file in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".h")):
+            found.update(f"{folder.name}/{file.relative_to(folder).as_posix()}\n".encode())
+            found.update(file.read_bytes())
+    return found.hexdigest()
+
+
+def run_packed(code: str, packed: bytes) -> Row:
+    """`run_point` of a pickled point, on any machine with the same code.
+
+    Raises
+    ------
+    OtherCode
+        If the code here is not that which is meant.
+    ValueError
+        As `run_point`, with the point.
+    """
+    if code != code_digest():
+        raise OtherCode(f"that of {platform.node()} is another")
+    point = pickle.loads(packed)
+    try:
+        return run_point(point)
+    except ValueError as error:
+        raise ValueError(f"{error} (method {point.method}, motion {point.text})") from None
+
+
+def run_point(point: Point) -> Row:
+    """Run a point: its row, with all of `COLUMNS` and one for each of its values.
+
+    Raises
+    ------
+    ValueError
+        If the motion has too many edges.
+    OSError
+        If the engine lacks what it needs here.
+    """
+    spec, encoding = point.spec, point.encoder.record(point.motion)
+    duration = encoding.recording.duration
+    trace = encoding.recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
+    run = golden.run(spec, trace)
+    mismatches = None
+    if point.engine is not None:
+        mismatches, _ = compare(run, pick(point.engine).run(spec, trace))
+    curve = run_curve(point.method, spec, run)
+    instants = np.empty(0)
+    if len(run.updates.clock):
+        instants = common_instants([curve], duration, float(spec.timing.tick_seconds), point.earliest)
+    found = score(curve, duration, instants, encoding.true_speed)
+    truth = encoding.true_speed(instants)
+    true_rms = float(np.sqrt(np.mean(truth * truth))) if len(truth) else None
+    figures = {
+        "point": point.digest,
+        "method": point.method,
+        "motion": point.text,
+        "engine": point.engine,
+        "mismatches": mismatches,
+        "clocks": trace.n_clocks,
+        "updates": len(run.updates.clock),
+        "forced_updates": int(np.count_nonzero(run.updates.forced)),
+        "updates_per_s": found.updates_per_second,
+        "mean_time_s": found.mean_time,
+        "worst_time_s": found.worst_time,
+        "true_rms_rad_s": true_rms,
+        "rms_error_rad_s": found.rms,
+        "max_error_rad_s": found.max,
+        "relative_error": found.rms / true_rms if found.rms is not None and true_rms else None,
+        "delay_s": found.delay,
+        "from_s": point.earliest,
+    }
+    return dict.fromkeys(COLUMNS) | figures | _core(spec) | _encoder(point.encoder) | point.values
+
+
+def _core(spec: TachometerSpec) -> Row:
+    """Columns of the configuration."""
+
+    def seconds(clocks: int | None) -> float | None:
+        return None if clocks is None else float(spec.seconds(clocks))
+
+    timing = spec.timing
+    own = {item.name: spec.parameters[item.name] for item in options_of(type(spec))}
+    if "min_time" in own:
+        own["min_time_s"] = seconds(own.pop("min_time"))
+    return {
+        "ppr": spec.encoder.pulses_per_rev,
+        "decoding": spec.encoder.decoding,
+        "clock_hz": timing.clock_hz,
+        "tick_s": seconds(timing.tick_cycles),
+        "max_time_s": seconds(timing.max_ticks * timing.tick_cycles),
+        "max_tick_period_s": seconds(spec.max_tick_cycles),
+        "unit": spec.unit,
+        "frac_bits": spec.frac_bits,
+        "velocity_width": spec.velocity_width,
+        "max_speed_rad_s": None if spec.max_speed is None else spec.max_speed.rad_per_s,
+        "position_width": spec.position_width,
+        "filter": spec.filter_clocks,
+        "index": spec.index,
+        "index_reset": spec.index_reset,
+        "age": spec.age,
+        "bounds": spec.bounds,
+        "lowpass_rad_s": None if spec.lowpass is None else float(spec.lowpass),
+    } | {name: float(value) if isinstance(value, Fraction) else value for name, value in own.items()}
+
+
+def _encoder(encoder: VirtualEncoder) -> Row:
+    """Columns of the encoder and what is wrong with it."""
+    vibration, bounce = encoder.vibration, encoder.bounce
+    return {
+        "vibration_rad": None if vibration is None else vibration.amplitude_rad,
+        "vibration_hz": None if vibration is None else vibration.frequency_hz,
+        "jitter": encoder.jitter,
+        "nonuniformity": encoder.nonuniformity,
+        "phase_error_deg": encoder.phase_error_deg,
+        "duty_error_deg": encoder.duty_error_deg,
+        "bounce_count": None if bounce is None else bounce.count,
+        "bounce_s": None if bounce is None else bounce.time_s,
+        "lost": encoder.lost,
+        "illegal": encoder.illegal,
+        "seed": encoder.seed,
+    }

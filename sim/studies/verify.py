@@ -1,0 +1,120 @@
+"""One core on seeded motions, by several engines, against its golden model."""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.engine import Engine
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Mismatch, Run, compare
+from tachometry.spec import TachometerSpec
+
+_EDGES, _MOST_EDGES = 300, 50_000  # at a speed, of a motion
+# Some thousand times slower than the others, it runs a thousandth of their clocks.
+_SLOW, _SLOW_SHARE, _SLOW_LEAST = "pysim", 1000, 10_000
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The first motion on which hardware and golden model differ.
+
+    Parameters
+    ----------
+    seed : int
+    first : list of Mismatch
+        In each signal that differs.
+    trace : PinTrace
+        The motion, up to what differs first.
+    """
+
+    seed: int
+    first: list[Mismatch]
+    trace: PinTrace
+
+
+@dataclass
+class Outcome:
+    """What came of the motions on an engine.
+
+    Parameters
+    ----------
+    n_motions, n_clocks, n_ticks, n_updates, n_mismatches : int
+    seconds : float
+        That the engine took, its build included.
+    failure : Failure or None
+    """
+
+    n_motions: int = 0
+    n_clocks: int = 0
+    n_ticks: int = 0
+    n_updates: int = 0
+    n_mismatches: int = 0
+    seconds: float = 0.0
+    failure: Failure | None = None
+
+
+def motions(spec: TachometerSpec, seed: int, n_clocks: int) -> Iterator[tuple[int, PinTrace]]:
+    """Seed and motion, of `seed`, `seed` + 1 … until they have `n_clocks` clocks together; one at least."""
+    done, n_edges = 0, _EDGES
+    while True:
+        trace = stress(spec, seed, n_edges)
+        yield seed, trace
+        done += trace.n_clocks
+        if done >= n_clocks:
+            return
+        seed += 1
+        n_edges = int(np.clip(n_edges * (n_clocks - done) // trace.n_clocks, _EDGES, _MOST_EDGES))
+
+
+def verify(spec: TachometerSpec, engines: Sequence[str], n_clocks: int, seed: int) -> dict[str, Outcome]:
+    """Run motions on every engine, and compare every bit of every tick and update with the golden model.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    engines : sequence of str
+    n_clocks : int
+        Clocks that each engine is to run at least; pysim a thousandth of them, but no fewer than 10,000.
+    seed : int
+        Of the first motion.
+
+    Returns
+    -------
+    dict of str to Outcome
+        By the engine.
+    """
+    outcomes = {engine: Outcome() for engine in engines}
+    used = {engine: pick(engine) for engine in engines}
+    few = max(n_clocks // _SLOW_SHARE, _SLOW_LEAST)
+    for number, whole in motions(spec, seed, n_clocks):
+        expected: dict[int, Run] = {}
+        for engine, outcome in outcomes.items():
+            most = few - outcome.n_clocks if engine == _SLOW else whole.n_clocks
+            if most == 0:
+                continue
+            trace = whole.until(min(most, whole.n_clocks))
+            if trace.n_clocks not in expected:
+                expected[trace.n_clocks] = golden.run(spec, trace)
+            _add(outcome, spec, used[engine], number, trace, expected[trace.n_clocks])
+    return outcomes
+
+
+def _add(outcome: Outcome, spec: TachometerSpec, engine: Engine, seed: int, trace: PinTrace, expected: Run) -> None:
+    begun = time.perf_counter()
+    actual = engine.run(spec, trace)
+    outcome.seconds += time.perf_counter() - begun
+    count, first = compare(expected, actual)
+    outcome.n_motions += 1
+    outcome.n_clocks += trace.n_clocks
+    outcome.n_ticks += len(actual.ticks.clock)
+    outcome.n_updates += len(actual.updates.clock)
+    outcome.n_mismatches += count
+    if count and outcome.failure is None:
+        # A capture holds what comes before its end; the outputs come a little later.
+        end = min(mismatch.clock for mismatch in first) + spec.longest_tick + spec.tick_latency
+        outcome.failure = Failure(seed, first, trace.until(min(end, trace.n_clocks)))

@@ -1,0 +1,1 @@
+"""Testbenches that stand on their own."""

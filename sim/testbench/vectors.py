@@ -1,0 +1,129 @@
+"""A testbench that stands on its own: what to put on the pins, and what the outputs must show, as data."""
+
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.imperfections import Bounce
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.run import STROBES, Index, Run, Ticks, Updates
+from tachometry.spec import TachometerSpec
+
+# Clocks of the motion, and of the standstill after it: Icarus takes some 40,000 a second.
+_MOVING, _STANDING = 160_000, 800_000
+_FEWEST_TICKS, _MOST_TICKS = 3, 1000
+
+
+def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = None) -> dict[str, str]:
+    """A bench for cocotb as texts by file name: `test_NAME.py` and `NAME_vectors.json`.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    name : str
+        Of the module; `NAME.v` and its manifest `NAME.json` must lie beside the bench.
+    recording : Recording or None
+        What to put on the pins; None: `usual_motion`.
+
+    Raises
+    ------
+    ValueError
+        If it does not last for a tick.
+    """
+    trace = (usual_motion(spec) if recording is None else recording).place(spec.timing.clock_hz)
+    if spec.max_tick_cycles:
+        trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
+    run = golden.run(spec, trace)
+    if not len(run.ticks.clock):
+        raise ValueError(f"motion must last for a tick, not for {trace.n_clocks} clocks")
+    vectors = {
+        "clocks": trace.n_clocks,
+        "pins": list(trace.lines),
+        "changes": _rows(trace.clock, *trace.lines.values()),
+        "strobes": _strobes(spec, run),
+    }
+    text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
+    bench = Path(__file__).with_name("cocotb_bench.py").read_text(encoding="utf-8")
+    return {f"test_{name}.py": bench, f"{name}_vectors.json": text}
+
+
+def usual_motion(spec: TachometerSpec) -> Recording:
+    """Fast and slow, forward, backward and back over the index, with jitter and illegal transitions, then at rest.
+
+    The rest outlasts the maximum time, so that the core reads zero, unless that takes a million clocks or more.
+    """
+    cycles, clock_hz = spec.timing.tick_cycles, spec.timing.clock_hz
+    moving = max(min(_MOVING, _MOST_TICKS * cycles), _FEWEST_TICKS * cycles)
+    standing = min(_STANDING, cycles * (8 * spec.timing.max_ticks // 5 + 10))
+    # Counts per tick that the lines can have: an edge in two clocks, slower with a filter.
+    most = cycles * spec.encoder.decoding / 8 / (1 + spec.filter_clocks)
+    part = moving / 8 / clock_hz
+
+    def speed(counts_per_tick: float) -> str:
+        return f"{spec.unit_velocity * counts_per_tick}rad/s"
+
+    brisk, fast = min(3.3, most), min(1.5 * spec.max_count, most)
+    motion = (
+        f"ramp:0:{speed(brisk)}:{part}s+constant:{speed(min(1.25, most))}:{part}s+constant:{speed(fast)}:{part / 20}s"
+        f"+constant:{speed(-fast)}:{part / 20}s+constant:{speed(-min(1.25, most))}:{part}s"
+        f"+ramp:{speed(-brisk)}:0:{part}s+sine:{speed(brisk / 2)}:{3 / part}Hz:{part}s"
+        f"+constant:{speed(min(0.3, most))}:{part}s+constant:{speed(-min(0.04, most))}:{2 * part}s"
+        f"+stop:{standing / clock_hz}s"
+    )
+    encoder = VirtualEncoder(
+        spec.encoder.pulses_per_rev,
+        jitter=0.1,
+        illegal=0.01,
+        bounce=Bounce(1, spec.filter_clocks / clock_hz) if spec.filter_clocks else None,
+        start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
+        seed=1,
+        index=spec.index,
+    )
+    return encoder.record(parse_motion(motion)).recording
+
+
+def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
+    """Clocks of ticks that come a little early or late, sometimes much too early or too late."""
+    cycles = spec.timing.tick_cycles
+    k = np.arange(n_clocks // 2 // cycles + 2)
+    gap = cycles + (k % 5 - 2) * (cycles // 16)
+    gap[7::30] = 2
+    gap[17::30] = 3 * spec.longest_tick
+    return np.cumsum(np.maximum(gap, 2)).astype(np.int64)
+
+
+def _strobes(spec: TachometerSpec, run: Run) -> dict[str, Any]:
+    """Each strobe of the core, with its ports and rows; with `tick` also what is held since the last update."""
+    ticks, updates = run.ticks, run.updates
+    shown = _values(updates) | updates.more
+    last = np.searchsorted(updates.clock, ticks.clock, side="right")
+    held = {name: np.array([None, *column], dtype=object)[last] for name, column in shown.items()}
+    groups: dict[str, tuple[NDArray[np.int64], dict[str, NDArray[Any]]]] = {
+        "tick": (ticks.clock, _values(ticks) | held),
+        "velocity_valid": (updates.clock, shown),
+        "index_valid": (run.index.clock, _values(run.index)),
+        "decode_error": (run.errors, {}),
+        "tick_error": (run.tick_errors, {}),
+    }
+    there = {port.name for port in spec.ports}
+    strobes = {}
+    for strobe in filter(there.__contains__, STROBES):
+        clock, values = groups[strobe]
+        names = [name for name in values if name in there]
+        strobes[strobe] = {"ports": names, "rows": _rows(clock, *(values[name] for name in names))}
+    return strobes
+
+
+def _values(group: Ticks | Updates | Index) -> dict[str, NDArray[Any]]:
+    return {item.name: getattr(group, item.name) for item in fields(group) if item.name not in ("clock", "more")}
+
+
+def _rows(*columns: NDArray[Any]) -> list[list[int | None]]:
+    return [[None if cell is None else int(cell) for cell in row] for row in zip(*columns, strict=True)]

@@ -1,0 +1,1 @@
+"""The methods: what each measures, its options, widths and latencies."""

@@ -1,0 +1,81 @@
+"""The M method: pulses per sampling period (Tsuji 2009, Sec. IV-A)."""
+
+from dataclasses import dataclass
+
+from tachometry.spec.formats.reciprocal import Reciprocal
+from tachometry.spec.option import option
+from tachometry.spec.tachometer import TachometerSpec, signed_width
+
+MAX_AVERAGE = 256
+
+
+@dataclass(frozen=True, kw_only=True)
+class MTachometer(TachometerSpec):
+    """M-method tachometer: an update every tick, the mean pulse number of the last n ticks.
+
+    Velocity is eq. (6) of Tsuji 2009, in counts per tick, correctly rounded. Ticks before the first count as empty.
+
+    Parameters
+    ----------
+    average : int
+        n, ticks that are averaged.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+
+    average: int = option(1, "Ticks that are averaged, 1 to 256.", metavar="N")
+
+    method = "m"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 1 <= self.average <= MAX_AVERAGE:
+            raise ValueError(f"average must be from 1 to {MAX_AVERAGE}, not {self.average}")
+
+    @property
+    def max_sum(self) -> int:
+        """Largest |Σ m_e| of n ticks."""
+        return self.average * self.max_count
+
+    @property
+    def sum_width(self) -> int:
+        """Bits of the sum, signed."""
+        return signed_width(self.max_sum)
+
+    @property
+    def shift(self) -> int | None:
+        """What the sum is shifted left by, where n is a power of two of at most 2^frac_bits; else None."""
+        halvings = self.average.bit_length() - 1
+        exact = self.average == 1 << halvings and halvings <= self.native_frac_bits
+        return self.native_frac_bits - halvings if exact else None
+
+    @property
+    def reciprocal(self) -> Reciprocal:
+        """What stands for 1/n where a shift does not do."""
+        return Reciprocal(self.average, self.max_sum + self.bounds, self.native_frac_bits, 0)
+
+    @property
+    def numerator_width(self) -> int:
+        """Bits of what is multiplied by it, signed."""
+        return signed_width(self.max_sum + self.bounds)
+
+    @property
+    def interval_width(self) -> int:
+        return self.average.bit_length()
+
+    @property
+    def remembered_clocks(self) -> int:
+        # The place in the memory may have to begin anew.
+        return (self.average + 1) * self.longest_tick
+
+    @property
+    def serial(self) -> bool:
+        return self.shift is None and self.has_room(self.numerator_width + 3)
+
+    @property
+    def datapath_latency(self) -> int:
+        # A clock for the sum, and what the scaler takes.
+        return 1 if self.shift is not None else self.numerator_width + 4

@@ -1,0 +1,72 @@
+"""The M/T method: counts over the time that they take, which is longer than a given one (Tsuji 2009, Sec. IV-C)."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from tachometry.spec.methods.timed import TimedTachometer
+from tachometry.spec.option import option
+from tachometry.spec.timing import Timing, whole_clocks
+
+
+def _parse_min_time(text: str, timing: Timing) -> int:
+    return whole_clocks("min_time", text, timing.clock_hz)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MTTachometer(TimedTachometer):
+    """M/T-method tachometer: counts over the time from the first to the last of them, eq. (13) of Tsuji 2009.
+
+    A window opens at a count, and closes at the first one later than T_c after it, which opens the next. In counts per
+    tick, correctly rounded.
+
+    Parameters
+    ----------
+    min_time : int or None
+        T_c in clocks; None: a tick.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+
+    min_time: int | None = option(
+        None,
+        "Tc: a measurement lasts longer than that. In s, ms, us or ns, or clocks. [default: a tick]",
+        metavar="TIME",
+        parse=_parse_min_time,
+    )
+
+    method = "mt"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        longest = self.timing.max_ticks * self.timing.tick_cycles
+        if not 1 <= self._min_time <= longest:
+            raise ValueError(f"min_time must be from 1 to {longest} clocks, the maximum time, not {self.min_time}")
+        if self._min_time % self.timer_cycles:
+            raise ValueError(
+                f"min_time must be a multiple of {self.timer_cycles} clocks with times in ticks, not {self.min_time}"
+            )
+
+    @property
+    def _min_time(self) -> int:
+        return self.timing.tick_cycles if self.min_time is None else self.min_time
+
+    @property
+    def min_periods(self) -> int:
+        """Timer periods that a measurement has to exceed: T_c, or one less than a division if that is longer."""
+        return max(self._min_time // self.timer_cycles, self.division_periods - 1)
+
+    @property
+    def max_interval(self) -> int:
+        return self.min_periods + self.max_periods
+
+    @property
+    def remembered_periods(self) -> int:
+        # The window that is open, whose length may wrap, up to a count; and the next.
+        return (1 << self.interval_width) + self.max_periods + self.max_interval + 2
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        return super().parameters | {"min_time": self._min_time}

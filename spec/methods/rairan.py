@@ -1,0 +1,247 @@
+"""The method of Rairán 2013: counts and sampling periods, both begun by a count."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target
+from tachometry.spec.option import option
+from tachometry.spec.tachometer import Port, TachometerSpec
+
+# The estimates are looked up by Ndt1, or by Nep1 − 1, in a table with as many entries at most.
+MAX_TABLE = 2048
+ESTIMATES = ("n1", "n2", "n3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RairanTachometer(TachometerSpec):
+    """Tachometer of Rairán 2013: sampling periods dt that a count begins, one clock being his ts.
+
+    A window begins with a count. It lasts dt, which has Nep1 counts (high speeds, n1 = Nep1), or until the next count,
+    Ndt1 whole dt later (low speeds, n1 = 1/Ndt1). Velocity is n1, n2 or n3 in counts per tick, dt being the tick,
+    correctly rounded. What it does at reversals and at rest is in docs/rairan.md.
+
+    Parameters
+    ----------
+    estimate : str
+        `n1`, the upper end of what the speed can be; `n2`, the lower; `n3`, eq. (11), their harmonic mean.
+    paper_exact : bool
+        Table 1 to the letter and nothing else: no direction, no standstill.
+    bound_decay : bool
+        Without a count the estimate falls with the time since the last one.
+    adaptive : Fraction or None
+        dt is doubled up to K times, and no more than eq. (13) needs to be at most this; None: dt is always the tick.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+
+    estimate: str = option(
+        "n3", "n1, the upper bound, n2, the lower, or n3, their harmonic mean, eq. (11).", choices=ESTIMATES
+    )
+    paper_exact: bool = option(False, "The published algorithm and nothing else: no direction, no standstill.")
+    bound_decay: bool = option(True, "Let the velocity fall with the time since the last count.")
+    adaptive: Fraction | None = option(  # noqa: RUF009
+        None,
+        "Longer dt, 2^k ticks: the shortest with which the relative error of n3, eq. (13), is at most this, such as 1% "
+        "or 0.01.",
+        metavar="TARGET",
+        parse=parse_target,
+    )
+
+    method = "rairan"
+    own_ticks = True
+    last_when_stalled = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.estimate not in ESTIMATES:
+            raise ValueError(f"estimate must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
+        if self.bounds and self.paper_exact:
+            raise ValueError("bounds must not be given with paper_exact, which leaves its own")
+        if self.timing.max_ticks >= MAX_TABLE:
+            raise ValueError(
+                f"max_ticks must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
+            )
+        if (self.estimate == "n3" or self.bounds) and self.max_count > MAX_TABLE:
+            why = "estimate n3" if self.estimate == "n3" else "bounds"
+            raise ValueError(f"max_speed must be at most {MAX_TABLE} counts per tick with {why}, not {self.max_count}")
+        if self.adaptive is not None:
+            self._check_adaptive(self.adaptive)
+
+    def _check_adaptive(self, target: Fraction) -> None:
+        if self.paper_exact:
+            raise ValueError("adaptive must not be given with paper_exact, which has one dt")
+        if self.lowpass is not None:
+            raise ValueError(
+                "lowpass must not be given with adaptive, whose ticks differ: its time is counted in ticks"
+            )
+        if not 0 < target < Fraction(1, 3):
+            raise ValueError(f"adaptive must be more than 0 and less than 1/3, not {float(target):.9g}")
+        if self.timing.max_ticks < 4:
+            raise ValueError(f"max_ticks must be at least 4 with adaptive, not {self.timing.max_ticks}")
+        if not self.max_shift:
+            most = MAX_TABLE // 2
+            raise ValueError(f"max_speed must be at most {most} counts per tick with adaptive, not {self.max_count}")
+        if self.adaptive_dt.fewest > self.max_pulse_count:
+            least = f"{1 / (2 * self.max_pulse_count - 1):.4g}"
+            raise ValueError(f"adaptive must be at least {least} with this speed and time, not {float(target):.9g}")
+
+    @property
+    def max_shift(self) -> int:
+        """K: a tick, of two dt at most, ends within the maximum time, and the tables hold what it counts."""
+        if self.adaptive is None:
+            return 0
+        longest = (self.timing.max_ticks // 2).bit_length() - 1
+        if self.estimate == "n3" or self.bounds:
+            longest = min(longest, (MAX_TABLE // self.max_count).bit_length() - 1)
+        # Nep1 or Nep1 − 1 of 2^k dt is not rounded.
+        return longest if self.estimate == "n3" else min(longest, self.native_frac_bits)
+
+    @property
+    def adaptive_dt(self) -> AdaptiveDt:
+        """The rule of dt, of which there must be one."""
+        assert self.adaptive is not None
+        return AdaptiveDt(self.adaptive, self.max_shift)
+
+    @property
+    def max_pulse_count(self) -> int:
+        return self.max_count << self.max_shift
+
+    def max_dt(self, shift: int) -> int:
+        """Greatest Ndt1 for dt·2^shift: those that the maximum time has."""
+        return self.timing.max_ticks >> shift
+
+    @property
+    def depth(self) -> int:
+        """Entries of the table, a power of two: by Ndt1 and, for n3, by Nep1 − 1."""
+        return 1 << max(self.timing.max_ticks, self.max_pulse_count - 1 if self.estimate == "n3" else 0).bit_length()
+
+    @property
+    def table(self) -> tuple[int, ...]:
+        """Contents by address i; 0 at address 0 stands for the velocity 0.
+
+        n1, n2: ⌊2^f/d + ½⌋ with d = i and i + 1. n3: ⌊2^(f+2)/q⌋ with q = 2i + 1. q is odd, so no multiple of ½ is
+        among what is rounded, and with h the entry ⌊2^f·2/q + ½⌋ is ⌊(h + 1)/2⌋ (low) and ⌊2^f/(2q) + ½⌋ is
+        ⌊(h + 4)/8⌋ (high). If dt is adaptive, n1 and n2 have one more bit, ⌊2^(f+1)/d⌋, as they are rounded later.
+        """
+        f = self.native_frac_bits
+        if self.estimate == "n3":
+            return (0, *((1 << (f + 2)) // (2 * i + 1) for i in range(1, self.depth)))
+        more = self.estimate == "n2"
+        if self.adaptive is not None:
+            return (0, *((1 << (f + 1)) // (i + more) for i in range(1, self.depth)))
+        return (0, *(((1 << (f + 1)) // (i + more) + 1) // 2 for i in range(1, self.depth)))
+
+    @property
+    def table_width(self) -> int:
+        """Bits of an entry."""
+        return max(self.table).bit_length()
+
+    def _bound(self, d: int, shift: int, more: int, towards: int) -> int:
+        """`d` counts in dt·2^shift, or one in −d of them, that may be `more` clocks longer; outward, and clipped."""
+        dt = self.timing.tick_cycles
+        up, down = (d * dt, (dt << shift) + more) if d >= 0 else (dt, (-d * dt << shift) + more)
+        if down <= 0:
+            return self.bound_limit
+        raw = (up << self.native_frac_bits) // down if towards < 0 else -((-up << self.native_frac_bits) // down)
+        return min(raw, self.bound_limit)
+
+    def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
+        """A bound's table, `one` being what it has for n, k and the regime.
+
+        By twice the address of the estimate, and one more if it is high. Where dt is adaptive, that of a low estimate
+        has a one in the place that `bound_depth` has, less k, and that of a high one in the place of `high_depth` and k
+        more: numbers below do not reach it.
+        """
+        if self.adaptive is None:
+            return tuple(one(n, 0, high) for n in range(self.bound_depth) for high in (False, True))
+        entries = [0] * (2 * self.bound_depth)
+        for shift in range(self.max_shift + 1):
+            low, high = self.low_depth >> shift, self.high_depth << shift
+            entries[2 * low : 4 * low : 2] = [one(n, shift, False) for n in range(low)]
+            entries[2 * high + 1 : 4 * high + 1 : 2] = [one(n, shift, True) for n in range(high)]
+        return tuple(entries)
+
+    @property
+    def lower_table(self) -> tuple[int, ...]:
+        """Lower bounds; 0 for low 0. n2 of a dt, or of Ndt1 + 1 of them, that took a clock longer."""
+
+        def lower(n: int, shift: int, high: bool) -> int:
+            return self._bound(n if high else -n - 1, shift, 1, -1) if n or high else 0
+
+        return self._by_address(lower)
+
+    @property
+    def upper_table(self) -> tuple[int, ...]:
+        """Upper bounds; none for low 0. n1 of a dt, or of Ndt1 of them, that took a clock less."""
+
+        def upper(n: int, shift: int, high: bool) -> int:
+            return self._bound(n + 1 if high else -n, shift, -1, 1) if n or high else self.bound_limit
+
+        return self._by_address(upper)
+
+    @property
+    def low_depth(self) -> int:
+        """A power of two above every Ndt1."""
+        return 1 << self.timing.max_ticks.bit_length()
+
+    @property
+    def high_depth(self) -> int:
+        """A power of two above every Nep1 − 1 of a dt as long as nominal."""
+        return 1 << (self.max_count - 1).bit_length()
+
+    @property
+    def bound_depth(self) -> int:
+        """Entries of each bound's table for low speeds, and for high ones: by Ndt1 and by Nep1 − 1."""
+        if self.adaptive is None:
+            return max(self.low_depth, self.high_depth)
+        return 2 * max(self.low_depth, self.high_depth << self.max_shift)
+
+    def tie(self, shift: int) -> int | None:
+        """The Ndt1 for which n1 or n2 is just half an LSB, if there can be one: it is rounded up, to 1 or to −0."""
+        ndt1 = (2 << self.native_frac_bits >> shift) - (self.estimate == "n2")
+        return ndt1 if self.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
+
+    @property
+    def memory(self) -> tuple[str, int, int]:
+        """What holds the reciprocal: what it is, entries, bits of an entry."""
+        return "table", self.depth, self.table_width
+
+    @property
+    def method_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("n_ep1", "output", self.max_pulse_count.bit_length()),
+            Port("n_dt1", "output", self.interval_width),
+            *([Port("dt_shift", "output", self.max_shift.bit_length())] if self.adaptive else []),
+        )
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        return super().parameters | {"adaptive": None if self.adaptive is None else float(self.adaptive)}
+
+    @property
+    def update_spacing(self) -> int:
+        """Fewest clocks between two updates: a count may come at any time."""
+        return 1
+
+    def has_room(self, clocks: int) -> bool:
+        return clocks <= self.update_spacing
+
+    @property
+    def remembered_clocks(self) -> int:
+        # Cdt, which may wrap, up to a count; one up to the next, which opens a window, and that.
+        return ((1 << self.interval_width) + 2 * self.timing.max_ticks + 3) * self.timing.tick_cycles << self.max_shift
+
+    @property
+    def serial(self) -> bool:
+        return False
+
+    @property
+    def datapath_latency(self) -> int:
+        # From the end of dt or a count: a clock for the decision, one for the address, one for the table, one for the
+        # sum; `tick` takes two as well.
+        return 4 - self.tick_latency

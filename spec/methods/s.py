@@ -1,0 +1,96 @@
+"""The S method of Tsuji 2009, Sec. V."""
+
+from dataclasses import dataclass
+
+from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
+from tachometry.spec.formats.reciprocal import Reciprocal
+from tachometry.spec.option import option
+from tachometry.spec.tachometer import TachometerSpec, signed_width
+
+# Up to this many ticks 1/m_s is looked up in a table of block RAM; for longer measurements it is carried along.
+MAX_TABLE = 2048
+
+
+@dataclass(frozen=True, kw_only=True)
+class STachometer(TachometerSpec):
+    """S-method tachometer: averages in step with the alterations of the pulse number.
+
+    Velocity is eq. (21) of Tsuji 2009, or eq. (17) without cancelling, in counts per tick, correctly rounded.
+
+    Parameters
+    ----------
+    cancel : bool
+        Cancel alternate pulse alterations: eq. (21) instead of eq. (17).
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+
+    cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).")
+
+    method = "s"
+
+    @property
+    def kept_ticks(self) -> int:
+        """Ticks of the window that a forced update leaves open: its newer half."""
+        return self.timing.max_ticks // 2
+
+    @property
+    def max_numerator(self) -> int:
+        """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
+        return (2 * self.max_count + self.bounds) * self.whole
+
+    @property
+    def whole(self) -> int:
+        """What of N is one count."""
+        return 2 if self.cancel else 1
+
+    @property
+    def reciprocal(self) -> Reciprocal | CarriedReciprocal:
+        """The reciprocal of m_s: looked up, or carried along where a table would be large."""
+        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, int(self.cancel))
+        carried = CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
+        return carried if self.timing.max_ticks > max(MAX_TABLE, carried.depth) else Reciprocal(*shape)
+
+    @property
+    def carried(self) -> bool:
+        """Whether the reciprocal is carried along."""
+        return isinstance(self.reciprocal, CarriedReciprocal)
+
+    @property
+    def memory(self) -> tuple[str, int, int]:
+        """What holds the reciprocal: what it is, entries, bits of an entry."""
+        return "table and carried on" if self.carried else "table", self.reciprocal.depth, self.reciprocal.width
+
+    @property
+    def numerator_width(self) -> int:
+        """Bits of N, signed: as many additions does its product take."""
+        return signed_width(self.max_numerator)
+
+    @property
+    def remembered_clocks(self) -> int:
+        # The window that is open, whose length may wrap, and the next.
+        return ((1 << self.interval_width) + self.timing.max_ticks + 1) * self.longest_tick
+
+    @property
+    def serial(self) -> bool:
+        """Whether ticks are far enough apart for one adder to form the velocity step by step."""
+        return self.has_room(self._serial_latency)
+
+    @property
+    def datapath_latency(self) -> int:
+        return self._serial_latency if self.serial else self._pipelined_latency
+
+    @property
+    def _serial_latency(self) -> int:
+        # A clock for the table, one for its register, one a bit of N, one to add b; carried, again one for every digit
+        # of N·R/m, and one to round.
+        return 2 * self.numerator_width + 4 if self.carried else self.numerator_width + 3
+
+    @property
+    def _pipelined_latency(self) -> int:
+        reciprocal = self.reciprocal
+        digits = reciprocal.digits if isinstance(reciprocal, CarriedReciprocal) else 0
+        return self.numerator_width + digits + 3

@@ -1,0 +1,131 @@
+"""`tachometry compare`."""
+
+import csv
+from pathlib import Path
+
+import pytest
+from support.command import run
+
+from tachometry.sim.studies import size as synthesis
+from tachometry.sim.studies.compare import RIVALS
+from tachometry.spec import METHODS, TachometerSpec
+
+CORE = "--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms".split()
+MOTION = ["--motion", "ramp:0:40rad/s:200ms+sine:30:10Hz:200ms"]
+
+
+def test_all_methods_in_one_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = ["--csv", tmp_path / "c.csv", "--plot", tmp_path / "c.png"]
+    assert run("compare", *CORE, *MOTION, *files) == 0
+    told = capsys.readouterr().out.splitlines()
+    names = [line.split()[0] for line in told[1 : 1 + len(METHODS) + len(RIVALS)]]
+    assert names == [*METHODS, *RIVALS]
+    with (tmp_path / "c.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["name"] for row in rows] == names
+    assert all(0 < float(row["rms"]) < float(row["max"]) for row in rows)
+    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("compare", *CORE, *MOTION, "--methods", "s, s:cancel=no,m:average=10") == 0
+    names = [line.split()[0] for line in capsys.readouterr().out.splitlines()[1:4]]
+    assert names == ["s", "s:cancel=no", "m:average=10"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--methods", "x"], "--methods must be of s, m, "),
+        (["--methods", ""], "or all, not ''"),
+        (["--methods", "s:foo=1"], "options of method s must be of cancel, not 'foo'"),
+        (["--methods", "m:average=q"], "average of method m must be a value of its kind: 'q' is not a valid integer."),
+        (["--methods", "m:average=900"], "--average must be from 1 to 256, not 900"),
+        (["--motion", "stop:1us"], "--motion must last at least two control periods of difference, not 1e-06 s"),
+        (["--motion", "stop:1500us", "--methods", "s"], "--motion must last until every method has a value"),
+        (["--replay", "x.sr"], "--motion must be given, or --replay, and not both"),
+        (["--from", "2s"], "--motion must last until every method has a value, and beyond --from, longer than 400ms"),
+        (["--from", "-1s"], "--from must be at least 0, not -1s"),
+        (["--plot", "x.jpg"], "file must end in .png or .pdf"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(
+    options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("compare", *CORE, *MOTION, "--csv", tmp_path / "new" / "c.csv", *options) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("tachometry: error: ")
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_capture_in_place_of_a_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same edges, as a capture: the same updates, and no errors, for nobody knows the truth."""
+    saved = [*"simulate --motion ramp:0:40rad/s:200ms --save-capture".split(), tmp_path / "c.sr"]
+    assert run(*saved, *CORE) == 0
+    capsys.readouterr()
+    names = ["--methods", "s,m,odrive"]
+    for source in (["--motion", "ramp:0:40rad/s:200ms"], ["--replay", tmp_path / "c.sr", "--plot", tmp_path / "c.png"]):
+        assert run("compare", *CORE, *names, *source, "--csv", tmp_path / "c.csv") == 0
+    motion, replayed = (
+        [line.split() for line in part.splitlines()[:3]] for part in capsys.readouterr().out.split("method ")[1:]
+    )
+    for known, unknown in zip(motion[1:], replayed[1:], strict=True):
+        assert known[:4] == unknown[:4]
+        assert unknown[4:] == ["-", "-", "-"]
+    with (tmp_path / "c.csv").open() as file:
+        assert [row["rms"] for row in csv.DictReader(file)] == ["", "", ""]
+    assert (tmp_path / "c.png").stat().st_size > 1000
+
+
+def test_a_capture_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "c.csv").write_text("time,a,b\n0,0,0\n0.1,1,0\n")
+    assert run("compare", *CORE, "--replay", tmp_path / "c.csv", "--csv", tmp_path / "c.csv") == 2
+    assert "--csv must be another file than the input" in capsys.readouterr().err
+
+
+def test_an_external_tick_is_nominal(capsys: pytest.CaptureFixture[str]) -> None:
+    tables = []
+    for options in ([], ["--external-tick"]):
+        assert run("compare", *CORE, *MOTION, "--methods", "s,m", *options) == 0
+        tables.append(capsys.readouterr().out)
+    assert tables[0].splitlines()[2].split()[2] == tables[1].splitlines()[2].split()[2] == "1ms"
+
+
+def test_sizes(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def measured(spec: TachometerSpec, *_: object) -> synthesis.Measurement:
+        return synthesis.Measurement({"COMB": 100 + len(spec.method), "FF": 50, "Fmax": 123.4}, "")
+
+    monkeypatch.setattr(synthesis, "versions", lambda: {"yosys": "0.70"})
+    monkeypatch.setattr(synthesis, "measure_core", measured)
+    assert run("compare", *CORE, *MOTION, "--methods", "s,odrive", "--size", "--csv", tmp_path / "c.csv") == 0
+    heads, s, odrive, *_ = capsys.readouterr().out.splitlines()
+    assert heads.split()[-3:] == ["COMB", "FF", "Fmax"]
+    assert s.split()[-3:] == ["101", "50", "123MHz"]
+    assert odrive.split()[-3:] == ["-", "-", "-"]
+    with (tmp_path / "c.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert (rows[0]["Fmax"], rows[1]["Fmax"]) == ("123.4", "")
+
+
+def test_sizes_need_their_tools(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(synthesis, "PACKAGES", ("yowasp-nothing",))
+    assert run("compare", *CORE, *MOTION, "--size") == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == (
+        "tachometry: error: --size needs the extra `size`: yowasp-nothing is not installed: pip install '.[size]'\n"
+    )
+
+
+def test_what_it_takes_to_get_going_can_be_left_out(tmp_path: Path) -> None:
+    worst = []
+    for options in ([], ["--from", "200ms"]):
+        motion = ["--motion", "constant:40rad/s:400ms", "--methods", "difference"]
+        assert run("compare", *CORE, *motion, *options, "--csv", tmp_path / "c.csv") == 0
+        with (tmp_path / "c.csv").open() as file:
+            worst.append(float(next(csv.DictReader(file))["max"]))
+    assert worst[0] > 30
+    assert worst[1] < 10

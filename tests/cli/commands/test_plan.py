@@ -1,0 +1,219 @@
+"""`tachometry plan`."""
+
+import csv
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from support.command import run
+
+from tachometry.sim import theory
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.manifest import manifest
+
+OPTIONS = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400rad/s".split()
+SPEC = STachometer(
+    encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("400rad/s")
+)
+
+
+def tables(text: str) -> tuple[dict[str, str], list[str], list[list[str]]]:
+    """The rows of the configuration, the heads of the second table and its rows."""
+    first, second, *_ = text.split("\n\n")
+    rows = [re.split(r" {2,}", line.strip(), maxsplit=1) for line in first.splitlines()]
+    heads, *lines = (re.split(r" {2,}", line.strip()) for line in second.splitlines())
+    return dict(rows), heads, lines
+
+
+def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("plan", *OPTIONS, "--filter", "3", "--decoding", "2") == 0
+    rows, _, _ = tables(capsys.readouterr().out)
+    spec = STachometer(encoder=Encoder(500, 2), timing=SPEC.timing, max_speed=SPEC.max_speed, filter_clocks=3)
+    described = json.loads(json.dumps(manifest(spec)))
+    assert rows["encoder"] == "500 pulses per revolution x2: 1000 counts"
+    assert rows["clock"] == "48,000,000 Hz"
+    assert rows["tick"] == "20us (960 clocks)"
+    assert rows["maximum time"] == "10ms (500 ticks)"
+    assert rows["unit velocity"] == "314.159 rad/s = 50 rev/s = 3000 rpm (1 count per tick)"
+    assert rows["greatest speed"] == "628.319 rad/s = 100 rev/s = 6000 rpm (2 counts per tick)"
+    assert float(rows["one LSB of velocity"].split()[3]) == pytest.approx(100 * math.pi / 65536, rel=1e-5)
+    widths = {port["name"]: port["width"] for port in described["ports"]}
+    assert {name: int(bits) for name, bits in (pair.split() for pair in rows["widths"].split(", "))} == {
+        name: widths[name] for name in ("velocity", "pulse_count", "interval", "position")
+    }
+    entries, width = len(spec.reciprocal.table), max(spec.reciprocal.table).bit_length()
+    assert rows["reciprocal"] == f"table: {entries} x {width} = {entries * width} bits of block RAM"
+    for name, clocks in described["latency_cycles"].items():
+        assert rows[name].startswith(f"{clocks} clocks (")
+    assert rows["pin_to_count"] == "5 clocks (104.2ns)"
+    assert rows["standstill"] == "reads 0 at most 15ms (750 ticks) after the last count's tick"
+    assert rows["method"] == "S, eq. (21), cancels alternate alterations"
+
+
+def test_speeds_from_one_count_in_the_maximum_time_to_the_greatest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("plan", *OPTIONS) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    _, heads, rows = tables(captured.out)
+    assert heads == ["speed (rad/s)", "counts/tick", "m_s (ticks)", "T_m", "Q_V (rad/s)", "error/V (%)", "update by"]
+    assert len(rows) == 12
+    assert rows[0] == ["0.314159", "0.002", "500", "10ms", "0.0006296", "0.582", "alteration"]
+    assert rows[-1][0] == "400"
+    ratio = [float(b[0]) / float(a[0]) for a, b in pairwise(rows)]
+    assert ratio == pytest.approx([ratio[0]] * 11, rel=1e-4)
+    for speed, counts, m_s, t_m, q_v, percent, update_by in rows:
+        units = float(speed) / (50 * math.pi)
+        interval = 1 / abs(units - math.floor(units + 0.5))
+        assert float(counts) == pytest.approx(units, rel=1e-5)
+        assert float(m_s) == pytest.approx(interval, rel=1e-3)
+        scale = 1e-3 if t_m.endswith("ms") else 1e-6
+        assert float(t_m[:-2]) * scale == pytest.approx(interval * 20e-6, rel=1e-3)
+        assert float(q_v) == pytest.approx(50 * math.pi / (interval * (interval - 1)), rel=1e-3)
+        rounding = SPEC.rad_per_s_per_lsb / 2
+        assert float(percent) == pytest.approx(100 * (float(q_v) + rounding) / float(speed), rel=1e-2)
+        assert update_by == "alteration"
+
+
+def test_a_multiple_of_the_unit_velocity_is_forced(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("plan", *OPTIONS, "--speeds", "0.5:1500rpm") == 0
+    _, heads, rows = tables(capsys.readouterr().out)
+    assert heads[0] == "speed (rpm)"
+    assert rows[0][:4] == ["0.5", "0.000333333", "500", "10ms"]
+    assert rows[0][4:] == ["3", "602", "maximum time (forced)"]
+    assert rows[-1] == ["1500", "1", "500", "10ms", "3", "0.201", "maximum time (forced)"]
+
+
+def test_plain_averaging_has_the_wider_bound(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("plan", *OPTIONS, "--no-cancel", "--speeds", "1:1500rpm") == 0
+    rows, _, lines = tables(capsys.readouterr().out)
+    assert rows["method"] == "S, eq. (17)"
+    assert lines[-1][4] == f"{1500 / 251:.4g}"
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "last"),
+    [
+        ("10:100", "10 rad/s", "100 rad/s"),
+        ("1:2rev/s", "1 rev/s", "2 rev/s"),
+        ("600rpm:20rev/s", "10 rev/s", "20 rev/s"),
+        (" 1e1rpm : 75rev/s ", "0.166667 rev/s", "75 rev/s"),  # exactly the greatest speed
+        (None, "0.314159 rad/s", "400 rad/s"),
+    ],
+)
+def test_units_of_speeds(text: str | None, first: str, last: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("plan", *OPTIONS, *([] if text is None else ["--speeds", text])) == 0
+    _, heads, rows = tables(capsys.readouterr().out)
+    unit = heads[0].removeprefix("speed (").removesuffix(")")
+    assert (f"{rows[0][0]} {unit}", f"{rows[-1][0]} {unit}") == (first, last)
+
+
+def test_without_a_greatest_speed_ten_counts_per_tick_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("plan", "--ppr", "500") == 0
+    _, _, rows = tables(capsys.readouterr().out)
+    assert (rows[0][1], rows[-1][1]) == ("0.002", "10")
+
+
+def test_csv_holds_the_dense_samples(tmp_path: Path) -> None:
+    assert run("plan", *OPTIONS, "--csv", tmp_path / "new" / "p.csv") == 0
+    with (tmp_path / "new" / "p.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) > 1000
+    assert float(rows[-1]["speed_rad_s"]) == 400
+    assert {row["forced"] for row in rows} == {"0", "1"}
+    for row in rows:
+        m_s = min(theory.tsuji_eq20_interval(float(row["speed_rad_s"]), 2000, 20e-6), 500)
+        assert float(row["interval_ticks"]) == pytest.approx(float(m_s))
+        assert float(row["measurement_time_s"]) == pytest.approx(20e-6 * float(m_s))
+
+
+def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def command(name: str) -> list[str]:
+        folder = tmp_path / name
+        files = {"--plot": folder / "p.png", "--csv": folder / "p.csv"}
+        return ["plan", *OPTIONS, *(str(word) for pair in files.items() for word in pair)]
+
+    assert run(*command("one")) == 0
+    assert run("plan", *OPTIONS, "--plot", tmp_path / "one" / "p.pdf") == 0
+    done = subprocess.run(
+        [sys.executable, "-c", "from tachometry.cli.main import main; main()", *command("two")],
+        env={**os.environ, "PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo", "LC_ALL": "C", "PYTHONUTF8": "0"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    out = capsys.readouterr().out
+    assert done.stdout == out[: len(out) // 2]
+    assert out.isascii()
+    for name in ("p.png", "p.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    assert (tmp_path / "one" / "p.png").read_bytes().startswith(b"\x89PNG\r")
+    assert (tmp_path / "one" / "p.pdf").read_bytes().startswith(b"%PDF-")
+
+
+def test_amaranth_is_not_loaded(tmp_path: Path) -> None:
+    code = f"""
+import sys
+from tachometry.cli.main import main
+try:
+    main(["plan", "--ppr", "9", "--plot", {str(tmp_path / "p.png")!r}])
+finally:
+    assert "matplotlib" in sys.modules and "amaranth" not in sys.modules
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--speeds 5", "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not '5'"),
+        ("--speeds :", "--speeds must be LO:HI, both greater than 0"),
+        ("--speeds 1:2:3", "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not '1:2:3'"),
+        ("--speeds 0:5rpm", "--speeds must be LO:HI, both greater than 0"),
+        ("--speeds -1:5rpm", "--speeds must be LO:HI, both greater than 0"),
+        ("--speeds 1m/s:5rpm", "--speeds must be LO:HI, both greater than 0"),
+        ("--speeds nan:inf", "--speeds must be LO:HI, both greater than 0"),
+        ("--speeds 5:5", "--speeds must be LO:HI with LO less than HI, not '5:5'"),
+        ("--speeds 50:5rpm", "--speeds must be LO:HI with LO less than HI, not '50:5rpm'"),
+        ("--speeds 1:75.01rev/s", "--speeds must be at most 3 counts per tick (75rev/s), the most that this core"),
+        ("--speeds 1:1e999", "--speeds must be at most 3 counts per tick (471.239rad/s)"),
+        ("--speeds 1e999:1", "error: a number is too large for this computer"),
+        ("--speeds 1e-999:1", "--speeds must be at least 1.5708e-07rad/s, not '1e-999:1'"),
+        ("--speeds 1e-9:1rpm", "--speeds must be at least 1.5e-06rpm, not '1e-9:1rpm'"),
+        ("--max-speed 1e999rpm", "error: a number is too large for this computer"),
+        ("--max-time 1us", "--max-time must be a whole number of ticks"),
+        ("--plot {new}/p.svg", "Invalid value for '--plot': file must end in .png or .pdf, not '{new}/p.svg'"),
+        ("--plot {new}/p.png --csv {new}/p.png", "--plot and --csv must be different files, not both {new}/p.png"),
+        ("--csv {new}/..", "--csv must be a file, which"),
+        ("--plot {new}/p.png --csv {new}/../file/p.csv", "file/p.csv: Not a directory"),
+        ("--csv {new}/p.csv --speeds 2:1", "--speeds must be LO:HI with LO less than HI"),
+        ("--motion stop:1s", "No such option '--motion'"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(
+    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("before")
+    new = str(tmp_path / "new")
+    assert run("plan", *OPTIONS, *options.replace("{new}", new).split()) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("tachometry: error: ")
+    assert captured.err.count("\n") == 1
+    assert message.replace("{new}", new) in captured.err
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file": "before"}
+
+
+def test_nothing_is_left_when_the_figure_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tachometry.sim.plots.plan.save_plan_plot", interrupted)
+    assert run("plan", *OPTIONS, "--csv", tmp_path / "new" / "p.csv", "--plot", tmp_path / "p.png") == 130
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,117 @@
+"""`tachometry replay`."""
+
+from pathlib import Path
+
+import pytest
+from support.command import run
+
+from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.captures.text import write_csv
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.recording import Recording
+
+CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
+
+
+def recorded() -> Recording:
+    return VirtualEncoder(100).record(parse_motion("ramp:0:20:100ms")).recording
+
+
+def test_a_saved_capture_gives_the_same_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = "--motion ramp:-10:20:200ms --jitter 0.2 --illegal 0.01 --vibration 1mrad:80Hz --seed 5".split()
+    names = {"--trace": "t.csv", "--counts": "c.csv", "--save-capture": "s.sr", "--vcd": "v.vcd"}
+
+    def outputs(folder: str) -> list[str]:
+        return [word for option, name in names.items() for word in (option, str(tmp_path / folder / name))]
+
+    assert run("simulate", *CORE, *options, *outputs("one")) == 0
+    assert run("replay", tmp_path / "one" / "s.sr", *CORE, *outputs("two")) == 0
+    for name in ("t.csv", "c.csv", "s.sr"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    simulated, replayed = capsys.readouterr().out.split("PASS")[:2]
+    for row in ("simulated", "updates", "mismatches"):
+        lines = [" ".join(line.split()) for part in (simulated, replayed) for line in part.splitlines() if row in line]
+        assert lines[0] == lines[-1]
+
+
+def test_what_is_unknown_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(tmp_path / "c.csv", recorded())
+    assert run("replay", tmp_path / "c.csv", *CORE, "--plot", tmp_path / "p.pdf") == 0
+    rows = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert "counts in unknown" in rows
+    assert "counts out 62" in rows
+    assert "errors flagged 0" in rows
+    assert "velocity error unknown: a capture does not tell the true speed" in rows
+
+
+def test_channels_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capture = tmp_path / "c.csv"
+    write_csv(capture, recorded())
+    capture.write_text(capture.read_text().replace("time,a,b", "time,left,right"))
+    assert run("replay", capture, *CORE, "--a", "right", "--b", "0") == 0
+    assert "counts out -62" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_samplerate(tmp_path: Path) -> None:
+    write_sr(tmp_path / "c.sr", recorded().place(20_000), 20_000)
+    assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
+    assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20000") == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("none.sr", "", "none.sr does not exist"),
+        ("c.txt", "", "a capture must be a .sr, .csv or .vcd file, not"),
+        ("empty.csv", "", "header of"),
+        ("text.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
+        ("cut.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
+        ("cut.csv", "", "a row must have 3 fields (time,a,b), not 2"),
+        ("folder.sr", "", "cannot read"),
+        ("c.sr", "--a X", "must be one of A (0), B (1), not 'X'"),
+        ("c.sr", "--a B", "must be two of A (0), B (1), not both B"),
+        ("c.sr", "--b 7", "must be one of A (0), B (1), not '7'"),
+        ("c.sr", "--samplerate 1MHz", "must be 20000 Hz as the file has it, not 1000000 Hz"),
+        ("c.sr", "--samplerate 1s", "--samplerate must be a number with one of the units Hz, kHz, MHz, GHz, not '1s'"),
+        ("c.csv", "--samplerate 1MHz", "--samplerate must not be given for"),
+        ("short.csv", "", "short.csv must last at least 22 clocks of --clock (1.1ms), a tick and its latency, not 1"),
+        ("c.sr", "--trace {folder}/c.sr", "--trace must be another file than the input"),
+        ("c.sr", "--index", "c.sr must be one of A (0), B (1), not 'z'"),
+        ("c.sr", "--external-tick", "c.sr must be one of A (0), B (1), not 'tick_in'"),
+        ("c.sr", "--external-tick --tick-in X", "must be one of A (0), B (1), not 'X'"),
+        ("c.sr", "--motion stop:1s", "No such option '--motion'"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(
+    name: str, options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_sr(tmp_path / "c.sr", recorded().place(20_000), 20_000)
+    write_csv(tmp_path / "c.csv", recorded())
+    (tmp_path / "cut.sr").write_bytes((tmp_path / "c.sr").read_bytes()[:-40])
+    (tmp_path / "cut.csv").write_text("time,a,b\n0.0,0,0\n0.1,1")
+    (tmp_path / "short.csv").write_text("time,a,b\n0.0,0,0\n0.00005,1,0\n")
+    (tmp_path / "text.sr").write_text("text")
+    for empty in ("c.txt", "empty.csv"):
+        (tmp_path / empty).write_text("")
+    (tmp_path / "folder.sr").mkdir()
+    before = sorted(tmp_path.iterdir())
+    arguments = [
+        *CORE,
+        "--save-capture",
+        tmp_path / "new" / "s.sr",
+        *options.replace("{folder}", str(tmp_path)).split(),
+    ]
+    assert run("replay", tmp_path / name, *arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("tachometry: error: ")
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_the_capture_is_an_argument(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("replay", *CORE) == 2
+    message = "Missing argument 'CAPTURE'. (see tachometry replay --help)"
+    assert capsys.readouterr().err == f"tachometry: error: {message}\n"

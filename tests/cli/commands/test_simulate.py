@@ -1,0 +1,341 @@
+"""`tachometry simulate`."""
+
+import csv
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.command import run
+
+from tachometry.sim import golden
+from tachometry.sim.captures.read import read_capture
+from tachometry.sim.encoder.imperfections import Bounce
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.run import Run
+from tachometry.spec import Encoder, STachometer, Timing
+
+CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
+MOTION = ["--motion", "ramp:0:20:200ms+stop:50ms+constant:-15:100ms"]
+OUTPUTS = {"--vcd": "v.vcd", "--plot": "p.png", "--trace": "t.csv", "--counts": "c.csv", "--save-capture": "s.sr"}
+COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()"]
+SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
+
+
+def all_outputs(folder: Path) -> list[str]:
+    return [word for option, name in OUTPUTS.items() for word in (option, str(folder / name))]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def summary(text: str) -> dict[str, str]:
+    """Value of each row of the table."""
+    rows = (line.strip().split("  ", 1) for line in text.splitlines() if "  " in line.strip())
+    return {name: value.strip() for name, value in rows}
+
+
+@pytest.fixture(scope="module")
+def golden_run() -> Run:
+    trace = VirtualEncoder(100).record(parse_motion(MOTION[1])).recording.place(20_000)
+    return golden.run(SPEC, trace)
+
+
+def test_all_outputs_and_the_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str], golden_run: Run) -> None:
+    assert run("simulate", *CORE, *MOTION, *all_outputs(tmp_path / "new")) == 0
+    assert set(contents(tmp_path / "new")) == {*OUTPUTS.values(), "v.gtkw"}
+    captured = capsys.readouterr()
+    assert captured.err == ""  # no terminal, no bar
+    table = summary(captured.out)
+    n_updates, n_forced = len(golden_run.updates.clock), int(np.count_nonzero(golden_run.updates.forced))
+    assert table["simulated"] == "7000 clocks (350ms), 349 ticks"
+    assert table["updates"] == f"{n_updates} ({n_forced} of them forced)"
+    assert table["mismatches"] == "0"
+    # 2 rad forwards, 1.5 rad backwards but for the last tick and latency, 400 counts a turn
+    assert table["counts in"] == table["counts out"] == str(golden_run.ticks.position[-1])
+    assert 30 <= int(table["counts in"]) <= 34
+    assert table["errors flagged"] == "0 (the encoder made 0 illegal transitions)"
+    assert captured.out.splitlines()[-1].startswith("PASS: ")
+
+
+def test_trace_has_a_row_per_update(tmp_path: Path, golden_run: Run) -> None:
+    assert run("simulate", *CORE, *MOTION, "--trace", tmp_path / "t.csv") == 0
+    with (tmp_path / "t.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["clock", "tick", "interval", "forced", "velocity_raw", "velocity_rad_s"]
+    updates = golden_run.updates
+    assert [list(map(int, row[:5])) for row in rows[1:]] == [
+        [clock, (clock - SPEC.tick_to_velocity - SPEC.tick_latency + 1) // 20 - 1, m_s, forced, raw]
+        for clock, m_s, forced, raw in zip(
+            updates.clock.tolist(),
+            updates.interval.tolist(),
+            updates.forced.tolist(),
+            updates.velocity.tolist(),
+            strict=True,
+        )
+    ]
+    assert [row[5] for row in rows[1:]] == [repr(raw * SPEC.rad_per_s_per_lsb) for raw in updates.velocity.tolist()]
+
+
+def test_counts_have_a_row_per_tick(tmp_path: Path, golden_run: Run) -> None:
+    assert run("simulate", *CORE, *MOTION, "--counts", tmp_path / "c.csv") == 0
+    text = (tmp_path / "c.csv").read_bytes().decode()
+    ticks = golden_run.ticks
+    rows = zip(ticks.pulse_count.tolist(), ticks.position.tolist(), strict=True)
+    assert text == "tick,pulse_count,position\n" + "".join(f"{i},{m_e},{x}\n" for i, (m_e, x) in enumerate(rows))
+
+
+def test_error_statistics(capsys: pytest.CaptureFixture[str]) -> None:
+    # 0.5 counts a tick for ever: after the first update, of which one tick was at rest, every estimate is exact.
+    assert run("simulate", *CORE, "--motion", "constant:1.25rev/s:100ms") == 0
+    table = summary(capsys.readouterr().out)
+    assert table["counts in"] == table["counts out"]
+    unit = SPEC.unit_velocity
+    assert float(table["velocity error, max"].split()[0]) <= unit
+    assert abs(float(table["velocity error, mean"].split()[0])) < 0.1 * unit
+    assert float(table["velocity error, RMS"].split()[0]) < 0.2 * unit
+
+
+def test_no_update_no_error_statistics(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("simulate", *CORE, "--motion", "stop:3ms") == 0
+    assert summary(capsys.readouterr().out)["velocity error"] == "unknown: there was no update"
+
+
+def test_counts_that_are_lost_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    options = "--motion constant:20:200ms --illegal 0.05 --seed 3".split()
+    assert run("simulate", *CORE, *options) == 0
+    table = summary(capsys.readouterr().out)
+    out, lost = table["counts out"].split()
+    assert int(out) - int(table["counts in"]) == int(lost.strip("()")) < 0
+    flagged = int(table["errors flagged"].split()[0])
+    assert flagged > 0
+    assert int(lost.strip("()")) == -2 * flagged
+    assert table["errors flagged"] == f"{flagged} (the encoder made {flagged} illegal transitions)"
+
+
+def test_pulses_that_are_missed_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    options = "--motion constant:20:200ms --lost 0.05 --seed 3".split()
+    assert run("simulate", *CORE, *options) == 0
+    table = summary(capsys.readouterr().out)
+    edges, missed = table["edges lost"].split(" ", 1)
+    out, lost = table["counts out"].split()
+    assert int(out) - int(table["counts in"]) == int(lost.strip("()")) == -2 * int(edges) < 0  # 4 counts a pulse
+    assert missed == f"(pulses that the encoder missed: {int(edges) // 2})"
+    assert table["errors flagged"] == "0 (the encoder made 0 illegal transitions)"
+
+
+def test_every_imperfection_reaches_the_pins_and_so_does_the_index(tmp_path: Path) -> None:
+    options = (
+        "--phase-error 20 --duty-error -30 --nonuniformity 0.1 --jitter 0.05 --bounce 2:100us --lost 0.05 "
+        "--illegal 0.02 --seed 5 --index"
+    )
+    assert run("simulate", *CORE, *MOTION, *options.split(), "--save-capture", tmp_path / "s.sr") == 0
+    encoder = VirtualEncoder(
+        100,
+        phase_error_deg=20,
+        duty_error_deg=-30,
+        nonuniformity=0.1,
+        jitter=0.05,
+        bounce=Bounce(2, 100e-6),
+        lost=0.05,
+        illegal=0.02,
+        seed=5,
+        index=True,
+    )
+    wanted = encoder.record(parse_motion(MOTION[1])).recording.place(20_000)
+    seen = read_capture(tmp_path / "s.sr", z="Z").place(20_000)
+    assert np.array_equal(seen.clock, wanted.clock)
+    assert np.array_equal(seen.level, wanted.level)
+    assert np.any(wanted.level == 4)
+
+
+def test_overflow_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("simulate", *CORE, "--motion", "constant:100:20ms", "--max-speed", "50rad/s") == 0
+    assert "faster than --max-speed" in summary(capsys.readouterr().out)["overflow"]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
+def test_plots(suffix: str, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        assert run("simulate", *CORE, "--motion", "ramp:0:20:50ms", "--plot", tmp_path / f"{name}{suffix}") == 0
+    one, two = (tmp_path / f"{name}{suffix}" for name in ("one", "two"))
+    assert one.read_bytes() == two.read_bytes()
+    assert b"matplotlib v" not in one.read_bytes().lower()
+    assert one.read_bytes()[:5] in (b"\x89PNG\r", b"%PDF-")
+
+
+def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["simulate", *CORE, "--motion", "ramp:0:20:100ms", "--jitter", "0.1", "--vibration", "1mrad:50Hz"]
+    for name in ("one", "two"):
+        assert run(*options, *all_outputs(tmp_path / name)) == 0
+    out = capsys.readouterr().out
+    assert out[: len(out) // 2] == out[len(out) // 2 :]
+    done = subprocess.run(
+        [*COMMAND, *options, *all_outputs(tmp_path / "three")],
+        env={**os.environ, "PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo", "LC_ALL": "C"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == out[: len(out) // 2]
+    assert contents(tmp_path / "one") == contents(tmp_path / "two") == contents(tmp_path / "three")
+
+
+def test_another_seed_gives_another_trace(tmp_path: Path) -> None:
+    for seed in "01":
+        options = ["--motion", "constant:20:100ms", "--jitter", "0.3", "--seed", seed]
+        assert run("simulate", *CORE, *options, "--save-capture", tmp_path / f"{seed}.sr") == 0
+    assert (tmp_path / "0.sr").read_bytes() != (tmp_path / "1.sr").read_bytes()
+
+
+def test_a_mismatch_fails_but_leaves_the_outputs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = golden.run
+
+    def wrong(spec: Any, trace: Any) -> Run:
+        right = honest(spec, trace)
+        velocity = right.updates.velocity.copy()
+        velocity[3] += 1
+        return replace(right, updates=replace(right.updates, velocity=velocity))
+
+    monkeypatch.setattr(golden, "run", wrong)
+    assert run("simulate", *CORE, *MOTION, *all_outputs(tmp_path)) == 1
+    captured = capsys.readouterr()
+    assert summary(captured.out)["mismatches"] == "1"
+    assert "first mismatch in updates.velocity[3]: expected" in captured.out
+    assert captured.out.splitlines()[-1] == "FAIL: hardware and golden model differ in 1 values"
+    assert len(contents(tmp_path)) == 6
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("", "Missing option '--motion'. (see tachometry simulate --help)"),
+        ("--motion jump:1", "--motion segment must be one of constant:SPEED:TIME, ramp:FROM:TO:TIME"),
+        ("--motion constant:1:-1s", "TIME of constant must be more than 0 s, not '-1s'"),
+        ("--motion constant:1:1ms", "--motion must last at least 22 clocks of --clock (1.1ms)"),
+        ("--motion csv:{new}/none.csv", "motion file '{new}/none.csv' cannot be read: No such file or directory"),
+        ("--motion stop:1s --vibration 1", "--vibration must be AMPLITUDE:FREQUENCY, not '1'"),
+        ("--motion stop:1s --vibration 0:1Hz", "--vibration amplitude must be more than 0"),
+        ("--motion stop:1s --jitter 0.5", "--jitter must be from 0 to less than 0.5, not 0.5"),
+        ("--motion stop:1s --jitter nan", "--jitter must be from 0 to less than 0.5, not nan"),
+        ("--motion stop:1s --nonuniformity -1", "--nonuniformity must be from 0 to less than 0.5, not -1.0"),
+        ("--motion stop:1s --illegal 2", "--illegal must be from 0 to 1, not 2.0"),
+        ("--motion stop:1s --phase-error 90", "--phase-error must be more than -90 and less than 90, not 90.0"),
+        ("--motion stop:1s --duty-error nan", "--duty-error must be more than -90 and less than 90, not nan"),
+        ("--motion stop:1s --duty-error 50 --phase-error -50", "must be less than 90 electrical degrees, not 100"),
+        ("--motion stop:1s --phase-error 20deg", "Invalid value for '--phase-error': '20deg' is not a valid float"),
+        ("--motion stop:1s --bounce 1ms", "--bounce must be COUNT:TIME, such as 3:500us, not '1ms'"),
+        ("--motion stop:1s --bounce 0:1ms", "--bounce count must be from 1 to 1000, not 0"),
+        ("--motion stop:1s --bounce 3:0us", "--bounce time must be more than 0 s, not 0.0 s"),
+        ("--motion stop:1s --lost 1.5", "--lost must be from 0 to 1, not 1.5"),
+        ("--motion stop:1s --lost nan", "--lost must be from 0 to 1, not nan"),
+        ("--motion stop:1s --seed -1", "--seed must be at least 0, not -1"),
+        ("--motion stop:1s --max-time 1ms", "--max-time, in ticks, must be from 2 to 1048576, not 1"),
+        ("--motion constant:1e9:1e9s", "--motion must be of at most 200000000 encoder edges"),
+        ("--motion stop:1s --plot {new}/p.jpg", "Invalid value for '--plot': file must end in .png or .pdf"),
+        ("--motion stop:1s --plot {new}/p", "file must end in .png or .pdf, not '{new}/p'"),
+        ("--motion stop:1s --vcd {new}/v.gtkw", "Invalid value for '--vcd': file must end in .vcd"),
+        ("--motion stop:1s --save-capture {new}/s.zip", "Invalid value for '--save-capture': file must end in .sr"),
+        ("--motion stop:1s --counts {new}/x --trace {new}/x", "--trace and --counts must be different files, not both"),
+        (
+            "--motion stop:1s --vcd {new}/x.vcd --trace {new}/x.gtkw",
+            "--vcd (its .gtkw) and --trace must be different files, not both {new}/x.gtkw",
+        ),
+        ("--motion stop:1s --counts {new}/../file/c.csv", "file/c.csv: Not a directory"),
+        ("--motion stop:1s --trace {new}/c.csv --counts {new}/..", "--counts must be a file, which {folder} is not"),
+        ("--motion stop:1s --trace /dev/null", "--trace must be a file, which /dev/null is not"),
+        ("--motion stop:1s --vcd {new}/v.vcd --vcd-from=-1ms", "--vcd-from must be at least 0, not -1ms"),
+        ("--motion stop:1s --vcd-from 1ms", "--vcd must be given together with --vcd-from and --vcd-to"),
+        (
+            "--motion stop:1s --vcd {new}/v.vcd --vcd-from 5ms --vcd-to 90",
+            "--vcd-from must be before --vcd-to and the end of the run, clock 90, not 100",
+        ),
+        ("--motion stop:1s --vcd {new}/v.vcd --vcd-to 1m", "vcd-to must be"),
+        ("--motion stop:1s --engine fast", "Invalid value for '--engine': 'fast' is not one of"),
+        ("--motion stop:1s --a A", "No such option '--a'"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(
+    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("before")
+    new = str(tmp_path / "new")
+    assert run("simulate", *CORE, *options.replace("{new}", new).split()) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("tachometry: error: ")
+    assert captured.err.count("\n") == 1
+    assert message.replace("{new}", new).replace("{folder}", str(tmp_path)) in captured.err
+    assert contents(tmp_path) == {"file": b"before"}
+
+
+def test_the_motion_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "m.csv"
+    table.write_text("time,angle_rad\n0,0\n0.01,0.1\n")
+    assert run("simulate", *CORE, "--motion", f"csv:{table}", "--trace", table) == 2
+    assert "--trace must be another file than the input" in capsys.readouterr().err
+    assert run("simulate", *CORE, "--motion", f"csv:{table}", "--trace", tmp_path / "t.csv") == 0
+
+
+def test_ctrl_c_in_the_simulation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = PySim.run
+
+    def interrupted(*args: Any, **options: Any) -> Run:
+        honest(*args, **options)  # the waveform is written
+        raise KeyboardInterrupt
+
+    (tmp_path / "t.csv").write_text("before")
+    monkeypatch.setattr(PySim, "run", interrupted)
+    options = [*all_outputs(tmp_path / "new"), "--trace", str(tmp_path / "t.csv"), "--engine", "pysim"]
+    assert run("simulate", *CORE, *MOTION, *options) == 130
+    assert capsys.readouterr() == ("", "tachometry: interrupted\n")
+    assert contents(tmp_path) == {"t.csv": b"before"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize(
+    ("engine", "end"), [("pysim", signal.SIGINT), ("cxxrtl", signal.SIGINT), ("cxxrtl", signal.SIGTERM)]
+)
+def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signal.Signals, tmp_path: Path) -> None:
+    options = [*CORE, "--motion", "constant:20:1000s", "--engine", engine, *all_outputs(tmp_path / "new")]
+    process = subprocess.Popen(
+        [*COMMAND, "simulate", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    while process.poll() is None and not any(
+        file.stat().st_size > 200_000 for file in tmp_path.glob("new/.tachometry-*/new/v.vcd")
+    ):
+        time.sleep(0.01)
+    process.send_signal(end)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    told = re.fullmatch(r"tachometry: interrupted after (\d+) of 20000000 clocks\n", err)
+    assert told is not None, err
+    assert summary(out)["simulated"].startswith(f"{told[1]} clocks")
+    assert "PASS" in out
+    assert set(contents(tmp_path / "new")) == {*OUTPUTS.values(), "v.gtkw"}
+
+
+def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture[str]) -> None:
+    # Each line changes every 21 clocks or so; some levels hold for less than 18.
+    assert run("simulate", *CORE, "--motion", "constant:30:200ms", "--jitter", "0.3", "--filter", "18") == 0
+    rows = summary(capsys.readouterr().out)
+    assert int(rows["edges swallowed"].split()[0]) > 0
+    assert rows["mismatches"] == "0"

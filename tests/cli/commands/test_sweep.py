@@ -1,0 +1,255 @@
+"""`tachometry sweep`: what it runs, keeps, tells and draws."""
+
+import re
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+from distributed import LocalCluster
+from support import command
+
+from tachometry.sim.studies import sweep
+from tachometry.sim.studies.sweep import COLUMNS
+
+CORE = "--ppr 100 --clock 1MHz --max-time 20ms".split()
+MOTION = ["--motion", "constant:{speed}:100ms", "--from", "40ms"]
+AXES = ["--vary", "speed=5rad/s,50rad/s", "--vary", "tick=100us,1ms", "--methods", "s,m:average=2"]
+
+
+def run(*args: str | Path) -> int:
+    return command.run("sweep", *args)
+
+
+def rows(path: Path) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = pq.read_table(path).to_pylist()
+    return found
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[list[str]]:
+    """A scheduler with a worker, in threads of this process."""
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
+    ) as local:
+        yield ["--scheduler", local.scheduler_address]
+
+
+def test_all_cores_of_this_machine(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """As most will use it: no scheduler, options only."""
+    files = ["--results", tmp_path / "r.parquet", "--plot", tmp_path / "r.png"]
+    assert run(*CORE, *MOTION, *AXES, *files) == 0
+    captured = capfd.readouterr()
+    assert captured.err == ""
+    assert "8 points, 8 of them run in " in captured.out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["r.parquet", "r.png"]
+    found = rows(tmp_path / "r.parquet")
+    assert list(found[0]) == [*COLUMNS, "speed"]
+    at = [(row["method"], row["speed"], row["tick_s"]) for row in found]
+    ticks = [(speed, tick) for speed in (5, 50) for tick in (1e-4, 1e-3)]
+    assert at == [(method, *where) for method in ("s", "m:average=2") for where in ticks]
+    assert {row["average"] for row in found} == {None, 2}
+    assert all(row["true_rms_rad_s"] == pytest.approx(row["speed"]) for row in found)
+
+
+def test_a_file_means_the_same_and_runs_nothing_twice(
+    scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, result = tmp_path / "s.toml", tmp_path / "new" / "r.parquet"
+    file.write_text(f"""
+ppr = 100
+clock = 1_000_000
+max-time = "0.02s"
+motion = "constant:{{speed}}:0.1s"
+from = "40ms"
+methods = ["s", "m:average=2"]
+results = "{result}"
+[vary]
+speed = ["5rad/s", "50rad/s"]
+tick = [100, "1ms"]
+""")
+    assert run(*CORE, *MOTION, *AXES, *scheduler, "--results", result) == 0
+    first = result.read_bytes()
+    assert run(file, *scheduler) == 0
+    assert capsys.readouterr().out.endswith(f"8 points, none run anew; rows in {result}\n")
+    assert result.read_bytes() == first
+    # Changed, it shares what has not changed; what is no longer of the sweep stays.
+    assert run(file, *scheduler, "--vary", "speed=20rad/s,50rad/s", "--methods", "s") == 0
+    assert "4 points, 2 of them run in " in capsys.readouterr().out
+    found = rows(result)
+    assert [row["speed"] for row in found] == [20, 20, 50, 50, 5, 5, 5, 5, 50, 50]
+    assert len({row["point"] for row in found}) == 10
+
+
+def test_options_are_for_the_methods_that_have_them(
+    scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    motion = ["--motion", "ramp:0:30rad/s:100ms", "--jitter", "0.1"]
+    axes = ["--vary=average=1,4", "--vary=dt=1ms,2ms", "--vary=lowpass=none,200rad/s", "--vary=seed=1..3:3"]
+    files = ["--results", tmp_path / "r.parquet", "--plot", tmp_path / "r.pdf", "--axes", "dt,average"]
+    assert run(*CORE, "--tick", "1ms", "--bounds", *motion, *axes, *files, "--metric=delay", *scheduler) == 0
+    found = rows(tmp_path / "r.parquet")
+    counts = {method: sum(row["method"] == method for row in found) for method in ("s", "m", "t", "mt", "rairan")}
+    assert counts == {"s": 6, "m": 12, "t": 6, "mt": 6, "rairan": 12}
+    assert {(row["method"] == "rairan", row["tick_s"]) for row in found} == {(False, 1e-3), (True, 1e-3), (True, 2e-3)}
+    assert {row["lowpass_rad_s"] for row in found} == {None, 200}
+    assert {row["seed"] for row in found} == {1, 2, 3}
+    assert all(row["bounds"] for row in found)
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_what_cannot_be_of_all_methods_is_left_out(scheduler: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(*CORE, "--external-tick", "--motion", "stop:50ms", "--vary", "tick=1ms,2ms", *scheduler) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "rairan: left out: --method must be another than rairan for an external tick" in told
+    assert "(method rairan, tick=1ms)" in told
+    assert "8 points" in told
+
+
+def test_the_hardware_in_lockstep(
+    scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = ["--ppr", "20", "--clock", "20kHz", "--tick", "1ms", "--motion", "constant:{speed}:100ms"]
+    line += ["--vary", "speed=5,50", "--methods", "m", "--engine", "pysim", "--results", tmp_path / "r.parquet"]
+    assert run(*line, *scheduler) == 0
+    assert capsys.readouterr().out.endswith(
+        "PASS: hardware and golden model agree in every bit of 2 points, 4000 clocks\n"
+    )
+    assert [(row["engine"], row["mismatches"]) for row in rows(tmp_path / "r.parquet")] == [("pysim", 0)] * 2
+    assert run(*("speed=5" if word == "speed=5,50" else word for word in line), *scheduler) == 0
+    told = capsys.readouterr().out
+    assert "\n1 point, none run anew; " in told
+    assert "in every bit of 1 point, 2000 clocks" in told
+    monkeypatch.setattr(sweep, "compare", lambda *_: (3, []))
+    assert run(*line, *scheduler, "--seed", "1") == 1
+    assert "FAIL: hardware and golden model differ in 6 values" in capsys.readouterr().out
+
+
+BASE = """
+ppr = 100
+clock = "1MHz"
+max-time = "20ms"
+motion = "constant:{speed}:100ms"
+[vary]
+speed = ["5rad/s", "50rad/s"]
+tick = ["100us", "1ms"]
+"""
+BAD = [
+    (["--vary", "cpr=1"], "--vary must be of ppr, decoding, "),
+    (["--vary", "cpr=1"], "or of a name in braces within --motion, such as {speed}, not 'cpr'"),
+    (["--motion", "stop:1s"], "not 'speed'"),
+    (["--motion", "constant:{speed}:{tick}"], "--motion must have names in braces that are no option or column, not "),
+    (["--motion", "constant:{speed}:{v}"], "--vary must have values for {v} of --motion, such as --vary v=1,2,5"),
+    (["--vary", "speed=1m"], "speed must be a number in rad/s, rev/s, rpm, s, ms, us, Hz, kHz"),
+    (["--vary", "speed=none"], "speed must be a number in"),
+    (["--vary", "tick=33us"], "--max-time must be a whole number of ticks, not 20ms"),
+    (["--vary", "tick=33us"], "(method s, speed=5rad/s, tick=33us)"),
+    (["--vary", "jitter=x"], "'x' is not a valid float"),
+    (["--vary", "jitter=0,0.7"], "--jitter must be "),
+    (["--vary", "average=1,2", "--methods", "s"], "--average must be given with a method that has it: m"),
+    (["--average", "2", "--methods", "s,t"], "--average must be given with a method that has it: m"),
+    (["--methods", "s,x"], "--methods must be of s, m, t, mt, rairan, or all, not 'x'"),
+    (["--methods", "m:average=900"], "--average must be from 1 to 256, not 900 (method m:average=900, "),
+    (["--vary", "seed=1..2000:2000", "--vary", "ppr=1..1000:1000"], "--vary must give at most 1000000 points, not "),
+    (["--vary", "seed=1", "--seed", "2"], "--seed must be given or varied, not both"),
+    (["--motion", "constant:{speed}:1us"], "--motion must last at least 102 clocks of --clock (102us)"),
+    (["--frobnicate"], "No such option"),
+    (["--vary", "speed=1", "--tick", "1ms", "--plot", "x.png"], "--vary must be given together with --plot"),
+    (["--axes", "speed,seed", "--plot", "x.png"], "--axes must be one or two of speed, tick, not 'speed,seed'"),
+    (["--from", "1s"], "--motion must last two ticks or more beyond --from, longer than 100ms (method s, speed=5rad/s"),
+    (["--vary", "speed=1..1e999:3log"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
+    (["--vary", "speed=1..1e999:3"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
+    (["--vary", "speed=1e-200..1e200:3log"], "numbers, and factors between, below 1e308, not '1e-200..1e200:3log'"),
+    (["--from", "-1s"], "--from must be at least 0, not -1s"),
+    (["--jobs", "0"], "--jobs must be at least 1, not 0"),
+    (["--jobs", "2", "--scheduler", "tcp://x:1"], "--jobs must not be given together with --scheduler"),
+    (["--results", "x.csv"], "file must end in .parquet"),
+    (["--results", "x.parquet", "--plot", "s.toml"], "file must end in .png or .pdf"),
+    (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1 does not answer: "),
+    (["--scheduler", "here"], "--scheduler here does not answer: "),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), BAD)
+def test_what_cannot_be_is_told_in_one_line(
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("tachometry.sim.studies.cluster._PATIENCE", 0.2)
+    Path("s.toml").write_text(BASE)
+    assert run("s.toml", *options) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("tachometry: error: ")
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+    assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
+
+
+def test_a_scheduler_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tachometry.sim.studies.cluster._PATIENCE", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        assert run(*CORE, *MOTION, *AXES, "--scheduler", address) == 2
+    assert capsys.readouterr().err == (
+        f"tachometry: error: --scheduler {address} does not answer: nothing within 0.2 s\n"
+    )
+
+
+def test_an_interrupt_before_there_is_a_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tachometry.sim.studies.cluster.cluster", interrupted)
+    assert run(*CORE, *MOTION, *AXES, "--results", tmp_path / "r.parquet") == 130
+    assert capsys.readouterr().err == "tachometry: interrupted after 0 of 8 points\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_not_there_or_no_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(tmp_path / "no.toml") == 2
+    assert capsys.readouterr().err == f"tachometry: error: {tmp_path / 'no.toml'}: No such file or directory\n"
+    (tmp_path / "s.toml").write_text("cpr = 3")
+    assert run(tmp_path / "s.toml") == 2
+    assert capsys.readouterr().err.startswith(f"tachometry: error: {tmp_path / 's.toml'}: 'cpr' is no key of a sweep: ")
+
+
+def test_what_fails_on_the_way_is_told_and_the_rest_is_kept(
+    scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = [*CORE, *MOTION, "--methods", "m", *scheduler, "--results", tmp_path / "r.parquet"]
+    assert run(*line, "--vary", "speed=1e12,5,1e13") == 2
+    err = capsys.readouterr().err
+    assert err.startswith("tachometry: error: --motion must be of at most 200000000 encoder edges")
+    assert re.search(r" \(method m, motion constant:1e1[23]:100ms\); 2 of 3 points could not be run\n$", err)
+    assert [row["speed"] for row in rows(tmp_path / "r.parquet")] == [5]
+
+
+def test_workers_of_another_version(
+    scheduler: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = threading.current_thread()
+    monkeypatch.setattr(sweep, "code_digest", lambda: str(threading.current_thread() is here))
+    assert run(*CORE, *MOTION, *AXES, *scheduler) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("tachometry: error: workers must have the same version of tachometry as this machine: ")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["distributed", "pyarrow"])
+def test_the_extra_is_needed(name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, name, None)
+    assert run(*CORE, *MOTION, *AXES) == 2
+    assert capsys.readouterr().err == (
+        f"tachometry: error: a sweep needs the extra `sweep`: {name} is not installed: pip install '.[sweep]'\n"
+    )

@@ -1,0 +1,163 @@
+"""`tachometry sweep` on processes that are killed, workers or itself: nothing is lost, nothing is there twice."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import dask
+import pyarrow.parquet as pq
+from distributed import Client, LocalCluster
+
+COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "sweep"]
+SWEEP = [
+    *"--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms --jitter 0.1 --motion constant:{speed}:50ms".split(),
+    *"--methods s,m --vary speed=1..100:50".split(),
+]
+POINTS = 100
+
+# Read by every worker, twice: what it runs it writes down, and takes its time.
+TRACE = """
+import os, time
+from tachometry.sim.studies import sweep
+if not hasattr(sweep, "traced"):
+    sweep.traced = sweep.run_point
+    def run_point(point):
+        with open(os.path.join({folder!r}, str(os.getpid())), "a") as file:
+            file.write(point.digest + "\\n")
+        time.sleep(0.03)
+        return sweep.traced(point)
+    sweep.run_point = run_point
+"""
+
+
+class Trace:
+    """What workers have run."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder / "trace"
+        self.folder.mkdir(parents=True)
+        self.script = folder / "trace.py"
+        self.script.write_text(TRACE.format(folder=str(self.folder)))
+
+    def of(self, worker: str) -> list[str]:
+        return (self.folder / worker).read_text().split()
+
+    def all(self) -> Counter[str]:
+        return Counter(point for file in self.folder.iterdir() for point in self.of(file.name))
+
+
+def begun(result: Path, *options: str, trace: Trace | None = None) -> subprocess.Popen[str]:
+    """The command, in a process group of its own, as a shell has it."""
+    preload = {} if trace is None else {"DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{trace.script}"]'}
+    return subprocess.Popen(
+        [*COMMAND, *SWEEP, "--results", str(result), *options],
+        env=os.environ | preload,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def kept(result: Path) -> list[str]:
+    """Rows of the journal: the line of each that is whole."""
+    journal = result.with_name(f".{result.name}.new")
+    return journal.read_text().split("\n")[1:-1] if journal.exists() else []
+
+
+def wait_for(there: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 120
+    while not there():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def points_in(rows: list[str]) -> list[str]:
+    return [row.split('"point": "')[1].split('"')[0] for row in rows]
+
+
+def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
+    result, trace = tmp_path / "r.parquet", Trace(tmp_path)
+    with (
+        dask.config.set({"distributed.worker.preload": [str(trace.script)]}),
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50) as local,
+        Client(local) as client,
+    ):
+        sweep = begun(result, "--scheduler", local.scheduler_address)
+        wait_for(lambda: len(kept(result)) >= 20)
+        victim = str(next(iter(client.run(os.getpid).values())))
+        before = points_in(kept(result))
+        os.kill(int(victim), signal.SIGKILL)
+        out, err = sweep.communicate(timeout=120)
+    assert (sweep.returncode, err) == (0, "")
+    assert f"{POINTS} points, {POINTS} of them run in " in out
+    points = pq.read_table(result)["point"].to_pylist()
+    assert len(points) == len(set(points)) == POINTS
+    executed = trace.all()
+    assert set(executed) == set(points)
+    assert len(before) < POINTS
+    # Only what the killed worker had not handed over ran again, or what Dask did not know yet to be in our hands.
+    again = {point for point, times in executed.items() if times > 1}
+    assert again <= set(trace.of(victim))
+    assert len(again) <= 5
+
+
+def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None:
+    result = tmp_path / "r.parquet"
+    traces = [Trace(tmp_path / name) for name in "123"]
+    sweep = begun(result, trace=traces[0])
+    wait_for(lambda: len(kept(result)) >= 10)
+    os.killpg(sweep.pid, signal.SIGINT)
+    out, err = sweep.communicate(timeout=120)
+    first = pq.read_table(result)["point"].to_pylist()
+    told = f"tachometry: interrupted after {len(first)} of {POINTS} points, kept in {result}\n"
+    assert (sweep.returncode, out, err) == (130, "", told)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["1", "2", "3", "r.parquet"]
+
+    sweep = begun(result, trace=traces[1])
+    wait_for(lambda: len(kept(result)) >= 10)
+    os.kill(sweep.pid, signal.SIGKILL)
+    sweep.communicate(timeout=120)
+    second = points_in(kept(result))
+    assert pq.read_table(result)["point"].to_pylist() == first
+    with result.with_name(".r.parquet.new").open("a") as file:
+        file.write('{"point": "half a li')  # as a kill might leave it
+
+    sweep = begun(result, trace=traces[2])
+    out, err = sweep.communicate(timeout=120)
+    assert (sweep.returncode, err) == (0, "")
+    left = POINTS - len(first) - len(second)
+    assert f"{POINTS} points, {left} of them run in " in out
+    points = pq.read_table(result)["point"].to_pylist()
+    assert len(points) == len(set(points)) == POINTS
+    ran = [trace.all() for trace in traces]
+    assert set(ran[0]) >= set(first)
+    assert set(ran[1]) >= set(second)
+    assert not set(ran[1]) & set(first)
+    assert ran[2] == Counter(set(points) - set(first) - set(second))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["1", "2", "3", "r.parquet"]
+
+    # The same, but for nothing in between.
+    whole = tmp_path / "whole.parquet"
+    begun(whole, "--jobs", "1").communicate(timeout=120)
+    assert whole.read_bytes() == result.read_bytes()
+
+
+def test_a_point_that_no_worker_outlives(tmp_path: Path) -> None:
+    script = tmp_path / "die.py"
+    script.write_text("import os\nfrom tachometry.sim import sweep\nsweep.run_point = lambda point: os._exit(1)\n")
+    more = {
+        "DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{script}"]',
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
+    }
+    words = [*COMMAND, *SWEEP[:-2], "--methods", "m", "--vary", "speed=5", "--jobs", "1"]
+    done = subprocess.run(words, env=os.environ | more, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("tachometry: error: no worker outlives the point of m on constant:5:50ms: ")
+    assert done.stderr.endswith("; 1 of 1 point could not be run\n")
+    assert done.stderr.count("\n") == 1

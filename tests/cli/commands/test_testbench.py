@@ -1,0 +1,174 @@
+"""`tachometry generate --testbench cocotb`: the bench passes on the core, and fails on one with anything wrong."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.mutant import mutant
+
+from tachometry.cli.main import main
+from tachometry.hdl.front_end.decoder import QuadratureDecoder
+from tachometry.hdl.front_end.glitch_filter import GlitchFilter
+from tachometry.hdl.front_end.position_counter import PositionCounter
+from tachometry.hdl.front_end.pulse_counter import PulseCounter
+from tachometry.hdl.methods import mt as mt_method
+from tachometry.hdl.methods.alteration import AlterationDetector
+from tachometry.sim.testbench.vectors import usual_motion
+from tachometry.spec import Encoder, STachometer, Timing
+
+SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us"
+CASES = {
+    "s": "--method s --index --index-reset --filter 2 --age --bounds",
+    "s in rpm": "--method s --no-cancel --external-tick --max-speed 30000rpm --unit rpm --velocity-width 12",
+    "m": "--method m --average 3 --lowpass 2000rad/s",
+    "t": "--method t --bounds",
+    "mt": "--method mt --index --age --external-tick --max-tick-period 12us",
+    "rairan": "--method rairan --bounds --filter 1",
+}
+
+
+def generate(folder: Path, *words: str) -> int:
+    with pytest.raises(SystemExit) as stop:
+        main(["generate", *words, "--testbench", "cocotb", "--name", "spindle", "-o", str(folder)])
+    assert isinstance(stop.value.code, int)
+    return stop.value.code
+
+
+def run(folder: Path, simulator: str, *more: str) -> subprocess.CompletedProcess[str]:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "COCOTB"))}
+    return subprocess.run(
+        [sys.executable, *more, folder / "test_spindle.py"],
+        cwd=folder,
+        env=environment | {"SIM": simulator, "CXXFLAGS": "-O0"},
+        capture_output=True,
+        text=True,
+    )
+
+
+def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
+    """What the bench says, empty if it passes; tachometry is not there."""
+    done = run(folder, simulator, *more)
+    said = done.stdout + done.stderr
+    assert done.returncode in (0, 1), said
+    assert ("PASS=1 FAIL=0" in said) == (done.returncode == 0), said
+    found = re.search(r"AssertionError: (clock .*)", said)
+    assert (found is None) == (done.returncode == 0), said
+    return "" if found is None else found[1]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_passes_in_icarus(case: str, tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
+    assert play(tmp_path) == ""
+
+
+def test_unknown_simulator_is_told_in_a_line(tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split()) == 0
+    done = run(tmp_path, "modelsim")
+    assert done.returncode == 1
+    assert re.fullmatch(r"test_spindle\.py: Simulator 'modelsim' is not [^\n]*icarus[^\n]*\n", done.stderr)
+
+
+def test_passes_in_pytest(tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split()) == 0
+    assert play(tmp_path, "icarus", "-m", "pytest", "-s") == ""
+
+
+@pytest.mark.parametrize("case", ["s", "mt"])
+def test_passes_in_verilator(case: str, tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
+    assert play(tmp_path, "verilator") == ""
+
+
+MUTANTS: dict[str, tuple[Any, str, str, str]] = {
+    "every alteration": (AlterationDetector, " & (self.m_e != offset)", "", "s"),
+    "count lost": (PulseCounter, "m.d.sync += count.eq(step)", "m.d.sync += count.eq(0)", "s"),
+    "tick lost": (PulseCounter, "self.tick.eq(complete)", "self.tick.eq(complete & ~self.step[0])", "m"),
+    "glitch believed": (GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2", "s"),
+    "index forgotten": (PositionCounter, "self.position.eq(0)", "self.position.eq(1)", "s"),
+    "no error": (QuadratureDecoder, "self.ready & change_a & change_b", "0", "s in rpm"),
+    "error too often": (QuadratureDecoder, "self.ready & change_a & change_b", "change_a & past_b", "s in rpm"),
+    "no sign rule": (mt_method.Datapath, "Mux(self._same, self._one, 0)", "self._one", "mt"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_fail(name: str, tmp_path: Path) -> None:
+    box, right, wrong, case = MUTANTS[name]
+    with mutant(box, right, wrong):
+        assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
+    assert play(tmp_path, "verilator" if name == "count lost" else "icarus").startswith("clock ")
+
+
+def test_an_output_that_is_not_held_fails(tmp_path: Path) -> None:
+    """The velocity is right while `velocity_valid` is high, and wrong after."""
+    assert generate(tmp_path, *SMALL.split(), "--method", "s") == 0
+    verilog = tmp_path / "spindle.v"
+    text = verilog.read_text()
+    inner = re.sub(r"\bmodule spindle\(", "module inner(", text)
+    assert inner != text
+    ports = json.loads((tmp_path / "spindle.json").read_text())["ports"]
+    listed = ", ".join(f"{port['direction']} [{port['width'] - 1}:0] {port['name']}" for port in ports)
+    wired = ", ".join(f".{port['name']}({port['name']})" for port in ports if port["name"] != "velocity")
+    wrapper = (
+        f"module spindle({listed}); wire [{ports_width(ports, 'velocity') - 1}:0] right; "
+        f"inner inner({wired}, .velocity(right)); assign velocity = velocity_valid ? right : ~right; endmodule\n"
+    )
+    verilog.write_text(inner + wrapper)
+    assert re.fullmatch(r"clock \d+, with tick: velocity is -?\d+, not -?\d+", play(tmp_path))
+
+
+def ports_width(ports: list[dict[str, Any]], name: str) -> int:
+    return next(port["width"] for port in ports if port["name"] == name)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_output_and_situation_is_in_the_vectors(case: str, tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
+    ports = json.loads((tmp_path / "spindle.json").read_text())["ports"]
+    vectors = json.loads((tmp_path / "spindle_vectors.json").read_text())
+    strobes = vectors["strobes"]
+    assert all(strobe["rows"] for strobe in strobes.values())
+    outputs = {port["name"] for port in ports if port["direction"] == "output"}
+    assert outputs == strobes.keys() | {name for strobe in strobes.values() for name in strobe["ports"]}
+    assert {"clk", "rst", *vectors["pins"]} == {port["name"] for port in ports} - outputs
+    rows = strobes["velocity_valid"]["rows"]
+    shown = {name: {row[k] for row in rows} for k, name in enumerate(strobes["velocity_valid"]["ports"], 1)}
+    assert min(shown["velocity"]) < 0 < max(shown["velocity"])
+    assert 0 in shown["velocity"]
+    if "--method m " not in CASES[case]:
+        assert shown["forced"] == {0, 1}
+
+
+def test_stands_on_its_own_and_is_the_same_again(tmp_path: Path) -> None:
+    for folder in ("1", "2"):
+        assert generate(tmp_path / folder, *SMALL.split(), *CASES["s"].split()) == 0
+    for name in ("test_spindle.py", "spindle_vectors.json"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+    assert "tachometry" not in (tmp_path / "1" / "test_spindle.py").read_text()
+
+
+def test_usual_motion_stays_short_for_every_timing() -> None:
+    for cycles, longest in ((1, 2), (1, 1 << 20), (960, 500), (1 << 20, 1 << 20)):
+        spec = STachometer(encoder=Encoder(500, 4), timing=Timing(48_000_000, cycles, longest))
+        recording = usual_motion(spec)
+        assert 3 * cycles <= recording.duration * 48e6 <= 1_000_000 + 4 * cycles
+        assert len(recording.time) <= 100_000
+
+
+def test_own_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    motion = ["--motion", "constant:100rad/s:4ms", "--lost", "0.2"]
+    assert generate(tmp_path, *SMALL.split(), *motion) == 0
+    assert json.loads((tmp_path / "spindle_vectors.json").read_text())["clocks"] == 4000
+    assert play(tmp_path) == ""
+    capsys.readouterr()
+    assert generate(tmp_path, *SMALL.split(), "--motion", "stop:2us") == 2
+    assert "--motion must last for a tick, not for 2 clocks" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        main(["generate", *SMALL.split(), "--motion", "stop:1s", "-o", str(tmp_path / "new")])
+    assert "--motion must be given together with --testbench" in capsys.readouterr().err

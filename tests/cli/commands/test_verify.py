@@ -1,0 +1,133 @@
+"""`tachometry verify`."""
+
+import re
+import shlex
+from itertools import combinations, product
+from pathlib import Path
+
+import pytest
+from support.command import run
+from support.mutant import mutant
+
+from tachometry.cli.commands import verify as command
+from tachometry.cli.options.pairs import APART, FACTORS, configurations, spec_of
+from tachometry.hdl.methods.m import MovingSum
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.studies.verify import motions
+from tachometry.spec import METHODS
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only two configurations of every method, with a tick a clock, whose motions are short."""
+
+    def short(method: str) -> list[tuple[str, ...]]:
+        return [words for words in configurations(method) if "--tick 1 " in " ".join(words)][:2]
+
+    monkeypatch.setattr(command, "configurations", short)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_two_options_meet(method: str) -> None:
+    """As far as they can be together at all."""
+    seen = [" ".join(core) + " " for core in configurations(method)]
+    assert len(set(seen)) == len(seen)
+    shown = {
+        name: values
+        for name, values in FACTORS[method].items()
+        if all(value == "" or value.startswith("--") for value in values)
+    }
+    for one, other in combinations(shown, 2):
+        for pair in product(filter(None, shown[one]), filter(None, shown[other])):
+            there = any(all(f"{value} " in text for value in pair) for text in seen)
+            possible = not any({(one, pair[0]), (other, pair[1])} == set(apart) for apart in APART)
+            assert there == possible, pair
+
+
+def test_all_that_it_makes_can_be_given_on_the_command_line() -> None:
+    for method in METHODS:
+        for words in configurations(method):
+            spec = spec_of(words)
+            assert spec.method == method
+            assert spec.velocity_bits is not None or "--velocity-width" not in words
+
+
+def test_all_engines_and_methods(few: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The short form of `make verify`."""
+    assert run("verify", "--clocks", "3000000", "-o", tmp_path / "out") == 0
+    told = capsys.readouterr().out
+    rows = [line.split() for line in told.splitlines()[1:16]]
+    assert [row[:2] for row in rows] == [
+        [method, name] for method in METHODS for name in ("pysim", "cxxrtl", "verilator")
+    ]
+    assert all(int(row[2]) == 2 and int(row[3]) >= 2 and int(row[6]) > 100 and row[7] == "0" for row in rows)
+    assert all(int(row[4]) >= 600_000 for row in rows if row[1] != "pysim")
+    assert "PASS: pysim, cxxrtl, verilator and golden models agree" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_difference_is_saved_with_the_command_that_replays_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = mutant(MovingSum, "(quiet >= last)", "(quiet >= last - 1)")
+    options = ["--methods", "m", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out"]
+    with wrong:
+        assert run("verify", *options) == 1
+    told = capsys.readouterr().out
+    assert "FAIL: hardware and golden model differ in" in told
+    replay = re.findall(r"^  tachometry (replay .*)$", told, re.MULTILINE)
+    captures = sorted(map(str, (tmp_path / "out").iterdir()))
+    assert sorted(shlex.split(line)[1] for line in replay) == captures
+    assert len(captures) > 1
+    for line in replay[:2]:
+        with mutant(MovingSum, "(quiet >= last)", "(quiet >= last - 1)"):
+            assert run(*shlex.split(line)) == 1
+        assert run(*shlex.split(line)) == 0
+
+
+def test_motions_last_as_long_as_is_wanted_and_differ() -> None:
+    spec = spec_of(configurations("m")[0])
+    some = list(motions(spec, 7, 500_000))
+    assert [seed for seed, _ in some] == list(range(7, 7 + len(some)))
+    assert 500_000 <= sum(trace.n_clocks for _, trace in some) < 2_000_000
+    assert len({trace.n_clocks for _, trace in some}) == len(some) > 1
+    assert len(list(motions(spec, 7, 0))) == 1
+    assert (stress(spec, 3).clock != stress(spec, 4).clock).any()
+
+
+def test_ctrl_c_tells_what_was_done(
+    few: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    checked = []
+
+    def check(core: object, **options: object) -> object:
+        if checked:
+            raise KeyboardInterrupt
+        checked.append(core)
+        return real(core, **options)  # type: ignore[arg-type]
+
+    real = command._check
+    monkeypatch.setattr(command, "_check", check)
+    assert run("verify", "--methods", "m", "--engines", "pysim", "--jobs", "1") == 130
+    told = capsys.readouterr()
+    assert told.out.splitlines()[1].split()[:3] == ["m", "pysim", "1"]
+    assert "interrupted after 1 of 2 configurations" in told.err
+    assert "PASS" not in told.out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--methods", "s,x"], "--methods must be of s, m, t, mt, rairan, or all, not 'x'"),
+        (["--engines", "icarus"], "--engines must be of pysim, cxxrtl, verilator, or all, not 'icarus'"),
+        (["--clocks", "-1"], "'--clocks': -1 is not in the range x>=0"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(
+    options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("verify", *options) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("tachometry: error: ")
+    assert message in told
+    assert told.count("\n") == 1

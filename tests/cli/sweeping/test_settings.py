@@ -1,0 +1,130 @@
+"""What a sweep is given: axes and options, from texts and files."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tachometry.cli.commands.sweep import sweep
+from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
+from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
+
+OPTIONS = by_name(sweep) | POINT_OPTIONS
+
+
+def vary(*texts: str) -> dict[str, list[str | None]]:
+    return of_command_line({"vary": texts}, OPTIONS).vary
+
+
+def read(folder: Path, text: str) -> Settings:
+    path = folder / "s.toml"
+    path.write_text(text, encoding="utf-8")
+    return of_file(path, OPTIONS)
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("tick=10us,20us , 50us", ["10us", "20us", "50us"]),
+        ("tick=10us..30us:3", ["10us", "20us", "30us"]),
+        ("tick=10us..1ms:3log", ["10us", "100us", "1000us"]),
+        ("tick=480..4800:4log", ["480", "1034", "2228", "4800"]),
+        ("speed=1..1000rad/s:4log", ["1rad/s", "10rad/s", "100rad/s", "1000rad/s"]),
+        ("speed=1..10:4log", ["1", "2.154", "4.642", "10"]),
+        ("speed=-2..2:5", ["-2", "-1", "0", "1", "2"]),
+        ("jitter=0..1:4", ["0", "0.333333333", "0.666666667", "1"]),
+        ("average=1..4:10", ["1", "2", "3", "4"]),
+        ("clock=1MHz..48MHz:2", ["1MHz", "48MHz"]),
+        ("lowpass=none,100rad/s", [None, "100rad/s"]),
+        ("motion=csv:../a.csv,stop:1s", ["csv:../a.csv", "stop:1s"]),
+        ("bounce=3:500us,3:500us", ["3:500us"]),
+    ],
+)
+def test_values_of_an_axis(text: str, values: list[str | None], tmp_path: Path) -> None:
+    """The same from the command line and from a file."""
+    name, _, right = text.partition("=")
+    assert vary(text) == {name: values}
+    assert read(tmp_path, f'[vary]\n{name} = "{right}"').vary == {name: values}
+    items = ", ".join(f'"{item}"' for item in right.split(","))
+    assert read(tmp_path, f"[vary]\n{name} = [{items}]").vary == {name: values}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tick", "vary must be NAME=VALUES, not 'tick'"),
+        ("tick=1us,,2us", "values of tick must be separated by one comma, and none may be empty"),
+        ("tick=", "values of tick must be separated by one comma, and none may be empty"),
+        ("tick=1us..2us", "a range of tick must be LO..HI:N, or LO..HI:Nlog, not '1us..2us'"),
+        ("tick=1us..2us:5exp", "a range of tick must be LO..HI:N, or LO..HI:Nlog, not '1us..2us:5exp'"),
+        ("tick=1us..2Hz:5", "a range of tick must have one unit, not '1us..2Hz:5'"),
+        ("tick=1us..2us:1", "a range of tick must have 2 to 100000 values, not '1us..2us:1'"),
+        ("tick=3us..2us:5", "a range of tick must go up, not '3us..2us:5'"),
+        ("speed=0..2:5log", "a range of speed must go up, from more than 0, not '0..2:5log'"),
+    ],
+)
+def test_what_is_no_axis(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        vary(text)
+
+
+def test_an_axis_twice() -> None:
+    with pytest.raises(ValueError, match=r"^vary must be given once for tick$"):
+        vary("tick=1us", "tick=2us")
+
+
+def test_files_and_options_mean_the_same(tmp_path: Path) -> None:
+    text = """
+ppr = 500
+clock = "10MHz"
+tick = 200 # clocks
+jitter = 0.02
+index = true
+cancel = false
+methods = ["s", "m:average=8"]
+motion = "constant:{speed}:1s"
+[vary]
+speed = [1, 2.5, "3rad/s"]
+bounds = [true, false]
+"""
+    line = {
+        **{"ppr": "500", "clock": "10MHz", "tick": "200", "jitter": "0.02", "index": True, "method_cancel": False},
+        **{"methods": "s,m:average=8", "motion": "constant:{speed}:1s"},
+        "vary": ("speed=1,2.5,3rad/s", "bounds=yes,no"),
+    }
+    settings = read(tmp_path, text)
+    assert settings == of_command_line(line, OPTIONS)
+    assert arguments(settings.first(), OPTIONS | {"speed": OPTIONS["tick"]}) == [
+        *("--ppr=500", "--clock=10MHz", "--tick=200", "--jitter=0.02", "--index", "--no-cancel"),
+        *("--methods=s,m:average=8", "--motion=constant:{speed}:1s", "--tick=1", "--bounds"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("ppr = ", "must be TOML: Invalid value"),
+        ("cpr = 500", ": 'cpr' is no key of a sweep: keys must be of methods, from, "),
+        ("cpr = 500", ", illegal, seed, and [vary]"),
+        ("tick = [1, 2]", "tick must be a text, a number, true or false, not [1, 2]: a list belongs into [vary]"),
+        ("tick = 1979-05-27", "tick must be a text, a number, true or false, not datetime.date"),
+        ("vary = 3", "vary must be a table of axes, not 3"),
+        ("[vary]\ntick = []", "tick must have values to be varied"),
+        ("[vary]\ntick = {a = 1}", "tick must be a text, a number, true or false, not {'a': 1}"),
+        ('tick = "1us"\n[vary]\ntick = ["1us"]', "tick must be given or varied, not both"),
+    ],
+)
+def test_what_is_no_file_of_a_sweep(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(str(tmp_path))}/s.toml.*{re.escape(message)}"):
+        read(tmp_path, text)
+
+
+def test_the_command_line_replaces_what_is_in_the_file() -> None:
+    file = Settings({"ppr": "500", "tick": "1us"}, {"speed": ["1", "2"], "jitter": ["0", "0.1"]})
+    line = Settings({"jitter": "0.2"}, {"tick": ["2us"], "speed": ["3"]})
+    assert line.over(file) == Settings({"ppr": "500", "jitter": "0.2"}, {"speed": ["3"], "tick": ["2us"]})
+
+
+def test_flags_are_yes_or_no() -> None:
+    with pytest.raises(ValueError, match=r"^--index must be yes or no, not 'maybe'$"):
+        arguments({"index": "maybe"}, OPTIONS)

@@ -1,0 +1,120 @@
+"""Exactness of long measurements: base + N/(2^s·m) through the carried reciprocal's gates, for every m."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.quotient import Quotient, every_quotient
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.arithmetic import carried_reciprocal, remainder_scaler
+from tachometry.sim.golden.quotient import round_quotient
+from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.timing import MAX_TICKS
+
+
+def long_spec(max_ticks: int, frac_bits: int, *, tick_cycles: int = 1, cancel: bool = True) -> STachometer:
+    timing = Timing(48_000_000, tick_cycles, max_ticks)
+    spec = STachometer(encoder=Encoder(500), timing=timing, frac_bits=frac_bits, cancel=cancel)
+    assert spec.carried
+    return spec
+
+
+def wanted(spec: STachometer, base: np.ndarray, n: np.ndarray, m: np.ndarray, towards: int = 0) -> np.ndarray:
+    return (base << spec.frac_bits) + round_quotient(n, m << spec.reciprocal.halvings, spec.frac_bits, towards)
+
+
+@pytest.mark.parametrize(("frac_bits", "cancel"), [(16, True), (24, True), (4, True), (16, False)])
+def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bits: int, cancel: bool) -> None:
+    """All N that one count per tick can give, and all m_s to the longest."""
+    spec = long_spec(MAX_TICKS, frac_bits, cancel=cancel)
+    numerators = range(-spec.max_numerator, spec.max_numerator + 1)
+    *operands, got = every_quotient(spec, numerators, 1, tmp_path)
+    assert np.array_equal(got, wanted(spec, *operands))
+
+
+@pytest.mark.parametrize("tick_cycles", [2, 960])
+def test_every_interval_and_the_extreme_numerators(tmp_path: Path, tick_cycles: int) -> None:
+    """Two and 960 counts per tick: pipelined and serial."""
+    spec = long_spec(MAX_TICKS, 16, tick_cycles=tick_cycles)
+    extreme = spec.max_numerator
+    distance = spec.tick_to_velocity if spec.serial else 1
+    *operands, got = every_quotient(
+        spec, [-extreme, extreme] if spec.serial else [-extreme, -1, 1, extreme], distance, tmp_path
+    )
+    assert np.array_equal(got, wanted(spec, *operands))
+
+
+@pytest.mark.parametrize("tick_cycles", [2, 40])
+@pytest.mark.parametrize("towards", [-1, 1])
+def test_every_bound(tmp_path: Path, tick_cycles: int, towards: int) -> None:
+    """Rounded down and up, pipelined and serial; with 6 fraction bits many quotients need no rounding at all."""
+    spec = long_spec(4096, 6, tick_cycles=tick_cycles)
+    assert spec.serial == (tick_cycles == 40)
+    distance = spec.tick_to_velocity if spec.serial else 1
+    *operands, got = every_quotient(spec, range(-8, 9), distance, tmp_path, towards)
+    assert np.array_equal(got, wanted(spec, *operands, towards))
+
+
+# With few fraction bits there are ties; with many the quotient is not yet 0 where the kept half begins.
+TIES, CARRIED = 6, 14
+
+
+def check_starts_over(*, serial: bool, frac_bits: int) -> None:
+    """m as in the S method: up, and over again from 1 or, after the longest, from the kept half; N of all sizes."""
+    spec = long_spec(2100, frac_bits, tick_cycles=2)
+    rng = np.random.default_rng(1)
+    m = [*range(1, 300), *range(1, 2101), *range(1051, 1200), *range(1, 20)]
+    n = rng.integers(-spec.max_numerator, spec.max_numerator + 1, len(m))
+    base = -(n >> 2)  # for which the ends of the window are within the range of m_e
+    off = [{"load": 0, "start": 0, "enable": 0}]
+    distance = 2 * spec.numerator_width + 4 if serial else 1
+    rows = []
+    for row in zip(m, base.tolist(), n.tolist(), strict=True):
+        rows += [{"load": 1, "start": 1, "enable": 1, **dict(zip(("m", "base", "numerator"), row, strict=True))}]
+        rows += off * (distance - 1)
+    seen = clock_by_clock(Quotient(spec, serial=serial), rows + off * 40, ["done", "velocity", "tag_out"])
+    got = [(row["velocity"], row["tag_out"]) for row in seen if row["done"]]
+    assert got == list(zip(wanted(spec, base, n, np.array(m)).tolist(), m, strict=True))
+
+
+@pytest.mark.parametrize("serial", [True, False])
+@pytest.mark.parametrize("frac_bits", [TIES, CARRIED])
+def test_m_starts_over(frac_bits: int, serial: bool) -> None:
+    check_starts_over(serial=serial, frac_bits=frac_bits)
+
+
+SERIAL, PIPELINED = remainder_scaler.SerialRemainderScaler, remainder_scaler.PipelinedRemainderScaler
+MUTANTS = {
+    "quotient never corrected": (carried_reciprocal.CarriedReciprocal, "q.eq(q - less[-1])", "q.eq(q)"),
+    "remainder corrected by m + 1": (
+        carried_reciprocal.CarriedReciprocal,
+        "less[-1], self.m, 0",
+        "less[-1], self.m + 1, 0",
+    ),
+    "no preset at the kept half": (
+        carried_reciprocal.CarriedReciprocal,
+        "sorted(spec.presets.items())",
+        "sorted(spec.presets.items())[:1]",
+    ),
+    "table read one m too far": (
+        carried_reciprocal.CarriedReciprocal,
+        "self.m[address_bits:].any()",
+        "self.m[address_bits + 1:].any()",
+    ),
+    "serial, half down": (SERIAL, "low.as_signed(), up)", "low.as_signed(), 0)"),
+    "serial, the sign bit counts positive": (SERIAL, "borrow.eq(sign & low[0])", "borrow.eq(0)"),
+    "pipelined, the sign bit counts positive": (PIPELINED, "total - (step_q << step)", "total + (step_q << step)"),
+    "pipelined, half down": (
+        PIPELINED,
+        "_rounded(total, quotient.as_signed(), up)",
+        "_rounded(total, quotient.as_signed(), 0)",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(*MUTANTS[name]), caught():
+        check_starts_over(serial=name.startswith("serial"), frac_bits=CARRIED if "kept half" in name else TIES)

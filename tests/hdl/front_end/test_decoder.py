@@ -1,0 +1,72 @@
+import itertools
+
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.front_end.decoder import QuadratureDecoder
+
+FORWARD = [(0, 0), (1, 0), (1, 1), (0, 1)]  # A leads B
+
+# Written out from the definition: what (A, B) -> (A', B') counts in each decoding.
+FORWARD_STEPS = {
+    4: {((0, 0), (1, 0)), ((1, 0), (1, 1)), ((1, 1), (0, 1)), ((0, 1), (0, 0))},
+    2: {((0, 0), (1, 0)), ((1, 1), (0, 1))},
+    1: {((0, 0), (1, 0))},
+}
+
+
+def expected(decoding: int, before: tuple[int, int], after: tuple[int, int]) -> tuple[int, int]:
+    forward = int((before, after) in FORWARD_STEPS[decoding])
+    backward = int((after, before) in FORWARD_STEPS[decoding])
+    return forward - backward, int(before[0] != after[0] and before[1] != after[1])
+
+
+def check_all_transitions(decoding: int) -> None:
+    for before, after in itertools.product(FORWARD, repeat=2):
+        rows = [{"ready": 0, "level_a": before[0], "level_b": before[1]}, {"ready": 1}]
+        rows += [{"level_a": after[0], "level_b": after[1]}, {}]
+        seen = clock_by_clock(QuadratureDecoder(decoding), rows, ["step", "decode_error"])
+        got = [(row["step"], row["decode_error"]) for row in seen]
+        assert got[1] == got[3] == (0, 0)
+        assert got[2] == expected(decoding, before, after), (before, after)
+
+
+@pytest.mark.parametrize("decoding", [1, 2, 4])
+def test_every_transition(decoding: int) -> None:
+    check_all_transitions(decoding)
+
+
+@pytest.mark.parametrize("decoding", [1, 2, 4])
+def test_neither_step_nor_error_until_ready(decoding: int) -> None:
+    for first, second in itertools.product(FORWARD, repeat=2):
+        rows = [
+            {"ready": 0, "level_a": first[0], "level_b": first[1]},
+            {"level_a": second[0], "level_b": second[1]},
+            {"ready": 1},
+        ]
+        seen = clock_by_clock(QuadratureDecoder(decoding), rows, ["step", "decode_error"])
+        assert all(row == {"step": 0, "decode_error": 0} for row in seen)
+
+
+@pytest.mark.parametrize("line", ["level_a", "level_b"])
+@pytest.mark.parametrize("other", [0, 1])
+@pytest.mark.parametrize("decoding", [1, 2, 4])
+def test_a_line_that_dithers_never_creeps(decoding: int, other: int, line: str) -> None:
+    still = "level_b" if line == "level_a" else "level_a"
+    rows = [{"ready": 1, still: other}] + [{line: k % 2} for k in range(101)]
+    seen = clock_by_clock(QuadratureDecoder(decoding), rows, ["step"])
+    position = 0
+    for row in seen[2:]:
+        position += row["step"]
+        assert abs(position) <= 1
+
+
+def test_mutant_with_the_directions_exchanged_is_caught() -> None:
+    with mutant(QuadratureDecoder, "~(self.level_a ^ past_b)", "(self.level_a ^ past_b)"), caught():
+        check_all_transitions(4)
+
+
+def test_bad_decoding() -> None:
+    with pytest.raises(ValueError, match=r"^decoding must be 1, 2 or 4, not 3$"):
+        QuadratureDecoder(3)

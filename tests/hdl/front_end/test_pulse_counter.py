@@ -1,0 +1,90 @@
+import itertools
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.front_end.pulse_counter import PulseCounter
+from tachometry.spec import TachometerSpec
+
+
+def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0.5) -> None:
+    rng = np.random.default_rng(seed)
+    n_ticks = 200
+    steps = rng.choice([-1, 0, 1], size=(n_ticks, tick_cycles), p=[0.9 - forward, 0.1, forward])
+    rows = [
+        {"step": int(step), "last": int(clock == tick_cycles - 1)} for tick in steps for clock, step in enumerate(tick)
+    ] + [{"step": 0, "last": 0}] * 3
+    seen = clock_by_clock(PulseCounter(tick_cycles, max_count), rows, ["tick", "pulse_count", "overflow"])
+    strobes = [clock for clock, row in enumerate(seen) if row["tick"]]
+    assert strobes == [(k + 1) * tick_cycles - 1 + TachometerSpec.tick_latency for k in range(n_ticks)], seed
+    sums = steps.sum(axis=1)
+    assert [seen[c]["pulse_count"] for c in strobes] == np.clip(sums, -max_count, max_count).tolist(), seed
+    assert [seen[c]["overflow"] for c in strobes] == (np.abs(sums) > max_count).astype(int).tolist(), seed
+    # Held from strobe to strobe.
+    for here, after in itertools.pairwise(strobes):
+        assert all(seen[c]["pulse_count"] == seen[here]["pulse_count"] for c in range(here, after)), seed
+
+
+@pytest.mark.parametrize(("tick_cycles", "max_count"), [(1, 1), (2, 2), (3, 3), (5, 2), (16, 16), (16, 4), (16, 1)])
+def test_counts_every_step_once(tick_cycles: int, max_count: int) -> None:
+    check_counts(tick_cycles, max_count, seed=tick_cycles)
+
+
+@pytest.mark.parametrize("forward", [0.0, 0.9])
+def test_full_speed_both_ways(forward: float) -> None:
+    check_counts(8, 8, seed=1, forward=forward)
+    check_counts(8, 7, seed=2, forward=forward)
+
+
+def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
+    with mutant(PulseCounter, "m.d.sync += count.eq(step)", "m.d.sync += count.eq(0)"), caught():
+        check_counts(5, 5, seed=0)
+
+
+def test_mutant_that_saturates_one_late_is_caught() -> None:
+    with mutant(PulseCounter, "value > Const(limit, ", "value > Const(limit + 1, "), caught():
+        check_counts(16, 4, seed=0)
+
+
+def test_bad_max_count() -> None:
+    with pytest.raises(ValueError, match=r"^max_count must be from 1 to 8, not 9$"):
+        PulseCounter(8, 9)
+
+
+def check_stretched(tick_cycles: int, max_count: int, seed: int) -> None:
+    """Windows of any length, and all steps one way in some: a sum that has left its bounds stays there."""
+    rng = np.random.default_rng(seed)
+    rows, wanted = [], []
+    for _ in range(200):
+        length = int(rng.integers(1, 5 * tick_cycles))
+        forward = rng.choice([0.1, 0.5, 0.8])
+        steps = rng.choice([-1, 0, 1], size=length, p=[0.9 - forward, 0.1, forward])
+        total, left = 0, 0
+        for step in steps.tolist():
+            total += step
+            left = left or (total > max_count) - (total < -max_count)
+        beyond = bool(rng.random() < 0.1)
+        rows += [{"step": int(step), "last": 0, "beyond": 0} for step in steps]
+        rows[-1] |= {"last": 1, "beyond": int(beyond)}
+        wanted.append((left * max_count or total, int(left != 0 or beyond)))
+    rows += [{"step": 0, "last": 0, "beyond": 0}] * 3
+    dut = PulseCounter(tick_cycles, max_count, stretched=True)
+    seen = clock_by_clock(dut, rows, ["tick", "pulse_count", "overflow"])
+    assert [(row["pulse_count"], row["overflow"]) for row in seen if row["tick"]] == wanted
+    assert any(overflow for _, overflow in wanted)
+
+
+@pytest.mark.parametrize(("tick_cycles", "max_count"), [(1, 1), (2, 2), (3, 3), (4, 4), (7, 7), (8, 3), (16, 16)])
+def test_a_window_may_be_longer_than_nominal(tick_cycles: int, max_count: int) -> None:
+    check_stretched(tick_cycles, max_count, seed=tick_cycles)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [("count.eq(count)", "count.eq(count + step)"), ("left | beyond", "left"), ("== -most", "== most")],
+)
+def test_mutants_of_a_longer_window_are_caught(right: str, wrong: str) -> None:
+    with mutant(PulseCounter, right, wrong), caught():
+        check_stretched(4, 4, seed=0)

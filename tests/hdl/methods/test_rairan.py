@@ -1,0 +1,196 @@
+"""The datapath of Rairán's method, with injected steps."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.rairan import DELAY, golden_updates, make_spec, random_steps, steps_of
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.methods import dt_shift, rairan
+from tachometry.sim.golden.methods.rairan import Model
+from tachometry.spec import Speed
+from tachometry.spec.tachometer import BOUNDS
+
+NAMES = ["velocity", "interval", "forced", "stalled", "n_ep1", "n_dt1"]
+
+
+def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) -> None:
+    """Every update, in its clock, with every output; and every end of dt."""
+    spec = make_spec(dt, max_ticks, **options)
+    names = NAMES + [*BOUNDS, "bounds_valid"] * spec.bounds + ["dt_shift"] * (spec.adaptive is not None)
+    rows = [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
+    seen = clock_by_clock(rairan.Datapath(spec), rows, ["velocity_valid", "last", "beyond", *names])
+    got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
+    updates = golden_updates(spec, step)
+    columns = [getattr(updates, name, updates.more.get(name)).astype(int).tolist() for name in names]
+    assert got == list(zip((updates.clock + DELAY).tolist(), *columns, strict=True))
+    ends, beyond = Model(spec).windows(steps_of(step), len(step))
+    assert [clock for clock, row in enumerate(seen[: len(step)]) if row["last"]] == ends.tolist()
+    assert [row["beyond"] for row in seen[: len(step)] if row["last"]] == beyond.astype(int).tolist()
+
+
+def steps(dt: int = 6, n: int = 4000) -> np.ndarray:
+    """Backwards at first, at gaps that end with dt, and some just longer than dt after short ones; then anything."""
+    gaps = np.repeat([dt, max(dt // 3, 1), dt + 2, max(dt // 2, 1), 5 * dt, 4 * dt + 1, max(dt // 3, 1), dt], 7)
+    regular = np.zeros(gaps.sum() + 1, dtype=np.int64)
+    regular[np.cumsum(gaps)] = -1
+    return np.append(regular, random_steps(np.random.default_rng(1), n, dt))
+
+
+@pytest.mark.parametrize("dt", [1, 2, 3, 6, 40])
+@pytest.mark.parametrize("options", [{}, {"paper_exact": True}, {"bound_decay": False}, {"bounds": True}])
+def test_every_update(dt: int, options: dict) -> None:
+    check(steps(dt), dt, **options)
+
+
+@pytest.mark.parametrize("estimate", ["n1", "n2", "n3"])
+@pytest.mark.parametrize("frac_bits", [4, 5, 9, 24])
+def test_every_estimate(estimate: str, frac_bits: int) -> None:
+    """With 4 fraction bits 1/32 is a tie, both ways."""
+    by_turns = np.zeros(6000, dtype=np.int64)
+    at = np.cumsum(np.tile([3, 20, 95, 96, 97, 100, 2, 2], 20))
+    by_turns[at[at < 6000]] = np.repeat([1, -1], 80)[: np.count_nonzero(at < 6000)]
+    check(by_turns, 3, 40, estimate=estimate, frac_bits=frac_bits)
+    check(steps(40), 40, 40, estimate=estimate, frac_bits=frac_bits)
+
+
+def steady_steps(dt: int, n: int = 12_000) -> np.ndarray:
+    """Constant speeds, for as long as it takes k to follow, with rests and reversals, and what is not regular."""
+    rng = np.random.default_rng(7)
+    gaps = [dt / 5, 3 * dt, dt / 2, 0.9 * dt, 20 * dt, 2 * dt, 8 * dt, 1, dt, 0.38 * dt, 0.5 * dt, 2 * dt, 0.78 * dt]
+    signs, at = [], []
+    now = 0.0
+    for k, gap in enumerate(gaps):
+        clocks = now + np.maximum(gap, 1) * np.arange(1, max(8, int(120 * dt / max(gap, dt / 3))))
+        at.append(clocks.astype(np.int64))
+        signs.append(np.full(len(clocks), -1 if k % 3 == 1 else 1))
+        now = clocks[-1] + (50 * dt if k % 4 == 3 else 0)
+    step = np.zeros(int(now) + 1, dtype=np.int64)
+    step[np.concatenate(at)] = np.concatenate(signs)
+    return np.append(step[:n], random_steps(rng, 2000, 3 * dt))
+
+
+@pytest.mark.parametrize(("dt", "max_ticks", "target"), [(1, 20, 7), (2, 70, 20), (6, 40, 10), (24, 9, 4)])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"bounds": True},
+        {"bound_decay": False},
+        {"estimate": "n1", "frac_bits": 4},
+        {"estimate": "n2", "frac_bits": 5, "bounds": True},
+        {"max_speed": Speed.parse("20000rev/s"), "bounds": True},
+    ],
+)
+def test_adaptive_dt(dt: int, max_ticks: int, target: int, options: dict) -> None:
+    check(steady_steps(dt), dt, max_ticks, adaptive=Fraction(1, target), **options)
+
+
+MUTANTS = {
+    "a count at the end of dt opens nothing": ("pulse & (late | due) | turns", "pulse & late | turns"),
+    "a reversal is none": ("self.step[1] ^ self.backward", "0"),
+    "the first count is a reversal": ("pulse & moved & (self.step[1]", "pulse & (self.step[1]"),
+    "Cep begins at 2": ("[c_more.eq(0), self.any.eq(1), self.beyond.eq(0)]", "[c_more.eq(1), self.any.eq(1)]"),
+    "Cdt does not saturate": ("with m.If(~self._is(self._spec.max_dt)):", "with m.If(1):"),
+    "rest comes a dt early": ("self.rest.eq(self._is_longest())", "self.rest.eq(0)"),
+    "never in step": ("in_step.eq(opens)", "in_step.eq(0)"),
+    "falls too early": ("(waited > n)", "(waited >= n)"),
+    "the high regime stays": ("(one & self.high)", "Const(0)"),
+    "Ndt1 ← 1 ends the high regime": ("opens & ((self.c_dt != 1) | ~self.high)", "opens"),
+    "a rounding carry is lost": ("Mux(high, ~entry[2], entry[0])", "Mux(high, 1, entry[0])"),
+    "the complement without its carry": ("carry ^ backward", "carry"),
+    "dt is a clock too long": ("start = cycles - 2", "start = cycles - 1"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    box = rairan.Datapath if "carry" in name else rairan.Counters
+    with mutant(box, *MUTANTS[name]), caught():
+        check(steps())
+
+
+def test_mutant_of_the_letter_is_caught() -> None:
+    with mutant(rairan.Counters, "opens.eq(pulse & late), self", "opens.eq(pulse & (late | due)), self"), caught():
+        check(steps(), paper_exact=True)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("loose=self.rest, unsynced=~in_step", "loose=0, unsynced=~in_step"),
+        ("loose=self.rest, unsynced=~in_step", "loose=self.rest"),
+        ("set_(1, loose=~pulse)", "set_(1)"),
+        ("set_(waited, forced=1, loose=1)", "set_(waited, forced=1)"),
+        ("self.known.eq(known)", "self.known.eq(1)"),
+    ],
+)
+def test_mutants_of_bounds_are_caught(right: str, wrong: str) -> None:
+    with mutant(rairan.Counters, right, wrong), caught():
+        check(steps(), bounds=True)
+
+
+def test_mutant_of_a_tie_is_caught() -> None:
+    with mutant(rairan.Datapath, "if not ties:", "if True:"), caught():
+        test_every_estimate("n1", 4)
+
+
+def check_adaptive() -> None:
+    check(steady_steps(2), 2, 70, adaptive=Fraction(1, 20), bounds=True, max_speed=Speed.parse("5000rev/s"))
+    check(steady_steps(6), 6, 40, adaptive=Fraction(1, 10), estimate="n1", frac_bits=4)
+
+
+def test_mutants_of_adaptive_dt_begin_with_what_is_right() -> None:
+    check_adaptive()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("(passed == mask)", "(passed == (mask >> 1))"),
+        ("with m.If(self.last | self.opens):", "with m.If(self.last):"),
+        ("self.n < rare,", "0,"),
+        ("(falling & up)", "0"),
+        ("(mask >> 1).any() & ~self.turns", "~self.turns"),
+        ("2 * rule.fewest - 1)", "2 * rule.fewest - 2)"),
+        ("self.n >= slow", "self.n > slow"),
+        ("(self.n < rule.fewest - 1)", "(self.n < rule.fewest)"),
+        ("with m.Elif(down), m.If(mask[0]):", "with m.Elif(down):"),
+        ("self.shift.eq(0)", "[]"),
+    ],
+)
+def test_mutants_of_adaptive_dt_are_caught(right: str, wrong: str) -> None:
+    with mutant(dt_shift.DtShift, right, wrong), caught():
+        check_adaptive()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("Mux(several, self.c_more, 1)", "Mux(several, 1, 1)"),
+        ("Mux(late, stays, several)", "Mux(late, 0, several)"),
+        ("(most << k) - 1", "(most << k) - 2"),
+        ("max_dt(k) - 1", "max_dt(k)"),
+        ("Mux(differs[1], n >> 1, n << 1)", "Mux(differs[1], n << 1, n >> 1)"),
+        ("Mux(differs[0], ", "Mux(0, "),
+    ],
+)
+def test_mutants_of_what_depends_on_dt_are_caught(right: str, wrong: str) -> None:
+    with mutant(rairan.Counters, right, wrong), caught():
+        check_adaptive()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("entry << 2) >> shift", "entry << 2) >> 0"),
+        ("low << shift if spec.adaptive else low", "low"),
+        ("spec.high_depth << counters.shift", "spec.high_depth"),
+        ("Const(spec.low_depth) >> counters.shift", "Const(spec.low_depth)"),
+        ("magnitude[3:], magnitude[2]", "magnitude[3:], Const(0)"),
+    ],
+)
+def test_mutants_of_the_shifted_estimate_are_caught(right: str, wrong: str) -> None:
+    with mutant(rairan.Datapath, right, wrong), caught():
+        check_adaptive()

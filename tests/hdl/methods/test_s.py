@@ -1,0 +1,95 @@
+"""The datapath, with injected ticks."""
+
+from fractions import Fraction
+
+import pytest
+from support.mutant import caught, mutant
+from support.sequences import MAX_TICKS, PAPER, rounded
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.methods.interval import IntervalAccumulator
+from tachometry.hdl.methods.s import Datapath
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+
+OUTPUTS = ["velocity_valid", "velocity", "interval", "forced", "stalled"]
+
+
+def datapath_spec(*, cancel: bool = True, serial: bool = True, frac_bits: int = 16) -> STachometer:
+    """|m_e| up to 4; the spec takes the serial or the pipelined scaler by the length of a tick."""
+    timing = Timing(clock_hz=1_000_000, tick_cycles=16 if serial else 4, max_ticks=MAX_TICKS)
+    speed = Speed(Fraction(4_000_000, 100 * timing.tick_cycles), "rev/s")
+    spec = STachometer(encoder=Encoder(25), timing=timing, frac_bits=frac_bits, max_speed=speed, cancel=cancel)
+    assert (spec.serial, spec.max_count) == (serial, 4)
+    return spec
+
+
+def run(spec: STachometer, m_e: list[int]) -> list[dict[str, int]]:
+    pause = spec.timing.tick_cycles - 1
+    rows = []
+    for number in m_e:
+        rows += [{"tick": 1, "pulse_count": number}] + [{"tick": 0}] * pause
+    return clock_by_clock(Datapath(spec), rows + [{}] * spec.tick_to_velocity, OUTPUTS)
+
+
+def check_paper_sequences(*, cancel: bool = True, serial: bool = True) -> None:
+    spec = datapath_spec(cancel=cancel, serial=serial)
+    for name, (m_e, updates) in PAPER.items():
+        seen = run(spec, m_e)
+        got = [(clock, row) for clock, row in enumerate(seen) if row["velocity_valid"]]
+        wanted = []
+        for tick, m_s, forced, eq17, eq21 in updates:
+            velocity = rounded(eq21 if cancel else eq17, spec.frac_bits)
+            whole_window = m_e[max(tick - m_s, 0) : tick + 1]
+            wanted.append(
+                (
+                    tick * spec.timing.tick_cycles + spec.tick_to_velocity,
+                    {
+                        "velocity_valid": 1,
+                        "velocity": velocity,
+                        "interval": m_s,
+                        "forced": int(forced),
+                        "stalled": int(forced and not any(whole_window)),
+                    },
+                )
+            )
+        assert got == wanted, name
+
+
+@pytest.mark.parametrize("serial", [True, False])
+@pytest.mark.parametrize("cancel", [True, False])
+def test_the_papers_sequences(cancel: bool, serial: bool) -> None:
+    check_paper_sequences(cancel=cancel, serial=serial)
+
+
+@pytest.mark.parametrize("serial", [True, False])
+def test_outputs_are_held_from_update_to_update(serial: bool) -> None:
+    seen = run(datapath_spec(serial=serial), PAPER["3.25 units"][0])
+    held = dict.fromkeys(OUTPUTS, 0)
+    for row in seen:
+        if row["velocity_valid"]:
+            held = row
+        assert {**row, "velocity_valid": 0} == {**held, "velocity_valid": 0}
+
+
+MUTANTS = {
+    "eq. (17) for eq. (21)": (
+        IntervalAccumulator,
+        "opening - self.previous + d1 if self._cancel else d1",
+        "d1 + d1",
+    ),
+    "m_s off by one": (IntervalAccumulator, "self.m_s.eq(1)", "self.m_s.eq(2)"),
+    "window opened afresh after a forced update": (IntervalAccumulator, "self._kept_ticks + 1", "1"),
+    "forced beats an alteration": (IntervalAccumulator, "longest & ~self.alteration", "longest"),
+    "opening number kept over a forced update": (
+        IntervalAccumulator,
+        "with m.If(self.update):",
+        "with m.If(self.alteration):",
+    ),
+    "stalled without the opening tick": (IntervalAccumulator, "(opening | self.previous).any()", "self.previous.any()"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(*MUTANTS[name]), caught():
+        check_paper_sequences()

@@ -1,0 +1,137 @@
+"""What users complain of elsewhere: the methods that work on ticks at reversals, at rest and after it, by the gates."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.methods import DATAPATHS, interval
+from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
+
+T, MAX_TICKS = 6, 20
+SHARED = {"encoder": Encoder(100), "timing": Timing(1_000_000, T, MAX_TICKS), "frac_bits": 10, "bounds": True}
+SPECS = {
+    "eq. (21)": STachometer(**SHARED),
+    "eq. (17)": STachometer(**SHARED, cancel=False),
+    "M": MTachometer(**SHARED),
+    "M of 6": MTachometer(**SHARED, average=6),
+}
+each_method = pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
+
+
+@dataclass(frozen=True)
+class Update:
+    """An update in counts per tick; `tick` is the one that caused it."""
+
+    tick: int
+    velocity: float
+    lower: float
+    upper: float
+    interval: int
+    stalled: bool
+
+
+def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
+    """Updates of these pulse numbers."""
+    rows: list[dict[str, int]] = []
+    for number in m_e:
+        rows += [{"tick": 1, "pulse_count": number}, *[{"tick": 0}] * (T - 1)]
+    names = ["velocity_valid", "velocity", "velocity_lower", "velocity_upper", "interval", "stalled", "bounds_valid"]
+    seen = clock_by_clock(DATAPATHS[spec.method](spec), rows, names)
+    found = []
+    for clock, row in enumerate(seen):
+        if row["velocity_valid"]:
+            shown = (row[name] / (1 << spec.frac_bits) for name in names[1:4])
+            found.append(Update((clock - spec.datapath_latency) // T, *shown, row["interval"], bool(row["stalled"])))
+    assert all(update.lower <= update.velocity <= update.upper for update in found)
+    assert all(abs(update.velocity) <= spec.max_count for update in found)
+    return found
+
+
+def longest(spec: TachometerSpec) -> int:
+    """Ticks within which the velocity is 0 after the last count: what the parameters promise."""
+    return spec.average if isinstance(spec, MTachometer) else 3 * MAX_TICKS // 2
+
+
+def check_rest(spec: TachometerSpec, updates: list[Update], last: int, n_ticks: int) -> None:
+    """From `longest` ticks after the tick `last` on it reads 0, again and again, between bounds of either sign."""
+    at_rest = [update for update in updates if update.tick >= last + longest(spec)]
+    assert at_rest
+    assert at_rest[0].tick <= last + 2 * longest(spec)
+    assert n_ticks - at_rest[-1].tick <= MAX_TICKS
+    assert all(update.velocity == 0 and update.lower < 0 < update.upper for update in at_rest)
+    assert at_rest[-1].stalled
+
+
+def steady(counts: int, ticks: int) -> list[int]:
+    """One count in so many ticks."""
+    return ([0] * (ticks - 1) + [1 if counts > 0 else -1]) * abs(counts)
+
+
+@each_method
+@pytest.mark.parametrize("sign", [1, -1])
+def test_reversal(spec: TachometerSpec, sign: int) -> None:
+    """Never faster than before; after it the other sign and the same speed."""
+    there = [sign * 2] * 30
+    updates = run(spec, there + [-number for number in there])
+    assert all(abs(update.velocity) <= 2 for update in updates)
+    assert [update.velocity for update in updates if update.tick < 30][-1] == sign * 2
+    assert updates[-1].velocity == -sign * 2
+    turned = next(update.tick for update in updates if update.velocity * sign < 0)
+    assert turned < 30 + longest(spec)
+    assert all(update.velocity * sign < 0 for update in updates if update.tick >= turned)
+
+
+@each_method
+@pytest.mark.parametrize("speed", [[3], [0, 1], [0, 0, 0, 0, 1]])
+def test_standstill(spec: TachometerSpec, speed: list[int]) -> None:
+    moving = speed * (60 // len(speed))
+    check_rest(spec, run(spec, moving + [0] * 100), 59, 160)
+
+
+def check_one_count(spec: TachometerSpec) -> None:
+    updates = run(spec, [0] * 50 + [1] + [0] * 100)
+    assert all(update.velocity == 0 for update in updates if update.tick < 50)
+    # A count after a silence is no spike: it has come in half the longest time at least, or in the n ticks.
+    most = 1 / spec.average if isinstance(spec, MTachometer) else 2 / MAX_TICKS
+    assert all(0 <= update.velocity < most + 2**-spec.frac_bits for update in updates)
+    check_rest(spec, updates, 50, 151)
+
+
+@each_method
+def test_one_count_then_silence(spec: TachometerSpec) -> None:
+    check_one_count(spec)
+
+
+@each_method
+@pytest.mark.parametrize("rhythm", [[1, -1], [1, 0, -1, 0], [0, 1, 0, 0, -1], [0] * 7 + [1] + [0] * 30 + [-1]])
+def test_dithering_on_one_edge(spec: TachometerSpec, rhythm: list[int]) -> None:
+    """Never more than a count in what was measured, so that 0 lies within the bounds; and 0 when it ends."""
+    moving = rhythm * (200 // len(rhythm))
+    updates = run(spec, moving + [0] * 100)
+    for update in updates:
+        assert abs(update.velocity) <= 1 / update.interval + 2**-spec.frac_bits
+        assert update.lower <= 0 <= update.upper
+    check_rest(spec, updates, len(moving) - 1, len(moving) + 100)
+
+
+@each_method
+def test_burst_after_standstill(spec: TachometerSpec) -> None:
+    updates = run(spec, [0] * 50 + [T] * 8 + [0] * 100)
+    assert max(update.velocity for update in updates) > T / 3
+    assert all(0 <= update.velocity <= T for update in updates)
+    check_rest(spec, updates, 57, 158)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("m_s.eq(after_forced)", "m_s.eq(1)"),  # a spike after a silence
+        ("(self.alteration | longest)", "self.alteration"),  # frozen
+    ],
+)
+def test_mutants_are_caught(right: str, wrong: str) -> None:
+    spec = replace(SPECS["eq. (21)"], position_width=16)
+    with mutant(interval.IntervalAccumulator, right, wrong), caught():
+        check_one_count(spec)

@@ -1,0 +1,179 @@
+"""What every method that measures times promises, clock by clock: docs/timed.md."""
+
+from typing import Any
+
+import pytest
+from support.mutant import caught, mutant
+from support.timed import SILENCE, TICK, decay, run, silence, spec_of, speed
+
+from tachometry.hdl.methods import gap_timer, quotient_velocity
+from tachometry.spec.methods.timed import TimedTachometer
+
+METHODS = ["t", "mt"]
+
+
+def timed(method: str, **options: Any) -> TimedTachometer:
+    """A measurement with each count, if they are not too close."""
+    return spec_of(method, **options, **({"min_time": 1} if method == "mt" else {}))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_steady_speed(method: str, sign: int) -> None:
+    """The first count opens; from the second on every one gives a speed."""
+    at = list(range(5, 400, 45))
+    got = run(timed(method), dict.fromkeys(at, sign), 400)
+    assert got == [(clock, sign * speed(1, 45), 45, False, False) for clock in at[1:]]
+
+
+def check_reversal(method: str) -> None:
+    """The edge that is met twice is no way."""
+    steps = {5: 1, 45: 1, 95: -1, 125: -1, 175: -1}
+    got = run(timed(method, bound_decay=False), steps, 180)
+    ways = [(45, 1, 40), (95, 0, 50), (125, -1, 30), (175, -1, 50)]
+    assert [row[:3] for row in got] == [(clock, speed(way, time), time) for clock, way, time in ways]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_reversal(method: str) -> None:
+    check_reversal(method)
+
+
+def check_standstill(method: str, sign: int = 1) -> None:
+    """The speed sinks tick by tick as 1 count over the silence, and is 0 when the maximum time is over."""
+    steps = {5: sign, 25: sign, 45: sign}
+    n = 45 + 3 * SILENCE
+    v = sign * speed(1, 20)
+    moving = [(25, v, 20, False, False), (45, v, 20, False, False)]
+    spec = timed(method)
+    # The 0 takes the divider from the last of them.
+    sinking = decay(45, v, 45 + SILENCE - spec.division_clocks + 1)
+    assert run(spec, steps, n) == moving + sinking + silence(45, n)
+    without = run(timed(method, bound_decay=False), steps, n)
+    assert without == moving + silence(45, n)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_standstill(method: str, sign: int) -> None:
+    check_standstill(method, sign)
+
+
+def check_one_count(method: str) -> None:
+    """One count is no speed."""
+    n = 100 + 3 * SILENCE
+    assert run(timed(method), {100: 1}, n) == silence(100, n)
+    # After reset nothing has been counted: that is standstill at once.
+    got = run(timed(method), {}, n)
+    assert got == [(clock, 0, SILENCE, True, True) for clock in range(SILENCE - 1, n, SILENCE)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_one_count_then_silence(method: str) -> None:
+    check_one_count(method)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_dithering_on_one_edge(method: str) -> None:
+    """It reads 0 for ever, in any rhythm."""
+    at = [7, 8, 9, 50, 51, 60, 100, 130, 131, 132, 133, 200, 229, 300]
+    got = run(timed(method), {clock: (-1) ** k for k, clock in enumerate(at)}, 300 + 2 * SILENCE)
+    assert len(got) > 4
+    assert {velocity for _, velocity, *_ in got} == {0}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_burst_after_standstill(method: str) -> None:
+    """No speed exceeds one count a clock, and none is left when the maximum time is over."""
+    begin = 2 * SILENCE + 10
+    steps = {clock: 1 for clock in range(begin, begin + 60)}
+    last, n = begin + 59, begin + 59 + 3 * SILENCE
+    got = run(timed(method), steps, n)
+    assert silence(last, n) == [row for row in got if row[0] > last and not row[1]]
+    moving = [row for row in got if row[1]]
+    assert [row[1] for row in moving if not row[3]] == [speed(1, 1)] * sum(not row[3] for row in moving)
+    assert all(
+        last < clock < last + SILENCE and 0 < v <= speed(1, age) for clock, v, age, forced, _ in moving if forced
+    )
+    assert len(moving) > 5
+
+
+def check_count_at_the_maximum_time(method: str) -> None:
+    """It is a count, and the silence of a clock more is one."""
+    got = run(timed(method, bound_decay=False), {5: 1, 5 + SILENCE: 1, 6 + 2 * SILENCE: 1}, 7 + 2 * SILENCE)
+    assert got == [
+        (5 + SILENCE, speed(1, SILENCE), SILENCE, False, False),
+        (5 + 2 * SILENCE, 0, SILENCE, True, False),
+    ]
+    # Where a second 0 would be forced, it is the first after a silence.
+    assert run(timed(method), {5: 1, 5 + 2 * SILENCE: 1}, 6 + 2 * SILENCE) == silence(5, 5 + 2 * SILENCE)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_count_at_the_maximum_time(method: str) -> None:
+    check_count_at_the_maximum_time(method)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_measurement_takes_the_divider_from_a_decay(method: str) -> None:
+    spec = timed(method)
+    tick = 6 * TICK - 1
+    for clock in range(tick + 1, tick + 20):
+        got = run(spec, {5: 1, 25: 1, 45: 1, clock: 1}, clock + 1)
+        assert got[-1] == (clock, speed(1, clock - 45), clock - 45, False, False)
+        assert ((tick, speed(1, tick - 45), tick - 45, True, False) in got) == (clock >= tick + spec.division_clocks)
+
+
+def check_turning_tail(method: str) -> None:
+    """A decay looks at the sign of the velocity, not of that before it."""
+    for late in range(20):
+        steps = {5: 1, 45: 1, 65: -1, 72 + late: -1}
+        got = run(timed(method), steps, 72 + late + 100)
+        assert all(velocity <= 0 for clock, velocity, *_ in got if clock > 65)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_turning_tail(method: str) -> None:
+    check_turning_tail(method)
+
+
+MUTANTS = {
+    "an age too short": (gap_timer.GapTimer, "self.age.eq(1)", "self.age.eq(0)", check_standstill),
+    "forced a period late": (
+        gap_timer.GapTimer,
+        "self.age == self._max_periods - 1",
+        "self.age == self._max_periods",
+        check_count_at_the_maximum_time,
+    ),
+    "forced in spite of a count": (gap_timer.GapTimer, " & ~self.count)", ")", check_count_at_the_maximum_time),
+    "open after a silence": (gap_timer.GapTimer, "self.opened.eq(self.count)", "self.opened.eq(1)", check_one_count),
+    "no sign kept": (gap_timer.GapTimer, "was_negative.eq(self.negative)", "was_negative.eq(0)", check_reversal),
+    "never nearer": (quotient_velocity.QuotientVelocity, "change[-1])", "0)", check_standstill),
+    "always nearer": (
+        quotient_velocity.QuotientVelocity,
+        "~change[-1] & change.any(), change[-1]",
+        "1, 1",
+        check_standstill,
+    ),
+    "down and not to the nearest": (
+        quotient_velocity.QuotientVelocity,
+        "(divider.quotient + 1) >> 1",
+        "divider.quotient >> 1",
+        check_standstill,
+    ),
+    "forced as it was before": (
+        quotient_velocity.QuotientVelocity,
+        "forced.eq(self.forced_in)",
+        "forced.eq(forced)",
+        check_standstill,
+    ),
+    "sinking too early": (quotient_velocity.QuotientVelocity, " & ~rounds & ~compared", "", check_turning_tail),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str, method: str) -> None:
+    box, right, wrong, check = MUTANTS[name]
+    with mutant(box, right, wrong), caught():
+        check(method)

@@ -1,0 +1,114 @@
+"""The bounds of the methods that measure times, in gates: to the bit those of the golden model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+from support.timed import OUTPUTS, TICK, spec_of
+
+from tachometry.hdl.methods import DATAPATHS, quotient_velocity
+from tachometry.hdl.methods import mt as mt_method
+from tachometry.sim.golden import model
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.signals.run import Ticks
+from tachometry.spec import Timing
+from tachometry.spec.tachometer import BOUNDS
+
+CLOCKS = 2400
+NAMES = [*OUTPUTS[1:], *BOUNDS, "bounds_valid"]
+
+
+def counts(seed: int) -> NDArray[np.int64]:
+    """A step for every clock: steady and fast, in either direction, over one edge, and silence up to three times."""
+    rng = np.random.default_rng(seed)
+    step = np.zeros(CLOCKS, np.int64)
+    at, way = 100, 1
+    while at < CLOCKS:
+        gap, turns = [(1, 0.2), (3, 0.5), (9, 0.1), (23, 0), (41, 0.3), (60, 0.2)][rng.integers(6)]
+        for _ in range(rng.integers(1, 8)):
+            if at < CLOCKS:
+                way *= -1 if rng.random() < turns else 1
+                step[at] = way
+            at += gap + int(rng.integers(2))
+        at += int(rng.integers(250)) * (rng.random() < 0.3)
+    return step
+
+
+def check(method: str, timer: str, seed: int = 1) -> None:
+    """All updates of a run, with their bounds."""
+    spec = replace(spec_of(method, timer=timer, bounds=True), timing=Timing(100 * TICK, TICK, 4))
+    step = counts(seed)
+    tick = np.arange(TICK - 1, CLOCKS, TICK)
+    m_e = step.reshape(-1, TICK).sum(axis=1)
+    off, none = np.zeros(len(tick), np.int64), np.empty(0, np.int64)
+    at = np.flatnonzero(step)
+    n_clocks = CLOCKS + spec.datapath_latency
+    steps = Steps(at - spec.tick_latency, step[at], none, none, none)
+    golden = model(spec).updates(Ticks(tick, m_e, off, off > 0, off, off), steps, n_clocks)
+    rows = []
+    for clock in range(n_clocks):
+        row = {"tick": int(clock < CLOCKS and clock % TICK == TICK - 1)}
+        if spec.on_lattice:
+            row["pulse_count"] = int(m_e[min(clock, CLOCKS - 1) // TICK])
+        else:
+            row["step"] = int(step[clock]) if clock < CLOCKS else 0
+        rows.append(row)
+    datapath = DATAPATHS[spec.method](spec)
+    seen = clock_by_clock(datapath, rows, ["velocity_valid", *NAMES])
+    got = [[clock, *(row[name] for name in NAMES)] for clock, row in enumerate(seen) if row["velocity_valid"]]
+    held = {"clock": golden.clock, **{name: getattr(golden, name) for name in OUTPUTS[1:]}, **golden.more}
+    wanted = np.stack([held[name].astype(np.int64) for name in ("clock", *NAMES)], axis=1)
+    assert len(wanted) > 20
+    assert len(np.unique(held["bounds_valid"])) == 2
+    assert got == wanted.tolist()
+
+
+KINDS = [("t", "clock"), ("t", "tick"), ("mt", "clock"), ("mt", "tick")]
+
+
+@pytest.mark.parametrize(("method", "timer"), KINDS)
+def test_bounds(method: str, timer: str) -> None:
+    check(method, timer)
+
+
+MUTANTS = {
+    "upper as the lower": ("-(self.dividend + self.more) if upper", "(self.dividend + self.more) if upper"),
+    "a count less is not seen": ("else self.dividend - self.less", "else self.dividend"),
+    "a count more is not seen": ("-(self.dividend + self.more)", "-self.dividend"),
+    "the time is not widened": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "0"),
+    "it is widened one way": ("Mux(end[-1], -1, 1), 0)", "1, 0)"),
+    "it is widened in silence": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "Mux(end[-1], -1, 1)"),
+    "over its last edge": ("Mux(still, 0, -greatest)", "-greatest"),
+    "not over it after a reversal": ("~(signs[0] | signs[1])", "~signs[0]"),
+    "still in a forced 0": ("still = sinks & (", "still = ("),
+    "none is a number": ("Mux(none, limit, box.quotient)", "box.quotient"),
+    "none after two": ("(self.divisor == 1)", "(self.divisor <= 2)"),
+    "always known": ("self.bounds_valid.eq(known)", "self.bounds_valid.eq(1)"),
+}
+
+
+def check_all() -> None:
+    for method, timer in KINDS[::-1]:
+        check(method, timer)
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_of_the_quotients_are_caught(name: str) -> None:
+    with mutant(quotient_velocity.QuotientVelocity, *MUTANTS[name]), caught():
+        check_all()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("quotient.less.eq(opening & ~timer.negative)", "quotient.less.eq(~timer.negative)"),
+        ("quotient.more.eq(~opening & timer.negative)", "quotient.more.eq(~opening)"),
+        ("with m.If(timer.count & opens):", "with m.If(timer.count):"),
+    ],
+)
+def test_mutants_of_the_ends_of_a_window_are_caught(right: str, wrong: str) -> None:
+    with mutant(mt_method.Datapath, right, wrong), caught():
+        check("mt", "tick")

@@ -1,0 +1,80 @@
+"""The low-pass filter's gates against the golden one, with injected updates."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.output import low_pass
+from tachometry.sim.golden.low_pass import filtered
+from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.spec import Encoder, STachometer, Timing
+
+
+class Resting(STachometer):
+    """An S tachometer whose `stalled` updates are taken as they are."""
+
+    last_when_stalled = True
+
+
+ONE_TABLE = Resting(encoder=Encoder(500), timing=Timing(48_000_000, 20, 60), frac_bits=6, lowpass=Fraction(100_000))
+TWO_TABLES = replace(ONE_TABLE, timing=Timing(48_000_000, 20, 5000), lowpass=Fraction(2000))
+
+
+def check(spec: STachometer, n: int = 150) -> None:
+    """Updates far apart, close together, and while another waits."""
+    form = spec.low_pass
+    rng = np.random.default_rng(2)
+    gaps = np.where(rng.random(n) < 0.5, form.latency + rng.integers(-4, 4, n), rng.integers(1, form.latency, n))
+    gaps[50] = 800  # more ticks than it can count
+    came = np.cumsum(gaps)
+    most = spec.max_count << spec.native_frac_bits
+    velocity = rng.integers(-most, most + 1, n)
+    n_clocks = int(came[-1]) + 2 * form.latency
+    # Many ticks, or none, or too many.
+    tick = np.flatnonzero(
+        rng.random(n_clocks) < np.repeat(rng.choice([0, 0.02, 0.9], n_clocks // 50 + 1), 50)[:n_clocks]
+    )
+    off = np.zeros(len(tick), dtype=np.int64)
+    clears = rng.random(n) < 0.1
+    none = np.zeros(n, dtype=np.bool_)
+    updates = Updates(came + form.latency, velocity, off[:n], none, clears, none, {"tag": np.arange(n) % 16})
+    wanted = filtered(spec, Ticks(tick, off, off, off > 0, off, off), updates, 1 << 40)
+    at = {clock: k for k, clock in enumerate(came.tolist())}
+    ticks = set(tick.tolist())
+    rows = []
+    for clock in range(n_clocks):
+        k = at.get(clock, 0)
+        known = {"native": int(velocity[k]), "clear": int(clears[k]), "tag": k % 16}
+        rows.append({"start": int(clock in at), "tick": int(clock in ticks), **known})
+    seen = clock_by_clock(low_pass.LowPass(form, tag_width=4), rows, ["done", "velocity", "tag_out"])
+    got = [(k, row["velocity"], row["tag_out"]) for k, row in enumerate(seen) if row["done"]]
+    columns = (wanted.clock, wanted.velocity, wanted.more["tag"])
+    assert got == list(zip(*(column.tolist() for column in columns), strict=True))
+    assert len(got) < n
+
+
+@pytest.mark.parametrize("spec", [ONE_TABLE, TWO_TABLES], ids=["one table", "two tables"])
+def test_as_the_golden_one(spec: STachometer) -> None:
+    assert len(spec.low_pass.tables) == (2 if spec is TWO_TABLES else 1)
+    check(spec)
+
+
+MUTANTS = {
+    "not rounded": ("Cat(step == bits, total).as_signed()", "Cat(0, total).as_signed()"),
+    "intervals of the first alone": ("Mux(waiting & ~take, next_interval, 0)", "0"),
+    "taken too early": ("waiting & ~working & ~adding", "waiting & ~working"),
+    "not cleared": ("Mux(next_clear, 0, y - (next_u << extra))", "y - (next_u << extra)"),
+    "one factor": ("working & last & (second if high else 1)", "working & last"),
+    "no rounding of the output": ("(y + (1 << (extra - 1)))", "y"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(low_pass.LowPass, *MUTANTS[name]), caught():
+        # Few bits below the LSB, so that roundings show.
+        check(replace(ONE_TABLE, lowpass=Fraction(2_400_000)) if name == "not rounded" else TWO_TABLES)

@@ -1,0 +1,82 @@
+"""From native velocity to the unit that is wanted: both boxes against the formula, clock by clock."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.output import velocity_output
+from tachometry.spec.formats.velocity_output import VelocityOutput
+
+SERIAL, PIPELINED = velocity_output.SerialVelocityOutput, velocity_output.PipelinedVelocityOutput
+MAX_NATIVE = 5 << 8
+WIDTH = 12
+# Multipliers with many digits, with two negative ones at the low end, of a power of two; and none, to hold only.
+RATIOS = [Fraction(2, 13), Fraction(11, 64), Fraction(1, 4), Fraction(3, 16), Fraction(1, 700), Fraction(1)]
+
+
+def check(serial: bool, ratio: Fraction, width: int | None = None, n: int = 150, towards: int = 0) -> None:
+    output = VelocityOutput(ratio, MAX_NATIVE, width, bounds=towards != 0)
+    latency = output.serial_latency if serial else output.pipelined_latency
+    rng = np.random.default_rng(4)
+    values = [MAX_NATIVE, -MAX_NATIVE, 1, -1, 0, *rng.integers(-MAX_NATIVE, MAX_NATIVE + 1, n).tolist()]
+    # Pipelined: a value in every clock, or now and then. Serial: as soon as the one before is done, or later.
+    gaps = (latency if serial else 1) + rng.choice([0, 0, 0, 2], len(values))
+    rows: list[dict[str, int]] = []
+    for k, (value, gap) in enumerate(zip(values, gaps.tolist(), strict=True)):
+        rows += [{"start": 1, "native": value, "tag": k % 8}, *[{"start": 0}] * (gap - 1)]
+    box = (SERIAL if serial else PIPELINED)(output, native_width=WIDTH, tag_width=3, towards=towards)
+    names = ["done", "velocity", "velocity_overflow", "tag_out"]
+    seen = clock_by_clock(box, [*rows, *[{"start": 0}] * (latency + 1)], names)
+    starts = np.cumsum(gaps) - gaps
+    got = [(k, *list(row.values())[1:]) for k, row in enumerate(seen) if row["done"]]
+    wanted = []
+    for k, (value, start) in enumerate(zip(values, starts.tolist(), strict=True)):
+        scaled = (value * output.multiplier + output.rounding(towards)) >> output.shift
+        held = max(-output.limit, min(output.limit, scaled))
+        wanted.append((start + latency, held, int(held != scaled), k % 8))
+        assert towards * (scaled - value * ratio) >= 0
+        assert abs(scaled - value * ratio) < (Fraction(9, 8) if towards else Fraction(9, 16))
+    assert got == wanted
+    assert any(over for _, _, over, _ in wanted) == (output.limit < output.greatest)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("width", [None, 8])
+def test_pipelined(ratio: Fraction, width: int | None) -> None:
+    check(False, ratio, width)
+
+
+@pytest.mark.parametrize("ratio", RATIOS[:1])
+@pytest.mark.parametrize("width", [None, 8])
+def test_serial(ratio: Fraction, width: int | None) -> None:
+    check(True, ratio, width)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("towards", [-1, 1])
+@pytest.mark.parametrize("serial", [False, True])
+def test_bounds_are_rounded_outward(ratio: Fraction, towards: int, serial: bool) -> None:
+    if len(VelocityOutput(ratio, MAX_NATIVE, None).digits) > 2 or not serial:
+        check(serial, ratio, 8, towards=towards)
+
+
+MUTANTS = {
+    "serial, not rounded": (SERIAL, "Mux(rounding, high, ", "Mux(rounding, 0, "),
+    "serial, a bit late": (SERIAL, "Const(output.multiplier >> 1, bits + 1)", "Const(output.multiplier, bits + 1)"),
+    "pipelined, not rounded": (PIPELINED, "(self._rounding >> place)", "0"),
+    "pipelined, digits all positive": (PIPELINED, "else total - (native << gap)", "else total + (native << gap)"),
+    "pipelined, no flag": (
+        PIPELINED,
+        "self.velocity_overflow.eq(overflow)",
+        "self.velocity_overflow.eq(0)",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(*MUTANTS[name]), caught():
+        check(name.startswith("serial"), RATIOS[0] if "serial" in name else RATIOS[1], 8)

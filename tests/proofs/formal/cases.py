@@ -1,0 +1,359 @@
+"""What is proven of which core."""
+
+from dataclasses import replace
+from typing import Any
+from unittest.mock import patch
+
+from proofs.formal.prove import Proof
+
+from tachometry.spec import (
+    Encoder,
+    MTachometer,
+    MTTachometer,
+    RairanTachometer,
+    Speed,
+    STachometer,
+    Timing,
+    TTachometer,
+)
+from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal as CarriedSpec
+from tachometry.spec.recovery import recovery_clocks
+
+
+def core(
+    tick_cycles: int, max_ticks: int = 4, max_count: int | None = None, decoding: int = 4, **options: Any
+) -> STachometer:
+    """A spec by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each."""
+    # One revolution a tick is as many counts as the encoder has, and one revolution a second a count a tick.
+    return STachometer(
+        encoder=Encoder(1, decoding),
+        timing=Timing(decoding * tick_cycles, tick_cycles, max_ticks),
+        max_speed=None if max_count is None else Speed.parse(f"{max_count}rev/s"),
+        **options,
+    )
+
+
+_FRONT_PROBES = {
+    "core_clocks": "conditioner.clocks_since_reset",
+    "core_count": "pulse_counter.count",
+}
+_WINDOW_PROBES = {"core_left": "sampling_clock.left"}
+_FILTER_PROBES = {
+    "core_held_a": "conditioner.filter_a.held",
+    "core_held_b": "conditioner.filter_b.held",
+    "core_a": "conditioner.filter_a.filtered",
+    "core_b": "conditioner.filter_b.filtered",
+}
+_METHOD_PROBES = {
+    "core_count": "pulse_counter.count",
+    "core_m_s": "datapath.interval.m_s",
+    "core_longest": "datapath.interval.longest",
+    "core_opening": "datapath.interval.opening",
+    "core_numerator": "datapath.interval.numerator",
+    "core_previous": "datapath.alteration.previous",
+    "core_offset": "datapath.alteration.offset",
+}
+_SERIAL_PROBES = {"core_running": "datapath.scaler.running", "core_step": "datapath.scaler.step"}
+_CARRIED_PROBES = {
+    "core_carried": "datapath.reciprocal.carried",
+    "core_q": "datapath.scaler.q",
+    "core_r": "datapath.scaler.r",
+}
+_RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
+
+
+def within(block: str, probes: dict[str, str], there: bool) -> dict[str, str]:
+    """Probes to wires of a generate block, if it is there."""
+    return {f"{block}.{wire}": path for wire, path in probes.items() if there}
+
+
+def front(name: str, spec: STachometer) -> Proof:
+    """P1, P2, P3, P6: the front end."""
+    parameters = {
+        "DECODING": spec.encoder.decoding,
+        "FILTER": spec.filter_clocks,
+        "T": spec.timing.tick_cycles,
+        "TICK_LATENCY": spec.tick_latency,
+        "MAX_COUNT": spec.max_count,
+        "COUNT_WIDTH": spec.count_width,
+        "POSITION_WIDTH": spec.position_width,
+    }
+    probes = _FRONT_PROBES | within("glitch", _FILTER_PROBES, spec.filter_clocks > 0)
+    probes |= within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
+    return Proof(name, spec, "front", parameters, probes, depth=5)
+
+
+def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_table: int | None = None) -> Proof:
+    """P4, P5 and standstill: the S method, from ticks to updates."""
+    with patch("tachometry.spec.methods.s.MAX_TABLE", max_table or 2048):
+        latency, serial, used = spec.tick_to_velocity, spec.serial, spec.reciprocal
+    carried = {}
+    if isinstance(used, CarriedSpec):
+        carried = {"CARRIED": used.depth, "C": used.scale, "SERIAL": int(serial)}
+    parameters = {
+        "T": spec.timing.tick_cycles,
+        "MAX_TICKS": spec.timing.max_ticks,
+        "MAX_COUNT": spec.max_count,
+        "COUNT_WIDTH": spec.count_width,
+        "INTERVAL_WIDTH": spec.interval_width,
+        "NUMERATOR_WIDTH": spec.numerator_width,
+        "FRAC_BITS": spec.frac_bits,
+        "CANCEL": int(spec.cancel),
+        "TICK_TO_VELOCITY": latency,
+        "AGE": int(spec.age),
+    }
+    probes = _METHOD_PROBES | within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
+    probes |= within("aged", {"core_age": "age"}, spec.age)
+    probes |= within("carried", _CARRIED_PROBES, bool(carried))
+    probes |= within("serial", _SERIAL_PROBES, bool(carried) and serial)
+    return Proof(
+        name, spec, "method", parameters | carried, probes, depth or latency + 2, without=without, max_table=max_table
+    )
+
+
+def m_method(name: str, spec: MTachometer) -> Proof:
+    """The M method, from ticks to updates."""
+    parameters = {
+        "N": spec.average,
+        "MAX_COUNT": spec.max_count,
+        "COUNT_WIDTH": spec.count_width,
+        "INTERVAL_WIDTH": spec.interval_width,
+        "BOUND_WIDTH": spec.bound_width,
+        "FRAC_BITS": spec.frac_bits,
+        "TICK_TO_VELOCITY": spec.tick_to_velocity,
+    }
+    return Proof(
+        name,
+        spec,
+        "m_method",
+        parameters,
+        {},
+        depth=max(spec.tick_to_velocity + spec.average + 2, 3 * spec.average + 1),
+    )
+
+
+def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Proof:
+    """The carried reciprocal."""
+    with patch("tachometry.spec.methods.s.MAX_TABLE", max_table or 2048):
+        carried = spec.reciprocal
+    assert isinstance(carried, CarriedSpec)
+    parameters = {
+        "MAX_TICKS": spec.timing.max_ticks,
+        "INTERVAL_WIDTH": spec.interval_width,
+        "C": carried.scale,
+        "CARRIED": carried.depth,
+    }
+    return Proof(name, spec, "reciprocal", parameters, _RECIPROCAL_PROBES, depth=2, max_table=max_table)
+
+
+def small(**options: Any) -> STachometer:
+    """A core whose whole S method is within reach of a SAT solver."""
+    return core(**{"tick_cycles": 2, "max_count": 1, "frac_bits": 4, "position_width": 8} | options)
+
+
+def small_m(average: int) -> MTachometer:
+    """A core of the M method, a tick a clock, with bounds."""
+    s = small(tick_cycles=1, bounds=True)
+    return MTachometer(
+        encoder=s.encoder,
+        timing=s.timing,
+        frac_bits=4,
+        position_width=8,
+        bounds=True,
+        average=average,
+    )
+
+
+_RAIRAN_PROBES = {
+    "core_step": "decoder.step",
+    "core_left": "datapath.counters.left",
+    "core_more": "datapath.counters.c_more",
+    "core_any": "datapath.counters.any",
+    "core_dt": "datapath.counters.c_dt",
+    "core_n": "datapath.counters.n",
+    "core_high": "datapath.counters.high",
+    "core_backward": "datapath.counters.backward",
+    "core_moved": "datapath.counters.moved",
+    "core_late": "datapath.counters.late",
+    "core_in_step": "datapath.counters.in_step",
+    "core_rest": "datapath.counters.rest",
+    "core_beyond": "datapath.counters.beyond",
+    "core_forced": "datapath.counters.forced",
+    "core_stalled": "datapath.counters.stalled",
+}
+
+
+def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof:
+    """PR: the method of Rairán, from steps to updates."""
+    spec = RairanTachometer(
+        encoder=Encoder(1, 4),
+        timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),
+        max_speed=Speed.parse(f"{max_count}rev/s"),
+        frac_bits=4,
+        position_width=8,
+    )
+    assert spec.max_count == max_count, spec.max_count
+    parameters = {
+        "T": tick_cycles,
+        "MAX_TICKS": max_ticks,
+        "MAX_COUNT": max_count,
+        "VELOCITY_WIDTH": spec.velocity_width,
+        "FRAC_BITS": spec.frac_bits,
+    }
+    return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES, depth=10)
+
+
+_TIMED_PROBES = {
+    "core_step": "decoder.step",
+    "core_age": "datapath.gap_timer.age",
+    "core_longest": "datapath.gap_timer.longest",
+    "core_opened": "datapath.gap_timer.opened",
+    "core_negative": "datapath.gap_timer.was_negative",
+    "core_measuring": "datapath.quotient_velocity.measuring",
+    "core_rounds": "datapath.quotient_velocity.rounds",
+    "core_compared": "datapath.quotient_velocity.compared",
+    "core_forced": "datapath.quotient_velocity.forced",
+    "core_stalled": "datapath.quotient_velocity.stalled",
+    "core_rounded": "datapath.quotient_velocity.rounded",
+    "core_running": "datapath.quotient_velocity.divider.running",
+    "core_remainder": "datapath.quotient_velocity.divider.remainder",
+    "core_left": "datapath.quotient_velocity.divider.left",
+    "core_digits": "datapath.quotient_velocity.divider.digits",
+    "core_steps": "datapath.quotient_velocity.divider.steps",
+    "core_by": "datapath.quotient_velocity.divider.by",
+}
+_WINDOW_OF_MT_PROBES = {
+    "core_length": "datapath.length",
+    "core_late": "datapath.late",
+    "core_way": "datapath.way",
+}
+
+
+def timed(
+    name: str,
+    method: type[TTachometer | MTTachometer],
+    tick_cycles: int,
+    max_count: int,
+    max_ticks: int = 4,
+    **options: Any,
+) -> Proof:
+    """PT: the T and the M/T method, from steps and ticks to updates."""
+    spec = method(
+        encoder=Encoder(1, 4),
+        timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),
+        max_speed=Speed.parse(f"{max_count}rev/s"),
+        frac_bits=4,
+        position_width=8,
+        **options,
+    )
+    assert spec.max_count == max_count, spec.max_count
+    mt = isinstance(spec, MTTachometer)
+    parameters = {
+        "MT": int(mt),
+        "LATTICE": int(spec.on_lattice),
+        "T": tick_cycles,
+        "COUNT_WIDTH": spec.count_width,
+        "MAX_COUNT": max_count,
+        "MAX_PERIODS": spec.max_periods,
+        "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,
+        "MAX_QUOTIENT": spec.max_quotient,
+        "SATURATES": int(spec.saturates),
+        "FLAGS": int(spec.flags_range),
+        "INTEGER_BITS": spec.max_quotient.bit_length(),
+        "INTERVAL_WIDTH": spec.interval_width,
+        "FRAC_BITS": spec.frac_bits,
+        "DIVISION_CLOCKS": spec.division_clocks,
+    }
+    probes = _TIMED_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
+    probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
+    probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
+    probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
+    return Proof(name, spec, "timed", parameters, probes, depth=4)
+
+
+def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proof:
+    """From any state of the flip-flops the properties hold again, and the `lemmas` on what the checker takes from the
+    core.
+
+    Neither core nor checker is reset, so what holds in one clock after any state holds in all that follow.
+    """
+    parameters = proof.parameters | ({} if proof.checker == "m_method" else {"UPSET": 1})
+    clocks = recovery_clocks(proof.spec)
+    assert clocks is not None
+    return replace(
+        proof, name=name, parameters=parameters, depth=1, recovers=clocks, only=f"p* {lemmas}", without=without
+    )
+
+
+# What can be said of M/T without what is divided; the last one takes as long as all the others.
+_MT_GIVEN = (
+    "lemma_idle lemma_age lemma_timer lemma_since lemma_free lemma_running lemma_silent lemma_many lemma_left "
+    "lemma_steps lemma_rest lemma_rested lemma_length lemma_unopened lemma_core_length lemma_window_free "
+    "pt_update pt_held pt_spacing pt_rest",
+    "lemma_way",
+)
+
+
+def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
+    """The same in parts, as quotients so far from the upset are beyond the solver.
+
+    From any state that is given which holds some clocks before the end; at the end what is shown is of a division that
+    began since then; and what such a division shows is right, by induction.
+    """
+    spec, clocks = proof.spec, recovery_clocks(proof.spec)
+    assert isinstance(spec, MTTachometer)
+    assert clocks is not None
+    settled = clocks - spec.max_periods - spec.max_interval - spec.division_clocks - 1
+    upset = replace(proof, parameters=proof.parameters | {"UPSET": 1, "SETTLED": 0})
+    late = upset.parameters | {"SETTLED": settled}
+    return [
+        *(
+            replace(upset, name=f"{name}: {part}", depth=1, recovers=settled, only=given)
+            for part, given in zip(("given", "way"), _MT_GIVEN, strict=True)
+        ),
+        replace(upset, name=f"{name}: since", parameters=late, depth=1, recovers=clocks, only="lemma_fresh"),
+        replace(upset, name=name, given=" ".join(_MT_GIVEN), without="lemma_fresh"),
+    ]
+
+
+PROOFS = [
+    front("x4, 960 clocks", core(960, max_count=20)),
+    front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
+    front("x4, 2 clocks", core(2)),
+    front("x4, 1 clock", core(1)),
+    front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
+    front("x1, filter 1", core(7, max_count=2, decoding=1, filter_clocks=1)),
+    method("eq. (17)", small(cancel=False)),
+    method("eq. (21), 5 ticks", small(max_ticks=5)),
+    method("eq. (21), 1 clock", small(tick_cycles=1)),
+    method("eq. (21), 16 ticks", small(tick_cycles=1, max_ticks=16)),
+    method("age", small(age=True), depth=14),
+    method("age, 1 clock", small(tick_cycles=1, age=True, max_ticks=5)),
+    m_method("M", small_m(1)),
+    m_method("M of 4", small_m(4)),
+    m_method("M of 3", small_m(3)),
+    method("serial", small(tick_cycles=7, max_ticks=16), depth=14),
+    method("sums", core(40, 8, max_count=7), depth=2, without="p4_* p5_velocity p7_* lemma_since"),
+    method(
+        "sums of eq. (17)",
+        core(40, 8, max_count=7, cancel=False),
+        depth=2,
+        without="p4_* p5_velocity p7_* lemma_since",
+    ),
+    method("carried", small(max_ticks=16), max_table=4),
+    method("serial, carried", small(tick_cycles=12, max_ticks=6), max_table=4),
+    reciprocal("2049 ticks", core(5, 2049, max_count=1)),
+    reciprocal("6 ticks", small(max_ticks=6), max_table=4),
+    rairan("Rairán", 3, 4, 2),
+    timed("T", TTachometer, 2, 1),
+    timed("M/T", MTTachometer, 2, 1),
+    timed("T in ticks", TTachometer, 2, 2, 12, timer="tick"),
+    timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),
+    after_upset("upset, x4, filter 3", front("", core(3, filter_clocks=3)), "lemma_held lemma_window", "p1_* p2_*"),
+    after_upset("upset, eq. (21)", method("", small(tick_cycles=1)), "lemma_core"),
+    after_upset("upset, carried", method("", small(tick_cycles=1, max_ticks=5), max_table=4), "lemma_core"),
+    after_upset("upset, M of 4", m_method("", small_m(4)), "lemma_bounded"),
+    after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left"),
+    after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
+    *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
+]

@@ -1,0 +1,175 @@
+"""What each proof refutes."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
+from tachometry.hdl.arithmetic.divider import Divider
+from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.front_end.conditioner import InputConditioner
+from tachometry.hdl.front_end.decoder import QuadratureDecoder
+from tachometry.hdl.front_end.glitch_filter import GlitchFilter
+from tachometry.hdl.front_end.position_counter import PositionCounter
+from tachometry.hdl.front_end.pulse_counter import PulseCounter
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.methods.alteration import AlterationDetector
+from tachometry.hdl.methods.gap_timer import GapTimer
+from tachometry.hdl.methods.interval import IntervalAccumulator
+from tachometry.hdl.methods.m import Datapath as MDatapath
+from tachometry.hdl.methods.m import MovingSum
+from tachometry.hdl.methods.mt import Datapath as MTDatapath
+from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
+from tachometry.hdl.methods.rairan import Counters
+from tachometry.hdl.methods.rairan import Datapath as RairanDatapath
+from tachometry.hdl.output.update_age import UpdateAge
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """`right` in the source of `box` made `wrong`: violates `refuted` within `steps` clocks in the proof's core."""
+
+    proof: str
+    refuted: str
+    box: Any
+    right: str
+    wrong: str
+    steps: int = 24
+
+
+# A sum that is carried along keeps what an upset has done to it.
+RECURSIVE_SUM = (
+    """self.total.eq(through - self._earlier(m, before, last))]
+        with m.If(self.tick):
+            m.d.sync += before.eq(through)
+""",
+    """self.total.eq(through)]
+        with m.If(self.tick):
+            m.d.sync += before.eq(through - self._earlier(m, self.m_e, last))
+""",
+)
+
+MUTANTS = [
+    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
+    Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
+    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~self.level_b", "~change_b & self.level_b"),
+    Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
+    Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
+    Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
+    Mutant("x2, 7 clocks", "p3_overflow", PulseCounter, "above.eq(value > ", "above.eq(value >= "),
+    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
+    Mutant("eq. (21), 1 clock", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p4_range",
+        IntervalAccumulator,
+        "self.m_s == self._max_ticks - 1",
+        "self.m_s == self._max_ticks",
+    ),
+    Mutant("eq. (21), 1 clock", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
+    Mutant("eq. (21), 1 clock", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p5_numerator",
+        IntervalAccumulator,
+        "opening - self.previous + d1",
+        "opening - self.previous",
+    ),
+    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
+    Mutant("eq. (21), 1 clock", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
+    Mutant(
+        "eq. (17)",
+        "p5_velocity",
+        PipelinedScaler,
+        "= reciprocal.rounding(towards)",
+        "= reciprocal.rounding(towards) >> 1",
+    ),
+    Mutant(
+        "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
+    ),
+    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
+    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
+    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
+    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
+    Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
+    Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "clocks_since_reset[-1]", "clocks_since_reset[-2]"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p7_stalled",
+        IntervalAccumulator,
+        "~(opening | self.previous).any()",
+        "~self.previous.any()",
+    ),
+    Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
+    Mutant("M of 4", "pm_update", MDatapath, "valid.eq(self.tick)", "valid.eq(self.tick & ~moving_sum.empty)"),
+    Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
+    Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
+    Mutant("M of 4", "pm_stalled", MovingSum, "(quiet >= last)", "(quiet >= last - 1)"),
+    Mutant("M of 3", "pm_bounds", MDatapath, "numerator.eq(total + bounds.get(name, 0))", "numerator.eq(total)"),
+    Mutant("M of 4", "pm_known", MDatapath, "known.append(seen >= spec.average)", "known.append(seen != 0)"),
+    Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
+    Mutant("Rairán", "pr_tick", Counters, "start = cycles - 2", "start = cycles - 1"),
+    Mutant("Rairán", "pr_update", Counters, "pulse & (late | due) | turns", "pulse & late | turns"),
+    Mutant("Rairán", "pr_estimate", Counters, "in_step.eq(opens)", "in_step.eq(0)", 32),
+    Mutant("Rairán", "pr_velocity", RairanDatapath, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
+    Mutant("Rairán", "pr_rest", Counters, "set_(0, update=~self.rest", "set_(1, update=~self.rest", 32),
+    Mutant("Rairán", "pr_range", Counters, "with m.If(full):", "with m.If(0):"),
+    Mutant("Rairán", "pr_flag", Counters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
+    Mutant("T", "pt_update", QuotientVelocity, "compared & (measuring | nearer)", "compared & nearer"),
+    Mutant(
+        "M/T in ticks", "pt_update", MTDatapath, "length == self._min_periods", "length == self._min_periods - 1", 32
+    ),
+    Mutant("T in ticks", "pt_spacing", Divider, "steps.eq(self._steps - 1)", "steps.eq(self._steps - 2)", 32),
+    Mutant("T", "pt_interval", GapTimer, "self.age.eq(1)", "self.age.eq(2)"),
+    Mutant("T", "pt_range", GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods", 32),
+    Mutant("T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant(
+        "M/T in ticks", "pt_velocity", MTDatapath, "way.eq(Mux(opens, 0, total))", "way.eq(Mux(ends, 0, total))", 32
+    ),
+    Mutant("T", "pt_flag", QuotientVelocity, "beyond | saturated", "beyond"),
+    Mutant("T in ticks", "pt_flag", QuotientVelocity, "beyond | saturated", "saturated"),
+    Mutant("T", "pt_saturated", QuotientVelocity, "self.velocity.eq(shown)", "self.velocity.eq(rounded)"),
+    Mutant("T in ticks", "pt_sinks", QuotientVelocity, "change.any(), change[-1])", "change.any(), 1)"),
+    Mutant("T in ticks", "pt_bound", QuotientVelocity, "compared & (measuring | nearer)", "compared & measuring", 32),
+    Mutant(
+        "T",
+        "pt_rest",
+        GapTimer,
+        "self.period & longest & ~self.count",
+        "self.period & longest & self.count",
+        40,
+    ),
+    Mutant("T", "pt_stalled", QuotientVelocity, "stalled.eq(self.stalled_in)", "stalled.eq(self.forced_in)", 32),
+    Mutant(
+        "T",
+        "pt_held",
+        QuotientVelocity,
+        "velocity_valid.eq(update)",
+        "velocity_valid.eq(update & ~forced)",
+        32,
+    ),
+    Mutant("upset, x4, filter 3", "p3_count", GlitchFilter, "held.eq(held + 1)", "held.eq(held + (held != 3))"),
+    Mutant(
+        "upset, eq. (21)",
+        "p4_latest",
+        IntervalAccumulator,
+        "self.m_s.eq(self.m_s + 1)",
+        "self.m_s.eq(self.m_s + (self.m_s <= self._max_ticks))",
+    ),
+    Mutant("upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(self.m == preset):", "with m.If(0):"),
+    Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),
+    Mutant("upset, Rairán", "pr_estimate", RairanDatapath, "shown = update | stalled", "shown = update"),
+    Mutant("upset, T", "pt_interval", Divider, "steps.eq(steps - 1)", "steps.eq(steps - (steps < self._steps))"),
+    Mutant("upset, M/T: given", "pt_update", MTDatapath, "length.eq(length + 1)", "length.eq(length + ~length.all())"),
+    Mutant("upset, M/T: way", "lemma_way", MTDatapath, "way.eq(Mux(opens, 0, total))", "way.eq(Mux(ends, 0, total))"),
+    Mutant(
+        "upset, M/T: since",
+        "lemma_fresh",
+        QuotientVelocity,
+        "compared & (measuring | nearer)",
+        "compared & nearer",
+    ),
+    Mutant("upset, M/T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+]

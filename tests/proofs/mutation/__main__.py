@@ -1,0 +1,60 @@
+"""How many wrong cores the tests' motions tell from the right one: `make mutate`.
+
+Names of methods as arguments choose those.
+"""
+
+import os
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+from proofs.mutation.cases import CASES
+from proofs.mutation.score import Score, judge
+from support.report import chosen, row
+
+from tachometry.spec import METHODS
+
+LEAST = 0.99  # of the mutants that are not equivalent
+
+
+def main(words: list[str]) -> bool:
+    """Whether enough mutants of every method were killed; prints the tables."""
+    methods = chosen("method", words, METHODS)
+    scores: list[Score] = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        row("core", "mutants", "killed", "equivalent", "in words", "survivors", "seconds")
+        row("---", *["---:"] * 6)
+        for case in CASES:
+            if case.method in methods:
+                start = time.monotonic()
+                score = judge(case, pool)
+                scores.append(score)
+                seconds = f"{time.monotonic() - start:.0f}"
+                row(
+                    *(case.name, score.mutants, score.killed, score.equivalent),
+                    *(score.in_words, len(score.survivors), seconds),
+                )
+    print()
+    row("method", "mutants", "killed", "equivalent", "in words", "survivors", "score")
+    row("---", *["---:"] * 6)
+    fine = True
+    for method in METHODS:
+        of_method = [score for score in scores if score.case.method == method]
+        if not of_method:
+            continue
+        mutants, killed, equivalent, words = (
+            sum(getattr(score, name) for score in of_method) for name in ("mutants", "killed", "equivalent", "in_words")
+        )
+        wrong = mutants - equivalent - words
+        fine &= killed >= LEAST * wrong
+        row(method, mutants, killed, equivalent, words, wrong - killed, f"{100 * killed / wrong:.1f} %")
+    for score in scores:
+        if score.survivors:
+            print(f"\nsurvivors of {score.case.name}:")
+        for mutant in score.survivors:
+            print(f"  {', '.join(mutant.lines)}: {mutant.place}")
+    return fine
+
+
+if __name__ == "__main__":
+    sys.exit(not main(sys.argv[1:]))

@@ -1,0 +1,278 @@
+"""Which survivors cannot be told from the core at all, proven by ABC in Yosys.
+
+The netlist is cut at its flip-flops. Core and mutant run side by side from their initial values, whatever the pins and
+`rst` do, and ABC (`dprove`: correspondence of signals, then property directed reachability) proves that all outputs are
+equal in every clock. At first a mutant has the core's flip-flops, but for those that it was seen to set differently: of
+these it has its own. Proven with the outputs is then that what goes into the shared ones is equal, wherefore they may
+be shared, and the lemmas of the case, which are about the core's registers. What is left is tried once more with
+nothing shared, and without lemmas.
+"""
+
+import ctypes
+import json
+import re
+import shutil
+import tempfile
+from collections import defaultdict
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from proofs.mutation.cases import Case
+from proofs.mutation.lemmas import lemmas
+from proofs.mutation.netlist import SELECTOR, Mutant, selected, yosys
+from proofs.mutation.simulate import compiled, key
+
+from tachometry.sim.engines import build
+from tachometry.spec import TachometerSpec
+
+_MAP = """\
+read_rtlil flat.il
+{mutants}
+memory -nomap
+memory_map
+dffunmap
+opt_clean
+write_rtlil mapped.il
+write_json mapped.json
+"""
+_WATCH = """
+struct State {{ {registers} }};
+template <size_t N> static inline void note(const value<N> &one, const value<N> &other, uint8_t *row) {{
+  for (size_t k = 0; k < N; k++) row[k] |= (one.data[k / 32] ^ other.data[k / 32]) >> (k % 32) & 1;
+}}
+ENTRY void mutation_watch(
+  const uint8_t *levels, int64_t n_clocks, int64_t n_mutants, uint8_t *differ
+) {{
+  Top top;
+  std::vector<State> states(1 + n_mutants);
+  for (auto &state : states) {{ {init} }}
+  for (int64_t clock = 0; clock < n_clocks; clock++) {{
+    pins(top, levels[clock]);
+    for (int64_t k = 0; k <= n_mutants; k++) {{
+      State &state = states[k], &core = states[0];
+      select(top, k);
+      {set}
+      settle(top);
+      {get}
+      uint8_t *row = differ + (k - 1) * {width};
+      if (k) {{ {compare} }}
+    }}
+  }}
+}}
+"""
+# What ABC says is lost, so it writes its verdict to a file. Undefined bits are 0, as in CXXRTL.
+_SOLVE = """\
+design -load all
+read_verilog miter_{number}.v
+hierarchy -top miter
+proc
+flatten
+setundef -zero
+opt -full
+techmap
+opt -full
+dffunmap
+simplemap
+opt_clean
+write_rtlil left_{number}.il
+abc -dff -script +strash;dprove,-j,-V,0,-T,{seconds};write_status,verdict_{number}
+"""
+_PROVEN = "snl_UNSAT"
+_SECONDS = 20  # for a mutant
+_WATCHED = 20_000  # clocks in which mutants are watched
+_TOGETHER = 8  # mutants for one run of Yosys
+
+
+@dataclass(frozen=True)
+class Register:
+    """A flip-flop; `init` has a character for each bit, the highest first, x where it is not known."""
+
+    width: int
+    init: str
+    names: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A netlist in RTLIL, cut at its flip-flops: register k comes in as `q_k` and goes out as `d_k`."""
+
+    text: str
+    registers: list[Register]
+
+
+def _known(mapped: dict[str, Any]) -> dict[str, tuple[str, frozenset[str]]]:
+    """Initial value and names of each register, by its cell."""
+    (module,) = mapped["modules"].values()
+    bits: dict[Any, str] = {}
+    names: dict[tuple[Any, ...], set[str]] = defaultdict(set)
+    for name, net in module["netnames"].items():
+        names[tuple(net["bits"])].add(re.sub(r"\$\d+", "", name))
+        if "init" in net["attributes"]:
+            bits.update(zip(net["bits"], reversed(net["attributes"]["init"]), strict=True))
+    known = {}
+    for name, cell in module["cells"].items():
+        if cell["type"] == "$dff":
+            q = cell["connections"]["Q"]
+            known[name] = "".join(bits.get(bit, "x") for bit in reversed(q)), frozenset(names[tuple(q)])
+    return known
+
+
+def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
+    """The netlist of a group of mutants without its flip-flops, memories taken apart."""
+    (folder / "flat.il").write_text(flat)
+    # What drives a register's net instead of it has lost the initial value.
+    yosys(_MAP.format(mutants=""), folder)
+    known = _known(json.loads((folder / "mapped.json").read_text()))
+    yosys(_MAP.format(mutants="\n".join([*selected(group), "setattr -unset init w:*"])), folder)
+    text = (folder / "mapped.il").read_text()
+    registers, wires, connections = [], [], []
+
+    def cut(cell: re.Match[str]) -> str:
+        d, q, width = (re.search(pattern, cell[2])[1] for pattern in (r"\\D (.*)", r"\\Q (.*)", r"\\WIDTH (\d+)"))
+        k = len(registers)
+        registers.append(Register(int(width), *known.get(cell[1].removeprefix("\\"), ("x" * int(width), frozenset()))))
+        wires.append(
+            f"  wire width {width} input {1000 + 2 * k} \\q_{k}\n  wire width {width} output {1001 + 2 * k} \\d_{k}\n"
+        )
+        connections.append(f"  connect {q} \\q_{k}\n  connect \\d_{k} {d}\n")
+        return ""
+
+    text = re.sub(r"^  cell \$dff (\S+)\n(.*?)^  end\n", cut, text, flags=re.DOTALL | re.MULTILINE)
+    head, body = re.split(r"(?<=^module \\top\n)", text, maxsplit=1, flags=re.MULTILINE)
+    body, tail = body.rsplit("end\n", 1)
+    return Opened(head + "".join(wires) + body + "".join(connections) + "end\n" + tail, registers)
+
+
+def watched(spec: TachometerSpec, cut: Opened, n_mutants: int, pins: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Which bits of the registers each mutant was seen to set differently, shape (n_mutants, bits)."""
+    registers = list(enumerate(cut.registers))
+    place = np.cumsum([0, *(register.width for _, register in registers)])
+    more = _WATCH.format(
+        registers=" ".join(f"value<{register.width}> r_{k};" for k, register in registers),
+        init=" ".join(
+            f"state.r_{k}.data[{chunk // 32}] = {int(register.init.replace('x', '0'), 2) >> chunk & 0xFFFFFFFF}u;"
+            for k, register in registers
+            for chunk in range(0, register.width, 32)
+        ),
+        set=" ".join(f"top.p_q__{k} = state.r_{k};" for k, _ in registers),
+        get=" ".join(f"state.r_{k} = now(top.p_d__{k});" for k, _ in registers),
+        compare=" ".join(f"note(core.r_{k}, state.r_{k}, row + {place[k]});" for k, _ in registers),
+        width=place[-1],
+    )
+
+    def make(folder: Path) -> Path:
+        (folder / "cut.il").write_text(cut.text)
+        yosys("read_rtlil cut.il\nsplitnets -driver\nopt_clean\nwrite_rtlil split.il\n", folder)
+        return compiled((folder / "split.il").read_text(), spec, folder, more)
+
+    made = build.cached(key(cut.text, more, spec.ports), ".so", make)
+    differ = np.zeros((n_mutants, place[-1]), dtype=np.uint8)
+    pointer, long = ctypes.c_void_p, ctypes.c_int64
+    watch = ctypes.CDLL(str(made)).mutation_watch
+    watch(pointer(pins.ctypes.data), long(len(pins)), long(n_mutants), pointer(differ.ctypes.data))
+    return differ.astype(bool)
+
+
+def _lemmas(case: Case, cut: Opened) -> list[str]:
+    """The lemmas of the case with the registers that they name, less those of a register that is not there."""
+
+    def register(found: re.Match[str]) -> str:
+        name = f".{found[2]}"
+        numbers = [k for k, one in enumerate(cut.registers) if any(f".{own}".endswith(name) for own in one.names)]
+        return f"{'core' if found[1] == '{' else 'mutant'}_q_{numbers[0] if len(numbers) == 1 else '?'}"
+
+    named = [re.sub(r"([{\[])([a-z][\w.]*)[}\]]", register, lemma) for lemma in lemmas(case.spec)]
+    return [lemma for lemma in named if "_q_?" not in lemma]
+
+
+def _miter(spec: TachometerSpec, cut: Opened, number: int, differ: NDArray[np.bool_], more: list[str]) -> str:
+    """Core and mutant, with the registers that they share and those that they do not, and whether anything is wrong."""
+    pins = [port.name for port in spec.ports if port.direction == "input" and port.name != "clk"]
+    outputs = [port for port in spec.ports if port.direction == "output"]
+    inputs, lines = [f"input {name}" for name in ("clk", *pins)], ["reg begun = 0;"]
+    lines += ["always @(posedge clk) begun <= 1;"]
+    links: dict[str, list[str]] = {"core": [], "mutant": []}
+    equal = []
+    place = 0
+
+    def held(name: str, d: str, k: int, register: Register) -> None:
+        """A register, which begins with any value if that is not known."""
+        bits = f"[{register.width - 1}:0]"
+        known = register.init.replace("x", "0")
+        lines.extend([f"reg {bits} {name}_held = {register.width}'b{known};", f"wire {bits} {name};"])
+        lines.append(f"always @(posedge clk) {name}_held <= {d};")
+        lines.append(
+            f"assign {name} = {f'begun ? {name}_held : first_{k}' if 'x' in register.init else f'{name}_held'};"
+        )
+
+    for k, register in enumerate(cut.registers):
+        own = differ[place : place + register.width]
+        place += register.width
+        last = register.width - 1
+        if "x" in register.init:
+            inputs.append(f"input [{last}:0] first_{k}")
+        lines += [f"wire [{last}:0] core_d_{k}, mutant_d_{k};"]
+        held(f"core_q_{k}", f"core_d_{k}", k, register)
+        if own.any():
+            held(f"own_{k}", f"mutant_d_{k}", k, register)
+        bits = ", ".join(f"{'own' if own[bit] else 'core_q'}_{k}[{bit}]" for bit in range(last, -1, -1))
+        lines += [f"wire [{last}:0] mutant_q_{k} = {{{bits}}};"]
+        shared = [bit for bit in range(last, -1, -1) if not own[bit]]
+        if shared:
+            sides = (", ".join(f"{side}_d_{k}[{bit}]" for bit in shared) for side in links)
+            equal.append(" == ".join(f"{{{side}}}" for side in sides))
+        for side, link in links.items():
+            link += [f".q_{k}({side}_q_{k})", f".d_{k}({side}_d_{k})"]
+    for port in outputs:
+        lines += [f"wire [{port.width - 1}:0] core_{port.name}, mutant_{port.name};"]
+        equal.append(f"core_{port.name} == mutant_{port.name}")
+    for (side, link), selector in zip(links.items(), (0, number), strict=True):
+        link += [f".{name}({name})" for name in pins] + [f".{SELECTOR}({selector})"]
+        link += [f".{port.name}({side}_{port.name})" for port in outputs]
+        lines += [f"top {side} ({', '.join(link)});"]
+    right = " && ".join(f"({term})" for term in [*equal, *more])
+    head = f"module miter({', '.join(inputs)}, output wrong);"
+    return "\n".join([head, *lines, f"assign wrong = !({right});", "endmodule", ""])
+
+
+def _holds(verdict: Path, left: Path) -> bool:
+    """What ABC says, which is not asked if nothing is left of what differs."""
+    if verdict.exists():
+        return verdict.read_text().startswith(_PROVEN)
+    return "connect \\wrong 1'0" in left.read_text()
+
+
+def equivalent(
+    case: Case, flat: str, group: list[Mutant], pins: NDArray[np.uint8], folder: Path, pool: Executor
+) -> list[bool]:
+    """Whether each mutant is proven to show at every output in every clock what the core shows, whatever the inputs."""
+    cut = opened(flat, group, folder)
+    differ = watched(case.spec, cut, len(group), pins[:_WATCHED])
+    text = folder / "cut.il"
+    text.write_text(cut.text)
+
+    more = _lemmas(case, cut)
+
+    def proven(numbers: list[int]) -> set[int]:
+        own = Path(tempfile.mkdtemp(dir=folder))
+        shutil.copy(text, own)
+        script = ["read_rtlil cut.il", "design -save all"]
+        for number in numbers:
+            (own / f"miter_{number}.v").write_text(_miter(case.spec, cut, number, differ[number - 1], more))
+            script.append(_SOLVE.format(number=number, seconds=_SECONDS))
+        yosys("\n".join(script), own)
+        return {number for number in numbers if _holds(own / f"verdict_{number}", own / f"left_{number}.il")}
+
+    alike: set[int] = set()
+    for together in (_TOGETHER, 1):
+        left = [number for number in range(1, len(group) + 1) if number not in alike]
+        parts = [left[first : first + together] for first in range(0, len(left), together)]
+        alike = alike.union(*pool.map(proven, parts))
+        # Some set a register that they share only later.
+        differ[:] = True
+        more.clear()
+    return [number in alike for number in range(1, len(group) + 1)]

@@ -1,0 +1,52 @@
+"""What makes proofs about mutants short, and is proven with them.
+
+In Verilog; `{name}` is a register of the core by name, which may be the end of a path, `[name]` that of the mutant.
+"""
+
+from tachometry.spec import STachometer, TachometerSpec
+from tachometry.spec.methods.timed import TimedTachometer
+
+
+def lemmas(spec: TachometerSpec) -> list[str]:
+    """Those for a core."""
+    if isinstance(spec, STachometer):
+        return [*_tick(spec), *_window(spec)]
+    if isinstance(spec, TimedTachometer):
+        return _gap(spec)
+    return []
+
+
+def _within(name: str, limit: object) -> str:
+    return f"$signed({{{name}}}) <= {limit} && $signed({{{name}}}) >= -{limit}"
+
+
+def _tick(spec: STachometer) -> list[str]:
+    """A window has no more counts than clocks."""
+    cycles = spec.timing.tick_cycles
+    left = "$signed({sampling_clock.left})"
+    return [
+        f"{left} >= -1 && {left} <= {cycles - 2}",
+        f"{left} == {cycles - 2} || !{{complete}}",
+        f"{left} == {cycles - 2} ? {_within('pulse_counter.count', cycles)}"
+        f" : {_within('pulse_counter.count', f'($signed({cycles - 2}) - {left})')}",
+    ]
+
+
+def _window(spec: STachometer) -> list[str]:
+    """Inside a window all pulse numbers but the first and the last are equal."""
+    longest = spec.timing.max_ticks
+    counts = ("pulse_counter.pulse_count", "alteration.previous", "alteration.offset", "interval.opening")
+    return [
+        f"{{m_s}} >= 1 && {{m_s}} <= {longest} && {{longest}} == ({{m_s}} == {longest})",
+        "{m_s} == 1 || {alteration.offset} == {alteration.previous}",
+        *(_within(name, spec.max_count) for name in counts),
+    ]
+
+
+def _gap(spec: TimedTachometer) -> list[str]:
+    """The last count's age, and its sign, which counts for nothing if it is too old."""
+    longest = spec.max_periods
+    return [
+        f"{{gap_timer.age}} >= 1 && {{gap_timer.age}} <= {longest} && {{longest}} == ({{gap_timer.age}} == {longest})",
+        "!{gap_timer.opened} || {was_negative} == [was_negative]",
+    ]

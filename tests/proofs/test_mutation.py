@@ -1,0 +1,74 @@
+"""The short form of `make mutate`: some mutants of one core, and what it says when they are not noticed."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import proofs.mutation.__main__ as command
+import proofs.mutation.equivalent
+import proofs.mutation.score
+import pytest
+from proofs.mutation.cases import CASES
+from proofs.mutation.equivalent import equivalent
+from proofs.mutation.netlist import exported, mutants
+from proofs.mutation.simulate import library, run
+from proofs.mutation.stimulus import Stimulus, stimulus
+
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec import TachometerSpec
+
+CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=40)
+CLOCKS = 50_000
+
+
+def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
+    """A reset, and then nothing."""
+    pins = np.zeros(n_clocks, dtype=np.uint8)
+    pins[0] = 1
+    low = {name: np.zeros(1, dtype=np.uint8) for name in ("a", "b")}
+    return Stimulus(pins, [PinTrace(np.zeros(1, dtype=np.int64), n_clocks=n_clocks - 1, **low)], [1])
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
+    monkeypatch.setattr(command, "CASES", [CASE])
+    monkeypatch.setattr(proofs.mutation.score, "CLOCKS", CLOCKS)
+    return monkeypatch
+
+
+def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["mt"])
+    total = capsys.readouterr().out.splitlines()[-1]
+    assert total.startswith("| mt | 40 |"), total
+    assert total.endswith("| 100.0 % |"), total
+
+
+def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    small.setattr(proofs.mutation.score, "stimulus", standstill)
+    small.setattr(proofs.mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
+    assert not command.main([])
+    survivors = capsys.readouterr().out.partition("survivors of mt, in clocks:\n")[2].splitlines()
+    assert len(survivors) > 10
+    assert all(line.startswith("  hdl/") or "amaranth/lib/cdc.py" in line for line in survivors), survivors
+
+
+def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 2)
+    spec, played = CASE.spec, stimulus(CASE.spec, CLOCKS)
+    flat, found = mutants(exported(spec), CASE.mutants, tmp_path)
+    n_outputs = sum(port.direction == "output" for port in spec.ports)
+    clocks, _ = run(library(spec, flat, found), len(found), n_outputs, played.pins)
+    # Those that are the last to be noticed are the most like the core.
+    latest = [found[number] for number in np.argsort(clocks)[-4:]]
+    assert clocks.max() > CLOCKS // 10
+    with ThreadPoolExecutor(2) as pool:
+        assert not any(equivalent(CASE, flat, latest, played.pins, tmp_path, pool))
+
+
+def test_golden_model_is_held_against_the_core() -> None:
+    played = stimulus(CASE.spec, 1000)
+    wrong = replace(played, traces=[replace(trace, a=trace.a ^ 1) for trace in played.traces])
+    with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match="mt, in clocks, from clock"):
+        proofs.mutation.score.judge(CASE, pool, wrong)

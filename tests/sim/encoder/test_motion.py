@@ -1,0 +1,244 @@
+"""Motion profiles: closed forms, units, files, and what is said of texts that are wrong."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tachometry.sim.encoder.motion import Motion, Vibration, cos2pi, parse_motion, sin2pi
+
+FORMS = (
+    "constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME, trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, "
+    "stop:TIME, csv:FILE"
+)
+
+
+def csv_file(folder: Path, text: str) -> str:
+    file = folder / "motion.csv"
+    file.write_text(text)
+    return str(file)
+
+
+def test_sine_and_cosine_are_right_to_1e_15() -> None:
+    phase = np.random.default_rng(1).uniform(-0.5, 0.5, 20_000)
+    for function, reference in ((sin2pi, math.sin), (cos2pi, math.cos)):
+        exact = np.array([reference(2 * math.pi * p) for p in phase])
+        assert np.max(np.abs(function(phase) - exact)) < 1e-15
+        assert np.max(np.abs(function(phase + 1000) - exact)) < 2e-12  # what is left of the phase there
+
+
+def test_sine_is_exactly_0_at_half_turns_and_cosine_between_them() -> None:
+    half_turns = np.array([-1, -0.5, 0, 0.5, 1, 7.5, 1e9])
+    assert sin2pi(half_turns).tolist() == [0] * 7
+    assert cos2pi(half_turns + 0.25).tolist() == [0] * 7
+
+
+def test_constant() -> None:
+    motion = parse_motion("constant:40rad/s:2s")
+    assert motion.duration == 2
+    assert motion.angle([0, 0.5, 2]).tolist() == [0, 20, 80]
+    assert motion.speed([0, 0.5, 2]).tolist() == [40, 40, 40]
+    assert motion.acceleration([0, 0.5, 2]).tolist() == [0, 0, 0]
+
+
+def test_ramp() -> None:
+    motion = parse_motion("ramp:2:-6:4s")
+    assert motion.speed([0, 1, 2, 4]).tolist() == [2, 0, -2, -6]
+    assert motion.angle([0, 1, 2, 4]).tolist() == [0, 1, 0, -8]
+    assert motion.acceleration(3) == -2
+
+
+def test_sine() -> None:
+    motion = parse_motion("sine:3:50Hz:100ms")
+    t = np.linspace(0, 0.1, 1001)
+    phase = 2 * math.pi * 50 * t
+    np.testing.assert_allclose(motion.speed(t), 3 * np.sin(phase), atol=1e-13)
+    np.testing.assert_allclose(motion.angle(t), 3 * (1 - np.cos(phase)) / (2 * math.pi * 50), atol=1e-16)
+    np.testing.assert_allclose(motion.acceleration(t), 3 * 2 * math.pi * 50 * np.cos(phase), atol=1e-10)
+
+
+def test_trapezoid() -> None:
+    motion = parse_motion("trapezoid:10:1:3")
+    assert motion.breakpoints.tolist() == [0, 1, 4, 5]
+    assert motion.speed([0, 0.5, 1, 2, 4, 4.5]).tolist() == [0, 5, 10, 10, 10, 5]
+    assert motion.angle([0, 1, 4, 5]).tolist() == [0, 5, 35, 40]
+
+
+def test_segments_join_with_continuous_angle() -> None:
+    motion = parse_motion("constant:4:1s + stop:500ms+sine:2:1.5Hz:1s+ramp:-1:3:2s+trapezoid:1rev/s:10ms:1ms")
+    assert motion.breakpoints.tolist() == pytest.approx([0, 1, 1.5, 2.5, 4.5, 4.51, 4.511, 4.521], abs=1e-14)
+    join = motion.breakpoints[1:-1]
+    np.testing.assert_allclose(motion.angle(np.nextafter(join, 0)), motion.angle(join), rtol=1e-14)
+    assert motion.angle(1.5) == 4
+    assert motion.angle(2.5) == pytest.approx(4 + 4 / (2 * math.pi * 1.5), rel=1e-14)
+    assert motion.angle(4.5) - motion.angle(2.5) == pytest.approx(2, rel=1e-14)
+
+
+def test_at_a_breakpoint_speed_is_that_of_the_segment_that_begins() -> None:
+    motion = parse_motion("constant:4:1+constant:-3:1")
+    assert motion.speed([np.nextafter(1, 0), 1, 2]).tolist() == [4, -3, -3]
+
+
+def test_speed_and_acceleration_are_derivatives() -> None:
+    motion = parse_motion("ramp:-5:20:1+sine:7:3Hz:1")
+    t = np.linspace(0.01, 1.99, 500)
+    t = t[np.abs(t - 1) > 1e-3]
+    h = 1e-5
+    np.testing.assert_allclose(motion.speed(t), (motion.angle(t + h) - motion.angle(t - h)) / (2 * h), atol=1e-6)
+    np.testing.assert_allclose(motion.acceleration(t), (motion.speed(t + h) - motion.speed(t - h)) / (2 * h), atol=1e-4)
+
+
+def test_before_and_after_the_motion_the_ends_hold() -> None:
+    motion = parse_motion("ramp:1:3:1")
+    assert motion.angle([-1, 5]).tolist() == [0, 2]
+    assert motion.speed([-1, 5]).tolist() == [1, 3]
+
+
+@pytest.mark.parametrize(
+    ("text", "speed"),
+    [
+        ("7", 7),
+        ("+7", 7),
+        ("-7.5rad/s", -7.5),
+        (".5 rad/s", 0.5),
+        ("1e+2", 100),
+        ("1E-2rad/s", 0.01),
+        ("2rev/s", 4 * math.pi),
+        ("-60rpm", -2 * math.pi),
+    ],
+)
+def test_units_of_speed(text: str, speed: float) -> None:
+    assert parse_motion(f"constant:{text}:1s+stop:1s").speed(0) == pytest.approx(speed, rel=1e-15)
+
+
+@pytest.mark.parametrize(("text", "time"), [("3", 3), ("3s", 3), ("9ms", 0.009), ("5us", 5e-6), ("1e-3s", 1e-3)])
+def test_units_of_time_are_rounded_once(text: str, time: float) -> None:
+    assert parse_motion(f"stop:{text}").duration == time
+
+
+def test_units_of_frequency() -> None:
+    assert parse_motion("sine:1:2kHz:1").sine_frequency == parse_motion("sine:1:2000:1").sine_frequency == 2000
+
+
+@pytest.mark.parametrize("text", ["ramp:0:20:1", "ramp:-20:5:1+constant:-3:2", "sine:7:3Hz:1"])
+def test_max_travel_bounds_the_way(text: str) -> None:
+    motion = parse_motion(text)
+    way = np.sum(np.abs(np.diff(motion.angle(np.linspace(0, motion.duration, 100_001)))))
+    assert way * (1 - 1e-9) <= motion.max_travel < 1.6 * way
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("foo:1", f"motion segment must be one of {FORMS}, not 'foo:1'"),
+        ("constant:1", f"motion segment must be one of {FORMS}, not 'constant:1'"),
+        ("stop:1s:2s", f"motion segment must be one of {FORMS}, not 'stop:1s:2s'"),
+        ("", f"motion segment must be one of {FORMS}, not ''"),
+        ("stop:1s+", f"motion segment must be one of {FORMS}, not ''"),
+        ("stop:1s+csv:x", "csv:FILE must be the whole motion, not a segment of it: 'csv:x'"),
+        ("constant:fast:1", "SPEED of constant must be a number in rad/s, rev/s, rpm (default rad/s), not 'fast'"),
+        ("constant:nan:1", "SPEED of constant must be a number in rad/s, rev/s, rpm (default rad/s), not 'nan'"),
+        ("ramp:1:2Hz:1", "TO of ramp must be a number in rad/s, rev/s, rpm (default rad/s), not '2Hz'"),
+        ("ramp:1m:2:1", "FROM of ramp must be a number in rad/s, rev/s, rpm (default rad/s), not '1m'"),
+        ("sine:1:1:1h", "TIME of sine must be a number in s, ms, us (default s), not '1h'"),
+        ("sine:1:1rpm:1", "FREQUENCY of sine must be a number in Hz, kHz (default Hz), not '1rpm'"),
+        ("sine:1:0:1", "FREQUENCY of sine must be more than 0 Hz, not '0'"),
+        ("stop:0s", "TIME of stop must be more than 0 s, not '0s'"),
+        ("stop:-1ms", "TIME of stop must be more than 0 s, not '-1ms'"),
+        ("stop:1e-999s", "TIME of stop must be more than 0 s, not '1e-999s'"),
+        ("trapezoid:1:0:1", "ACCEL_TIME of trapezoid must be more than 0 s, not '0'"),
+        ("trapezoid:1:1:0", "HOLD_TIME of trapezoid must be more than 0 s, not '0'"),
+        ("constant:1e999:1", "SPEED of constant must be finite, not '1e999'"),
+        ("constant:1:1e999s", "TIME of constant must be finite, not '1e999s'"),
+        ("constant:1e300:1e300s", "times, angles and speeds of a motion must be finite"),
+        ("stop:1e308s+stop:1e308s", "times, angles and speeds of a motion must be finite"),
+        ("stop:1e9s+stop:1e-9s", "times of a motion must begin at 0 and increase by more than their rounding error"),
+    ],
+)
+def test_texts_that_are_wrong(text: str, message: str) -> None:
+    with pytest.raises(ValueError) as error:  # noqa: PT011 (the whole message is compared)
+        parse_motion(text + "+stop:1" if "1e300" in text else text)
+    assert str(error.value) == message
+
+
+def test_csv_is_interpolated_linearly_from_time_0(tmp_path: Path) -> None:
+    file = csv_file(tmp_path, "time,angle_rad\n5,1\n6,3\n\n8,2\n")
+    motion = parse_motion(f"csv:{file}")
+    assert motion.breakpoints.tolist() == [0, 1, 3]
+    assert motion.angle([0, 0.5, 1, 2, 3]).tolist() == [1, 2, 3, 2.5, 2]
+    assert motion.speed([0, 0.5, 1, 2, 3]).tolist() == [2, 2, -0.5, -0.5, -0.5]
+
+
+def test_csv_as_a_spreadsheet_writes_it(tmp_path: Path) -> None:
+    file = csv_file(tmp_path, "\ufefftime, angle_rad\r\n0, 0\r\n1e0, -2\r\n")
+    assert parse_motion(f" csv:{file} ").angle(0.5) == -1
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "{}:1: header must be 'time,angle_rad', not ''"),
+        ("t,angle\n0,0\n1,1\n", "{}:1: header must be 'time,angle_rad', not 't,angle'"),
+        ("time,angle_rad\n0,0\n1,x\n", "{}:3: row must be two numbers TIME,ANGLE, not '1,x'"),
+        ("time,angle_rad\n0,0\n1\n", "{}:3: row must be two numbers TIME,ANGLE, not '1'"),
+        ("time,angle_rad\n0,0,0\n", "{}:2: row must be two numbers TIME,ANGLE, not '0,0,0'"),
+        ("time,angle_rad\n0,nan\n1,1\n", "{}:2: time and angle must be finite, not '0,nan'"),
+        ("time,angle_rad\n0,0\n\n2,1\n2,1\n", "{}:5: time must be more than 2.0 s, not 2.0 s"),
+        ("time,angle_rad\n0,0\n2,1\n1,1\n", "{}:4: time must be more than 2.0 s, not 1.0 s"),
+        ("time,angle_rad\n0,0\n", "{}:2: file must have at least 2 rows, not 1"),
+        ("time,angle_rad\n0,0\n1e-9,1e308\n", "times, angles and speeds of a motion must be finite"),
+    ],
+)
+def test_csv_files_that_are_wrong(tmp_path: Path, content: str, message: str) -> None:
+    file = csv_file(tmp_path, content)
+    with pytest.raises(ValueError) as error:  # noqa: PT011 (the whole message is compared)
+        parse_motion(f"csv:{file}")
+    assert str(error.value) == message.format(file)
+
+
+def test_csv_files_that_cannot_be_read(tmp_path: Path) -> None:
+    missing = str(tmp_path / "no.csv")
+    with pytest.raises(ValueError) as error:  # noqa: PT011 (the whole message is compared)
+        parse_motion(f"csv:{missing}")
+    assert str(error.value) == f"motion file {missing!r} cannot be read: No such file or directory"
+    binary = tmp_path / "motion.bin"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ValueError) as error:  # noqa: PT011 (the whole message is compared)
+        parse_motion(f"csv:{binary}")
+    assert str(error.value) == f"motion file {str(binary)!r} cannot be read: it is not UTF-8 text"
+
+
+def test_motion_must_have_a_segment() -> None:
+    none = np.empty(0)
+    with pytest.raises(ValueError, match=r"^times of a motion must begin at 0 and increase"):
+        Motion(np.zeros(1), none, none, none, none, none)
+
+
+def test_vibration() -> None:
+    vibration = Vibration.parse("1mrad:50Hz")
+    assert vibration == Vibration(1e-3, 50.0)
+    assert Vibration.parse("180deg:1kHz").amplitude_rad == pytest.approx(math.pi, rel=1e-15)
+    assert Vibration.parse("0.1rad:1kHz") == Vibration(0.1, 1000.0)
+    t = np.linspace(0, 0.04, 201)
+    rate = 2 * math.pi * 50
+    np.testing.assert_allclose(vibration.angle(t), 1e-3 * np.sin(rate * t), atol=1e-17)
+    np.testing.assert_allclose(vibration.speed(t), 1e-3 * rate * np.cos(rate * t), atol=1e-14)
+    np.testing.assert_allclose(vibration.acceleration(t), -1e-3 * rate**2 * np.sin(rate * t), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1mrad", "vibration must be AMPLITUDE:FREQUENCY, not '1mrad'"),
+        ("1mrad:50Hz:1", "vibration must be AMPLITUDE:FREQUENCY, not '1mrad:50Hz:1'"),
+        ("1m:50Hz", "vibration amplitude must be a number in rad, mrad, deg (default rad), not '1m'"),
+        ("1mrad:x", "vibration frequency must be a number in Hz, kHz (default Hz), not 'x'"),
+        ("0:50Hz", "vibration amplitude must be more than 0, not 0.0"),
+        ("1:-50Hz", "vibration frequency must be more than 0, not -50.0"),
+    ],
+)
+def test_vibrations_that_are_wrong(text: str, message: str) -> None:
+    with pytest.raises(ValueError) as error:  # noqa: PT011 (the whole message is compared)
+        Vibration.parse(text)
+    assert str(error.value) == message

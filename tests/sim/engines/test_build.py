@@ -1,0 +1,160 @@
+"""The cache of compiled cores."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from tachometry.sim.engines import build
+from tachometry.sim.engines.build import cached, compile_library, digest
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("TACHOMETRY_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+class Maker:
+    """Writes a content, and counts how often."""
+
+    def __init__(self, content: bytes = b"made") -> None:
+        self.content = content
+        self.calls = 0
+
+    def __call__(self, folder: Path) -> Path:
+        self.calls += 1
+        (folder / "x").write_bytes(self.content)
+        return folder / "x"
+
+
+def test_a_thing_is_made_once_for_a_key(folder: Path) -> None:
+    make = Maker()
+    first = cached("one", ".bin", make)
+    assert cached("one", ".bin", make) == first
+    assert (first.read_bytes(), first.suffix, make.calls) == (b"made", ".bin", 1)
+    cached("two", ".bin", make)
+    assert make.calls == 2
+    assert sorted(path.name for path in folder.iterdir()) == sorted(["one", "two", first.name])
+
+
+@pytest.mark.parametrize("half", ["file", "no file", "index", "empty index", "index elsewhere"])
+def test_what_is_not_whole_is_made_anew(half: str, folder: Path) -> None:
+    make = Maker()
+    target = cached("one", ".bin", make)
+    index = folder / "one"
+    if half == "file":
+        target.write_bytes(b"ma")
+    elif half == "no file":
+        target.unlink()
+    else:
+        index.write_text({"index": index.read_text()[:20], "empty index": "", "index elsewhere": "../x"}[half])
+    assert cached("one", ".bin", make).read_bytes() == b"made"
+    assert make.calls == 2
+
+
+def test_a_build_that_fails_leaves_nothing(folder: Path) -> None:
+    with pytest.raises(OSError, match=r"cannot compile the core: .*error.*wrong"):
+        cached("one", ".so", lambda inside: compile_library("wrong", inside))
+    assert not list(folder.iterdir())
+
+
+def test_without_a_cache_that_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a container with a read-only home."""
+    monkeypatch.setenv("TACHOMETRY_CACHE", "/proc/cache")
+    with pytest.raises(OSError, match="TACHOMETRY_CACHE must be a folder that can be written, not '/proc/cache'"):
+        cached("one", ".bin", Maker())
+    monkeypatch.delenv("TACHOMETRY_CACHE")
+    monkeypatch.setattr("platformdirs.user_cache_path", lambda name: Path("/proc/cache"))
+    make = Maker()
+    assert cached("one", ".bin", make) == cached("one", ".bin", make)
+    assert make.calls == 1
+
+
+@pytest.mark.parametrize(
+    ("compiler", "message"),
+    [
+        ("/nonexistent", r"CXX must name a C\+\+ compiler that is there, not '/nonexistent'"),
+        ("c++ 'x", 'CXX must name a C\\+\\+ compiler that is there, not "c\\+\\+ \'x"'),
+        ("true -x", "true -x made no library"),
+        ("c++ -bogus", r"c\+\+ -bogus cannot compile the core: .*bogus"),
+    ],
+)
+def test_compilers_that_are_none(compiler: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CXX", compiler)
+    with pytest.raises(OSError, match=message):
+        compile_library("int x;", tmp_path)
+
+
+def test_builds_at_the_same_time(folder: Path) -> None:
+    """Each is given a whole file, whoever is first, and other processes find it."""
+    found: list[bytes] = []
+    together = threading.Barrier(4)
+
+    def work(k: int) -> None:
+        def make(inside: Path) -> Path:
+            together.wait()
+            (inside / "x").write_bytes(b"made by %d" % k * 100_000)
+            return inside / "x"
+
+        found.append(cached("one", ".bin", make).read_bytes())
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(found) == [b"made by %d" % k * 100_000 for k in range(4)]
+    make = Maker()
+    assert cached("one", ".bin", make).read_bytes() in found
+    assert make.calls == 0
+
+
+def test_processes_that_build_one_core_at_the_same_time(folder: Path) -> None:
+    program = """
+import numpy as np
+from tachometry.sim import golden
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import compare
+from tachometry.spec import Encoder, MTachometer, Timing
+spec = MTachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
+trace = PinTrace(np.array([0, 30, 90]), np.array([0, 1, 1], dtype=np.uint8), np.array([0, 0, 1], dtype=np.uint8), 500)
+assert compare(golden.run(spec, trace), pick("cxxrtl").run(spec, trace)) == (0, [])
+"""
+    runs = [subprocess.Popen([sys.executable, "-c", program]) for _ in range(2)]
+    assert [run.wait() for run in runs] == [0, 0]
+    assert not list(folder.glob(".building-*"))
+    # A run of which only half a library was left makes it anew.
+    for library in folder.glob("*.so"):
+        library.write_bytes(library.read_bytes()[:1000])
+    assert subprocess.run([sys.executable, "-c", program]).returncode == 0
+
+
+def test_what_was_not_used_for_longest_goes_first(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build, "_KEPT", 6)
+    make = {name: Maker(name.encode()) for name in "abcd"}
+    for age, name in enumerate("dcb"):
+        target = cached(name, ".bin", make[name])
+        then = time.time() - 1000 + 100 * age
+        for path in (target, folder / name):
+            os.utime(path, (then, then))
+    (abandoned := folder / ".building-x").mkdir()
+    os.utime(abandoned, (0, 0))
+    cached("d", ".bin", make["d"])  # used again
+    monkeypatch.setattr(build, "_KEPT", 4)
+    cached("a", ".bin", make["a"])
+    assert not abandoned.exists()
+    for name in "da":
+        cached(name, ".bin", make[name])
+    assert [make[name].calls for name in "abcd"] == [1, 1, 1, 1]
+    cached("c", ".bin", make["c"])
+    assert make["c"].calls == 2
+
+
+def test_any_difference_gives_another_name() -> None:
+    assert len({digest("a", "bc"), digest("ab", "c"), digest("abc"), digest(("a", "bc"))}) == 4

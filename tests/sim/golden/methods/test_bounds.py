@@ -1,0 +1,76 @@
+"""The bounds of the methods that work on ticks: they enclose the true mean speed of every window, and no less would."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support.ideal_motion import SUBCOUNTS, motion, ticks_of
+from support.mutant import caught, mutant
+
+from tachometry.sim.golden import model
+from tachometry.sim.golden.methods import m as m_method
+from tachometry.sim.golden.methods import s as s_method
+from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
+
+S = STachometer(encoder=Encoder(500), timing=Timing(1_000_000, 32, 500), bounds=True)
+PLAIN = replace(S, cancel=False, frac_bits=8)
+M = MTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 32, 500), bounds=True)
+
+
+def true_travel(spec: TachometerSpec, angle: NDArray[np.int64], at: NDArray[np.int64], m_s: NDArray) -> NDArray:
+    """Twice the angle travelled in the windows that close with the ticks `at`, in 1/`SUBCOUNTS`.
+
+    The angles begin a tick before the first that is counted. Eq. (21) is the mean of two windows, of which one lies a
+    tick before the other.
+    """
+    later = angle[at + 2] - angle[at + 2 - m_s]
+    earlier = angle[at + 1] - angle[at + 1 - m_s]
+    return later + (earlier if getattr(spec, "cancel", False) else later)
+
+
+def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000) -> tuple[int, float]:
+    """Every window of random motions; how many there were, and how near the truth came to a bound, in counts."""
+    windows, nearest = 0, 1.0
+    for seed in range(n_motions):
+        angle = motion(n_ticks + 1, spec.max_count, seed)
+        updates = model(spec).updates(ticks_of(angle[1:]), None, 1 << 40)
+        at = updates.clock - spec.tick_to_velocity
+        m_s, valid = updates.interval, updates.more["bounds_valid"]
+        windows += np.count_nonzero(valid)
+        # Twice the travel in LSB · ticks, so that all is whole.
+        travel = true_travel(spec, angle, at, m_s) << spec.native_frac_bits
+        above = (2 * updates.more["velocity_upper"] * m_s * SUBCOUNTS - travel)[valid]
+        below = (travel - 2 * updates.more["velocity_lower"] * m_s * SUBCOUNTS)[valid]
+        assert (above >= 0).all(), f"seed {seed}: above the upper bound at {at[valid][above < 0][:1]}"
+        assert (below >= 0).all(), f"seed {seed}: below the lower bound at {at[valid][below < 0][:1]}"
+        width = updates.more["velocity_upper"] - updates.more["velocity_lower"]
+        assert (width * m_s < (2 << spec.native_frac_bits) + 2 * m_s).all()
+        scale = 2 * SUBCOUNTS << spec.native_frac_bits
+        nearest = min(nearest, above.min() / scale, below.min() / scale)
+    return windows, nearest
+
+
+@pytest.mark.parametrize(
+    ("spec", "n_motions"),
+    [(S, 36), (PLAIN, 36), (M, 4), (replace(M, average=8), 4), (replace(M, average=5), 4)],
+    ids=["eq. (21)", "eq. (17)", "M", "M of 8", "M of 5"],
+)
+def test_true_mean_speed_is_always_enclosed(spec: TachometerSpec, n_motions: int) -> None:
+    windows, nearest = check_enclosure(spec, n_motions)
+    assert windows > 999_900
+    # No narrower one would do: the truth comes as near as this, of the whole count on either side.
+    assert nearest < (0.1 if getattr(spec, "cancel", False) else 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("module", "right", "wrong", "spec"),
+    [
+        (s_method, "whole * counts)[seen]", "counts)[seen]", S),
+        (s_method, "np.arange(len(i))[seen] > 0", "np.arange(len(i))[seen] >= 0", replace(S, frac_bits=20)),
+        (m_method, "total + counts", "total + 0 * counts", M),
+    ],
+)
+def test_mutants_are_caught(module: object, right: str, wrong: str, spec: TachometerSpec) -> None:
+    with mutant(module.Model, right, wrong), caught():  # type: ignore[attr-defined]
+        check_enclosure(spec, 100, 1000)

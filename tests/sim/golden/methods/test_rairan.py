@@ -1,0 +1,336 @@
+"""The golden model of Rairán's method: against Table 1 to the letter, and against its description, clock by clock."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.rairan import clock_by_clock, golden_updates, make_spec, random_steps, steps_of
+from support.sequences import rounded
+from support.table1 import every_ts
+
+from tachometry.sim.golden.methods.rairan import Model, orbit
+from tachometry.sim.signals.run import Updates
+from tachometry.sim.theory.rairan import rairan_eq13_max_error
+from tachometry.spec import RairanTachometer, Speed, Timing
+from tachometry.spec.methods.adaptive import parse_target
+
+
+def held(updates: Updates, name: str, n: int, first: int) -> np.ndarray:
+    """An output of the method at every ts, in time with its cause."""
+    row = np.searchsorted(updates.clock, np.arange(n), side="right")
+    return np.append(first, updates.more[name])[row]
+
+
+@pytest.mark.parametrize("dt", [1, 2, 3, 7, 40, 1000])
+def test_to_the_letter_it_is_table_1_at_every_ts(dt: int) -> None:
+    """A million ts of all speeds in each dt."""
+    n = 1_000_000 if dt == 40 else 200_000
+    spec = make_spec(dt, max_ticks=2000, paper_exact=True)
+    step = random_steps(np.random.default_rng(dt), n, dt)
+    updates = golden_updates(spec, step)
+    wanted = np.array(every_ts(np.abs(step).tolist(), dt))
+    assert np.array_equal(held(updates, "n_ep1", n, 0), wanted[:, 0])
+    assert np.array_equal(held(updates, "n_dt1", n, 1), wanted[:, 1])
+    assert len(updates.clock) > n / dt / 20
+    assert (updates.velocity >= 0).all()
+    assert not updates.forced.any()
+
+
+def exact(estimate: str, n_ep1: int, n_dt1: int) -> Fraction:
+    """Eqs. (6) and (11)."""
+    n1 = Fraction(n_ep1, n_dt1)
+    if n1 == 0:
+        return n1
+    n2 = Fraction(n_ep1, n_dt1 + 1) if n_ep1 == 1 else Fraction(n_ep1 - 1, n_dt1)
+    return {"n1": n1, "n2": n2, "n3": 2 / (1 / n1 + 1 / n2)}[estimate]
+
+
+@pytest.mark.parametrize("dt", [1, 2, 3, 7, 40])
+@pytest.mark.parametrize("bound_decay", [True, False])
+def test_it_does_what_is_described_clock_by_clock(dt: int, bound_decay: bool) -> None:
+    for seed, estimate in enumerate(("n1", "n2", "n3")):
+        spec = make_spec(dt, max_ticks=12, bound_decay=bound_decay, estimate=estimate, frac_bits=4 + 8 * (seed > 0))
+        step = random_steps(np.random.default_rng([dt, seed]), 40_000, dt)
+        updates = golden_updates(spec, step)
+        rows, ends = clock_by_clock(step.tolist(), dt, 12, bound_decay=bound_decay)
+        assert updates.clock.tolist() == [row.clock for row in rows]
+        assert updates.more["n_ep1"].tolist() == [row.n_ep1 for row in rows]
+        assert updates.more["n_dt1"].tolist() == [row.n_dt1 for row in rows]
+        assert updates.forced.tolist() == [row.forced for row in rows]
+        assert updates.stalled.tolist() == [row.stalled for row in rows]
+        assert updates.interval.tolist() == [row.n_dt1 for row in rows]
+        wanted = [rounded(row.sign * exact(estimate, row.n_ep1, row.n_dt1), spec.frac_bits) for row in rows]
+        assert updates.velocity.tolist() == wanted
+        assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
+        assert any(row.forced for row in rows) == (bound_decay or any(row.stalled for row in rows))
+
+
+def steady_steps(rng: np.random.Generator, n: int, dt: int) -> np.ndarray:
+    """Stretches of many counts at all speeds, so that dt settles, with reversals and rests; shape (n,)."""
+    step, at, sign = np.zeros(n, dtype=np.int64), 0, 1
+    while at < n:
+        gap = max(1.0, dt * 10 ** rng.uniform(-1.3, 1.3))
+        clocks = at + (np.arange(1, int(rng.integers(2, 150)) + 1) * gap).astype(np.int64)
+        step[clocks[clocks < n]] = sign
+        at = int(clocks[-1]) + int(rng.choice([0, 0, dt, 40 * dt]))
+        sign *= int(rng.choice([1, 1, -1]))
+    return step
+
+
+@pytest.mark.parametrize(
+    ("dt", "max_ticks", "target"), [(1, 12, "0.2"), (3, 40, "0.1"), (7, 70, "0.04"), (40, 33, "5%")]
+)
+@pytest.mark.parametrize("bound_decay", [True, False])
+def test_adaptive_dt_clock_by_clock(dt: int, max_ticks: int, target: str, bound_decay: bool) -> None:
+    for seed, estimate in enumerate(("n1", "n2", "n3", "n3")):
+        goal = parse_target(target, Timing(1, 1, 2))
+        options = {"adaptive": goal, "bound_decay": bound_decay, "estimate": estimate}
+        spec = make_spec(dt, max_ticks, **options, frac_bits=5 + 7 * (seed > 0))
+        rng = np.random.default_rng([dt, seed])
+        step = steady_steps(rng, 60_000, dt) if seed < 3 else random_steps(rng, 60_000, dt)
+        updates = golden_updates(spec, step)
+        rows, ends = clock_by_clock(
+            step.tolist(), dt, max_ticks, bound_decay=bound_decay, adaptive=(goal, spec.max_shift)
+        )
+        for name, wanted in (
+            ("clock", [row.clock for row in rows]),
+            ("forced", [row.forced for row in rows]),
+            ("stalled", [row.stalled for row in rows]),
+            ("interval", [row.n_dt1 << row.k for row in rows]),
+            ("n_ep1", [row.n_ep1 for row in rows]),
+            ("n_dt1", [row.n_dt1 for row in rows]),
+            ("dt_shift", [row.k for row in rows]),
+        ):
+            assert getattr(updates, name, updates.more.get(name)).tolist() == wanted, name
+        exactly = [row.sign * exact(estimate, row.n_ep1, row.n_dt1) / 2**row.k for row in rows]
+        assert updates.velocity.tolist() == [rounded(value, spec.frac_bits) for value in exactly]
+        assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
+        assert set(updates.more["dt_shift"].tolist()) == set(range(spec.max_shift + 1))
+
+
+def test_orbit_follows_to_the_end() -> None:
+    assert orbit(np.array([2, 2, 3, 5, 5, 5]), 0).tolist() == [0, 2, 3]
+    assert orbit(np.array([1, 1]), 0).tolist() == [0]
+    assert orbit(np.arange(1, 9).clip(max=7), 0).tolist() == list(range(7))
+
+
+def pulses(period: Fraction, n: int, sign: int = 1) -> np.ndarray:
+    """A count every so many clocks, in n clocks."""
+    step = np.zeros(n, dtype=np.int64)
+    at = (np.arange(1, int(n / period)) * period.numerator) // period.denominator
+    step[at] = sign
+    return step
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_table_1_locks_just_below_the_speed_limit_and_the_default_does_not(sign: int) -> None:
+    """At 0.9995 ω_lim, a count every 1000.5 ts: n1 = ½ for ever, though the speed is outside [n2, n1] = [⅓, ½]."""
+    step = pulses(Fraction(2001, 2), 1_000_000, sign)
+    letter = golden_updates(make_spec(1000, paper_exact=True, estimate="n1"), step)
+    locked = np.array(every_ts(np.abs(step).tolist(), 1000))
+    assert {tuple(row) for row in locked[100_000:].tolist()} == {(1, 2)}
+    assert set((letter.velocity / 2**16)[10:]) == {0.5}
+    default = golden_updates(make_spec(1000, estimate="n1"), step)
+    assert set((default.velocity / 2**16)[10:]) == {sign * 1.0}
+
+
+def test_a_steady_count_with_every_end_of_dt_is_the_speed_limit() -> None:
+    """From 0.2 ω_lim to ω_lim itself: Table 1 never updates Ndt1 again."""
+    step = np.concatenate([pulses(Fraction(5000), 50_001), pulses(Fraction(1000), 50_000)])
+    step[:] = 0
+    step[1000:50_000:5000] = 1
+    step[51_000::1000] = 1
+    assert golden_updates(make_spec(1000, estimate="n1"), step).velocity[-1] == 1 << 16
+
+
+DT, MAX = 40, 25
+
+
+def seen(step: np.ndarray, **options: object) -> Updates:
+    return golden_updates(make_spec(DT, MAX, **options), step)
+
+
+def at_clock(updates: Updates, clock: int) -> float:
+    """The held velocity in counts per dt."""
+    row = np.searchsorted(updates.clock, clock, side="right")
+    return float(np.append(0, updates.velocity)[row]) / 2**16
+
+
+def script(*at: tuple[int, int], n: int = 4000) -> np.ndarray:
+    step = np.zeros(n, dtype=np.int64)
+    for clock, sign in at:
+        step[clock] = sign
+    return step
+
+
+def test_reversal_reads_0_until_there_is_a_new_measurement() -> None:
+    forward, back = [(100 + 10 * k, 1) for k in range(40)], [(500 + 10 * k, -1) for k in range(40)]
+    updates = seen(script(*forward, *back))
+    turn = int(np.flatnonzero(updates.clock == 500)[0])
+    assert updates.velocity[turn - 1] > 3 << 16
+    assert updates.velocity[turn] == 0
+    # A window after the turn: 4 counts in dt, from 3 to 4 of them.
+    assert updates.clock[turn + 1] == 500 + DT
+    assert -(4 << 16) < updates.velocity[turn + 1] < -(3 << 16)
+    assert (updates.velocity[turn + 1 : turn + 9] == updates.velocity[turn + 1]).all()
+
+
+@pytest.mark.parametrize("bound_decay", [True, False])
+@pytest.mark.parametrize("gap", [3, 10, 39, 40, 41, 100, 999])
+def test_standstill_reads_0_in_time(gap: int, bound_decay: bool) -> None:
+    """Never above one count over the time since the last, less a dt to see it by; 0 max_ticks after the last dt."""
+    counts = [(100 + gap * k, 1) for k in range(30)]
+    last = counts[-1][0]
+    updates = seen(script(*counts, n=last + 4000), bound_decay=bound_decay)
+    assert updates.velocity[-1] == 0
+    assert updates.stalled[-1]
+    assert updates.forced[-1]
+    assert updates.clock[-1] <= last + MAX * DT
+    assert np.count_nonzero(updates.stalled) == 1
+    if bound_decay:
+        for clock in range(last + 2 * DT, last + MAX * DT + 10):
+            waited = (clock - last) // DT - 1
+            assert at_clock(updates, clock) <= 1 / waited, clock
+    # The next count ends it.
+    again = seen(script(*counts, (last + 3000, 1), n=last + 3100), bound_decay=bound_decay)
+    assert again.clock[-1] == last + 3000
+    assert not again.stalled[-1]
+    assert 0 < again.velocity[-1] <= (1 << 16) / MAX
+
+
+@pytest.mark.parametrize("clock", [5, 38, 39, 40, 41, 500, 3000])
+def test_one_count_then_silence(clock: int) -> None:
+    updates = seen(script((clock, 1), n=10_000))
+    assert (updates.velocity <= 1 << 16).all()
+    for later in range(clock + DT, clock + MAX * DT, 7):
+        assert at_clock(updates, later) <= max(1 / ((later - clock) // DT), 0)
+    assert at_clock(updates, clock + MAX * DT) == 0
+    assert updates.stalled[-1]
+
+
+@pytest.mark.parametrize("gap", [1, 2, 13, 39, 40, 41, 80, 200])
+def test_dithering_on_one_edge_reads_0_for_ever(gap: int) -> None:
+    counts = [(100 + gap * k, -1 if k % 2 else 1) for k in range(300)]
+    updates = seen(script((90, -1), *counts, n=100 + 301 * gap))
+    after = updates.clock >= 100
+    assert after.sum() >= 299
+    assert not updates.velocity[after].any()
+
+
+@pytest.mark.parametrize("target", [Fraction(1, 4), Fraction(1, 30)])
+def test_situations_with_an_adaptive_dt(target: Fraction) -> None:
+    """A reversal reads 0, and is measured in the shortest dt; rest is seen in time; dithering reads 0 for ever."""
+    forward, back = [(100 + 30 * k, 1) for k in range(200)], [(6200 + 30 * k, -1) for k in range(200)]
+    dithers = [(13_000 + 50 * k, 1 - 2 * (k % 2)) for k in range(100)]
+    burst = [(22_000 + k, 1) for k in range(10)]
+    updates = seen(script(*forward, *back, *dithers, *burst, n=26_000), adaptive=target)
+    shift = updates.more["dt_shift"]
+    turn = int(np.flatnonzero(updates.clock == 6200)[0])
+    assert updates.velocity[turn - 1] > 0 == updates.velocity[turn]
+    assert shift[turn - 1] > 0 == shift[turn + 1]
+    assert updates.velocity[turn + 1] < 0
+    assert updates.clock[turn + 1] <= 6200 + 2 * DT
+    inside = (updates.clock >= 13_000) & (updates.clock < 13_000 + 99 * 50)
+    assert inside.any()
+    assert not updates.velocity[inside].any()
+    assert at_clock(updates, 12_170 + MAX * DT) == 0
+    assert at_clock(updates, 22_009 + MAX * DT) == 0
+    assert updates.stalled[-1]
+    assert 0 < updates.velocity[updates.clock >= 22_000].max() <= 10 << 16
+
+
+def test_a_burst_after_standstill() -> None:
+    """Ten counts as fast as they can come, at rest before and after."""
+    burst = [(5000 + k, 1) for k in range(10)]
+    updates = seen(script(*burst, n=9000))
+    assert updates.velocity.max() <= 10 << 16
+    assert at_clock(updates, 5000 + DT) > 9
+    assert at_clock(updates, 5000 + 2 * DT) <= 1
+    assert at_clock(updates, 5010 + 4 * DT) <= 1 / 2
+    assert at_clock(updates, 5009 + MAX * DT) == 0
+    assert updates.stalled[-1]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"max_ticks": 2048}, "max_ticks must be from 2 to 2047 with method rairan, not 2048"),
+        ({"dt": 4096}, "max_speed must be at most 2048 counts per tick with estimate n3, not 4096"),
+        (
+            {"dt": 4096, "estimate": "n1", "bounds": True},
+            "max_speed must be at most 2048 counts per tick with bounds, not 4096",
+        ),
+        (
+            {"paper_exact": True, "bounds": True},
+            "bounds must not be given with paper_exact, which leaves its own",
+        ),
+        ({"adaptive": Fraction(1, 3)}, "adaptive must be more than 0 and less than 1/3, not 0.333333333"),
+        ({"adaptive": Fraction(0)}, "adaptive must be more than 0 and less than 1/3, not 0"),
+        (
+            {"adaptive": Fraction(1, 10), "paper_exact": True},
+            "adaptive must not be given with paper_exact, which has one dt",
+        ),
+        (
+            {"adaptive": Fraction(1, 10), "max_ticks": 3},
+            "max_ticks must be at least 4 with adaptive, not 3",
+        ),
+        (
+            {"adaptive": Fraction(1, 10), "dt": 1025},
+            "max_speed must be at most 1024 counts per tick with adaptive, not 1025",
+        ),
+        (
+            {"adaptive": Fraction(1, 1000), "dt": 4},
+            "adaptive must be at least 0.03226 with this speed and time, not 0.001",
+        ),
+        ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
+        ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own"),
+    ],
+)
+def test_bad_parameters(parameters: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        make_spec(**({"dt": 40} | parameters))
+
+
+@pytest.mark.parametrize(
+    ("text", "target"), [("0.1%", "1/1000"), ("0.001", "1/1000"), (" 5 %", "1/20"), ("1/8", "1/8")]
+)
+def test_targets(text: str, target: str) -> None:
+    assert parse_target(text, Timing(1, 1, 2)) == Fraction(target)
+
+
+@pytest.mark.parametrize("text", ["", "%", "1ms", "a%", "1/0"])
+def test_bad_targets(text: str) -> None:
+    with pytest.raises(ValueError, match=r"^adaptive must be a fraction such as 0\.1% or 0\.001, not '"):
+        parse_target(text, Timing(1, 1, 2))
+
+
+@pytest.mark.parametrize("target", [Fraction(1, 10), Fraction(1, 50), Fraction(1, 200)])
+def test_at_a_steady_speed_eq13_is_within_the_target_and_dt_no_longer_than_that_takes(target: Fraction) -> None:
+    dt, looked_at, shifts = 48, 0, set()
+    spec = make_spec(dt, 300, adaptive=target, max_speed=Speed.parse("5000rev/s"))
+    rule, most = spec.adaptive_dt, spec.max_shift
+    assert (spec.max_count, most) == (24, 6)
+    for period in np.geomspace(2.1, 2.2 * rule.fewest * dt, 40):
+        gap = Fraction(period).limit_denominator(1000)
+        step = pulses(gap, int(30 * gap) + (12 * dt << most))
+        updates = golden_updates(spec, step)
+        looked = updates.clock <= np.flatnonzero(step)[-1]
+        looked[: np.count_nonzero(looked) * 2 // 3] = False
+        (shift,) = set(updates.more["dt_shift"][looked].tolist())
+        n_ep, n_dt = updates.more["n_ep1"][looked], updates.more["n_dt1"][looked]
+        error, true = rairan_eq13_max_error(n_ep / n_dt), float(dt / gap)
+        # The estimate keeps to the bound, but for a clock and the rounding.
+        slack = 1.1 / (dt << shift) + 2**-17 / true
+        assert (np.abs(updates.velocity[looked] / 2**16 / true - 1) <= error + slack).all(), gap
+        if true * 2**most > rule.fewest or (rule.slow == rule.fewest - 1 and gap > (rule.slow + 1) * dt):
+            looked_at += 1
+            shifts.add(shift)
+            assert (error <= target).all(), gap
+            # Half as long, dt has fewer counts than it takes, or the last of them late: in the last half gap.
+            assert shift == 0 or true * 2 ** (shift - 1) <= rule.fewest - 0.5 + 0.05, gap
+    assert looked_at > 10
+    assert len(shifts) > 3
+
+
+def test_without_n3_the_counts_of_a_tick_are_not_limited() -> None:
+    assert isinstance(make_spec(5000, estimate="n1"), RairanTachometer)

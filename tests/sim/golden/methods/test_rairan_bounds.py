@@ -1,0 +1,97 @@
+"""Bounds of Rairán's method: they enclose the true mean speed of every measured window, in exact integers."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.rairan import golden_updates, make_spec, random_steps
+
+from tachometry.sim.golden.methods import rairan
+
+FINE = 64  # parts of a clock in which the true times of the counts are known
+FRAC_BITS = 10
+
+
+def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float, float]:
+    """Updates that were looked at, the mean width of their bounds, and that of [n2, n1], where both are finite.
+
+    A count is seen in the first clock after it. What is measured goes from the true time of a count to that of the next
+    (Ndt1), or to the last clock of dt, and between two counts in one direction the shaft turns evenly.
+    """
+    spec = make_spec(dt, 30, bounds=True, frac_bits=FRAC_BITS, **options)
+    rng = np.random.default_rng([dt, seed])
+    step = random_steps(rng, n, dt, turns=0.002)
+    updates = golden_updates(spec, step)
+    at = np.flatnonzero(step)
+    sign = step[at]
+    # At either end of the clock in particular.
+    within = np.where(rng.random(len(at)) < 0.5, rng.integers(0, FINE, len(at)), rng.choice([0, FINE - 1], len(at)))
+    true = np.append(at * FINE - within, (n + 100 * dt) * FINE)
+
+    rows = np.flatnonzero(updates.more["bounds_valid"])
+    in_dt = dt << updates.more["dt_shift"][rows] if options else np.full(len(rows), dt)
+    clock, n_ep, n_dt = updates.clock[rows], updates.more["n_ep1"][rows], updates.more["n_dt1"][rows]
+    forced, lower, upper = (
+        x[rows] for x in (updates.forced, *(updates.more[f"velocity_{k}er"] for k in ("low", "upp")))
+    )
+    seen = np.searchsorted(at, clock, side="right") - 1  # the last count by then
+    by_count = (step[clock] != 0) & (n_ep == 1) & ~forced
+    last = seen - (step[clock] != 0)  # before this clock
+    # Opening count: the one before, the one that began this dt, or the last at all.
+    opening = np.where(by_count | forced, last, np.searchsorted(at, clock - in_dt))
+    assert (by_count | forced | (at[np.minimum(opening, len(at) - 1)] == clock - in_dt)).all()
+    following = np.minimum(last + 1, len(at))
+    straight = (following < len(at)) & (np.append(sign, 0)[following] == sign[last])
+    end = np.where(by_count, true[following], (clock - ~forced) * FINE)
+    gap = true[following] - true[last]
+    part = np.where(straight, np.clip(end - true[last], 0, gap), 0)
+    # travelled/time in counts per dt is (whole·gap + part)·dt·FINE / (gap·time)
+    whole, time = last - opening, end - true[opening]
+    travelled = sign[last] * (whole * gap + part) * dt * FINE << FRAC_BITS
+    none = spec.bound_limit
+    assert ((lower * gap * time <= travelled) | (lower == -none)).all()
+    assert ((travelled <= upper * gap * time) | (upper == none)).all()
+
+    finite = ~forced & (np.abs(lower) < none) & (np.abs(upper) < none) & (lower != 0) & (upper != 0)
+    n2 = np.where(n_ep > 1, n_ep - 1, 1 / (n_dt + 1))[finite]
+    width = (upper - lower)[finite] / 2**FRAC_BITS
+    return len(rows), float(width.mean()), float((n_ep / n_dt)[finite].mean() - n2.mean())
+
+
+def test_they_enclose_the_true_mean_speed_of_a_million_windows() -> None:
+    """And the wider a clock is in dt, the wider are they than [n2, n1]."""
+    found = [enclosed(dt, n, seed=1) for dt, n in ((1, 10**6), (2, 2 * 10**6), (3, 2 * 10**6), (8, 3 * 10**6))]
+    found.append(enclosed(40, 4 * 10**6, seed=1))
+    assert sum(looked_at for looked_at, _, _ in found) > 1_000_000
+    assert all(width >= least for _, width, least in found)
+    _, width, least = found[-1]
+    assert width < 1.2 * least
+
+
+@pytest.mark.parametrize("dt", [1, 2, 8])
+def test_they_enclose_it_where_dt_is_adaptive(dt: int) -> None:
+    looked_at, _, _ = enclosed(dt, 10**6, seed=2, adaptive=Fraction(1, 7))
+    assert looked_at > 10**5 // dt
+
+
+def test_they_are_tight_where_dt_has_many_clocks() -> None:
+    looked_at, width, least = enclosed(960, 20_000_000, seed=1)
+    assert looked_at > 5000
+    assert width < 1.03 * least
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("lower[events.loose | (n == 0)] = 0", "lower[n == 0] = 0"),
+        ("n - events.unsynced) * dt - 1", "n) * dt - 1"),
+        ("(n + 1) * dt + 1), bits, -1)", "(n + 1) * dt), bits, -1)"),
+        ("(n + 1) * dt + 1), bits, -1)", "(n + 1) * dt + 1), bits, 1)"),
+        ("np.maximum(time, 1), bits, 1)", "np.maximum(time, 1), bits, -1)"),
+    ],
+)
+def test_mutants_are_caught(right: str, wrong: str) -> None:
+    with mutant(rairan.Model, right, wrong), caught():
+        for dt in (2, 3, 8):
+            enclosed(dt, 300_000, seed=3)

@@ -1,0 +1,107 @@
+"""The golden model against the papers' words and against the definition tick by tick, not against itself."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.sequences import MAX_TICKS, PAPER, rounded
+
+from tachometry.sim.golden.methods.s import Model
+from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.signals.run import Ticks
+from tachometry.spec import Encoder, STachometer, Timing
+
+
+def model(max_ticks: int, *, cancel: bool = True, frac_bits: int = 16) -> Model:
+    timing = Timing(clock_hz=1_000_000, tick_cycles=16, max_ticks=max_ticks)
+    return Model(STachometer(encoder=Encoder(25), timing=timing, frac_bits=frac_bits, cancel=cancel))
+
+
+def as_ticks(m_e: list[int]) -> Ticks:
+    clock = 16 * np.arange(len(m_e), dtype=np.int64)
+    numbers = np.array(m_e, dtype=np.int64)
+    return Ticks(clock, numbers, np.cumsum(numbers), np.zeros(len(m_e), dtype=bool), *np.zeros((2, len(m_e)), np.int64))
+
+
+def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
+    """(tick, m_s, forced, stalled, raw velocity) of every update."""
+    s_model = model(max_ticks, **options)
+    found = s_model.updates(as_ticks(m_e), None, 1 << 40)
+    latency = s_model._spec.tick_to_velocity
+    return [
+        (int(clock - latency) // 16, int(m_s), bool(forced), bool(stalled), int(raw))
+        for clock, m_s, forced, stalled, raw in zip(
+            found.clock, found.interval, found.forced, found.stalled, found.velocity, strict=True
+        )
+    ]
+
+
+@pytest.mark.parametrize("cancel", [True, False])
+@pytest.mark.parametrize("name", PAPER)
+def test_the_papers_sequences(name: str, cancel: bool) -> None:
+    m_e, updates = PAPER[name]
+    got = [(tick, m_s, forced, raw) for tick, m_s, forced, _, raw in results(m_e, MAX_TICKS, cancel=cancel)]
+    assert got == [
+        (tick, m_s, forced, rounded(eq21 if cancel else eq17, 16)) for tick, m_s, forced, eq17, eq21 in updates
+    ]
+
+
+def definition(m_e: list[int], max_ticks: int, cancel: bool) -> list[tuple[int, int, bool, bool, int]]:
+    """The semantics in plain words, tick by tick, with fractions."""
+
+    def number(tick: int) -> int:
+        return 0 if tick < 0 else m_e[tick]
+
+    found, offset, opening = [], 0, -1
+    for i in range(len(m_e)):
+        alters = number(i) != number(i - 1) and number(i) != offset
+        if not alters:
+            offset = number(i)
+        m_s = i - opening
+        forced = not alters and m_s == max_ticks
+        if not (alters or forced):
+            continue
+        if cancel:
+            total = Fraction(number(opening) + number(i), 2) + sum(number(i - j) for j in range(1, m_s))
+        else:
+            total = Fraction(sum(number(i - j) for j in range(m_s)))
+        quiet = not any(number(k) for k in range(opening, i + 1))
+        found.append((i, m_s, forced, forced and quiet, rounded(total / m_s, 16)))
+        opening = i if alters else i - max_ticks // 2
+    return found
+
+
+@pytest.mark.parametrize("cancel", [True, False])
+@pytest.mark.parametrize("max_ticks", [2, 3, 4, 7, 20])
+@pytest.mark.parametrize("seed", range(5))
+def test_random_numbers_against_the_definition(seed: int, max_ticks: int, cancel: bool) -> None:
+    rng = np.random.default_rng(seed)
+    m_e: list[int] = []
+    while len(m_e) < 1500:
+        offset, run = int(rng.integers(-16, 17)), int(rng.integers(1, 4 * max_ticks))
+        m_e += np.clip(offset + rng.choice([0, 0, 0, 0, 1, -1], size=run), -16, 16).tolist()
+    assert results(m_e, max_ticks, cancel=cancel) == definition(m_e, max_ticks, cancel), seed
+
+
+def test_rounding_of_ties_and_of_the_largest_numbers() -> None:
+    numerator = np.array([1, -1, 3, -3, 5, -5, 0, (1 << 44) - 1, -(1 << 44) + 1])
+    denominator = np.array([32, 32, 32, 32, 32, 32, 7, (1 << 21) - 1, (1 << 21) - 1])
+    for frac_bits in (4, 16, 24):
+        got = round_quotient(numerator, denominator, frac_bits).tolist()
+        assert got == [
+            rounded(Fraction(int(n), int(d)), frac_bits) for n, d in zip(numerator, denominator, strict=True)
+        ]
+
+
+def test_sums_telescope_to_the_position_between_forced_updates() -> None:
+    rng = np.random.default_rng(7)
+    m_e = (3 + rng.choice([0, 0, 0, 1, -1], size=3000)).tolist()
+    rows = results(m_e, 500, cancel=True)
+    assert not any(forced for _, _, forced, _, _ in rows)
+    opening = [-1] + [tick for tick, *_ in rows[:-1]]
+    travelled = 0
+    for (tick, m_s, *_), start in zip(rows, opening, strict=True):
+        assert m_s == tick - start
+        travelled += (m_e[start] if start >= 0 else 0) + m_e[tick] + 2 * sum(m_e[start + 1 : tick])
+    last = rows[-1][0]
+    assert travelled == 2 * sum(m_e[: last + 1]) - m_e[last]

@@ -1,0 +1,127 @@
+"""The bounds of the methods that measure times enclose the true mean speed, by whole numbers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support.mutant import caught, mutant
+
+from tachometry.sim.golden import model
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.methods import timed
+from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.spec import Encoder, MTTachometer, Timing, TTachometer
+from tachometry.spec.methods.timed import TimedTachometer
+from tachometry.spec.tachometer import BOUNDS
+
+INSTANTS = 1 << 10  # in a clock
+TICK = 20
+
+Ints = NDArray[np.int64]
+
+
+def edges(n: int, seed: int) -> tuple[Ints, Ints]:
+    """When an ideal shaft passes edges, in 1/`INSTANTS` clocks, at most one a clock, and in which direction."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    while sum(map(len, parts)) < n:
+        m = int(rng.integers(1, 3000))
+        gap = 10.0 ** rng.uniform(0, 2.5) * np.linspace(1, rng.uniform(0.3, 3), m)
+        parts.append(gap * (1 + rng.choice([0, 0.9]) * rng.uniform(-1, 1, m)))
+    gaps = np.maximum(np.concatenate(parts)[:n], 1) * INSTANTS
+    gaps[rng.random(n) < 1e-4] *= 300
+    turns = np.where(rng.random(n) < rng.choice([0.001, 0.3]), -1, 1)
+    return np.cumsum(np.ceil(gaps).astype(np.int64)) + 10 * INSTANTS, np.cumprod(turns)
+
+
+def check_silence(spec: TimedTachometer, updates: Updates) -> None:
+    """Without a count the shaft may have come within a hair of the next edge, and over none."""
+    forced = updates.forced & updates.more["bounds_valid"]
+    lasted = (updates.interval * spec.interval_unit_cycles)[forced]
+    lower, upper = (updates.more[name][forced] * lasted for name in BOUNDS)
+    one, velocity = TICK << spec.native_frac_bits, updates.velocity[forced]
+    assert (velocity == 0).sum() > 5
+    assert ((upper >= one) & (upper < one + lasted))[velocity >= 0].all()
+    assert ((lower <= -one) & (lower > -one - lasted))[velocity <= 0].all()
+    if spec.bound_decay:
+        assert (velocity != 0).sum() > 5
+    # What sinks has passed an edge last, and has not come back over it; after a reversal it may go on either way.
+    assert ((lower == 0) | (lower <= -one))[velocity > 0].all()
+    assert ((upper == 0) | (upper >= one))[velocity < 0].all()
+
+
+def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, float, float]:
+    """How many were checked, the least distance from truth to bound in LSB, the median of (upper − lower)/|truth|."""
+    time, step = edges(n, seed)
+    clock = -(-time // INSTANTS)
+    n_clocks = int(clock[-1]) + 10 * TICK
+    none = np.empty(0, np.int64)
+    tick = np.arange(TICK - 1, n_clocks, TICK)
+    through = np.append(0, np.cumsum(step))
+    m_e = np.diff(through[np.searchsorted(clock, tick, side="right")], prepend=0)
+    off = np.zeros(len(tick), np.int64)
+    ticks = Ticks(tick + spec.tick_latency, m_e, off, off > 0, off, off)
+    updates = model(spec).updates(ticks, Steps(clock, step, none, none, none), n_clocks)
+
+    # The edge that each count is: on the lattice the last in the tick that leads to where the tick ends.
+    end = updates.clock - spec.tick_to_velocity - spec.tick_latency
+    if spec.on_lattice:
+        period = np.searchsorted(tick, clock)
+        leads = (step == np.sign(m_e)[period]) & (through[1:] == through[np.searchsorted(clock, tick, "right")][period])
+        edge_of = np.full(len(tick), -1)
+        np.maximum.at(edge_of, period[leads], np.flatnonzero(leads))
+        end = np.searchsorted(tick, end)
+        last = edge_of[end]
+        first = edge_of[end - updates.interval]
+    else:
+        last, first = (np.searchsorted(clock, at) for at in (end, end - updates.interval))
+    check_silence(spec, updates)
+    chosen = ~updates.forced & updates.more["bounds_valid"]
+    last, first = last[chosen], first[chosen]
+    # Where the shaft is when it passes: half a count before or after the counts on its sides.
+    way = through[last + 1] - through[first + 1] - (step[last] - step[first]) // 2
+    scale = INSTANTS * TICK << spec.native_frac_bits
+    lasted = time[last] - time[first]
+    lower, upper = updates.more["velocity_lower"][chosen], updates.more["velocity_upper"][chosen]
+    above, below = upper == spec.bound_limit, lower == -spec.bound_limit  # there is none
+    assert (below | (lower * lasted <= way * scale)).all()
+    assert (above | (upper * lasted >= way * scale)).all()
+    if not spec.saturates:
+        assert (updates.more["velocity_lower"] <= updates.velocity)[updates.more["bounds_valid"]].all()
+        assert (updates.more["velocity_upper"] >= updates.velocity)[updates.more["bounds_valid"]].all()
+    finite = ~above & ~below & (way != 0)
+    exact = way[finite] * scale / lasted[finite]
+    lower, upper = lower[finite], upper[finite]
+    nearest = np.minimum(upper - exact, exact - lower).min()
+    return len(way), float(nearest), float(np.median((upper - lower) / np.abs(exact)))
+
+
+OPTIONS = {"encoder": Encoder(500), "timing": Timing(1_000_000, TICK, 500), "bounds": True}
+T, MT = TTachometer(**OPTIONS), MTTachometer(**OPTIONS, min_time=100)
+
+
+@pytest.mark.parametrize(
+    ("spec", "n"),
+    [
+        (replace(T, frac_bits=8), 1_500_000),
+        (MT, 1_000_000),
+        (replace(T, timer="tick"), 500_000),
+        (replace(MT, timer="tick"), 1_000_000),
+    ],
+    ids=["T", "M/T", "T, ticks", "M/T, ticks"],
+)
+def test_true_mean_speed_is_always_enclosed(spec: TimedTachometer, n: int) -> None:
+    checked, nearest, width = check_enclosure(spec, n)
+    assert checked > 200_000
+    assert nearest < 1
+    assert width < 0.5
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [("np.where(low < 0, time - 1, time + 1)", "time"), ("np.where(high > 0, time - 1, time + 1)", "time")],
+)
+def test_mutants_are_caught(right: str, wrong: str) -> None:
+    with mutant(timed.enclosure, right, wrong), caught():
+        check_enclosure(MT, 20_000)

@@ -1,0 +1,33 @@
+"""What a figure leaves out must not be seen."""
+
+import numpy as np
+import pytest
+
+from tachometry.sim.plots.style import columns
+
+
+@pytest.mark.parametrize("n", [0, 1, 400])
+def test_what_can_be_drawn_is_kept(n: int) -> None:
+    x = np.arange(n, dtype=np.float64)
+    assert columns(x, x, n_columns=100).tolist() == list(range(n))
+
+
+def test_each_column_keeps_its_first_least_greatest_and_last() -> None:
+    random = np.random.default_rng(1)
+    x = np.sort(random.uniform(5, 6, 50_000))
+    y = random.standard_normal(50_000)
+    kept = columns(x, y, n_columns=100)
+    assert len(kept) <= 4 * 101
+    assert np.all(np.diff(kept) > 0)
+    column = ((x - x[0]) * (100 / (x[-1] - x[0]))).astype(int)
+    for k in range(101):
+        (every,) = np.nonzero(column == k)
+        seen = kept[column[kept] == k]
+        assert (seen[0], seen[-1]) == (every[0], every[-1])
+        assert (y[seen].min(), y[seen].max()) == (y[every].min(), y[every].max())
+
+
+def test_one_spike_in_a_million_is_kept() -> None:
+    y = np.zeros(1_000_000)
+    y[345_678] = 1
+    assert 345_678 in columns(np.arange(1_000_000.0), y)

@@ -1,0 +1,69 @@
+"""What plans of all methods promise, measured on their golden models with the virtual encoder."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.studies.plan import plan_at, standstill
+from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
+
+TICKS = 3000
+OPTIONS: dict[str, dict[str, object]] = {"m": {"average": 3}, "adaptive": {"adaptive": Fraction(1, 20)}}
+
+
+def spec_of(method: str) -> TachometerSpec:
+    return METHODS["rairan" if method == "adaptive" else method](
+        encoder=Encoder(500),
+        timing=Timing(1_000_000, 100, 50),
+        max_speed=Speed.parse("900rad/s"),
+        frac_bits=20,
+        **OPTIONS.get(method, {}),
+    )
+
+
+def speeds() -> list[float]:
+    """In counts per tick, from 1/100 to 20, none of them special, some close to multiples."""
+    near = [k + d for k in (1, 2, 7) for d in (-0.013, 0.003, 0.029)]
+    return [*(10 ** np.random.default_rng(5).uniform(-2, 1.3, 40)).tolist(), *near]
+
+
+@pytest.mark.parametrize("method", [*METHODS, "adaptive"])
+def test_no_error_is_greater_than_the_resolution(method: str) -> None:
+    spec = spec_of(method)
+    tick = float(spec.timing.tick_seconds)
+    reached = []
+    for units in speeds():
+        speed = units * spec.unit_velocity
+        encoder = VirtualEncoder(spec.encoder.pulses_per_rev, start_angle_rad=0.001)
+        recording = encoder.record(parse_motion(f"constant:{speed!r}rad/s:{TICKS * tick!r}s")).recording
+        updates = golden.run(spec, recording.place(spec.timing.clock_hz)).updates
+        settled = updates.clock > 150 * spec.timing.tick_cycles
+        error = np.abs(updates.velocity[settled] * spec.rad_per_s_per_lsb - speed)
+        # A count's time is told to a clock. That is in the resolution of methods that measure times by the clock, and
+        # not in that of Rairán's, to which the speed is a clock in dt higher or lower.
+        clock = speed / spec.timing.tick_cycles if spec.method == "rairan" else 0.0
+        expected = plan_at(spec, speed + clock * np.array([-1, 0, 1])).resolution.max()
+        bound = expected + clock + 0.51 * spec.rad_per_s_per_lsb
+        assert error.max() <= bound, units
+        reached.append(error.max() / bound)
+    assert max(reached) > 0.6
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_standstill(method: str) -> None:
+    spec = spec_of(method)
+    tick = float(spec.timing.tick_seconds)
+    for units in (0.05, 0.9, 5.3):
+        moving = 1000
+        motion = f"constant:{units * spec.unit_velocity!r}rad/s:{moving * tick!r}s+stop:{300 * tick!r}s"
+        recording = VirtualEncoder(500).record(parse_motion(motion)).recording
+        run = golden.run(spec, recording.place(spec.timing.clock_hz))
+        latest = (moving + standstill(spec) + 1) * spec.timing.tick_cycles + spec.tick_latency + spec.tick_to_velocity
+        zero = run.updates.clock > latest
+        held = run.updates.velocity[~zero][-1]
+        assert held == 0
+        assert not run.updates.velocity[zero].any()
