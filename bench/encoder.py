@@ -107,7 +107,7 @@ def measure(example: Example) -> list[str]:
         f"`{example.option}`" if example.measured else example.option,
         f"{run.ticks.position[-1] - true} of {true}",
         str(len(run.errors)),
-        str(run.ticks.swallowed_edges[-1]),
+        str(int(run.ticks.get("swallowed_edges")[-1])),
         " ".join(map(str, run.ticks.pulse_count[SHOWN])),
         velocity_errors(spec, *fast),
         velocity_errors(spec, *slow),

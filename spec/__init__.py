@@ -6,7 +6,8 @@ from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.t import TTachometer
-from tachometry.spec.tachometer import Port, TachometerSpec
+from tachometry.spec.port import Port
+from tachometry.spec.tachometer import TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed
 

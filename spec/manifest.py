@@ -1,12 +1,12 @@
 """The manifest that lies beside the Verilog."""
 
 import re
-from dataclasses import asdict
 from typing import Any
 
 from tachometry.spec.recovery import recovery_clocks
 from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END, TachometerSpec
 
+_OF_PORTS = ("name", "direction", "width", "signed")
 _KEYWORDS = frozenset(
     """
     always and assign automatic begin buf bufif0 bufif1 case casex casez cell cmos config deassign default defparam
@@ -75,6 +75,6 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             if spec.max_tick_cycles
             else {}
         ),
-        "ports": [asdict(port) for port in spec.ports],
+        "ports": [{key: getattr(port, key) for key in _OF_PORTS} for port in spec.ports],
         "parameters": spec.parameters,
     }

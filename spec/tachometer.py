@@ -9,6 +9,7 @@ from tachometry.spec.encoder import Encoder
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS, LowPass
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, VelocityOutput, per_count
 from tachometry.spec.option import options_of
+from tachometry.spec.port import UPDATE, Port, held, ports_of
 from tachometry.spec.timing import MAX_TICK_CYCLES, Timing
 from tachometry.spec.units import Speed, ceil_log2
 
@@ -21,16 +22,6 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 def signed_width(limit: int) -> int:
     """Bits of a two's complement number that holds -limit … +limit."""
     return limit.bit_length() + 1
-
-
-@dataclass(frozen=True)
-class Port:
-    """A scalar port of the exported core; `direction` is `input` or `output`."""
-
-    name: str
-    direction: str
-    width: int = 1
-    signed: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -319,7 +310,7 @@ class TachometerSpec:
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
-        """Outputs of the method that change only with `velocity_valid`."""
+        """Outputs that only this method has; they are new with `velocity_valid`."""
         return ()
 
     @property
@@ -328,43 +319,47 @@ class TachometerSpec:
         if not self.bounds:
             return ()
         width = self.bound_width if self.output is None else self.output.port_width
-        ends = (Port(name, "output", width, signed=True) for name in BOUNDS)
-        return (*ends, Port("bounds_valid", "output"))
-
-    @property
-    def held_ports(self) -> list[str]:
-        """Names of the outputs beside the velocity's own that change only with `velocity_valid`."""
-        return [port.name for port in (*self.bound_ports, *self.method_ports)]
+        none = self.shown_bound_limit
+        return (
+            *(
+                held(
+                    *(UPDATE, name, width),
+                    signed=True,
+                    unit=f"2^{-self.frac_bits} {self.unit}",
+                    help=f"{side} end of what the true mean speed over the measured window was; {towards * none} means "
+                    "that there is none.",
+                )
+                for (name, towards), side in zip(BOUNDS.items(), ("Lower", "Upper"), strict=True)
+            ),
+            held(UPDATE, "bounds_valid", help="There are bounds; not yet for the first measurement."),
+        )
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Ports of the exported core, in order; method-specific ones come last."""
-        return (
-            Port("clk", "input"),
-            Port("rst", "input"),
-            Port("a", "input"),
-            Port("b", "input"),
-            *([Port("z", "input")] if self.index else []),
-            *([Port("tick_in", "input")] if self.max_tick_cycles else []),
-            Port("velocity", "output", self.velocity_width, signed=True),
-            Port("velocity_valid", "output"),
-            Port("interval", "output", self.interval_width),
-            Port("forced", "output"),
-            Port("tick", "output"),
-            Port("pulse_count", "output", self.count_width, signed=True),
-            Port("position", "output", self.position_width, signed=True),
-            Port("decode_error", "output"),
-            Port("overflow", "output"),
-            Port("stalled", "output"),
-            *([Port("velocity_overflow", "output")] if self.output else []),
-            *([Port("age", "output", self.timing.max_ticks.bit_length())] if self.age else []),
-            *self.bound_ports,
-            *self.method_ports,
-            *([Port("index_valid", "output")] if self.index else []),
-            *([Port("index_position", "output", self.position_width, signed=True)] if self.index else []),
-            *([Port("tick_error", "output")] if self.max_tick_cycles else []),
-            *([Port("swallowed_edges", "output", 16)] if self.filter_clocks else []),
-        )
+        """Ports of the exported core, in order."""
+        return ports_of(self)
+
+    @property
+    def pins(self) -> tuple[Port, ...]:
+        """Inputs beside clock and reset."""
+        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
+
+    @property
+    def outputs(self) -> tuple[Port, ...]:
+        """Outputs of the exported core, in order."""
+        return tuple(port for port in self.ports if port.direction == "output")
+
+    @property
+    def strobes(self) -> dict[str, tuple[str, ...]]:
+        """Outputs that strobe, each with the names of the outputs that are new with it."""
+        outputs = self.outputs
+        return {
+            strobe.name: tuple(
+                port.name for port in outputs if port.held_by == strobe.name and port.name != strobe.name
+            )
+            for strobe in outputs
+            if strobe.is_strobe
+        }
 
     @property
     def parameters(self) -> dict[str, Any]:

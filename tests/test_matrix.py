@@ -36,4 +36,4 @@ def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     assert bool(len(actual.errors)) or bool(spec.filter_clocks)
     assert bool(len(actual.index.clock)) == spec.index
     assert bool(len(actual.tick_errors)) == (spec.max_tick_cycles is not None)
-    assert updates.velocity_overflow.any() <= ("--velocity-width" in words)
+    assert updates.get("velocity_overflow").any() <= ("--velocity-width" in words)

@@ -168,6 +168,10 @@ def _write(spec: TachometerSpec, trace: PinTrace, run: Run, truth: Encoding | No
         from tachometry.sim.signals.tables import write_counts
 
         write_counts(path, run)
+    if path := outputs.get("--events"):
+        from tachometry.sim.signals.tables import write_events
+
+        write_events(path, run)
     if path := outputs.get("--save-capture"):
         from tachometry.sim.captures.sigrok import write_sr
 

@@ -152,9 +152,10 @@ _OUTPUT_OPTIONS = [
     output(
         "--trace",
         help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
-        "velocity in rad/s; then bounds and outputs of the method.",
+        "velocity in rad/s; then all other outputs that change with an update.",
     ),
-    output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts)."),
+    output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts), and what else ticks have."),
+    output("--events", help="CSV with a row per index pulse, illegal transition and external tick that was wrong."),
     output(
         "--save-capture",
         suffixes=(".sr",),
@@ -176,6 +177,7 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
         plot: Path | None,
         trace: Path | None,
         counts: Path | None,
+        events: Path | None,
         save_capture: Path | None,
         **others: Any,
     ) -> Any:
@@ -185,6 +187,7 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--plot": plot,
             "--trace": trace,
             "--counts": counts,
+            "--events": events,
             "--save-capture": save_capture,
         }
         return command(targets={what: path for what, path in given.items() if path is not None}, **others)

@@ -125,7 +125,7 @@ def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
     if n_overflows:
         rows.append(("overflow", f"{n_overflows} ticks: faster than --max-speed, velocity saturated"))
-    if n_saturated := int(np.count_nonzero(updates.velocity_overflow)):
+    if n_saturated := int(np.count_nonzero(updates.get("velocity_overflow"))):
         rows.append(("velocity overflow", f"{n_saturated} updates: beyond --velocity-width, saturated"))
     return rows + _errors(spec, run, truth)
 

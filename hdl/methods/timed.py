@@ -58,7 +58,7 @@ class TimedDatapath(wiring.Component):
     @property
     def probes(self) -> dict[str, Value]:
         """What a waveform should show of the inside."""
-        return {"age": self.gap_timer.age}
+        return {"gap": self.gap_timer.age}
 
     @property
     def _size(self) -> Signal:

@@ -21,7 +21,7 @@ from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
 from tachometry.sim.signals.recording import PinTrace, packed
-from tachometry.sim.signals.run import STROBES, Run, observed
+from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import Port, TachometerSpec
 
 DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
@@ -61,12 +61,12 @@ class Design:
     @property
     def outputs(self) -> list[Port]:
         """Outputs of the core, in order."""
-        return [port for port in self.spec.ports if port.direction == "output"]
+        return list(self.spec.outputs)
 
     @property
     def strobes(self) -> list[str]:
         """Names of those that make a row."""
-        return [port.name for port in self.outputs if port.name in STROBES]
+        return list(self.spec.strobes)
 
     def source(self, model: str) -> str:
         """The driver behind a text with the struct `Model`."""

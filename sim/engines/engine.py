@@ -66,8 +66,7 @@ def driven_pins(spec: TachometerSpec, trace: PinTrace) -> list[Port]:
     ValueError
         If the trace lacks one.
     """
-    pins = [port for port in spec.ports if port.direction == "input" and port.name not in ("clk", "rst")]
-    missing = [port.name for port in pins if port.name not in trace.lines]
+    missing = [port.name for port in spec.pins if port.name not in trace.lines]
     if missing:
         raise ValueError(f"the trace must have the lines of the core, and lacks {', '.join(missing)}")
-    return pins
+    return list(spec.pins)

@@ -8,20 +8,27 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl import Tachometer
 from tachometry.spec import TachometerSpec
+from tachometry.spec.port import INDEX, TICK, UPDATE
 
 WORD = 32  # bits
+_ORDER = {TICK: 1, UPDATE: 2, INDEX: 3}  # of strobes in the waveform; errors come first
 
 
 def shown(core: Tachometer) -> dict[str, Value]:
-    """Signals of the waveform, in the order in which they are shown."""
-    inner = {"m_e": core.pulse_count, **core.datapath.probes}
-    order = (
-        *("a", "b", "z", "tick_in", "decode_error", "tick", "tick_error", *inner, "overflow", "velocity_valid"),
-        *("velocity", "velocity_overflow", "interval", "forced", "stalled", "index_valid", "index_position"),
-        *("position", "swallowed_edges"),
-    )
-    ports = {port.name for port in core.spec.ports}
-    return {name: inner[name] if name in inner else getattr(core, name) for name in order if name in ports | {*inner}}
+    """Signals of the waveform, in the order in which they are shown.
+
+    First the pins, then every strobe with the ports that are new with it; the inside of the datapath stands before the
+    update that comes of it.
+    """
+    spec = core.spec
+    found: dict[str, Value] = {pin.name: getattr(core, pin.name) for pin in spec.pins}
+    for strobe, held in sorted(spec.strobes.items(), key=lambda item: _ORDER.get(item[0], 0)):
+        if strobe == UPDATE:
+            inner = core.datapath.probes
+            assert not inner.keys() & {port.name for port in spec.ports}, "a probe must not have the name of a port"
+            found |= inner
+        found |= {name: getattr(core, name) for name in (strobe, *held)}
+    return found
 
 
 class Watched(wiring.Component):

@@ -15,7 +15,7 @@ from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import shown
 from tachometry.sim.engines.waveform import Waveform
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import STROBES, Run, observed
+from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import TachometerSpec
 
 # The simulator counts in femtoseconds; a nanosecond per clock keeps every instant exact. Waveforms have true times.
@@ -63,9 +63,9 @@ class PySim:
         core = Tachometer(spec)
         top = Module()
         top.submodules.core = core
-        outputs = [port for port in spec.ports if port.direction == "output"]
+        outputs = spec.outputs
         strobe = Signal()
-        top.d.comb += strobe.eq(Cat(getattr(core, port.name) for port in outputs if port.name in STROBES).any())
+        top.d.comb += strobe.eq(Cat(getattr(core, port.name) for port in outputs if port.is_strobe).any())
         values = _packed(top, [getattr(core, port.name) for port in outputs])
         seen = shown(core) if vcd is not None else {}
         seen_values = _packed(top, list(seen.values()))

@@ -10,7 +10,7 @@ from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import Run
+from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import TachometerSpec
 
 
@@ -29,7 +29,14 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
     else:
         last, tick_errors = windows(spec, trace)
         beyond = None
-    ticks, index = count(spec, steps, last, trace.n_clocks, beyond)
-    measured = golden.updates(ticks, steps, trace.n_clocks)
-    updates = in_unit(spec, filtered(spec, ticks, measured, trace.n_clocks))
-    return Run(trace.n_clocks, with_age(spec, ticks, updates), updates, index, steps.errors, tick_errors)
+    ticks, index = count(spec, steps, last, beyond)
+    updates = in_unit(spec, filtered(spec, ticks, golden.updates(ticks, steps, trace.n_clocks)))
+    tables = {
+        "tick": with_age(spec, ticks, updates),
+        "velocity_valid": updates,
+        "index_valid": index,
+        "decode_error": Table(steps.errors, {}),
+        "tick_error": Table(tick_errors, {}),
+    }
+    seen = {name: table.rows(table.clock < trace.n_clocks) for name, table in tables.items()}
+    return Run.of_ports(spec, trace.n_clocks, seen)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import Index, Ticks
+from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 
 # Where a pair of levels stands in the forward cycle 00, 10, 11, 01 of (A, B).
@@ -113,7 +113,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     errors = at[illegal]
     rises = at[:0] if trace.z is None or not spec.index else at[(trace.z[1:] == 1) & (trace.z[:-1] == 0)]
     # Two clocks for the synchroniser, one for the counter of glitches.
-    return Steps(at, step, errors[errors < trace.n_clocks], rises, returned + 3)
+    return Steps(at, step, errors, rises, returned + 3)
 
 
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:
@@ -132,9 +132,8 @@ def count(
     spec: TachometerSpec,
     steps: Steps,
     last: NDArray[np.int64],
-    n_clocks: int,
     beyond: NDArray[np.bool_] | None = None,
-) -> tuple[Ticks, Index]:
+) -> tuple[Table, Table]:
     """Pulse numbers and positions of all ticks, and positions at the index.
 
     Parameters
@@ -143,7 +142,6 @@ def count(
     steps : Steps
     last : int64 array
         Last clock of each window.
-    n_clocks : int
     beyond : bool array or None
         Windows that may be longer than nominal: whether the method raises `overflow`. A sum that has left
         ±max_pulse_count is saturated, whatever comes after.
@@ -171,13 +169,10 @@ def count(
 
     strobe = last + spec.tick_latency
     glitches = np.searchsorted(steps.swallowed, strobe, side="right")
-    ticks = Ticks(
-        clock=strobe,
-        pulse_count=np.clip(sums, -spec.max_pulse_count, spec.max_pulse_count),
-        position=wrapped(reached - origin[np.searchsorted(rises, last, side="right")]),
-        overflow=overflow,
-        swallowed_edges=2 * np.minimum(glitches, (1 << 15) - 1),
-        age=np.zeros(len(last), dtype=np.int64),
-    )
-    seen = rises + spec.tick_latency < n_clocks
-    return ticks, Index((rises + spec.tick_latency)[seen], wrapped(captured - origin[:-1])[seen])
+    columns = {
+        "pulse_count": np.clip(sums, -spec.max_pulse_count, spec.max_pulse_count),
+        "position": wrapped(reached - origin[np.searchsorted(rises, last, side="right")]),
+        "overflow": overflow,
+        "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),
+    }
+    return Table(strobe, columns), Table(rises + spec.tick_latency, {"index_position": wrapped(captured - origin[:-1])})

@@ -1,15 +1,13 @@
 """Golden low-pass filter: eq. (22) of Tsuji 2009, update by update."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 
 
-def filtered(spec: TachometerSpec, ticks: Ticks, updates: Updates, n_clocks: int) -> Updates:
-    """Updates with the filtered velocity in counts per tick, those whose strobe falls within `n_clocks`.
+def filtered(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
+    """Updates with the filtered velocity in counts per tick, as late as the filter shows them.
 
     The filter takes an update when it is done with the one before; of those that come meanwhile it takes the last, for
     the ticks of all. What is the last update of a shaft at rest it takes as it is.
@@ -20,7 +18,7 @@ def filtered(spec: TachometerSpec, ticks: Ticks, updates: Updates, n_clocks: int
     latency = form.latency
     tables, low_bits, extra, bits = form.tables, form.low_bits, form.extra_bits, form.factor_bits
     half = 1 << (bits - 1)
-    came = updates.clock - spec.output_latency - latency
+    came = updates.clock
     # Ticks from the clock of the update before, or from reset, on.
     intervals = np.diff(np.searchsorted(ticks.clock, came, side="left"), prepend=0)
     clears = (updates.stalled & spec.last_when_stalled).tolist()
@@ -47,11 +45,6 @@ def filtered(spec: TachometerSpec, ticks: Ticks, updates: Updates, n_clocks: int
         y = u + difference
         shown.append((y + (1 << (extra - 1))) >> extra)
 
-    done = np.array([take for take, _, _ in taken], dtype=np.int64) + latency - 1 + spec.output_latency
-    seen = done < n_clocks
-    rows = np.array([row for _, row, _ in taken], dtype=np.int64)[seen]
-    columns = {
-        name: column[rows] for name, column in vars(updates).items() if name not in ("clock", "velocity", "more")
-    }
-    more = {name: column[rows] for name, column in updates.more.items()}
-    return replace(updates, clock=done[seen], velocity=np.array(shown, dtype=np.int64)[seen], more=more, **columns)
+    done = np.array([take for take, _, _ in taken], dtype=np.int64) + latency - 1
+    rows = np.array([row for _, row, _ in taken], dtype=np.int64)
+    return updates.rows(rows).having(clock=done, velocity=np.array(shown, dtype=np.int64))

@@ -1,17 +1,15 @@
 """Golden velocity output: from counts per tick to the unit, the LSB and the width that are wanted."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.tachometer import BOUNDS
 
 
-def in_unit(spec: TachometerSpec, updates: Updates) -> Updates:
-    """Updates whose velocity and bounds are native, with those of the output instead.
+def in_unit(spec: TachometerSpec, updates: Table) -> Table:
+    """Updates whose velocity and bounds are native, with those of the output instead, as many clocks later.
 
     Where 64 bits do not hold the products, Python's integers do.
     """
@@ -27,14 +25,15 @@ def in_unit(spec: TachometerSpec, updates: Updates) -> Updates:
         return held.astype(np.int64), (held != wide).astype(bool)
 
     velocity, overflow = scaled(updates.velocity)
-    bounds = {name: scaled(updates.more[name], towards)[0] for name, towards in BOUNDS.items() if spec.bounds}
-    return replace(updates, velocity=velocity, velocity_overflow=overflow, more=updates.more | bounds)
+    bounds = {name: scaled(updates[name], towards)[0] for name, towards in BOUNDS.items() if spec.bounds}
+    clock = updates.clock + spec.output_latency
+    return updates.having(clock=clock, velocity=velocity, velocity_overflow=overflow, **bounds)
 
 
-def with_age(spec: TachometerSpec, ticks: Ticks, updates: Updates) -> Ticks:
+def with_age(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
     """Ticks with the age of the velocity: how many there were from the clock of its update, or from reset, on."""
     if not spec.age:
         return ticks
     begun = np.append(0, updates.clock)[np.searchsorted(updates.clock, ticks.clock, side="right")]
     age = np.arange(len(ticks.clock)) - np.searchsorted(ticks.clock, begun, side="left")
-    return replace(ticks, age=np.minimum(age, spec.timing.max_ticks))
+    return ticks.having(age=np.minimum(age, spec.timing.max_ticks))

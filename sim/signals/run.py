@@ -1,110 +1,117 @@
-"""What a core shows at its ports, as arrays: the common language of engines and golden models."""
+"""What a core shows at its ports, as arrays: the common language of engines and golden models.
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
+A run is what the ports say: a table for every strobe, with a column for every port that is held by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.signals.arrays import Ints
 from tachometry.spec import TachometerSpec
+from tachometry.spec.port import INDEX, TICK, UPDATE
 
 
-@dataclass(frozen=True)
-class Ticks:
-    """One row per strobe of `tick`.
+@dataclass(frozen=True, eq=False)
+class Table:
+    """One row for every clock in which a strobe is high.
 
-    Parameters
-    ----------
-    clock : int64 array, shape (n,)
-        Clock in which `tick` is high.
-    pulse_count, position : int64 arrays, shape (n,), counts
-    overflow : bool array, shape (n,)
-    swallowed_edges : int64 array, shape (n,)
-        All zero without a filter.
-    age : int64 array, shape (n,), ticks
-        Of the velocity; all zero without an age.
-    """
-
-    clock: NDArray[np.int64]
-    pulse_count: NDArray[np.int64]
-    position: NDArray[np.int64]
-    overflow: NDArray[np.bool_]
-    swallowed_edges: NDArray[np.int64]
-    age: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Updates:
-    """One row per strobe of `velocity_valid`.
+    A column is found by its name, `table["velocity"]`, or as an attribute, `table.velocity`.
 
     Parameters
     ----------
     clock : int64 array, shape (n,)
-        Clock in which `velocity_valid` is high.
-    velocity : int64 array, shape (n,)
-        Raw value, in 2^−frac_bits of the spec's unit.
-    interval : int64 array, shape (n,)
-        m_s.
-    forced, stalled : bool arrays, shape (n,)
-    velocity_overflow : bool array, shape (n,)
-        The velocity was saturated; never where it is as wide as it can need.
-    more : dict of str to array, shape (n,)
-        Bounds, and outputs of the method.
+        Clocks in which the strobe is high.
+    columns : mapping of str to array, shape (n,)
+        Values of ports in these clocks: bool for ports of one bit, else int64.
     """
 
-    clock: NDArray[np.int64]
-    velocity: NDArray[np.int64]
-    interval: NDArray[np.int64]
-    forced: NDArray[np.bool_]
-    stalled: NDArray[np.bool_]
-    velocity_overflow: NDArray[np.bool_]
-    more: dict[str, NDArray[Any]] = field(default_factory=dict)
+    clock: Ints
+    columns: Mapping[str, NDArray[Any]]
+
+    def __len__(self) -> int:
+        return len(self.clock)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.columns[name]
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        if name.startswith("_") or name not in self.columns:
+            raise AttributeError(f"the table has no column {name!r}, but {', '.join(self.columns)}")
+        return self.columns[name]
+
+    def get(self, name: str) -> NDArray[Any]:
+        """A column, or zeros where the core has no such port."""
+        return self.columns.get(name, np.zeros(len(self), dtype=np.bool_))
+
+    def rows(self, chosen: Any) -> Table:
+        """The rows of an index array, a mask or a slice."""
+        return Table(self.clock[chosen], {name: column[chosen] for name, column in self.columns.items()})
+
+    def having(self, **columns: NDArray[Any]) -> Table:
+        """The same table with these columns added or replaced; `clock` replaces the clocks."""
+        clock = columns.pop("clock", self.clock)
+        return Table(clock, {**self.columns, **columns})
 
 
-@dataclass(frozen=True)
-class Index:
-    """One row per strobe of `index_valid`; none without an index.
-
-    Parameters
-    ----------
-    clock : int64 array, shape (n,)
-        Clock in which `index_valid` is high.
-    index_position : int64 array, shape (n,), counts
-    """
-
-    clock: NDArray[np.int64]
-    index_position: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """All that happened at the ports in clocks 0 … n_clocks − 1.
 
     Parameters
     ----------
     n_clocks : int
-    ticks : Ticks
-    updates : Updates
-    index : Index
-    errors : int64 array
-        Clocks in which `decode_error` was high.
-    tick_errors : int64 array
-        Clocks in which `tick_error` was high; none without an external tick.
+    tables : dict of str to Table
+        By the strobe, for each that the core has.
     """
 
     n_clocks: int
-    ticks: Ticks
-    updates: Updates
-    index: Index
-    errors: NDArray[np.int64]
-    tick_errors: NDArray[np.int64]
+    tables: dict[str, Table]
+
+    @classmethod
+    def of_ports(cls, spec: TachometerSpec, n_clocks: int, tables: Mapping[str, Table]) -> Run:
+        """The run with just what the ports of `spec` say, in their order; KeyError if a column is missing."""
+        found = {
+            strobe: Table(tables[strobe].clock, {name: tables[strobe][name] for name in names})
+            for strobe, names in spec.strobes.items()
+        }
+        return cls(n_clocks, found)
+
+    @property
+    def ticks(self) -> Table:
+        """Rows of `tick`."""
+        return self.tables[TICK]
+
+    @property
+    def updates(self) -> Table:
+        """Rows of `velocity_valid`."""
+        return self.tables[UPDATE]
+
+    @property
+    def index(self) -> Table:
+        """Rows of `index_valid`; none without an index."""
+        return self.tables.get(INDEX, _NONE)
+
+    @property
+    def errors(self) -> Ints:
+        """Clocks in which `decode_error` was high."""
+        return self.tables["decode_error"].clock
+
+    @property
+    def tick_errors(self) -> Ints:
+        """Clocks in which `tick_error` was high; none without an external tick."""
+        return self.tables.get("tick_error", _NONE).clock
 
 
-STROBES = ("tick", "velocity_valid", "index_valid", "decode_error", "tick_error")
+_NONE = Table(np.empty(0, dtype=np.int64), {"index_position": np.empty(0, dtype=np.int64)})
 
 
-def observed(spec: TachometerSpec, n_clocks: int, rows: NDArray[np.int64]) -> Run:
+def observed(spec: TachometerSpec, n_clocks: int, rows: Ints) -> Run:
     """The run that was seen at the output ports.
 
     Parameters
@@ -112,29 +119,14 @@ def observed(spec: TachometerSpec, n_clocks: int, rows: NDArray[np.int64]) -> Ru
     spec : TachometerSpec
     n_clocks : int
     rows : int64 array, shape (n, 1 + number of outputs)
-        The clock, and all outputs in the order of the ports, in every clock with one of the `STROBES`.
+        The clock, and all outputs in the order of the ports, in every clock in which a strobe is high.
     """
-    outputs = [port for port in spec.ports if port.direction == "output"]
-    columns = {port.name: rows[:, k].astype(bool if port.width == 1 else np.int64) for k, port in enumerate(outputs, 1)}
-    columns["clock"] = rows[:, 0]
-    absent = np.zeros(len(rows), dtype=bool)
-
-    def at(strobe: str, names: Iterable[str]) -> list[NDArray[Any]]:
-        high = columns.get(strobe, absent)
-        return [columns.get(name, absent)[high] for name in names]
-
-    def group(strobe: str, kind: type[Any]) -> Any:
-        return kind(*at(strobe, (item.name for item in fields(kind) if item.name != "more")))
-
-    more = spec.held_ports
-    return Run(
-        n_clocks,
-        group("tick", Ticks),
-        replace(group("velocity_valid", Updates), more=dict(zip(more, at("velocity_valid", more), strict=True))),
-        group("index_valid", Index),
-        *at("decode_error", ["clock"]),
-        *at("tick_error", ["clock"]),
-    )
+    columns = {
+        port.name: rows[:, k].astype(np.bool_ if port.width == 1 and not port.signed else np.int64)
+        for k, port in enumerate(spec.outputs, 1)
+    }
+    every = Table(rows[:, 0], columns)
+    return Run.of_ports(spec, n_clocks, {strobe: every.rows(columns[strobe]) for strobe in spec.strobes})
 
 
 @dataclass(frozen=True)
@@ -160,24 +152,27 @@ def compare(expected: Run, actual: Run) -> tuple[int, list[Mismatch]]:
         Rows that differ, summed over all signals; a row that only one run has is one.
     first : list of Mismatch
         The first of them in each signal that differs.
+
+    Raises
+    ------
+    ValueError
+        If they are not runs of the same ports.
     """
+    shapes = [{strobe: list(table.columns) for strobe, table in run.tables.items()} for run in (expected, actual)]
+    if shapes[0] != shapes[1]:
+        raise ValueError(f"runs must be of the same ports, not {shapes[0]} and {shapes[1]}")
     count, first = 0, []
-    both = (expected, actual)
-    pairs = []
-    for name in ("errors", "tick_errors"):
-        clocks = [getattr(run, name) for run in both]
-        pairs.append((name, clocks, clocks))
-    for group in ("ticks", "updates", "index"):
-        rows = [{**vars(side), **vars(side).get("more", {})} for side in (getattr(run, group) for run in both)]
-        clocks = [side["clock"] for side in rows]
-        pairs += [(f"{group}.{name}", clocks, [side[name] for side in rows]) for name in rows[0] if name != "more"]
-    for signal, clocks, (left, right) in pairs:
-        common = min(len(left), len(right))
-        differ = np.flatnonzero(left[:common] != right[:common])
-        surplus = max(len(left), len(right)) - common
-        if len(differ) or surplus:
-            row = int(differ[0]) if len(differ) else common
-            old, new = (int(side[row]) if row < len(side) else None for side in (left, right))
-            first.append(Mismatch(signal, row, old, new, min(int(side[row]) for side in clocks if row < len(side))))
-            count += len(differ) + surplus
+    for strobe, left in expected.tables.items():
+        right = actual.tables[strobe]
+        pairs = {f"{strobe}.{name}": (left[name], right[name]) for name in left.columns}
+        for signal, (old, new) in ({f"{strobe}.clock": (left.clock, right.clock)} | pairs).items():
+            common = min(len(old), len(new))
+            differ = np.flatnonzero(old[:common] != new[:common])
+            surplus = max(len(old), len(new)) - common
+            if len(differ) or surplus:
+                row = int(differ[0]) if len(differ) else common
+                was, got = (int(side[row]) if row < len(side) else None for side in (old, new))
+                clock = min(int(side.clock[row]) for side in (left, right) if row < len(side))
+                first.append(Mismatch(signal, row, was, got, clock))
+                count += len(differ) + surplus
     return count, first

@@ -1,15 +1,18 @@
 """A run as tables: updates, ticks, and the held velocity with its error."""
 
+import csv
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.signals.run import Run
 from tachometry.spec import TachometerSpec
+from tachometry.spec.port import TICK, UPDATE
 
 _ROWS = 1 << 16  # rows written at once
 
@@ -68,9 +71,9 @@ def velocity_error(
 
 
 def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
-    """Write a CSV with a row per update: when it came, which tick closed its window, and what it says.
+    """Write a CSV with a row per update: when it came, which tick closed its window, and what all its ports say.
 
-    Bounds and outputs of the method follow, raw, by the names of their ports.
+    The velocity stands there as the raw number and in rad/s; all else is raw, by the names of the ports.
     """
     updates = run.updates
     tick = np.searchsorted(run.ticks.clock, updates.clock - spec.tick_to_velocity, side="right") - 1
@@ -81,15 +84,32 @@ def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
         "forced": updates.forced.astype(np.int64),
         "velocity_raw": updates.velocity,
         "velocity_rad_s": updates.velocity * spec.rad_per_s_per_lsb,
-        **{name: column.astype(np.int64) for name, column in updates.more.items()},
     }
+    columns |= {name: updates[name].astype(np.int64) for name in updates.columns if name not in (*columns, "velocity")}
     write_csv(path, ",".join(columns), columns.values())
 
 
 def write_counts(path: Path, run: Run) -> None:
-    """Write a CSV with a row per tick: its number, its pulse number m_e and the position at its end."""
-    ticks = run.ticks
-    write_csv(path, "tick,pulse_count,position", (np.arange(len(ticks.clock)), ticks.pulse_count, ticks.position))
+    """Write a CSV with a row per tick: its number, then what all ports say that are held by the tick."""
+    columns = {"tick": np.arange(len(run.ticks)), **run.ticks.columns}
+    write_csv(path, ",".join(columns), (column.astype(np.int64) for column in columns.values()))
+
+
+def write_events(path: Path, run: Run) -> None:
+    """Write a CSV with a row for every strobe that is neither a tick nor an update: index, errors.
+
+    A row has the clock, the name of the strobe, and what the ports say that are held by it; other cells are empty.
+    """
+    tables = {name: table for name, table in run.tables.items() if name not in (TICK, UPDATE)}
+    columns = [name for table in tables.values() for name in table.columns]
+    rows: list[tuple[Any, ...]] = []
+    for event, table in tables.items():
+        cells = [table[name].tolist() if name in table.columns else [""] * len(table) for name in columns]
+        rows += [(clock, event, *values) for clock, *values in zip(table.clock.tolist(), *cells, strict=True)]
+    with path.open("w", encoding="ascii", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["clock", "event", *columns])
+        writer.writerows(sorted(rows, key=lambda row: row[0]))
 
 
 def write_csv(path: Path, header: str, columns: Iterable[NDArray[np.generic]]) -> None:

@@ -1,7 +1,6 @@
 """A testbench that stands on its own: what to put on the pins, and what the outputs must show, as data."""
 
 import json
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import Recording
-from tachometry.sim.signals.run import STROBES, Index, Run, Ticks, Updates
+from tachometry.sim.signals.run import Run
 from tachometry.spec import TachometerSpec
 
 # Clocks of the motion, and of the standstill after it: Icarus takes some 40,000 a second.
@@ -47,7 +46,7 @@ def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = 
         "clocks": trace.n_clocks,
         "pins": list(trace.lines),
         "changes": _rows(trace.clock, *trace.lines.values()),
-        "strobes": _strobes(spec, run),
+        "strobes": strobe_rows(run),
     }
     text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
     bench = Path(__file__).with_name("cocotb_bench.py").read_text(encoding="utf-8")
@@ -99,30 +98,15 @@ def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
     return np.cumsum(np.maximum(gap, 2)).astype(np.int64)
 
 
-def _strobes(spec: TachometerSpec, run: Run) -> dict[str, Any]:
+def strobe_rows(run: Run) -> dict[str, Any]:
     """Each strobe of the core, with its ports and rows; with `tick` also what is held since the last update."""
-    ticks, updates = run.ticks, run.updates
-    shown = _values(updates) | updates.more
-    last = np.searchsorted(updates.clock, ticks.clock, side="right")
-    held = {name: np.array([None, *column], dtype=object)[last] for name, column in shown.items()}
-    groups: dict[str, tuple[NDArray[np.int64], dict[str, NDArray[Any]]]] = {
-        "tick": (ticks.clock, _values(ticks) | held),
-        "velocity_valid": (updates.clock, shown),
-        "index_valid": (run.index.clock, _values(run.index)),
-        "decode_error": (run.errors, {}),
-        "tick_error": (run.tick_errors, {}),
-    }
-    there = {port.name for port in spec.ports}
+    last = np.searchsorted(run.updates.clock, run.ticks.clock, side="right")
+    held = {name: np.array([None, *column], dtype=object)[last] for name, column in run.updates.columns.items()}
     strobes = {}
-    for strobe in filter(there.__contains__, STROBES):
-        clock, values = groups[strobe]
-        names = [name for name in values if name in there]
-        strobes[strobe] = {"ports": names, "rows": _rows(clock, *(values[name] for name in names))}
+    for strobe, table in run.tables.items():
+        columns = {**table.columns, **(held if table is run.ticks else {})}
+        strobes[strobe] = {"ports": list(columns), "rows": _rows(table.clock, *columns.values())}
     return strobes
-
-
-def _values(group: Ticks | Updates | Index) -> dict[str, NDArray[Any]]:
-    return {item.name: getattr(group, item.name) for item in fields(group) if item.name not in ("clock", "more")}
 
 
 def _rows(*columns: NDArray[Any]) -> list[list[int | None]]:

@@ -7,7 +7,8 @@ from typing import Any
 
 from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target
 from tachometry.spec.option import option
-from tachometry.spec.tachometer import Port, TachometerSpec
+from tachometry.spec.port import UPDATE, Port, held
+from tachometry.spec.tachometer import TachometerSpec
 
 # The estimates are looked up by Ndt1, or by Nep1 − 1, in a table with as many entries at most.
 MAX_TABLE = 2048
@@ -214,9 +215,26 @@ class RairanTachometer(TachometerSpec):
     @property
     def method_ports(self) -> tuple[Port, ...]:
         return (
-            Port("n_ep1", "output", self.max_pulse_count.bit_length()),
-            Port("n_dt1", "output", self.interval_width),
-            *([Port("dt_shift", "output", self.max_shift.bit_length())] if self.adaptive else []),
+            held(
+                *(UPDATE, "n_ep1", self.max_pulse_count.bit_length()),
+                unit="counts",
+                help="Nep1 of the velocity: counts in a sampling period dt.",
+            ),
+            held(
+                *(UPDATE, "n_dt1", self.interval_width),
+                unit="dt",
+                help="Ndt1 of the velocity: sampling periods dt from one count to the next.",
+            ),
+            *(
+                [
+                    held(
+                        *(UPDATE, "dt_shift", self.max_shift.bit_length()),
+                        help="k: dt of this measurement is 2^k times the nominal one.",
+                    )
+                ]
+                if self.adaptive
+                else []
+            ),
         )
 
     @property

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tachometry.spec.option import option
-from tachometry.spec.tachometer import Port, TachometerSpec
+from tachometry.spec.port import UPDATE, Port, held
+from tachometry.spec.tachometer import TachometerSpec
 
 _TIMERS = ("clock", "tick")
 
@@ -160,7 +161,9 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
-        return (Port("out_of_range", "output"),) if self.flags_range else ()
+        if not self.flags_range:
+            return ()
+        return (held(UPDATE, "out_of_range", help="The speed was too high to be measured; the velocity is saturated."),)
 
     @property
     def parameters(self) -> dict[str, Any]:

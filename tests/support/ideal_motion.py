@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.signals.run import Ticks
+from tachometry.sim.signals.run import Table
 
 SUBCOUNTS = 1 << 20  # in a count
 
@@ -34,9 +34,7 @@ def motion(n_ticks: int, max_count: int, seed: int) -> NDArray[np.int64]:
     return np.append(0, np.cumsum(np.concatenate(parts))) + int(rng.integers(SUBCOUNTS))
 
 
-def ticks_of(angle: NDArray[np.int64]) -> Ticks:
+def ticks_of(angle: NDArray[np.int64]) -> Table:
     """What an ideal encoder shows of it, a tick in every clock."""
     m_e = np.diff(angle // SUBCOUNTS)
-    n = len(m_e)
-    none = np.zeros(n, np.int64)
-    return Ticks(np.arange(n), m_e, np.cumsum(m_e), none.astype(np.bool_), none, none)
+    return Table(np.arange(len(m_e)), {"pulse_count": m_e})

@@ -236,14 +236,14 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         return {kind: len(updates.clock)}
     if isinstance(spec, RairanTachometer):
         rows, stalled = len(updates.clock), updates.stalled
-        shift = updates.more.get("dt_shift", np.zeros(rows, dtype=np.int64))
+        shift = updates.get("dt_shift")
         return {
             "low": np.count_nonzero(updates.interval > 1),
-            "high": np.count_nonzero(updates.more["n_ep1"] > 1),
-            "reversal": np.count_nonzero((updates.more["n_ep1"] == 0) & ~stalled),
+            "high": np.count_nonzero(updates["n_ep1"] > 1),
+            "reversal": np.count_nonzero((updates["n_ep1"] == 0) & ~stalled),
             "speed that fell": np.count_nonzero(updates.forced & ~stalled),
             "rest": np.count_nonzero(stalled),
-            "count after rest": np.count_nonzero(stalled[:-1] & (updates.more["n_ep1"][1:] == 1)),
+            "count after rest": np.count_nonzero(stalled[:-1] & (updates["n_ep1"][1:] == 1)),
             "dt longer than nominal": np.count_nonzero(np.diff(run.ticks.clock) > spec.timing.tick_cycles),
             "to the letter": rows * spec.paper_exact,
             "dt longer": np.count_nonzero(shift),
@@ -270,7 +270,7 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
     velocity, forced, interval = updates.velocity, updates.forced, updates.interval
     decay = forced & (interval < spec.max_periods) & (velocity != 0) if spec.decays else np.zeros(n, dtype=np.bool_)
     overdue = forced & ~decay
-    flagged = updates.more.get("out_of_range", np.zeros(n, dtype=np.bool_))
+    flagged = updates.get("out_of_range")
     return {
         "times in ticks" if spec.on_lattice else "times in clocks": n,
         "paper exact": n * spec.paper_exact,
@@ -306,14 +306,14 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
             "external tick": len(run.ticks.clock) * (spec.max_tick_cycles is not None),
             "external tick too early": np.count_nonzero(~np.isin(run.tick_errors, run.ticks.clock)),
             "external tick missing": np.count_nonzero(np.isin(run.tick_errors, run.ticks.clock)),
-            "velocity saturated": np.count_nonzero(updates.velocity_overflow),
+            "velocity saturated": np.count_nonzero(updates.get("velocity_overflow")),
             "filtered": len(updates.clock) * (spec.lowpass is not None),
             "waited for the filter": spec.lowpass is not None
             and np.count_nonzero(np.diff(updates.clock) == spec.low_pass.latency - 2),
-            "bounds": np.count_nonzero(updates.more.get("bounds_valid", 0)),
-            "aged": np.count_nonzero(run.ticks.age),
+            "bounds": np.count_nonzero(updates.get("bounds_valid")),
+            "aged": np.count_nonzero(run.ticks.get("age")),
             "update in every clock": np.count_nonzero(np.diff(updates.clock) == 1),
-            "glitch swallowed": run.ticks.swallowed_edges[-1] // 2,
+            "glitch swallowed": run.ticks.get("swallowed_edges")[-1] // 2,
             "position wrapped": np.count_nonzero(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
         }
     )
@@ -343,7 +343,7 @@ def _lost_counts(spec: TachometerSpec, encoding: Encoding, run: Run) -> list[str
 
     Jitter makes an edge come early or late, but never twice or not at all.
     """
-    if len(run.errors) or run.ticks.swallowed_edges[-1] or spec.index_reset:
+    if len(run.errors) or run.ticks.get("swallowed_edges")[-1] or spec.index_reset:
         return []
     sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / CLOCK_HZ
     turned = encoding.true_position(sampled, spec.encoder.decoding)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.rairan import Model
-from tachometry.sim.signals.run import Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, RairanTachometer, Timing
 
 DELAY = 4  # clocks from a step to `velocity_valid`
@@ -28,7 +28,7 @@ def steps_of(step: np.ndarray) -> Steps:
     return Steps(at, step[at].astype(np.int64), none, none, none)
 
 
-def golden_updates(spec: RairanTachometer, step: np.ndarray) -> Updates:
+def golden_updates(spec: RairanTachometer, step: np.ndarray) -> Table:
     """Updates that are caused in the clocks of these steps; `clock` is that of the cause."""
     updates = Model(spec).updates(None, steps_of(step), len(step) + DELAY)  # type: ignore[arg-type]
     updates.clock[:] -= DELAY

@@ -9,7 +9,7 @@ from support.compiled import lint
 from tachometry.hdl import export
 from tachometry.sim.engines.verilator import Verilator
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import STROBES, Run, observed
+from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import Port, TachometerSpec
 
 # The bench reads a line (clock, level of each pin) for every change, and writes a row (clock, value of each output) for
@@ -49,9 +49,7 @@ endmodule
 
 def _ports(spec: TachometerSpec) -> tuple[list[Port], list[Port], list[str]]:
     """Pins, outputs and strobes."""
-    pins = [port for port in spec.ports if port.direction == "input" and port.name not in ("clk", "rst")]
-    outputs = [port for port in spec.ports if port.direction == "output"]
-    return pins, outputs, [port.name for port in outputs if port.name in STROBES]
+    return list(spec.pins), list(spec.outputs), list(spec.strobes)
 
 
 def _filled(text: str, **parts: str | int) -> str:

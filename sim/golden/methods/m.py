@@ -4,7 +4,7 @@ import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import MTachometer
 from tachometry.spec.tachometer import BOUNDS
 
@@ -20,30 +20,27 @@ class Model:
     def __init__(self, spec: MTachometer) -> None:
         self._spec = spec
 
-    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
-        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+    def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
+        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
         n = self._spec.average
 
         def moving(row: np.ndarray) -> np.ndarray:
             total = np.concatenate([np.zeros(n, dtype=np.int64), np.cumsum(row)])
             return total[n:] - total[:-n]
 
-        clock = ticks.clock + self._spec.tick_to_velocity
-        seen = clock < n_clocks
-        m_e = ticks.pulse_count[seen]
+        m_e = ticks.pulse_count
         total, length = moving(m_e), np.full(len(m_e), n)
 
         def quotient(counts: int, towards: int) -> np.ndarray:
             return round_quotient(total + counts, length, self._spec.native_frac_bits, towards)
 
-        more = {name: quotient(one, one) for name, one in BOUNDS.items() if self._spec.bounds}
-        never = np.zeros(len(m_e), dtype=np.bool_)
-        return Updates(
-            clock=clock[seen],
-            velocity=quotient(0, 0),
-            interval=length,
-            forced=never,
-            stalled=moving(m_e != 0) == 0,
-            velocity_overflow=never,
-            more=more | ({"bounds_valid": np.arange(len(m_e)) >= n} if self._spec.bounds else {}),
-        )
+        columns = {
+            "velocity": quotient(0, 0),
+            "interval": length,
+            "forced": np.zeros(len(m_e), dtype=np.bool_),
+            "stalled": moving(m_e != 0) == 0,
+        }
+        if self._spec.bounds:
+            columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}
+            columns["bounds_valid"] = np.arange(len(m_e)) >= n
+        return Table(ticks.clock + self._spec.datapath_latency, columns)

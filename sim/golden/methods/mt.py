@@ -4,7 +4,7 @@ import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, chain, enclosure, updates, with_silences
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import MTTachometer
 
 
@@ -19,10 +19,9 @@ class Model:
     def __init__(self, spec: MTTachometer) -> None:
         self._spec = spec
 
-    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
-        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+    def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
+        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
         spec = self._spec
-        assert steps is not None
         counts = Counts.of(spec, ticks, steps, n_clocks)
         n, period = len(counts.period), counts.period
         # The first count after reset or a silence only opens.
@@ -49,7 +48,7 @@ class Model:
             most=most,
             known=~none,
         )
-        return updates(spec, counts, with_silences(spec, counts, found), ticks, n_clocks)
+        return updates(spec, counts, with_silences(spec, counts, found), ticks)
 
     def _distance(self, size: Ints, opening: Ints, closing: Ints) -> Ints:
         """Counts from an opening to a closing one."""

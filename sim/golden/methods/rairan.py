@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.adaptive import adaptive_windows
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import RairanTachometer
 
 Ints = NDArray[np.int64]
@@ -100,7 +100,7 @@ def windows(spec: RairanTachometer, steps: Steps, n_clocks: int) -> Windows:
 
 @dataclass(frozen=True)
 class Events:
-    """One row per update; as in `Updates`, with the clock that causes it."""
+    """One row per update; as in an update, with the clock that causes it."""
 
     clock: Ints
     n: Ints
@@ -146,23 +146,22 @@ class Model:
         last = np.repeat(found.start, found.n_dt) + (nth + 1) * np.repeat(dt << found.shift, found.n_dt)
         return last, (nth == 0) & np.repeat(found.c_ep > self._spec.max_count << found.shift, found.n_dt)
 
-    def updates(self, ticks: Ticks, steps: Steps, n_clocks: int) -> Updates:
-        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+    def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
+        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
         spec = self._spec
-        delay = spec.tick_latency + spec.tick_to_velocity
+        delay = spec.tick_latency + spec.datapath_latency
         found = windows(spec, steps, n_clocks - delay)
         events = self._to_the_letter(found) if spec.paper_exact else self._events(found)
-        return Updates(
-            clock=events.clock + delay,
-            velocity=self._velocity(events),
-            interval=np.where(events.high | (events.n == 0), 1, events.n) << events.shift,
-            forced=events.forced,
-            stalled=events.stalled,
-            velocity_overflow=np.zeros(len(events.clock), dtype=np.bool_),
-            more=self._bounds(events)
-            | {"n_ep1": events.n_ep1, "n_dt1": events.n_dt1}
-            | ({} if spec.adaptive is None else {"dt_shift": events.shift}),
-        )
+        columns = {
+            "velocity": self._velocity(events),
+            "interval": np.where(events.high | (events.n == 0), 1, events.n) << events.shift,
+            "forced": events.forced,
+            "stalled": events.stalled,
+            "n_ep1": events.n_ep1,
+            "n_dt1": events.n_dt1,
+            "dt_shift": events.shift,
+        }
+        return Table(events.clock + delay, columns | self._bounds(events))
 
     def _bounds(self, events: Events) -> dict[str, NDArray[Any]]:
         """n2 and n1 of a time that is a clock longer and shorter, rounded outward."""

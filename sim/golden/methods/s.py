@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import STachometer
 from tachometry.spec.tachometer import BOUNDS
 
@@ -81,8 +81,8 @@ class Model:
     def __init__(self, spec: STachometer) -> None:
         self._spec = spec
 
-    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
-        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+    def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
+        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
         spec, m_e = self._spec, ticks.pulse_count
         i, m_s, forced = windows(alterations(m_e), spec.timing.max_ticks)
         at = i + 1  # m_e(−1) = 0 comes first
@@ -95,22 +95,18 @@ class Model:
             # Eq. (17): Σ_{j=0}^{m_s−1} m_e(i−j), over m_s.
             numerator = total[at + 1] - total[at - m_s + 1]
         moving = np.concatenate([[0], np.cumsum(numbers != 0)])
-        clock = ticks.clock[i] + spec.tick_to_velocity
-        seen = clock < n_clocks
 
         def quotient(counts: int, towards: int) -> NDArray[np.int64]:
             whole = 2 if spec.cancel else 1
-            return round_quotient(
-                (numerator + whole * counts)[seen], (whole * m_s)[seen], spec.native_frac_bits, towards
-            )
+            return round_quotient(numerator + whole * counts, whole * m_s, spec.native_frac_bits, towards)
 
-        more = {name: quotient(one, one) for name, one in BOUNDS.items() if spec.bounds}
-        return Updates(
-            clock=clock[seen],
-            velocity=quotient(0, 0),
-            interval=m_s[seen],
-            forced=forced[seen],
-            stalled=(forced & (moving[at + 1] == moving[at - m_s]))[seen],
-            velocity_overflow=np.zeros(np.count_nonzero(seen), dtype=np.bool_),
-            more=more | ({"bounds_valid": np.arange(len(i))[seen] > 0} if spec.bounds else {}),
-        )
+        columns = {
+            "velocity": quotient(0, 0),
+            "interval": m_s,
+            "forced": forced,
+            "stalled": forced & (moving[at + 1] == moving[at - m_s]),
+        }
+        if spec.bounds:
+            columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}
+            columns["bounds_valid"] = np.arange(len(i)) > 0
+        return Table(ticks.clock[i] + spec.datapath_latency, columns)

@@ -4,7 +4,7 @@ import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.timed import Counts, Measurements, chain, enclosure, updates, with_silences
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import TTachometer
 
 
@@ -19,10 +19,9 @@ class Model:
     def __init__(self, spec: TTachometer) -> None:
         self._spec = spec
 
-    def updates(self, ticks: Ticks, steps: Steps | None, n_clocks: int) -> Updates:
-        """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+    def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
+        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
         spec = self._spec
-        assert steps is not None
         counts = Counts.of(spec, ticks, steps, n_clocks)
         sign, gap = np.sign(counts.size), counts.gap
         many = np.abs(counts.size) > 1
@@ -45,4 +44,4 @@ class Model:
         asked = with_silences(spec, counts, found[opened | many])
         # What comes while the divider is at work is not measured.
         taken = asked[chain(np.searchsorted(asked.clock, asked.clock + spec.division_clocks))]
-        return updates(spec, counts, taken, ticks, n_clocks)
+        return updates(spec, counts, taken, ticks)

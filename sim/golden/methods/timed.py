@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec.methods.timed import TimedTachometer
 from tachometry.spec.tachometer import BOUNDS
 
@@ -50,7 +50,7 @@ class Counts:
     n_periods: int
 
     @classmethod
-    def of(cls, spec: TimedTachometer, ticks: Ticks, steps: Steps, n_clocks: int) -> "Counts":
+    def of(cls, spec: TimedTachometer, ticks: Table, steps: Steps, n_clocks: int) -> "Counts":
         """The counts that the datapath sees within `n_clocks`: steps, or ticks that are not empty."""
         if spec.on_lattice:
             period = np.flatnonzero(ticks.pulse_count)
@@ -158,7 +158,7 @@ def _among(values: Ints, ordered: Ints) -> NDArray[np.bool_]:
     return np.append(ordered, -1)[np.searchsorted(ordered, values)] == values
 
 
-def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Ticks) -> Measurements:
+def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> Measurements:
     """Ticks at which the velocity sinks; `held` is the velocity after each measurement.
 
     A tick without a count asks, if nothing is being divided; a measurement that begins meanwhile takes the divider.
@@ -193,22 +193,19 @@ def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: I
     return Measurements(clock, sign, age, ~none, none, none, least, most, ~none)[nearer]
 
 
-def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Ticks, n_clocks: int) -> Updates:
-    """All updates whose strobe falls within `n_clocks`, with the velocity in counts per tick."""
+def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
+    """All updates with the velocity in counts per tick, as the datapath shows it."""
     if spec.decays:
         taken = taken.merged(_sinking(spec, counts, taken, rounded(spec, taken.distance, taken.time)[0], ticks))
-    taken = taken[taken.clock + spec.tick_to_velocity < n_clocks]
     velocity, saturated = rounded(spec, taken.distance, taken.time)
-    more = {"out_of_range": saturated | taken.beyond} if spec.flags_range else {}
-    return Updates(
-        clock=taken.clock + spec.tick_to_velocity,
-        velocity=velocity,
-        interval=taken.time,
-        forced=taken.forced,
-        stalled=taken.stalled,
-        velocity_overflow=np.zeros(len(velocity), dtype=np.bool_),
-        more=more | (_bounds(spec, taken) if spec.bounds else {}),
-    )
+    columns = {
+        "velocity": velocity,
+        "interval": taken.time,
+        "forced": taken.forced,
+        "stalled": taken.stalled,
+        "out_of_range": saturated | taken.beyond,
+    }
+    return Table(taken.clock + spec.datapath_latency, columns | (_bounds(spec, taken) if spec.bounds else {}))
 
 
 def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any]]:

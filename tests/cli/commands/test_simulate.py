@@ -72,7 +72,7 @@ def test_trace_has_a_row_per_update(tmp_path: Path, golden_run: Run) -> None:
     assert run("simulate", *CORE, *MOTION, "--trace", tmp_path / "t.csv") == 0
     with (tmp_path / "t.csv").open(newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["clock", "tick", "interval", "forced", "velocity_raw", "velocity_rad_s"]
+    assert rows[0] == ["clock", "tick", "interval", "forced", "velocity_raw", "velocity_rad_s", "stalled"]
     updates = golden_run.updates
     assert [list(map(int, row[:5])) for row in rows[1:]] == [
         [clock, (clock - SPEC.tick_to_velocity - SPEC.tick_latency + 1) // 20 - 1, m_s, forced, raw]
@@ -92,7 +92,19 @@ def test_counts_have_a_row_per_tick(tmp_path: Path, golden_run: Run) -> None:
     text = (tmp_path / "c.csv").read_bytes().decode()
     ticks = golden_run.ticks
     rows = zip(ticks.pulse_count.tolist(), ticks.position.tolist(), strict=True)
-    assert text == "tick,pulse_count,position\n" + "".join(f"{i},{m_e},{x}\n" for i, (m_e, x) in enumerate(rows))
+    wanted = "".join(f"{i},{m_e},{x},0\n" for i, (m_e, x) in enumerate(rows))
+    assert text == f"tick,pulse_count,position,overflow\n{wanted}"
+
+
+def test_events_have_a_row_each(tmp_path: Path) -> None:
+    options = "--motion constant:40:400ms --illegal 0.05 --seed 3 --index".split()
+    assert run("simulate", *CORE, *options, "--events", tmp_path / "e.csv") == 0
+    with (tmp_path / "e.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["clock", "event", "index_position"]
+    assert {row[1] for row in rows[1:]} == {"decode_error", "index_valid"}
+    assert all((row[2] == "") == (row[1] == "decode_error") for row in rows[1:])
+    assert [int(row[0]) for row in rows[1:]] == sorted(int(row[0]) for row in rows[1:])
 
 
 def test_error_statistics(capsys: pytest.CaptureFixture[str]) -> None:

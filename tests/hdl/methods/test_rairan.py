@@ -24,7 +24,7 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
     seen = clock_by_clock(rairan.Datapath(spec), rows, ["velocity_valid", "last", "beyond", *names])
     got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
     updates = golden_updates(spec, step)
-    columns = [getattr(updates, name, updates.more.get(name)).astype(int).tolist() for name in names]
+    columns = [updates[name].astype(int).tolist() for name in names]
     assert got == list(zip((updates.clock + DELAY).tolist(), *columns, strict=True))
     ends, beyond = Model(spec).windows(steps_of(step), len(step))
     assert [clock for clock, row in enumerate(seen[: len(step)]) if row["last"]] == ends.tolist()

@@ -13,7 +13,7 @@ from tachometry.hdl.methods import DATAPATHS, quotient_velocity
 from tachometry.hdl.methods import mt as mt_method
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.signals.run import Ticks
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Timing
 from tachometry.spec.tachometer import BOUNDS
 
@@ -43,11 +43,12 @@ def check(method: str, timer: str, seed: int = 1) -> None:
     step = counts(seed)
     tick = np.arange(TICK - 1, CLOCKS, TICK)
     m_e = step.reshape(-1, TICK).sum(axis=1)
-    off, none = np.zeros(len(tick), np.int64), np.empty(0, np.int64)
+    none = np.empty(0, np.int64)
     at = np.flatnonzero(step)
     n_clocks = CLOCKS + spec.datapath_latency
     steps = Steps(at - spec.tick_latency, step[at], none, none, none)
-    golden = model(spec).updates(Ticks(tick, m_e, off, off > 0, off, off), steps, n_clocks)
+    golden = model(spec).updates(Table(tick, {"pulse_count": m_e}), steps, n_clocks)
+    golden = golden.rows(golden.clock < n_clocks)
     rows = []
     for clock in range(n_clocks):
         row = {"tick": int(clock < CLOCKS and clock % TICK == TICK - 1)}
@@ -59,7 +60,7 @@ def check(method: str, timer: str, seed: int = 1) -> None:
     datapath = DATAPATHS[spec.method](spec)
     seen = clock_by_clock(datapath, rows, ["velocity_valid", *NAMES])
     got = [[clock, *(row[name] for name in NAMES)] for clock, row in enumerate(seen) if row["velocity_valid"]]
-    held = {"clock": golden.clock, **{name: getattr(golden, name) for name in OUTPUTS[1:]}, **golden.more}
+    held = {"clock": golden.clock, **golden.columns}
     wanted = np.stack([held[name].astype(np.int64) for name in ("clock", *NAMES)], axis=1)
     assert len(wanted) > 20
     assert len(np.unique(held["bounds_valid"])) == 2

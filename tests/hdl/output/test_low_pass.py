@@ -10,7 +10,7 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl.output import low_pass
 from tachometry.sim.golden.low_pass import filtered
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, STachometer, Timing
 
 
@@ -38,11 +38,9 @@ def check(spec: STachometer, n: int = 150) -> None:
     tick = np.flatnonzero(
         rng.random(n_clocks) < np.repeat(rng.choice([0, 0.02, 0.9], n_clocks // 50 + 1), 50)[:n_clocks]
     )
-    off = np.zeros(len(tick), dtype=np.int64)
     clears = rng.random(n) < 0.1
-    none = np.zeros(n, dtype=np.bool_)
-    updates = Updates(came + form.latency, velocity, off[:n], none, clears, none, {"tag": np.arange(n) % 16})
-    wanted = filtered(spec, Ticks(tick, off, off, off > 0, off, off), updates, 1 << 40)
+    updates = Table(came, {"velocity": velocity, "stalled": clears, "tag": np.arange(n) % 16})
+    wanted = filtered(spec, Table(tick, {}), updates)
     at = {clock: k for k, clock in enumerate(came.tolist())}
     ticks = set(tick.tolist())
     rows = []
@@ -52,7 +50,7 @@ def check(spec: STachometer, n: int = 150) -> None:
         rows.append({"start": int(clock in at), "tick": int(clock in ticks), **known})
     seen = clock_by_clock(low_pass.LowPass(form, tag_width=4), rows, ["done", "velocity", "tag_out"])
     got = [(k, row["velocity"], row["tag_out"]) for k, row in enumerate(seen) if row["done"]]
-    columns = (wanted.clock, wanted.velocity, wanted.more["tag"])
+    columns = (wanted.clock, wanted.velocity, wanted["tag"])
     assert got == list(zip(*(column.tolist() for column in columns), strict=True))
     assert len(got) < n
 

@@ -10,7 +10,6 @@ from proofs.mutation.netlist import SELECTOR, WIDTH, Mutant, grouped
 
 from tachometry.sim.engines import build
 from tachometry.sim.engines.cxxrtl import headers, mangled, translate
-from tachometry.sim.signals.run import STROBES
 from tachometry.spec import TachometerSpec
 
 _OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory
@@ -64,7 +63,7 @@ def _ports(spec: TachometerSpec) -> str:
     return _PORTS.format(
         n_outputs=len(outputs),
         pins=" ".join(f"top.{mangled(pin.name)} = value<1>{{level >> {bit} & 1u}};" for bit, pin in enumerate(pins)),
-        strobes=" || ".join(f"{value[name]}.get<bool>()" for name in STROBES if name in value),
+        strobes=" || ".join(f"{value[name]}.get<bool>()" for name in spec.strobes),
         outputs=" ".join(
             f"row[{k}] = "
             + (f"extended({value[port.name]});" if port.signed else f"{value[port.name]}.get<uint64_t>();")

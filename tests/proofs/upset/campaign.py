@@ -73,10 +73,8 @@ def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
         return found
 
     ticks, updates = run.ticks, run.updates
-    found = {name: held(ticks.clock, getattr(ticks, name)) for name in ("pulse_count", "overflow")}
-    found |= {name: held(updates.clock, getattr(updates, name)) for name in ("velocity", "interval", "forced")}
-    found |= {name: held(updates.clock, values) for name, values in updates.more.items()}
-    found["stalled"] = held(updates.clock, updates.stalled)
+    found = {name: held(ticks.clock, ticks[name]) for name in ("pulse_count", "overflow")}
+    found |= {name: held(updates.clock, values) for name, values in updates.columns.items()}
     found["tick"], found["velocity_valid"] = high(ticks.clock), high(updates.clock)
     found["decode_error"] = high(run.errors)
     found["age"] = np.zeros(run.n_clocks, dtype=np.int64)

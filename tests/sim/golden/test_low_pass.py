@@ -1,7 +1,6 @@
 """The low-pass filter against the exact recursion of eq. (22)."""
 
 import math
-from dataclasses import replace
 from decimal import Decimal, localcontext
 from fractions import Fraction
 
@@ -13,7 +12,7 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.golden.low_pass import filtered
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, RairanTachometer, Speed, STachometer, Timing
 from tachometry.spec.formats import low_pass
 
@@ -26,18 +25,16 @@ def spec_of(lowpass: Fraction, max_ticks: int = 500, frac_bits: int = 16) -> STa
     return STachometer(encoder=Encoder(500), timing=timing, lowpass=lowpass, frac_bits=frac_bits)
 
 
-def through(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, stalled: bool = False) -> Updates:
+def through(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, stalled: bool = False) -> Table:
     """What the filter of a core makes of velocities, each so many ticks after the one before."""
-    return filtered(spec, *far_apart(spec, velocity, elapsed, stalled), 1 << 50)
+    return filtered(spec, *far_apart(spec, velocity, elapsed, stalled))
 
 
-def far_apart(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, stalled: bool) -> tuple[Ticks, Updates]:
+def far_apart(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, stalled: bool) -> tuple[Table, Table]:
     came = TICK * np.cumsum(elapsed)
     tick = TICK * np.arange(int(elapsed.sum()))
-    off = np.zeros(len(tick), dtype=np.int64)
-    none = np.zeros(len(velocity), dtype=np.bool_)
-    clock = came + spec.low_pass_latency + spec.output_latency
-    return Ticks(tick, off, off, off > 0, off, off), Updates(clock, velocity, elapsed, none, none | stalled, none)
+    columns = {"velocity": velocity, "interval": elapsed, "stalled": np.full(len(velocity), stalled)}
+    return Table(tick, {}), Table(came, columns)
 
 
 def velocities(spec: STachometer, rng: np.random.Generator, n: int) -> np.ndarray:
@@ -113,14 +110,11 @@ def test_settles_to_the_last_bit() -> None:
 
 def test_takes_the_last_of_those_that_come_meanwhile_for_the_time_of_all() -> None:
     spec = spec_of(Fraction(2000))
-    latency = spec.low_pass_latency + spec.output_latency
+    latency = spec.low_pass_latency
     n = np.array([100, 200, 300, 400]) << 16
-    none = np.zeros(4, dtype=np.bool_)
-    came = np.array([50, 53, 57, 500])
-    updates = Updates(came + latency, n, none.astype(np.int64), none, none, none)
+    updates = Table(np.array([50, 53, 57, 500]), {"velocity": n, "stalled": np.zeros(4, dtype=np.bool_)})
     tick = np.concatenate([np.arange(0, 50, 10), [51, 52, 54, 55, 55, 55], [400]])
-    off = np.zeros(len(tick), dtype=np.int64)
-    got = filtered(spec, Ticks(tick, off, off, off > 0, off, off), updates, 1 << 40)
+    got = filtered(spec, Table(tick, {}), updates)
     assert got.velocity.tolist() == through(spec, n[[0, 2, 3]], np.array([5, 6, 1])).velocity.tolist()
     first = 50 + latency
     assert got.clock.tolist() == [first, first + spec.low_pass.latency - 2, 500 + latency]
@@ -131,7 +125,7 @@ def test_time_is_what_has_passed_and_not_what_was_measured() -> None:
     spec = spec_of(Fraction(50))
     n = 1500
     ticks, updates = far_apart(spec, np.full(n, 1000 << 6), np.ones(n, dtype=np.int64), False)
-    got = filtered(spec, ticks, replace(updates, interval=np.full(n, 77)), 1 << 40).velocity
+    got = filtered(spec, ticks, updates.having(interval=np.full(n, 77))).velocity
     seconds = n * float(spec.timing.tick_seconds)
     assert got[-1] == pytest.approx((1000 << 6) * (1 - math.exp(-50 * seconds)), abs=1)
 

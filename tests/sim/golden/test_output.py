@@ -8,16 +8,15 @@ import pytest
 
 from tachometry.sim.golden.output import in_unit
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.signals.run import Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.units import PI
 
 REV_PER_UNIT = {"rad/s": 1 / (2 * PI), "rev/s": Fraction(1), "rpm": Fraction(1, 60)}
 
 
-def updates_of(velocity: np.ndarray) -> Updates:
-    none = np.zeros(len(velocity), dtype=np.int64)
-    return Updates(none, velocity, none, none > 0, none > 0, none > 0)
+def updates_of(velocity: np.ndarray) -> Table:
+    return Table(np.zeros(len(velocity), dtype=np.int64), {"velocity": velocity})
 
 
 @pytest.mark.parametrize("unit", REV_PER_UNIT)
@@ -51,16 +50,14 @@ def test_bounds_stay_bounds(unit: str, ppr: int) -> None:
     native = np.random.default_rng(ppr).integers(-spec.bound_limit, spec.bound_limit + 1, 1000)
     native[:2] = spec.bound_limit, -spec.bound_limit
     bounds = {"velocity_lower": native, "velocity_upper": native, "bounds_valid": native > 0}
-    done = in_unit(spec, replace(updates_of(native), more=bounds))
+    done = in_unit(spec, updates_of(native).having(**bounds))
     per_tick = 1 / (spec.encoder.counts_per_rev * spec.timing.tick_seconds * REV_PER_UNIT[unit])
     scale = per_tick * Fraction(2) ** (spec.frac_bits - spec.native_frac_bits)
-    rows = zip(
-        native.tolist(), *(done.more[name].tolist() for name in ("velocity_lower", "velocity_upper")), strict=True
-    )
+    rows = zip(native.tolist(), *(done[name].tolist() for name in ("velocity_lower", "velocity_upper")), strict=True)
     for raw, lower, upper in rows:
         assert 0 <= raw * scale - lower < Fraction(9, 8)
         assert 0 <= upper - raw * scale < Fraction(9, 8)
-    assert done.more["velocity_upper"][0] == -done.more["velocity_lower"][1] == spec.shown_bound_limit
+    assert done["velocity_upper"][0] == -done["velocity_lower"][1] == spec.shown_bound_limit
 
 
 def test_what_does_not_fit_saturates_and_is_flagged() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.methods.s import Model
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.sim.studies.plan import Plan, default_range, dense_speeds, plan_at, standstill_ticks, write_plan
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
@@ -21,20 +21,18 @@ def with_max_ticks(max_ticks: int, *, cancel: bool = True) -> STachometer:
     return replace(SPEC, timing=replace(SPEC.timing, max_ticks=max_ticks), cancel=cancel)
 
 
-def updates_of(spec: STachometer, m_e: NDArray[np.int64]) -> Updates:
+def updates_of(spec: STachometer, m_e: NDArray[np.int64]) -> Table:
     """What the golden model makes of pulse numbers; `clock` is the tick that caused the update."""
-    none = np.zeros(len(m_e), dtype=np.int64)
-    ticks = Ticks(np.arange(len(m_e)), m_e, none, none.astype(np.bool_), none, none)
-    updates = Model(spec).updates(ticks, None, len(m_e) + spec.tick_to_velocity)
-    return replace(updates, clock=updates.clock - spec.tick_to_velocity)
+    ticks = Table(np.arange(len(m_e)), {"pulse_count": m_e})
+    updates = Model(spec).updates(ticks, None, len(m_e) + spec.datapath_latency)
+    return updates.having(clock=updates.clock - spec.datapath_latency)
 
 
-def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Updates, NDArray[np.float64]]:
+def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Table, NDArray[np.float64]]:
     """Settled updates at a speed in counts per tick, to the count, and their errors in the same unit."""
     position = (np.arange(n_ticks + 1) * units.numerator + units.denominator // 3) // units.denominator
     updates = updates_of(spec, np.diff(position))
-    settled = updates.clock > 200  # more than two windows, and two equal pulse numbers
-    updates = Updates(*(row[settled] for row in vars(updates).values() if isinstance(row, np.ndarray)))
+    updates = updates.rows(updates.clock > 200)  # more than two windows, and two equal pulse numbers
     return updates, np.abs(updates.velocity / 2.0**spec.frac_bits - float(units))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tachometry.sim import golden, theory
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.signals.run import Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), frac_bits=20)
@@ -19,7 +19,7 @@ HALF_LSB = 2.0 ** -(SPEC.frac_bits + 1)
 
 def measure(
     units: float, n_ticks: int, spec: STachometer = SPEC, jitter: float = 0.0
-) -> tuple[Updates, NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[Table, NDArray[np.float64], NDArray[np.int64]]:
     """Run a constant speed, given in unit velocities: updates, their velocities in the same unit, pulse numbers."""
     speed = units * spec.unit_velocity
     encoder = VirtualEncoder(spec.encoder.pulses_per_rev, jitter=jitter, start_angle_rad=0.001, seed=1)

@@ -36,15 +36,15 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
         angle = motion(n_ticks + 1, spec.max_count, seed)
         updates = model(spec).updates(ticks_of(angle[1:]), None, 1 << 40)
         at = updates.clock - spec.tick_to_velocity
-        m_s, valid = updates.interval, updates.more["bounds_valid"]
+        m_s, valid = updates.interval, updates["bounds_valid"]
         windows += np.count_nonzero(valid)
         # Twice the travel in LSB · ticks, so that all is whole.
         travel = true_travel(spec, angle, at, m_s) << spec.native_frac_bits
-        above = (2 * updates.more["velocity_upper"] * m_s * SUBCOUNTS - travel)[valid]
-        below = (travel - 2 * updates.more["velocity_lower"] * m_s * SUBCOUNTS)[valid]
+        above = (2 * updates["velocity_upper"] * m_s * SUBCOUNTS - travel)[valid]
+        below = (travel - 2 * updates["velocity_lower"] * m_s * SUBCOUNTS)[valid]
         assert (above >= 0).all(), f"seed {seed}: above the upper bound at {at[valid][above < 0][:1]}"
         assert (below >= 0).all(), f"seed {seed}: below the lower bound at {at[valid][below < 0][:1]}"
-        width = updates.more["velocity_upper"] - updates.more["velocity_lower"]
+        width = updates["velocity_upper"] - updates["velocity_lower"]
         assert (width * m_s < (2 << spec.native_frac_bits) + 2 * m_s).all()
         scale = 2 * SUBCOUNTS << spec.native_frac_bits
         nearest = min(nearest, above.min() / scale, below.min() / scale)

@@ -9,16 +9,16 @@ from support.sequences import rounded
 from support.table1 import every_ts
 
 from tachometry.sim.golden.methods.rairan import Model, orbit
-from tachometry.sim.signals.run import Updates
+from tachometry.sim.signals.run import Table
 from tachometry.sim.theory.rairan import rairan_eq13_max_error
 from tachometry.spec import RairanTachometer, Speed, Timing
 from tachometry.spec.methods.adaptive import parse_target
 
 
-def held(updates: Updates, name: str, n: int, first: int) -> np.ndarray:
+def held(updates: Table, name: str, n: int, first: int) -> np.ndarray:
     """An output of the method at every ts, in time with its cause."""
     row = np.searchsorted(updates.clock, np.arange(n), side="right")
-    return np.append(first, updates.more[name])[row]
+    return np.append(first, updates[name])[row]
 
 
 @pytest.mark.parametrize("dt", [1, 2, 3, 7, 40, 1000])
@@ -54,8 +54,8 @@ def test_it_does_what_is_described_clock_by_clock(dt: int, bound_decay: bool) ->
         updates = golden_updates(spec, step)
         rows, ends = clock_by_clock(step.tolist(), dt, 12, bound_decay=bound_decay)
         assert updates.clock.tolist() == [row.clock for row in rows]
-        assert updates.more["n_ep1"].tolist() == [row.n_ep1 for row in rows]
-        assert updates.more["n_dt1"].tolist() == [row.n_dt1 for row in rows]
+        assert updates["n_ep1"].tolist() == [row.n_ep1 for row in rows]
+        assert updates["n_dt1"].tolist() == [row.n_dt1 for row in rows]
         assert updates.forced.tolist() == [row.forced for row in rows]
         assert updates.stalled.tolist() == [row.stalled for row in rows]
         assert updates.interval.tolist() == [row.n_dt1 for row in rows]
@@ -101,11 +101,11 @@ def test_adaptive_dt_clock_by_clock(dt: int, max_ticks: int, target: str, bound_
             ("n_dt1", [row.n_dt1 for row in rows]),
             ("dt_shift", [row.k for row in rows]),
         ):
-            assert getattr(updates, name, updates.more.get(name)).tolist() == wanted, name
+            assert updates[name].tolist() == wanted, name
         exactly = [row.sign * exact(estimate, row.n_ep1, row.n_dt1) / 2**row.k for row in rows]
         assert updates.velocity.tolist() == [rounded(value, spec.frac_bits) for value in exactly]
         assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
-        assert set(updates.more["dt_shift"].tolist()) == set(range(spec.max_shift + 1))
+        assert set(updates["dt_shift"].tolist()) == set(range(spec.max_shift + 1))
 
 
 def test_orbit_follows_to_the_end() -> None:
@@ -146,11 +146,11 @@ def test_a_steady_count_with_every_end_of_dt_is_the_speed_limit() -> None:
 DT, MAX = 40, 25
 
 
-def seen(step: np.ndarray, **options: object) -> Updates:
+def seen(step: np.ndarray, **options: object) -> Table:
     return golden_updates(make_spec(DT, MAX, **options), step)
 
 
-def at_clock(updates: Updates, clock: int) -> float:
+def at_clock(updates: Table, clock: int) -> float:
     """The held velocity in counts per dt."""
     row = np.searchsorted(updates.clock, clock, side="right")
     return float(np.append(0, updates.velocity)[row]) / 2**16
@@ -224,7 +224,7 @@ def test_situations_with_an_adaptive_dt(target: Fraction) -> None:
     dithers = [(13_000 + 50 * k, 1 - 2 * (k % 2)) for k in range(100)]
     burst = [(22_000 + k, 1) for k in range(10)]
     updates = seen(script(*forward, *back, *dithers, *burst, n=26_000), adaptive=target)
-    shift = updates.more["dt_shift"]
+    shift = updates["dt_shift"]
     turn = int(np.flatnonzero(updates.clock == 6200)[0])
     assert updates.velocity[turn - 1] > 0 == updates.velocity[turn]
     assert shift[turn - 1] > 0 == shift[turn + 1]
@@ -316,8 +316,8 @@ def test_at_a_steady_speed_eq13_is_within_the_target_and_dt_no_longer_than_that_
         updates = golden_updates(spec, step)
         looked = updates.clock <= np.flatnonzero(step)[-1]
         looked[: np.count_nonzero(looked) * 2 // 3] = False
-        (shift,) = set(updates.more["dt_shift"][looked].tolist())
-        n_ep, n_dt = updates.more["n_ep1"][looked], updates.more["n_dt1"][looked]
+        (shift,) = set(updates["dt_shift"][looked].tolist())
+        n_ep, n_dt = updates["n_ep1"][looked], updates["n_dt1"][looked]
         error, true = rairan_eq13_max_error(n_ep / n_dt), float(dt / gap)
         # The estimate keeps to the bound, but for a clock and the rounding.
         slack = 1.1 / (dt << shift) + 2**-17 / true

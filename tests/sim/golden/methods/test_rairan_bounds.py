@@ -29,12 +29,10 @@ def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float,
     within = np.where(rng.random(len(at)) < 0.5, rng.integers(0, FINE, len(at)), rng.choice([0, FINE - 1], len(at)))
     true = np.append(at * FINE - within, (n + 100 * dt) * FINE)
 
-    rows = np.flatnonzero(updates.more["bounds_valid"])
-    in_dt = dt << updates.more["dt_shift"][rows] if options else np.full(len(rows), dt)
-    clock, n_ep, n_dt = updates.clock[rows], updates.more["n_ep1"][rows], updates.more["n_dt1"][rows]
-    forced, lower, upper = (
-        x[rows] for x in (updates.forced, *(updates.more[f"velocity_{k}er"] for k in ("low", "upp")))
-    )
+    rows = np.flatnonzero(updates["bounds_valid"])
+    in_dt = dt << updates["dt_shift"][rows] if options else np.full(len(rows), dt)
+    clock, n_ep, n_dt = updates.clock[rows], updates["n_ep1"][rows], updates["n_dt1"][rows]
+    forced, lower, upper = (x[rows] for x in (updates.forced, *(updates[f"velocity_{k}er"] for k in ("low", "upp"))))
     seen = np.searchsorted(at, clock, side="right") - 1  # the last count by then
     by_count = (step[clock] != 0) & (n_ep == 1) & ~forced
     last = seen - (step[clock] != 0)  # before this clock

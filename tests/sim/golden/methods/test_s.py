@@ -8,7 +8,7 @@ from support.sequences import MAX_TICKS, PAPER, rounded
 
 from tachometry.sim.golden.methods.s import Model
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.signals.run import Ticks
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, STachometer, Timing
 
 
@@ -17,17 +17,17 @@ def model(max_ticks: int, *, cancel: bool = True, frac_bits: int = 16) -> Model:
     return Model(STachometer(encoder=Encoder(25), timing=timing, frac_bits=frac_bits, cancel=cancel))
 
 
-def as_ticks(m_e: list[int]) -> Ticks:
+def as_ticks(m_e: list[int]) -> Table:
     clock = 16 * np.arange(len(m_e), dtype=np.int64)
     numbers = np.array(m_e, dtype=np.int64)
-    return Ticks(clock, numbers, np.cumsum(numbers), np.zeros(len(m_e), dtype=bool), *np.zeros((2, len(m_e)), np.int64))
+    return Table(clock, {"pulse_count": numbers})
 
 
 def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
     """(tick, m_s, forced, stalled, raw velocity) of every update."""
     s_model = model(max_ticks, **options)
     found = s_model.updates(as_ticks(m_e), None, 1 << 40)
-    latency = s_model._spec.tick_to_velocity
+    latency = s_model._spec.datapath_latency
     return [
         (int(clock - latency) // 16, int(m_s), bool(forced), bool(stalled), int(raw))
         for clock, m_s, forced, stalled, raw in zip(

@@ -10,7 +10,7 @@ from support.mutant import caught, mutant
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods import timed
-from tachometry.sim.signals.run import Ticks, Updates
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTTachometer, Timing, TTachometer
 from tachometry.spec.methods.timed import TimedTachometer
 from tachometry.spec.tachometer import BOUNDS
@@ -35,11 +35,11 @@ def edges(n: int, seed: int) -> tuple[Ints, Ints]:
     return np.cumsum(np.ceil(gaps).astype(np.int64)) + 10 * INSTANTS, np.cumprod(turns)
 
 
-def check_silence(spec: TimedTachometer, updates: Updates) -> None:
+def check_silence(spec: TimedTachometer, updates: Table) -> None:
     """Without a count the shaft may have come within a hair of the next edge, and over none."""
-    forced = updates.forced & updates.more["bounds_valid"]
+    forced = updates.forced & updates["bounds_valid"]
     lasted = (updates.interval * spec.interval_unit_cycles)[forced]
-    lower, upper = (updates.more[name][forced] * lasted for name in BOUNDS)
+    lower, upper = (updates[name][forced] * lasted for name in BOUNDS)
     one, velocity = TICK << spec.native_frac_bits, updates.velocity[forced]
     assert (velocity == 0).sum() > 5
     assert ((upper >= one) & (upper < one + lasted))[velocity >= 0].all()
@@ -60,12 +60,12 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     tick = np.arange(TICK - 1, n_clocks, TICK)
     through = np.append(0, np.cumsum(step))
     m_e = np.diff(through[np.searchsorted(clock, tick, side="right")], prepend=0)
-    off = np.zeros(len(tick), np.int64)
-    ticks = Ticks(tick + spec.tick_latency, m_e, off, off > 0, off, off)
+    ticks = Table(tick + spec.tick_latency, {"pulse_count": m_e})
     updates = model(spec).updates(ticks, Steps(clock, step, none, none, none), n_clocks)
 
     # The edge that each count is: on the lattice the last in the tick that leads to where the tick ends.
-    end = updates.clock - spec.tick_to_velocity - spec.tick_latency
+    updates = updates.rows(updates.clock < n_clocks)
+    end = updates.clock - spec.datapath_latency - spec.tick_latency
     if spec.on_lattice:
         period = np.searchsorted(tick, clock)
         leads = (step == np.sign(m_e)[period]) & (through[1:] == through[np.searchsorted(clock, tick, "right")][period])
@@ -77,19 +77,19 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     else:
         last, first = (np.searchsorted(clock, at) for at in (end, end - updates.interval))
     check_silence(spec, updates)
-    chosen = ~updates.forced & updates.more["bounds_valid"]
+    chosen = ~updates.forced & updates["bounds_valid"]
     last, first = last[chosen], first[chosen]
     # Where the shaft is when it passes: half a count before or after the counts on its sides.
     way = through[last + 1] - through[first + 1] - (step[last] - step[first]) // 2
     scale = INSTANTS * TICK << spec.native_frac_bits
     lasted = time[last] - time[first]
-    lower, upper = updates.more["velocity_lower"][chosen], updates.more["velocity_upper"][chosen]
+    lower, upper = updates["velocity_lower"][chosen], updates["velocity_upper"][chosen]
     above, below = upper == spec.bound_limit, lower == -spec.bound_limit  # there is none
     assert (below | (lower * lasted <= way * scale)).all()
     assert (above | (upper * lasted >= way * scale)).all()
     if not spec.saturates:
-        assert (updates.more["velocity_lower"] <= updates.velocity)[updates.more["bounds_valid"]].all()
-        assert (updates.more["velocity_upper"] >= updates.velocity)[updates.more["bounds_valid"]].all()
+        assert (updates["velocity_lower"] <= updates.velocity)[updates["bounds_valid"]].all()
+        assert (updates["velocity_upper"] >= updates.velocity)[updates["bounds_valid"]].all()
     finite = ~above & ~below & (way != 0)
     exact = way[finite] * scale / lasted[finite]
     lower, upper = lower[finite], upper[finite]
