@@ -195,10 +195,11 @@ def _time(seconds: float) -> str:
 
 def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Recording], Curve]]:
     """What is to be compared, each from what the encoder gave."""
+    from tachometry.sim.signals.recording import PinTrace
     from tachometry.sim.studies.compare import core_curve, rival_curve
 
     def core(name: str, spec: TachometerSpec) -> Callable[[Recording], Curve]:
-        return lambda recording: core_curve(name, spec, recording.place(spec.timing.clock_hz))
+        return lambda recording: core_curve(name, spec, PinTrace.of(recording, spec))
 
     def rival(name: str) -> Callable[[Recording], Curve]:
         return lambda recording: rival_curve(name, recording, encoder.counts_per_rev, encoder.decoding)

@@ -117,30 +117,22 @@ def _run_and_report(
 ) -> int:
     """Run hardware and golden model, write what is wanted, print the summary; the exit status."""
     from tachometry.cli.reports.run import clocks_progress, interrupted, print_summary
-    from tachometry.sim import golden
-    from tachometry.sim.engines.engine import Interrupted
     from tachometry.sim.engines.pick import pick
-    from tachometry.sim.signals.run import compare
+    from tachometry.sim.signals.recording import PinTrace
+    from tachometry.sim.studies.lockstep import lockstep
 
-    trace = recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
+    trace = PinTrace.of(recording, spec)
     _require_a_tick(spec, source, trace)
     shown, chosen, wanted = window(spec, trace.n_clocks), pick(engine), trace.n_clocks
     with outputs:
-        expected = golden.run(spec, trace)
-        try:
-            with clocks_progress(trace.n_clocks) as progress:
-                actual = chosen.run(spec, trace, vcd=outputs.get("--vcd"), window=shown, progress=progress)
-        except Interrupted as early:
-            actual = early.run
-            if actual.n_clocks < _least(spec):
-                raise
-            trace = trace.until(actual.n_clocks)
-            expected = golden.run(spec, trace)
-        _write(spec, trace, actual, truth, outputs)
-    n_mismatches, first = compare(expected, actual)
+        with clocks_progress(trace.n_clocks) as progress:
+            vcd, fewest = outputs.get("--vcd"), _least(spec)
+            found = lockstep(spec, trace, chosen, vcd=vcd, window=shown, progress=progress, fewest=fewest)
+        _write(spec, found.trace, found.actual, truth, outputs)
+    actual = found.actual
     missing = " (there is no C++ compiler)" if (engine, chosen.name) == ("auto", "pysim") else ""
-    print_summary(spec, actual, truth, n_mismatches, first, chosen.name + missing)
-    if n_mismatches:
+    print_summary(spec, actual, truth, found.n_mismatches, found.first, chosen.name + missing)
+    if found.n_mismatches:
         return 1
     return interrupted(actual.n_clocks, wanted) if actual.n_clocks < wanted else 0
 

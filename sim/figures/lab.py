@@ -6,7 +6,9 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Motion, Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.engines.pysim import PySim
-from tachometry.sim.signals.run import Mismatch, Run, compare
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import TachometerSpec
 
 
@@ -61,22 +63,19 @@ class Lab:
 
     def golden(self, spec: TachometerSpec, encoding: Encoding) -> Run:
         """What the core shows, by its golden model."""
-        return golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
+        return golden.run(spec, PinTrace.of(encoding.recording, spec))
 
     def lockstep(self, spec: TachometerSpec, encoding: Encoding, begin: float = 0.0, end: float = 1.0) -> Run:
         """The same, and the hardware in Amaranth's simulator held against it.
 
         It takes the figure from the share `begin` of its work to the share `end`.
         """
-        trace = encoding.recording.place(spec.timing.clock_hz)
-        expected = golden.run(spec, trace)
-        if self._hdl:
-            report = self._progress
-            progress = None if report is None else (lambda done: report(begin + (end - begin) * done / trace.n_clocks))
-            self._note(spec, *compare(expected, PySim().run(spec, trace, progress=progress)))
-            self.locked += trace.n_clocks
-        return expected
-
-    def _note(self, spec: TachometerSpec, count: int, first: list[Mismatch]) -> None:
-        self.mismatches += count
-        self.first += [f"{spec.method} method: {mismatch}" for mismatch in first]
+        if not self._hdl:
+            return self.golden(spec, encoding)
+        trace, report = PinTrace.of(encoding.recording, spec), self._progress
+        progress = None if report is None else (lambda done: report(begin + (end - begin) * done / trace.n_clocks))
+        found = lockstep(spec, trace, PySim(), progress=progress)
+        self.mismatches += found.n_mismatches
+        self.first += [f"{spec.method} method: {mismatch}" for mismatch in found.first]
+        self.locked += trace.n_clocks
+        return found.expected

@@ -151,6 +151,12 @@ class PinTrace(_Lines):
         if self.clock[0] != 0 or np.any(np.diff(self.clock) <= 0):
             raise ValueError("clocks of a pin trace must begin at 0 and must increase")
 
+    @classmethod
+    def of(cls, recording: Recording, spec: TachometerSpec) -> "PinTrace":
+        """What the pins of a core see of a recording; with nominal external ticks if the core takes them and there are
+        none."""
+        return recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
+
     def until(self, n_clocks: int) -> "PinTrace":
         """The first clocks of the trace."""
         inside = self.clock < n_clocks

@@ -4,6 +4,7 @@ import csv
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import chain
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -106,10 +107,11 @@ def write_events(path: Path, run: Run) -> None:
     for event, table in tables.items():
         cells = [table[name].tolist() if name in table.columns else [""] * len(table) for name in columns]
         rows += [(clock, event, *values) for clock, *values in zip(table.clock.tolist(), *cells, strict=True)]
+    rows.sort(key=itemgetter(0))
     with path.open("w", encoding="ascii", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["clock", "event", *columns])
-        writer.writerows(sorted(rows, key=lambda row: row[0]))
+        writer.writerows(rows)
 
 
 def write_csv(path: Path, header: str, columns: Iterable[NDArray[np.generic]]) -> None:

@@ -92,7 +92,7 @@ class Score:
 
 def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
     """What a core shows, by its golden model, which the hardware equals bit for bit."""
-    return run_curve(name, spec, golden.run(spec, trace.with_nominal_ticks(spec)))
+    return run_curve(name, spec, golden.run(spec, trace))
 
 
 def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:

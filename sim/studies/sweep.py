@@ -17,8 +17,9 @@ from tachometry.sim.encoder.motion import Motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.build import digest
 from tachometry.sim.engines.pick import pick
-from tachometry.sim.signals.run import compare
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.compare import common_instants, run_curve, score
+from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import TachometerSpec
 from tachometry.spec.option import options_of
 from tachometry.spec.units import format_time
@@ -186,11 +187,11 @@ def run_point(point: Point) -> Row:
     """
     spec, encoding = point.spec, point.encoder.record(point.motion)
     duration = encoding.recording.duration
-    trace = encoding.recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
+    trace = PinTrace.of(encoding.recording, spec)
     run = golden.run(spec, trace)
     mismatches = None
     if point.engine is not None:
-        mismatches, _ = compare(run, pick(point.engine).run(spec, trace))
+        mismatches = lockstep(spec, trace, pick(point.engine), expected=run).n_mismatches
     curve = run_curve(point.method, spec, run)
     instants = np.empty(0)
     if len(run.updates.clock):

@@ -11,7 +11,8 @@ from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import Mismatch, Run, compare
+from tachometry.sim.signals.run import Mismatch, Run
+from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import TachometerSpec
 
 _EDGES, _MOST_EDGES = 300, 50_000  # at a speed, of a motion
@@ -106,15 +107,14 @@ def verify(spec: TachometerSpec, engines: Sequence[str], n_clocks: int, seed: in
 
 def _add(outcome: Outcome, spec: TachometerSpec, engine: Engine, seed: int, trace: PinTrace, expected: Run) -> None:
     begun = time.perf_counter()
-    actual = engine.run(spec, trace)
+    found = lockstep(spec, trace, engine, expected=expected)
     outcome.seconds += time.perf_counter() - begun
-    count, first = compare(expected, actual)
     outcome.n_motions += 1
     outcome.n_clocks += trace.n_clocks
-    outcome.n_ticks += len(actual.ticks.clock)
-    outcome.n_updates += len(actual.updates.clock)
-    outcome.n_mismatches += count
-    if count and outcome.failure is None:
+    outcome.n_ticks += len(found.actual.ticks)
+    outcome.n_updates += len(found.actual.updates)
+    outcome.n_mismatches += found.n_mismatches
+    if found.n_mismatches and outcome.failure is None:
         # A capture holds what comes before its end; the outputs come a little later.
-        end = min(mismatch.clock for mismatch in first) + spec.longest_tick + spec.tick_latency
-        outcome.failure = Failure(seed, first, trace.until(min(end, trace.n_clocks)))
+        end = min(mismatch.clock for mismatch in found.first) + spec.longest_tick + spec.tick_latency
+        outcome.failure = Failure(seed, found.first, trace.until(min(end, trace.n_clocks)))

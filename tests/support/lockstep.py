@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import Run, compare
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.lockstep import lockstep as side_by_side
 from tachometry.spec import (
     METHODS,
     Encoder,
@@ -325,8 +325,9 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
 def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter[str]]:
     """Run one random case; what went wrong, and what it covered."""
     spec, encoding, trace = random_case(seed, method)
-    expected, actual = golden.run(spec, trace), engine.run(spec, trace)
-    problems = [f"{method}, seed {seed}: {mismatch}" for mismatch in compare(expected, actual)[1]]
+    found = side_by_side(spec, trace, engine)
+    actual = found.actual
+    problems = [f"{method}, seed {seed}: {mismatch}" for mismatch in found.first]
     timed = isinstance(spec, TimedTachometer)
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4

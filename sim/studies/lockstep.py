@@ -1,0 +1,76 @@
+"""Hardware and golden model on the same pins: the one place where they are run side by side and compared."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tachometry.sim import golden
+from tachometry.sim.engines.engine import Engine, Interrupted
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Mismatch, Run, compare
+from tachometry.spec import TachometerSpec
+
+
+@dataclass(frozen=True)
+class Lockstep:
+    """What came of a trace.
+
+    Parameters
+    ----------
+    trace : PinTrace
+        What was played; after Ctrl-C shorter than what was asked for.
+    expected, actual : Run
+        Of the golden model and of the engine.
+    n_mismatches : int
+        Values that differ.
+    first : list of Mismatch
+        The first of them in each signal that differs.
+    """
+
+    trace: PinTrace
+    expected: Run
+    actual: Run
+    n_mismatches: int
+    first: list[Mismatch]
+
+
+def lockstep(
+    spec: TachometerSpec,
+    trace: PinTrace,
+    engine: Engine,
+    *,
+    expected: Run | None = None,
+    vcd: Path | None = None,
+    window: tuple[int, int] | None = None,
+    progress: Callable[[int], None] | None = None,
+    fewest: int | None = None,
+) -> Lockstep:
+    """Run a trace on the golden model and on an engine, and compare every bit of every row.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    trace : PinTrace
+    engine : Engine
+    expected : Run or None
+        What the golden model makes of the trace, if that is known already.
+    vcd, window, progress
+        See `Engine.run`.
+    fewest : int or None
+        Ctrl-C after this many clocks gives what has been done by then; None: it always ends the run.
+
+    Raises
+    ------
+    Interrupted
+        At Ctrl-C before that.
+    """
+    if expected is None:
+        expected = golden.run(spec, trace)
+    try:
+        actual = engine.run(spec, trace, vcd=vcd, window=window, progress=progress)
+    except Interrupted as early:
+        if fewest is None or early.run.n_clocks < fewest:
+            raise
+        actual, trace = early.run, trace.until(early.run.n_clocks)
+        expected = golden.run(spec, trace)
+    return Lockstep(trace, expected, actual, *compare(expected, actual))
