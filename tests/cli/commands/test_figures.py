@@ -55,7 +55,7 @@ def test_a_mismatch_of_the_hardware_is_told(
     monkeypatch.setattr(m_method, "round_quotient", lambda *args: true_quotient(*args) + 1)
     assert run("--only", "tsuji12", "-o", tmp_path) == 1
     told = capsys.readouterr().out
-    assert "tsuji12: first mismatch in m method: updates.velocity[0]: expected 1, got 0" in told
+    assert "tsuji12: first mismatch in m method: velocity_valid.velocity[0]: expected 1, got 0" in told
     assert " mismatches in " in told
 
 
