@@ -161,7 +161,7 @@ class Results:
         path = self._path.with_name(f".{self._path.name}.new")
         with self._writing(path):
             self._journal = path.open("w", encoding="ascii")
-            self._journal.write(f"{code_digest()}\n")
+            self._journal.write(f"{_made_by()}\n")
             self._journal.flush()
 
     def _close_journal(self) -> None:
@@ -199,7 +199,12 @@ class Results:
 
 def _schema(values: Iterable[str]) -> pa.Schema:
     columns = [(name, _KINDS[kind]) for name, (kind, _) in COLUMNS.items()]
-    return pa.schema([*columns, *((name, pa.float64()) for name in values)], metadata={_MADE_BY: code_digest()})
+    return pa.schema([*columns, *((name, pa.float64()) for name in values)], metadata={_MADE_BY: _made_by()})
+
+
+def _made_by() -> str:
+    """What rows here are made by: the code of all of them, and that of those with an engine."""
+    return f"{code_digest()} {code_digest(hardware=True)}"
 
 
 def _read(path: Path) -> pa.Table:
@@ -210,20 +215,22 @@ def _read(path: Path) -> pa.Table:
     made_by = (table.schema.metadata or {}).get(_MADE_BY.encode())
     if made_by is None:
         raise ValueError(f"results must be a Parquet file of a sweep, which {path} is not")
-    _check_code(path, made_by.decode())
+    _check_code(path, made_by.decode(), table["engine"].to_pylist() if "engine" in table.column_names else [])
     return table
 
 
 def _read_journal(path: Path) -> list[Row]:
     """Rows of a journal after its first line, the code; the last line may not be whole, even if it is the first."""
     whole = path.read_text(encoding="ascii").split("\n")[:-1]
-    if lines := whole[1:]:
-        _check_code(path, whole[0])
-    return [json.loads(line) for line in lines]
+    rows: list[Row] = [json.loads(line) for line in whole[1:]]
+    if rows:
+        _check_code(path, whole[0], [row["engine"] for row in rows])
+    return rows
 
 
-def _check_code(path: Path, made_by: str) -> None:
-    if made_by != code_digest():
+def _check_code(path: Path, made_by: str, engines: Sequence[str | None]) -> None:
+    parts = 2 if any(engines) else 1
+    if made_by.split()[:parts] != _made_by().split()[:parts]:
         raise ValueError(
             f"results must be of this version of tachometry, and {path} is of another: remove it, or take another file"
         )
