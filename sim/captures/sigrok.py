@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, replacing
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, writing
 from tachometry.sim.signals.recording import PinTrace, Recording
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
@@ -101,7 +101,7 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
     if trace.n_clocks < 1:
         raise ValueError(f"n_clocks must be at least 1, not {trace.n_clocks}")
     level = trace.level
-    with replacing(Path(path)) as file, zipfile.ZipFile(file, "w") as archive:
+    with writing(Path(path)) as beside, zipfile.ZipFile(beside, "w") as archive:
         archive.writestr(_member("version"), "2")
         archive.writestr(_member("metadata"), _metadata(clock_hz, [_CHANNELS[name] for name in trace.lines]))
         for number, first in enumerate(range(0, trace.n_clocks, _chunk), 1):

@@ -1,10 +1,10 @@
 """Results of a sweep on disk: one Parquet file, whole at any time, and beside it the rows that are not in it yet."""
 
 import json
-import os
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 from typing import IO, Any, Self
 
@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
+from tachometry.sim.files import replacing
 from tachometry.sim.studies.sweep import COLUMNS, Row, code_digest
 
 _KINDS = {"text": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
@@ -70,6 +71,8 @@ class Results:
             raise ValueError(f"results must be of one sweep at a time: {self._path} is in use") from None
         self._lock = lock
         try:
+            for torn in self._path.parent.glob(f".{escape(self._path.name)}.*.part"):  # by one that was killed
+                torn.unlink()
             if self._path.exists():
                 self._table = _joined([self._table, _read(self._path)])
                 self._n_kept = len(self._table)
@@ -141,17 +144,8 @@ class Results:
         place = {point: k for k, point in enumerate(self._points)}
         order = [place.get(point, len(place)) for point in self._table["point"].to_pylist()]
         table = self._table.take(pc.array_sort_indices(pa.array(order, pa.int64())))
-        beside = self._path.with_name(f".{self._path.name}.part")
-        try:
-            with self._writing(self._path):
-                with beside.open("wb") as file:
-                    pq.write_table(table, file)
-                    file.flush()
-                    os.fsync(file.fileno())
-                beside.replace(self._path)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+        with self._writing(self._path), replacing(self._path) as beside, beside.open("wb") as file:
+            pq.write_table(table, file)
         self._n_kept = len(table)
 
     def _begin_journal(self) -> None:

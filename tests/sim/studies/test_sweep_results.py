@@ -226,3 +226,11 @@ def test_nothing_is_kept_without_a_file() -> None:
         results.add(row("b", method="s"))
         assert results.missing == ["a"]
         assert results.columns("method") == {"method": ["s"]}
+
+
+def test_what_a_killed_sweep_was_writing_is_removed(tmp_path: Path) -> None:
+    path = tmp_path / "r.parquet"
+    (tmp_path / ".r.parquet.123.part").write_bytes(b"PAR1")
+    with Results(path, ["a"]) as results:
+        results.add(row("a"))
+    assert [file.name for file in tmp_path.iterdir()] == ["r.parquet"]
