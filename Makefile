@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test verify formal mutate upset bench size lint clean
+.PHONY: help venv demo figures compare icarus test verify formal mutate upset bench size api lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -34,6 +34,10 @@ $(VENV)/.size: $(VENV)/.run
 
 $(VENV)/.formal: $(VENV)/.test
 	$(BIN)/pip install -q --disable-pip-version-check -e '.[formal]'
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.run
+	$(BIN)/pip install -q --disable-pip-version-check -e '.[docs]'
 	@touch $@
 
 venv: $(VENV)/.test ## the environment in .venv, with all that tests need
@@ -75,6 +79,10 @@ compare: $(VENV)/.run ## all methods and what others use in several situations, 
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
 	$(BIN)/python bench/size.py -o docs/size.md
+
+api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
+	$(BIN)/pdoc --docformat numpy -o build/api $(addprefix tachometry.,$(LAYERS)) \
+	  $(addprefix tachometry.,$(subst /,.,$(filter-out %/py %/export,$(basename $(wildcard spec/[a-z]* hdl/[a-z]*)))))
 
 lint: $(VENV)/.test ## ruff and mypy
 	$(BIN)/ruff check .

@@ -11,7 +11,7 @@ import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
-from pages import write
+from pages import markdown, write
 
 from tachometry.cli.main import main as tachometry
 
@@ -152,11 +152,8 @@ def table(found: list[dict[str, str]]) -> str:
         return f"{scale * float(row[name]):.3g}" if row[name] else ""
 
     heads = ("method", "updates/s", "longest T_m (ms)", "RMS error (rad/s)", "greatest (rad/s)", "delay (ms)")
-    lines = [heads, ("---",) + ("---:",) * (len(heads) - 1)]
-    for row in found:
-        numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms", 1), ("max", 1), ("delay", 1e3))
-        lines.append((row["name"], *(cell(row, name, scale) for name, scale in numbers)))
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms", 1), ("max", 1), ("delay", 1e3))
+    return markdown(heads, [(row["name"], *(cell(row, name, scale) for name, scale in numbers)) for row in found])
 
 
 def section(situation: Situation) -> str:

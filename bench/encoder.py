@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pages import write
+from pages import markdown, write
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import Bounce
@@ -125,8 +125,7 @@ def table() -> str:
         f"velocity error, RMS (mean), at {FAST} counts per tick",
         f"and at {SLOW}",
     ]
-    rows = [head, ["---"] * len(head), *map(measure, EXAMPLES)]
-    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+    return markdown(head, list(map(measure, EXAMPLES)))
 
 
 def staircase(time: FloatArray, value: NDArray[Any], end: float, bottom: float, height: float, colour: str) -> str:

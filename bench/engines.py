@@ -17,8 +17,9 @@ import numpy as np
 from amaranth.back import cxxrtl as amaranth_cxxrtl
 from amaranth.back import rtlil
 from golden import BEGIN, MOTION, part_of
-from pages import markdown, show, write_from
+from pages import markdown, write_from
 
+from tachometry.cli.reports.table import print_table
 from tachometry.hdl import Tachometer
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
@@ -45,11 +46,9 @@ on both levels of the clock, adds up the outputs at the strobes, and does nothin
 golden model, bit by bit. Clocks per second, in processor time:
 
 {speeds}
-
 All ten seconds, {clocks:,} clocks, by cxxrtl, compared with the golden model in every bit of every update:
 
 {whole}
-
 A golden model's time goes with edges, ticks and updates, not with clocks. It is a hundredth and less where updates are
 made of whole ticks; with T, M/T and Rairán's method every count is looked at, most of them make an update, and a chain
 of windows, each beginning where one before ended, has to be followed.
@@ -57,7 +56,6 @@ of windows, each beginning where one before ended, has to be followed.
 What makes it fast, each with what stands above it, on the S method:
 
 {steps}
-
 - Debug information keeps every value of every clock in memory; without it the compiler keeps what it needs.
 - `step()` on both levels of the clock settles the core twice; all flip-flops take the rising edge, so that one
   evaluation does, with the level and the reset as constants.
@@ -237,11 +235,14 @@ def main() -> None:
     common = {"encoder": Encoder(500), "timing": Timing.parse("48MHz", "20us", "10ms")}
     cores = {name: method(**common) for name, method in METHODS.items()}
     speeds = [speed(name, spec, trace).cells for name, spec in cores.items()]
-    show(SPEED_COLUMNS, speeds)
+    print_table(SPEED_COLUMNS, speeds)
+    print()
     entire = [whole(name, spec, trace) for name, spec in cores.items()]
-    show(WHOLE_COLUMNS, entire)
+    print_table(WHOLE_COLUMNS, entire)
+    print()
     loop = steps(cores["s"], trace)
-    show(STEP_COLUMNS, loop)
+    print_table(STEP_COLUMNS, loop)
+    print()
     if output is None:
         return
     part = _PAGE.format(

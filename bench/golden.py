@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from pages import markdown, show, write
+from pages import markdown, write
 from rich.console import Console
 from rich.progress import track
 
+from tachometry.cli.reports.table import print_table
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -39,7 +40,6 @@ the hardware clock by clock: `make bench` measures both in one run and writes th
 {edges:,} edges), the simulator {simulated:,} clocks of it, in which both agree on every bit.
 
 {table}
-
 Measured with {python} on {machine}, {cores} cores. A golden model takes time for edges, ticks and updates, none for
 clocks; the low-pass filter is a recursion, which it follows update by update. A tick is 960 clocks here.
 """
@@ -126,7 +126,8 @@ def main() -> None:
         measure(name, spec, trace) for name, spec in track(cores().items(), "Cores", console=Console(stderr=True))
     ]
     rows = [result.cells for result in results]
-    show(COLUMNS, rows)
+    print_table(COLUMNS, rows)
+    print()
     if output is None:
         return
     page = HEAD.format(

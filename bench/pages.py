@@ -1,36 +1,22 @@
-"""Tables of the benchmarks, on the terminal and in the pages of the docs that they write."""
+"""Pages of the docs that the benchmarks write, and their tables."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
+from tachometry.sim.files import replacing
 
 
-def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table for a page."""
-    lines = [columns, ["---", *["---:"] * (len(columns) - 1)], *rows]
-    return "\n".join(f"| {' | '.join(row)} |" for row in lines)
-
-
-def show(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """The same on the terminal."""
-    table = Table(box=None, header_style="")
-    for column in columns:
-        table.add_column(column, justify="left" if column == columns[0] else "right")
-    for row in rows:
-        table.add_row(*row)
-    console = Console()
-    console.print(table)
-    console.print()
+def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
+    """A table for a page, numbers to the right; `left` are the columns of words."""
+    rules = ["---" if column in left else "---:" for column in range(len(columns))]
+    return "".join(f"| {' | '.join(row)} |\n" for row in (columns, rules, *rows))
 
 
 def write(page: Path, text: str) -> None:
     """Replace a page at once: a reader sees the old or the new one."""
     page.parent.mkdir(parents=True, exist_ok=True)
-    beside = page.with_name(f".{page.name}.new")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(page)
+    with replacing(page) as beside:
+        beside.write_text(text, encoding="utf-8")
 
 
 def write_from(page: Path, heading: str, part: str) -> None:

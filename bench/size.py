@@ -7,7 +7,6 @@ Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
 """
 
 import argparse
-import json
 import os
 import sys
 from collections import Counter
@@ -18,8 +17,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeVar
 
-import rich.table
-from pages import write
+from pages import markdown, write
 from rich.console import Console
 from rich.progress import track
 
@@ -28,8 +26,8 @@ from tachometry.sim.studies.size import (
     CORE,
     TARGETS,
     Measurement,
+    made,
     measure_core,
-    run_cached,
     split_name,
     synthesis,
     versions,
@@ -47,7 +45,6 @@ from tachometry.spec import (
 )
 
 ROOT = Path(__file__).resolve().parent.parent
-BUILD = ROOT / "build" / "size"
 PAGE = ROOT / "docs" / "size.md"
 Item = TypeVar("Item")
 
@@ -161,12 +158,13 @@ CONFIGURATIONS = (
 )
 
 COSTS = (("ECP5", "COMB"), ("ECP5", "FF"), ("ECP5", "DP16KD"), ("HX8K", "LC"), ("HX8K", "RAM"), ("ECP5", "latency"))
+WORDS = ("configuration", "what", "what limits Fmax", "option", "box", "core", "gives", "target", "figure", "verdict")
 UNITS = {"Fmax": "MHz", "latency": "clocks"}
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table for the page and for the terminal."""
+    """A table with a title."""
 
     title: str
     header: Sequence[str]
@@ -174,15 +172,8 @@ class Table:
 
     def markdown(self) -> str:
         """A section in Markdown."""
-        lines = [self.header, ["---"] * len(self.header), *self.rows]
-        return f"## {self.title}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-    def rich(self) -> rich.table.Table:
-        """For a terminal."""
-        table = rich.table.Table(*self.header, title=self.title, title_justify="left")
-        for row in self.rows:
-            table.add_row(*row)
-        return table
+        words = [column for column, head in enumerate(self.header) if head in WORDS]
+        return f"## {self.title}\n\n{markdown(self.header, self.rows, words)}"
 
 
 PEERS = Table(
@@ -232,8 +223,7 @@ Results = Mapping[tuple[str, str], Measurement]
 
 def measure(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Measurement:
     """Synthesise, pack and route a core for a target."""
-    folder = BUILD / configuration.name / target_name
-    return measure_core(configuration.spec, TARGETS[target_name], verilog, folder, tools)
+    return measure_core(configuration.spec, TARGETS[target_name], verilog, tools)
 
 
 def box_name(cell: str) -> str:
@@ -251,13 +241,12 @@ def boxes(configuration: Configuration, target_name: str, verilog: str, tools: M
     Flattened, a cell bears the name of a net that may be another box's. The price is a total that differs somewhat.
     """
     target = TARGETS[target_name]
-    folder = BUILD / configuration.name / target_name / "boxes"
     commands = [
         synthesis("core.v", f"{target.synth} -noflatten -top {CORE}; flatten", "core"),
         [*target.route, "-q", "--json", "core.json", "--pack-only", "--write", "packed.json"],
     ]
-    run_cached(folder, {"core.v": verilog}, commands, tools)
-    (module,) = json.loads((folder / "packed.json").read_text())["modules"].values()
+    (packed,) = made({"core.v": verilog}, commands, ["packed.json"], tools)
+    (module,) = packed["modules"].values()
     return boxes_table(f"{configuration.name} on {target_name}, by box", module["cells"], target.cells)
 
 
@@ -360,7 +349,6 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, print, and write the page; 1 if a bar is missed."""
-    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
     tools = versions()
     chosen = [found for found in CONFIGURATIONS if options.only is None or found.name in options.only]
     work = [
@@ -372,10 +360,10 @@ def run(options: argparse.Namespace) -> int:
     results = {(found.name, target): result for (found, target, *_), result in zip(work, done, strict=True)}
     measured = tables(results)
     for table in [*measured, *split]:
-        console.print(table.rich())
+        print(table.markdown())
     if options.output:
         write(options.output, page(measured, tools))
-        console.print(f"written: {options.output}")
+        print(f"written: {options.output}")
     return int(any("missed" in row for row in bar_table(results).rows))
 
 

@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from pages import markdown, show, write_from
+from pages import markdown, write_from
 
 from tachometry.cli.commands.sweep import sweep
 from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
+from tachometry.cli.reports.table import print_table
 from tachometry.cli.sweeping.points import points_of
 from tachometry.cli.sweeping.settings import of_file
 from tachometry.sim.studies import cluster
@@ -24,8 +25,7 @@ The points of [sweep.toml](sweep.toml), 200 ms each by the golden model: one aft
 processes of `tachometry sweep`. The start is until workers are there, each of which then imports numpy; it is not in
 points/s, but all is in processor time, that of the scheduler too.
 
-{table}
-"""
+{table}"""
 
 
 def all_points() -> dict[str, Point]:
@@ -79,7 +79,8 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/bench.md")
     output = parser.parse_args().output
     rows = table(sorted({1, os.cpu_count() or 1}))
-    show(COLUMNS, rows)
+    print_table(COLUMNS, rows)
+    print()
     if output is not None:
         write_from(output, _HEADING, _PAGE.format(table=markdown(COLUMNS, rows)))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -171,14 +170,11 @@ def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
 
     specs = {name: spec for name, spec in named.specs.items() if spec is not None}
     sizes = {}
-    with (
-        TemporaryDirectory(prefix="tachometry-") as folder,
-        progress_bar("measuring sizes", len(specs), MofNCompleteColumn(), TextColumn("cores")) as report,
-    ):
+    with progress_bar("measuring sizes", len(specs), MofNCompleteColumn(), TextColumn("cores")) as report:
         for done, (name, spec) in enumerate(specs.items(), 1):
             verilog = export(spec, CORE)[f"{CORE}.v"]
             try:
-                sizes[name] = measure_core(spec, TARGETS["ECP5"], verilog, Path(folder) / str(done), tools)
+                sizes[name] = measure_core(spec, TARGETS["ECP5"], verilog, tools)
             except RuntimeError as error:
                 raise click.ClickException(str(error)) from error
             if report is not None:

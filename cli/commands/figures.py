@@ -12,7 +12,8 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
-    from tachometry.sim.figures import Entry, Lab, Result
+    from tachometry.sim.figures.lab import Lab
+    from tachometry.sim.figures.result import Entry, Result
 
 _FIGURES = "Figures"
 _KINDS = ("svg", "png", "csv")
@@ -54,8 +55,8 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """
     from tachometry.cli.reports.run import progress_bar
-    from tachometry.sim.figures import Lab
     from tachometry.sim.figures.drawing import write_claims, write_data, write_figure
+    from tachometry.sim.figures.lab import Lab
 
     chosen = _chosen(only)
     names = [f"{entry.name}.{kind}" for entry in chosen for kind in _KINDS] + [_SUMMARY]

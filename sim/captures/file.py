@@ -1,11 +1,11 @@
 """What every kind of capture shares: its error, the choice of channels, and files written whole or not at all."""
 
 import itertools
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+
+from tachometry.sim.files import replacing
 
 Channel = str | int
 NONE: Mapping[str, Channel] = {}
@@ -27,18 +27,13 @@ def reading(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that takes the place of `path` when all is written, and leaves nothing behind after an error."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+def writing(path: Path) -> Iterator[Path]:
+    """Give a path to write to, which takes the place of `path` when all is written (see `sim.files.replacing`)."""
     try:
-        with beside.open("wb") as file:
-            yield file
-        beside.replace(path)
-    except BaseException as error:
-        beside.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise CaptureError(f"cannot write {path}: {error.strerror or error}") from error
-        raise
+        with replacing(path) as beside:
+            yield beside
+    except OSError as error:
+        raise CaptureError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 def choose_channels(

@@ -19,8 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, replacing
-from tachometry.sim.captures.run_zip import RunZip
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, writing
 from tachometry.sim.signals.recording import PinTrace, Recording
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
@@ -79,8 +78,8 @@ def read_sr(
 def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
     """Write a trace as a sigrok session of version 2, channels A, B and the others that there are, one sample a clock.
 
-    Equal traces give equal files, byte for byte on any machine, whatever its zlib (see `run_zip`). Read back and placed
-    on the same clock, the file gives the same trace.
+    Equal traces give equal files, byte for byte, with the same zlib: zlib promises what its output unpacks to, not
+    which bytes it is. Read back and placed on the same clock, the file gives the same trace.
 
     Parameters
     ----------
@@ -95,22 +94,30 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
     CaptureError
         If the file cannot be written.
     ValueError
-        If `clock_hz` or the number of clocks is below 1, or if the session would pass 4 GiB.
+        If `clock_hz` or the number of clocks is below 1.
     """
     if clock_hz < 1:
         raise ValueError(f"clock_hz must be at least 1, not {clock_hz}")
     if trace.n_clocks < 1:
         raise ValueError(f"n_clocks must be at least 1, not {trace.n_clocks}")
     level = trace.level
-    with replacing(Path(path)) as file, RunZip(file) as archive:
-        archive.add_text("version", "2")
-        archive.add_text("metadata", _metadata(clock_hz, [_CHANNELS[name] for name in trace.lines]))
+    with writing(Path(path)) as beside, zipfile.ZipFile(beside, "w") as archive:
+        archive.writestr(_member("version"), "2")
+        archive.writestr(_member("metadata"), _metadata(clock_hz, [_CHANNELS[name] for name in trace.lines]))
         for number, first in enumerate(range(0, trace.n_clocks, _chunk), 1):
             end = min(first + _chunk, trace.n_clocks)
             row = int(np.searchsorted(trace.clock, first, "right")) - 1  # the row that holds at `first`
             row_end = int(np.searchsorted(trace.clock, end, "left"))
             starts = np.maximum(trace.clock[row:row_end], first)
-            archive.add_runs(f"logic-1-{number}", level[row:row_end], np.diff(starts, append=end))
+            samples = np.repeat(level[row:row_end], np.diff(starts, append=end))
+            archive.writestr(_member(f"logic-1-{number}"), samples.tobytes(), zipfile.ZIP_DEFLATED)
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    """A member without the time, and with the same attributes on every system."""
+    member = zipfile.ZipInfo(name)  # 1980-01-01, the earliest that a zip file can tell
+    member.create_system = 3  # Unix
+    return member
 
 
 def _metadata(samplerate_hz: int, channels: list[str]) -> str:

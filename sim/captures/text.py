@@ -9,12 +9,12 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, replacing
+from tachometry.sim import files
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, writing
 from tachometry.sim.signals.recording import Recording
 
 BLOCK = 4 << 20  # bytes of text parsed at once
 LONGEST_HEADER = 1 << 16  # bytes
-ROWS = 1 << 16  # rows written at once
 
 
 def read_csv(
@@ -103,11 +103,8 @@ def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
     if recording.duration > recording.time[-1]:
         columns = [np.append(column, column[-1]) for column in columns]
         columns[0][-1] = recording.duration
-    with replacing(Path(path)) as file:
-        file.write(f"{','.join(('time', *recording.lines))}\n".encode())
-        for first in range(0, len(columns[0]), ROWS):
-            rows = zip(*(column[first : first + ROWS].tolist() for column in columns), strict=True)
-            file.write("".join(f"{','.join(map(repr, row))}\n" for row in rows).encode())
+    with writing(Path(path)) as beside:
+        files.write_csv(beside, ("time", *recording.lines), files.rows_of(columns))
 
 
 def _read_header(path: Path, file: BinaryIO) -> list[str]:

@@ -3,10 +3,9 @@
 `FIGURES` has one function for each; `tachometry figures` draws them all.
 """
 
-from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.rairan_algorithm import fig2, fig3
 from tachometry.sim.figures.rairan_runs import fig5, fig7
-from tachometry.sim.figures.result import Claim, Curve, Entry, Panel, Result
+from tachometry.sim.figures.result import Entry
 from tachometry.sim.figures.tsuji_methods import fig06, fig07, fig08
 from tachometry.sim.figures.tsuji_runs import fig05, fig09, fig12
 
@@ -26,5 +25,3 @@ FIGURES: dict[str, Entry] = {
         Entry("rairan7", fig7, 5),
     )
 }
-
-__all__ = ["FIGURES", "Claim", "Curve", "Entry", "Lab", "Panel", "Result"]

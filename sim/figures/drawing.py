@@ -1,6 +1,5 @@
 """Figures on paper and as tables: SVG, PNG and CSV of a `Result`."""
 
-import csv
 import textwrap
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tachometry.sim.figures.result import Curve, Panel, Result
+from tachometry.sim.files import write_csv
 from tachometry.sim.plots.style import columns, save_figure
 
 _COLOURS = ("#2a78c8", "#d9730d", "#2e6b3e", "#7b3fa0", "#b3261e", "#00838f")
@@ -28,24 +28,23 @@ def write_figure(path: Path, result: Result) -> None:
 def write_data(path: Path, result: Result) -> None:
     """Write what is drawn as a CSV: a row per point, with the panel (its title and y axis), the curve, x and y."""
     (x_label,) = {panel.x_label for panel in result.panels}
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("panel", "curve", _plain(x_label), "y"))
-        for panel in result.panels:
-            name = _plain(": ".join(filter(None, (panel.title, panel.y_label))))
-            for curve in panel.curves:
-                rows = zip(curve.x.tolist(), curve.y.tolist(), strict=True)
-                writer.writerows((name, _plain(curve.label), f"{x:.9g}", f"{y:.9g}") for x, y in rows)
+    rows = (
+        (_plain(": ".join(filter(None, (panel.title, panel.y_label)))), _plain(curve.label), f"{x:.9g}", f"{y:.9g}")
+        for panel in result.panels
+        for curve in panel.curves
+        for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True)
+    )
+    write_csv(path, ("panel", "curve", _plain(x_label), "y"), rows)
 
 
 def write_claims(path: Path, results: dict[str, Result]) -> None:
     """Write a CSV with a row per claim: the figure, what the paper says, what was found, whether they agree."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("figure", "source", "paper", "found", "agrees"))
-        for name, result in results.items():
-            for claim in result.claims:
-                writer.writerow((name, result.source, claim.paper, claim.found, "yes" if claim.agrees else "no"))
+    rows = (
+        (name, result.source, claim.paper, claim.found, "yes" if claim.agrees else "no")
+        for name, result in results.items()
+        for claim in result.claims
+    )
+    write_csv(path, ("figure", "source", "paper", "found", "agrees"), rows)
 
 
 def _plain(label: str) -> str:

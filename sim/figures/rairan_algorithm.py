@@ -4,7 +4,7 @@ import numpy as np
 
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
-from tachometry.sim.theory import (
+from tachometry.sim.theory.rairan import (
     rairan_eq01_update_time,
     rairan_eq03_error,
     rairan_eq04_max_error,

@@ -11,7 +11,7 @@ from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
 from tachometry.sim.signals.run import Run
-from tachometry.sim.theory import (
+from tachometry.sim.theory.rairan import (
     rairan_eq04_max_error,
     rairan_eq05_n2,
     rairan_eq08_sup_error,

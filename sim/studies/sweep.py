@@ -134,26 +134,49 @@ class Point:
         """Digest of all that decides the row, the code that makes it included."""
         motion = [array.tobytes() for array in vars(self.motion).values()]
         rest = (self.method, self.spec, self.encoder, self.values, self.earliest, self.engine)
-        return digest(code_digest(), motion, *rest)
+        return digest(self.code, motion, *rest)
+
+    @property
+    def code(self) -> str:
+        """Digest of the code that the row depends on."""
+        return code_digest(hardware=self.engine is not None)
 
 
 class OtherCode(ImportError):
     """A worker has another version."""
 
 
+# Code that decides the row of a point, and, where an engine runs the hardware beside the golden model, that, too.
+_CODE = (
+    *("spec", "sim/golden", "sim/encoder", "sim/signals"),
+    *(f"sim/studies/{name}.py" for name in ("__init__", "sweep", "compare", "baselines")),
+)
+_HARDWARE_CODE = ("hdl", "sim/engines")
+
+
 @functools.cache
-def code_digest() -> str:
-    """Digest of all code that rows depend on: the results of equal code are the same."""
+def code_digest(hardware: bool = False) -> str:
+    """Digest of the code that rows depend on, those with an engine if `hardware`: equal code gives equal results."""
     found = hashlib.sha256()
-    for layer in ("spec", "hdl", "sim"):
-        module = find_spec(f"tachometry.{layer}")  # not imported: the golden models need no Amaranth
-        assert module is not None
-        assert module.origin is not None
-        folder = Path(module.origin).parent
-        for file in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".h")):
-            found.update(f"{folder.name}/{file.relative_to(folder).as_posix()}\n".encode())
+    for name in (*_CODE, *(_HARDWARE_CODE if hardware else ())):
+        layer, _, rest = name.partition("/")
+        for file in _sources(_layer(layer) / rest):
+            found.update(f"{layer}/{file.relative_to(_layer(layer)).as_posix()}\n".encode())
             found.update(file.read_bytes())
     return found.hexdigest()
+
+
+def _layer(name: str) -> Path:
+    module = find_spec(f"tachometry.{name}")  # not imported: the golden models need no Amaranth
+    assert module is not None
+    assert module.origin is not None
+    return Path(module.origin).parent
+
+
+def _sources(place: Path) -> list[Path]:
+    if place.is_file():
+        return [place]
+    return sorted(path for path in place.rglob("*") if path.suffix in (".py", ".h"))
 
 
 def run_packed(code: str, packed: bytes) -> Row:
@@ -166,7 +189,7 @@ def run_packed(code: str, packed: bytes) -> Row:
     ValueError
         As `run_point`, with the point.
     """
-    if code != code_digest():
+    if code not in (code_digest(), code_digest(hardware=True)):
         raise OtherCode(f"that of {platform.node()} is another")
     point = pickle.loads(packed)
     try:

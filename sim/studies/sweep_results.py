@@ -1,10 +1,10 @@
 """Results of a sweep on disk: one Parquet file, whole at any time, and beside it the rows that are not in it yet."""
 
 import json
-import os
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 from typing import IO, Any, Self
 
@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
+from tachometry.sim.files import replacing
 from tachometry.sim.studies.sweep import COLUMNS, Row, code_digest
 
 _KINDS = {"text": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
@@ -70,6 +71,8 @@ class Results:
             raise ValueError(f"results must be of one sweep at a time: {self._path} is in use") from None
         self._lock = lock
         try:
+            for torn in self._path.parent.glob(f".{escape(self._path.name)}.*.part"):  # by one that was killed
+                torn.unlink()
             if self._path.exists():
                 self._table = _joined([self._table, _read(self._path)])
                 self._n_kept = len(self._table)
@@ -141,17 +144,8 @@ class Results:
         place = {point: k for k, point in enumerate(self._points)}
         order = [place.get(point, len(place)) for point in self._table["point"].to_pylist()]
         table = self._table.take(pc.array_sort_indices(pa.array(order, pa.int64())))
-        beside = self._path.with_name(f".{self._path.name}.part")
-        try:
-            with self._writing(self._path):
-                with beside.open("wb") as file:
-                    pq.write_table(table, file)
-                    file.flush()
-                    os.fsync(file.fileno())
-                beside.replace(self._path)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+        with self._writing(self._path), replacing(self._path) as beside, beside.open("wb") as file:
+            pq.write_table(table, file)
         self._n_kept = len(table)
 
     def _begin_journal(self) -> None:
@@ -161,7 +155,7 @@ class Results:
         path = self._path.with_name(f".{self._path.name}.new")
         with self._writing(path):
             self._journal = path.open("w", encoding="ascii")
-            self._journal.write(f"{code_digest()}\n")
+            self._journal.write(f"{_made_by()}\n")
             self._journal.flush()
 
     def _close_journal(self) -> None:
@@ -199,7 +193,12 @@ class Results:
 
 def _schema(values: Iterable[str]) -> pa.Schema:
     columns = [(name, _KINDS[kind]) for name, (kind, _) in COLUMNS.items()]
-    return pa.schema([*columns, *((name, pa.float64()) for name in values)], metadata={_MADE_BY: code_digest()})
+    return pa.schema([*columns, *((name, pa.float64()) for name in values)], metadata={_MADE_BY: _made_by()})
+
+
+def _made_by() -> str:
+    """What rows here are made by: the code of all of them, and that of those with an engine."""
+    return f"{code_digest()} {code_digest(hardware=True)}"
 
 
 def _read(path: Path) -> pa.Table:
@@ -210,20 +209,22 @@ def _read(path: Path) -> pa.Table:
     made_by = (table.schema.metadata or {}).get(_MADE_BY.encode())
     if made_by is None:
         raise ValueError(f"results must be a Parquet file of a sweep, which {path} is not")
-    _check_code(path, made_by.decode())
+    _check_code(path, made_by.decode(), table["engine"].to_pylist() if "engine" in table.column_names else [])
     return table
 
 
 def _read_journal(path: Path) -> list[Row]:
     """Rows of a journal after its first line, the code; the last line may not be whole, even if it is the first."""
     whole = path.read_text(encoding="ascii").split("\n")[:-1]
-    if lines := whole[1:]:
-        _check_code(path, whole[0])
-    return [json.loads(line) for line in lines]
+    rows: list[Row] = [json.loads(line) for line in whole[1:]]
+    if rows:
+        _check_code(path, whole[0], [row["engine"] for row in rows])
+    return rows
 
 
-def _check_code(path: Path, made_by: str) -> None:
-    if made_by != code_digest():
+def _check_code(path: Path, made_by: str, engines: Sequence[str | None]) -> None:
+    parts = 2 if any(engines) else 1
+    if made_by.split()[:parts] != _made_by().split()[:parts]:
         raise ValueError(
             f"results must be of this version of tachometry, and {path} is of another: remove it, or take another file"
         )

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from support import command
 
-from tachometry.sim.figures import FIGURES, Lab
+from tachometry.sim.figures import FIGURES
+from tachometry.sim.figures.lab import Lab
 from tachometry.sim.golden.methods import m as m_method
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from support.command import run
 
-from tachometry.sim import theory
+from tachometry.sim.theory import tsuji
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.manifest import manifest
 
@@ -127,7 +127,7 @@ def test_csv_holds_the_dense_samples(tmp_path: Path) -> None:
     assert float(rows[-1]["speed_rad_s"]) == 400
     assert {row["forced"] for row in rows} == {"0", "1"}
     for row in rows:
-        m_s = min(theory.tsuji_eq20_interval(float(row["speed_rad_s"]), 2000, 20e-6), 500)
+        m_s = min(tsuji.tsuji_eq20_interval(float(row["speed_rad_s"]), 2000, 20e-6), 500)
         assert float(row["interval_ticks"]) == pytest.approx(float(m_s))
         assert float(row["measurement_time_s"]) == pytest.approx(20e-6 * float(m_s))
 

@@ -239,7 +239,7 @@ def test_workers_of_another_version(
     scheduler: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     here = threading.current_thread()
-    monkeypatch.setattr(sweep, "code_digest", lambda: str(threading.current_thread() is here))
+    monkeypatch.setattr(sweep, "code_digest", lambda **_: str(threading.current_thread() is here))
     assert run(*CORE, *MOTION, *AXES, *scheduler) == 2
     err = capsys.readouterr().err
     assert err.startswith("tachometry: error: workers must have the same version of tachometry as this machine: ")

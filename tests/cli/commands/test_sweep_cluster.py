@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import dask
@@ -20,29 +19,45 @@ SWEEP = [
 ]
 POINTS = 100
 
-# Read by every worker, twice: what it runs it writes down, and takes its time.
+# Read by every worker, twice: what it runs it writes down, and waits until the test lets a point run. A worker that is
+# told to end does not wait.
 TRACE = """
-import os, time
+import os, select
+from distributed import Status, get_worker
 from tachometry.sim.studies import sweep
 if not hasattr(sweep, "traced"):
     sweep.traced = sweep.run_point
+    gate = os.open({gate!r}, os.O_RDWR | os.O_NONBLOCK)
+    def allowed():
+        try:
+            return os.read(gate, 1)
+        except BlockingIOError:  # another worker was first
+            return b""
     def run_point(point):
         with open(os.path.join({folder!r}, str(os.getpid())), "a") as file:
             file.write(point.digest + "\\n")
-        time.sleep(0.03)
+        while not (select.select([gate], [], [], 0.05)[0] and allowed()):
+            if get_worker().status != Status.running:
+                raise RuntimeError("ended")
         return sweep.traced(point)
     sweep.run_point = run_point
 """
 
 
 class Trace:
-    """What workers have run."""
+    """What workers have run, and how many points they may."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder / "trace"
         self.folder.mkdir(parents=True)
+        os.mkfifo(folder / "gate")
+        self._gate = os.open(folder / "gate", os.O_RDWR)
         self.script = folder / "trace.py"
-        self.script.write_text(TRACE.format(folder=str(self.folder)))
+        self.script.write_text(TRACE.format(folder=str(self.folder), gate=str(folder / "gate")))
+
+    def let(self, points: int) -> None:
+        """Let so many more points run."""
+        os.write(self._gate, bytes(points))
 
     def of(self, worker: str) -> list[str]:
         return (self.folder / worker).read_text().split()
@@ -70,10 +85,10 @@ def kept(result: Path) -> list[str]:
     return journal.read_text().split("\n")[1:-1] if journal.exists() else []
 
 
-def wait_for(there: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 120
-    while not there():
-        assert time.monotonic() < deadline
+def wait_for(rows: int, result: Path, sweep: subprocess.Popen[str]) -> None:
+    """Until so many are kept; the sweep has not ended by then."""
+    while len(kept(result)) < rows:
+        assert sweep.poll() is None, sweep.communicate()
         time.sleep(0.01)
 
 
@@ -89,18 +104,20 @@ def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
         Client(local) as client,
     ):
         sweep = begun(result, "--scheduler", local.scheduler_address)
-        wait_for(lambda: len(kept(result)) >= 20)
+        trace.let(20)
+        wait_for(20, result, sweep)
         victim = str(next(iter(client.run(os.getpid).values())))
         before = points_in(kept(result))
         os.kill(int(victim), signal.SIGKILL)
-        out, err = sweep.communicate(timeout=120)
+        trace.let(2 * POINTS)
+        out, err = sweep.communicate()
     assert (sweep.returncode, err) == (0, "")
     assert f"{POINTS} points, {POINTS} of them run in " in out
     points = pq.read_table(result)["point"].to_pylist()
     assert len(points) == len(set(points)) == POINTS
     executed = trace.all()
     assert set(executed) == set(points)
-    assert len(before) < POINTS
+    assert len(before) == 20
     # Only what the killed worker had not handed over ran again, or what Dask did not know yet to be in our hands.
     again = {point for point, times in executed.items() if times > 1}
     assert again <= set(trace.of(victim))
@@ -111,28 +128,32 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
     result = tmp_path / "r.parquet"
     traces = [Trace(tmp_path / name) for name in "123"]
     sweep = begun(result, trace=traces[0])
-    wait_for(lambda: len(kept(result)) >= 10)
+    traces[0].let(10)
+    wait_for(10, result, sweep)
     os.killpg(sweep.pid, signal.SIGINT)
-    out, err = sweep.communicate(timeout=120)
+    out, err = sweep.communicate()
     first = pq.read_table(result)["point"].to_pylist()
-    told = f"tachometry: interrupted after {len(first)} of {POINTS} points, kept in {result}\n"
+    assert len(first) == 10
+    told = f"tachometry: interrupted after 10 of {POINTS} points, kept in {result}\n"
     assert (sweep.returncode, out, err) == (130, "", told)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["1", "2", "3", "r.parquet"]
 
     sweep = begun(result, trace=traces[1])
-    wait_for(lambda: len(kept(result)) >= 10)
+    traces[1].let(10)
+    wait_for(10, result, sweep)
     os.kill(sweep.pid, signal.SIGKILL)
-    sweep.communicate(timeout=120)
+    sweep.communicate()
     second = points_in(kept(result))
     assert pq.read_table(result)["point"].to_pylist() == first
     with result.with_name(".r.parquet.new").open("a") as file:
         file.write('{"point": "half a li')  # as a kill might leave it
 
     sweep = begun(result, trace=traces[2])
-    out, err = sweep.communicate(timeout=120)
+    traces[2].let(POINTS)
+    out, err = sweep.communicate()
     assert (sweep.returncode, err) == (0, "")
-    left = POINTS - len(first) - len(second)
-    assert f"{POINTS} points, {left} of them run in " in out
+    assert len(second) == 10
+    assert f"{POINTS} points, {POINTS - 20} of them run in " in out
     points = pq.read_table(result)["point"].to_pylist()
     assert len(points) == len(set(points)) == POINTS
     ran = [trace.all() for trace in traces]
@@ -144,13 +165,15 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
 
     # The same, but for nothing in between.
     whole = tmp_path / "whole.parquet"
-    begun(whole, "--jobs", "1").communicate(timeout=120)
+    begun(whole, "--jobs", "1").communicate()
     assert whole.read_bytes() == result.read_bytes()
 
 
 def test_a_point_that_no_worker_outlives(tmp_path: Path) -> None:
     script = tmp_path / "die.py"
-    script.write_text("import os\nfrom tachometry.sim import sweep\nsweep.run_point = lambda point: os._exit(1)\n")
+    script.write_text(
+        "import os\nfrom tachometry.sim.studies import sweep\nsweep.run_point = lambda point: os._exit(1)\n"
+    )
     more = {
         "DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{script}"]',
         "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",

@@ -213,6 +213,3 @@ def test_csv_cut_in_its_last_line(tmp_path: Path) -> None:
     assert_error(tmp_path / "x.csv", "PATH line 3: a row must have 3 fields (time,a,b), not 2")
     make_csv(tmp_path / "x.csv", "time,a,b\n0,0,1\n0.25,1,")
     assert_error(tmp_path / "x.csv", "PATH line 3: b must be a number, not ''")
-
-
-# Writing

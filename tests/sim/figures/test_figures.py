@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tachometry.sim.figures import FIGURES, Lab, Result
+from tachometry.sim.figures import FIGURES
+from tachometry.sim.figures.lab import Lab
+from tachometry.sim.figures.result import Result
 
 DOCS = (Path(__file__).parents[3] / "docs" / "figures.md").read_text(encoding="utf-8")
 

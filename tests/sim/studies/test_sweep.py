@@ -1,8 +1,11 @@
 """Points of a sweep: their rows, and what they are known by."""
 
+import ast
 import pickle
+import shutil
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,7 @@ from tachometry.sim.studies import sweep
 from tachometry.sim.studies.sweep import COLUMNS, OtherCode, Point, code_digest, run_packed, run_point
 from tachometry.spec import METHODS, Encoder, MTTachometer, RairanTachometer, Speed, STachometer, Timing
 
+ROOT = Path(__file__).resolve().parents[3]
 TIMING = Timing(1_000_000, 1000, 20)
 SPEC = STachometer(encoder=Encoder(100), timing=TIMING)
 TEXT = "sine:30rad/s:5Hz:400ms"
@@ -97,7 +101,7 @@ def test_what_a_point_is_known_by(monkeypatch: pytest.MonkeyPatch) -> None:
     assert replace(POINT, motion=parse_motion("sine:30:0.005kHz:0.4s")).digest == POINT.digest
     every = {replace(POINT, **change).digest for change in DIFFERENT} | {POINT.digest}
     assert len(every) == len(DIFFERENT) + 1
-    monkeypatch.setattr(sweep, "code_digest", lambda: "another")
+    monkeypatch.setattr(sweep, "code_digest", lambda **_: "another")
     assert replace(POINT).digest != POINT.digest
 
 
@@ -117,3 +121,85 @@ def test_only_the_same_code_runs_a_point() -> None:
     assert run_packed(code_digest(), pickle.dumps(POINT)) == run_point(POINT)
     with pytest.raises(OtherCode):
         run_packed("another", b"never read")
+
+
+def of_tachometry(module: str) -> Path | None:
+    """The file of a module of ours."""
+    found = ROOT.joinpath(*module.split(".")[1:])
+    if not module.startswith("tachometry."):
+        return None
+    return next((file for file in (found.with_suffix(".py"), found / "__init__.py") if file.is_file()), None)
+
+
+def needed(start: Path, *without: Path) -> set[Path]:
+    """Files that a file imports, and what they import, but for those of some folders."""
+    found, new = set[Path](), {start}
+    while new:
+        found |= new
+        names = set[str]()
+        for node in (node for file in new for node in ast.walk(ast.parse(file.read_text("utf-8")))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+        files = {file for name in names if (file := of_tachometry(name)) is not None}
+        new = {file for file in files - found if not any(folder in file.parents for folder in without)}
+    return found
+
+
+def covered(monkeypatch: pytest.MonkeyPatch, *, hardware: bool) -> set[Path]:
+    """What the digest of the code reads."""
+    read, read_bytes = set[Path](), Path.read_bytes
+
+    def seen(path: Path) -> bytes:
+        read.add(path.resolve())
+        return read_bytes(path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "read_bytes", seen)
+        code_digest.__wrapped__(hardware=hardware)
+    return read
+
+
+def test_code_that_decides_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that a row is made with is in the digest, and no other part of tachometry."""
+    start, engines = ROOT / "sim" / "studies" / "sweep.py", ROOT / "sim" / "engines"
+    golden = covered(monkeypatch, hardware=False)
+    assert {path for path in needed(start, engines) if path.stat().st_size} <= golden
+    hardware = covered(monkeypatch, hardware=True)
+    assert {path for path in needed(start) if path.stat().st_size} | {engines / "driver.h"} <= hardware
+
+    def folders(files: set[Path]) -> set[str]:
+        return {file.relative_to(ROOT).parts[0 if file.parts[len(ROOT.parts)] != "sim" else 1] for file in files}
+
+    assert folders(golden) == {"spec", "golden", "encoder", "signals", "studies"}
+    assert folders(hardware) == folders(golden) | {"hdl", "engines"}
+    studies = {file.stem for file in golden if file.parent == start.parent}
+    assert studies == {"__init__", "sweep", "compare", "baselines"}
+
+
+def test_code_that_decides_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A change of the hardware invalidates the rows with an engine, one of a plot or a command none."""
+    for layer in ("spec", "hdl", "sim", "cli"):
+        shutil.copytree(ROOT / layer, tmp_path / layer, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(sweep, "_layer", lambda name: tmp_path / name)
+
+    def digests(change: str | None = None) -> tuple[str, str]:
+        if change is not None:
+            with (tmp_path / change).open("a", encoding="utf-8") as file:
+                file.write("# changed\n")
+        return code_digest.__wrapped__(), code_digest.__wrapped__(hardware=True)
+
+    before = digests()
+    assert before == (code_digest(), code_digest(hardware=True))
+    for file in ("sim/plots/run.py", "sim/figures/lab.py", "sim/captures/vcd.py", "sim/studies/plan.py", "cli/main.py"):
+        assert digests(file) == before, file
+    for file in ("hdl/tachometer.py", "sim/engines/driver.h"):
+        golden, hardware = digests(file)
+        assert golden == before[0]
+        assert hardware != before[1]
+        before = golden, hardware
+    for file in ("spec/timing.py", "sim/golden/front_end.py", "sim/encoder/motion.py", "sim/studies/compare.py"):
+        golden, hardware = digests(file)
+        assert golden != before[0], file
+        assert hardware != before[1], file
+        before = golden, hardware
+    assert replace(POINT, engine="pysim").digest != POINT.digest

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tachometry.sim.studies import sweep_results
-from tachometry.sim.studies.sweep import COLUMNS
+from tachometry.sim.studies.sweep import COLUMNS, code_digest
 from tachometry.sim.studies.sweep_results import Results
 
 
@@ -192,10 +192,33 @@ def test_what_is_no_parquet_is_refused(tmp_path: Path) -> None:
 def test_a_journal_of_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "r.parquet"
     killed(path, row("a"))
-    monkeypatch.setattr(sweep_results, "code_digest", lambda: "another")
+    monkeypatch.setattr(sweep_results, "code_digest", lambda **_: "another")
     with pytest.raises(ValueError, match=r"\.r\.parquet\.new is of another"):
         Results(path, []).__enter__()
     assert (tmp_path / ".r.parquet.new").exists()
+
+
+@pytest.mark.parametrize("engine", [None, "pysim"])
+@pytest.mark.parametrize("finished", [False, True])
+def test_other_hardware_is_refused_only_with_rows_of_an_engine(
+    engine: str | None, finished: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "r.parquet"
+    if finished:
+        with Results(path, ["a"]) as results:
+            results.add(row("a", engine=engine))
+    else:
+        killed(path, row("a", engine=engine))
+    monkeypatch.setattr(sweep_results, "code_digest", lambda hardware=False: "new" if hardware else code_digest())
+    if engine is None:
+        with Results(path, ["a", "b"]) as results:
+            assert results.missing == ["b"]
+            results.add(row("b", engine="pysim"))
+        with Results(path, ["a", "b"]) as results:
+            assert results.missing == []
+    else:
+        with pytest.raises(ValueError, match=r"^results must be of this version of tachometry, and .* is of another"):
+            Results(path, ["a"]).__enter__()
 
 
 def test_nothing_is_kept_without_a_file() -> None:
@@ -203,3 +226,11 @@ def test_nothing_is_kept_without_a_file() -> None:
         results.add(row("b", method="s"))
         assert results.missing == ["a"]
         assert results.columns("method") == {"method": ["s"]}
+
+
+def test_what_a_killed_sweep_was_writing_is_removed(tmp_path: Path) -> None:
+    path = tmp_path / "r.parquet"
+    (tmp_path / ".r.parquet.123.part").write_bytes(b"PAR1")
+    with Results(path, ["a"]) as results:
+        results.add(row("a"))
+    assert [file.name for file in tmp_path.iterdir()] == ["r.parquet"]

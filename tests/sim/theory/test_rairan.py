@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from support.table1 import table1
 
-from tachometry.sim import theory
+from tachometry.sim.theory import rairan, tsuji
 from tachometry.sim.theory.checks import Floats
 
 DT = 2520  # ts, divisible by 1 to 10
@@ -63,7 +63,7 @@ def test_output_of_table_1_is_constant_and_does_not_depend_on_the_phase(period: 
 
 def test_update_time_is_that_of_table_1_and_the_printed_line_is_above_it() -> None:
     m = measured()
-    time = theory.rairan_update_time(m.speed, 1, DT)
+    time = rairan.rairan_update_time(m.speed, 1, DT)
     # The double of a speed at a multiple of ω_lim is that multiple, for all that DT can be divided by.
     np.testing.assert_allclose(m.update_time, time, rtol=1e-9)
 
@@ -81,18 +81,18 @@ def test_update_time_is_that_of_table_1_and_the_printed_line_is_above_it() -> No
 def test_update_time_is_the_measurement_time_of_mt() -> None:
     """A window from a pulse to the first one later than a given time: eq. (16) of Tsuji 2009, in ticks of dt."""
     speed = np.geomspace(0.01, 50, 999)
-    unit = theory.unit_velocity(500, 1e-3)
+    unit = tsuji.unit_velocity(500, 1e-3)
     np.testing.assert_allclose(
-        theory.rairan_update_time(speed, 1, 1), theory.tsuji_eq16_interval(speed * unit, 1, 500, 1e-3), rtol=1e-9
+        rairan.rairan_update_time(speed, 1, 1), tsuji.tsuji_eq16_interval(speed * unit, 1, 500, 1e-3), rtol=1e-9
     )
 
 
 def test_estimates_enclose_the_speed() -> None:
     m = measured()
     assert set(np.minimum(m.n_ep1, m.n_dt1)) == {1}
-    n2 = theory.rairan_eq05_n2(m.n1)
-    np.testing.assert_allclose(theory.rairan_eq06_n2(m.n_ep1, m.n_dt1), n2)
-    n3 = theory.rairan_eq11_n3(m.n1, n2)
+    n2 = rairan.rairan_eq05_n2(m.n1)
+    np.testing.assert_allclose(rairan.rairan_eq06_n2(m.n_ep1, m.n_dt1), n2)
+    n3 = rairan.rairan_eq11_n3(m.n1, n2)
     assert np.all((n2 < n3) & (n3 < m.n1))
     assert np.all((n2 <= m.speed) & (m.speed <= m.n1))
     # Low intervals have their left end, high ones their right end, and ω_lim is one of the low ones.
@@ -103,18 +103,18 @@ def test_estimates_enclose_the_speed() -> None:
 
 def test_bounds_of_the_errors_are_attained_or_suprema() -> None:
     m = measured()
-    n2 = theory.rairan_eq05_n2(m.n1)
-    n3 = theory.rairan_eq11_n3(m.n1, n2)
-    errors = [theory.rairan_eq03_error(m.n1, m.speed, 1), theory.rairan_eq07_error(n2, m.speed, 1)]
+    n2 = rairan.rairan_eq05_n2(m.n1)
+    n3 = rairan.rairan_eq11_n3(m.n1, n2)
+    errors = [rairan.rairan_eq03_error(m.n1, m.speed, 1), rairan.rairan_eq07_error(n2, m.speed, 1)]
     for estimate, error in zip((m.n1, n2), errors, strict=True):
-        np.testing.assert_allclose(error, theory.rairan_eq02_error(estimate, m.speed), atol=1e-12)
-    errors.append(theory.rairan_eq02_error(n3, m.speed))
+        np.testing.assert_allclose(error, rairan.rairan_eq02_error(estimate, m.speed), atol=1e-12)
+    errors.append(rairan.rairan_eq02_error(n3, m.speed))
     bounds = [
-        theory.rairan_eq04_max_error(m.n1),
-        theory.rairan_eq08_sup_error(n2),
-        theory.rairan_eq12_max_error(n3),
+        rairan.rairan_eq04_max_error(m.n1),
+        rairan.rairan_eq08_sup_error(n2),
+        rairan.rairan_eq12_max_error(n3),
     ]
-    np.testing.assert_allclose(theory.rairan_eq13_max_error(m.n1), bounds[2])
+    np.testing.assert_allclose(rairan.rairan_eq13_max_error(m.n1), bounds[2])
     attained = [lambda n1: n1 <= 1, lambda n1: n1 >= 1, lambda n1: True]
     for error, bound, is_attained in zip(errors, bounds, attained, strict=True):
         assert np.all(error <= bound * (1 + 1e-12))
@@ -127,39 +127,39 @@ def test_bounds_of_the_errors_are_attained_or_suprema() -> None:
 
 
 def test_the_harmonic_mean_has_the_least_greatest_error() -> None:
-    n2 = theory.rairan_eq05_n2(N1)
-    n3 = theory.rairan_eq11_n3(N1, n2)
+    n2 = rairan.rairan_eq05_n2(N1)
+    n3 = rairan.rairan_eq11_n3(N1, n2)
     np.testing.assert_allclose(1 / n3, (1 / N1 + 1 / n2) / 2)
-    left, right = theory.rairan_eq09_left_error(n3, n2), theory.rairan_eq10_right_error(n3, N1)
+    left, right = rairan.rairan_eq09_left_error(n3, n2), rairan.rairan_eq10_right_error(n3, N1)
     np.testing.assert_allclose(left, right)
-    np.testing.assert_allclose(theory.rairan_eq12_max_error(n3), left)
-    np.testing.assert_allclose(theory.rairan_eq13_max_error(N1), left)
+    np.testing.assert_allclose(rairan.rairan_eq12_max_error(n3), left)
+    np.testing.assert_allclose(rairan.rairan_eq13_max_error(N1), left)
 
     share = np.linspace(0, 1, 1001)[:, np.newaxis]
     candidate = n2 + share * (N1 - n2)
-    worst = np.maximum(theory.rairan_eq09_left_error(candidate, n2), theory.rairan_eq10_right_error(candidate, N1))
+    worst = np.maximum(rairan.rairan_eq09_left_error(candidate, n2), rairan.rairan_eq10_right_error(candidate, N1))
     assert np.all(worst.min(axis=0) >= left * (1 - 1e-12))
     np.testing.assert_allclose(worst.min(axis=0), left, rtol=2e-3)
     # At the ends of the range, n3 = n1 and n3 = n2, the errors are those of the other two estimates.
-    np.testing.assert_allclose(worst[-1], theory.rairan_eq04_max_error(N1), rtol=1e-9)
-    np.testing.assert_allclose(worst[0], theory.rairan_eq08_sup_error(n2), rtol=1e-9)
+    np.testing.assert_allclose(worst[-1], rairan.rairan_eq04_max_error(N1), rtol=1e-9)
+    np.testing.assert_allclose(worst[0], rairan.rairan_eq08_sup_error(n2), rtol=1e-9)
 
 
 def test_n3_takes_a_reciprocal_only() -> None:
     """With q = 2·Ndt1 + 1: 2/q; with q = 2·Nep1 − 1: (q − 1/q)/2. And eq. (13) is 1/q."""
     q_low, q_high = 2 / LOW + 1, 2 * HIGH - 1
     for n1, q, n3 in ((LOW, q_low, 2 / q_low), (HIGH, q_high, (q_high - 1 / q_high) / 2)):
-        np.testing.assert_allclose(theory.rairan_eq11_n3(n1, theory.rairan_eq05_n2(n1)), n3)
-        np.testing.assert_allclose(theory.rairan_eq13_max_error(n1), 1 / q)
+        np.testing.assert_allclose(rairan.rairan_eq11_n3(n1, rairan.rairan_eq05_n2(n1)), n3)
+        np.testing.assert_allclose(rairan.rairan_eq13_max_error(n1), 1 / q)
 
 
 def test_optimal_error_is_from_a_third_to_half_of_that_of_the_classical_methods() -> None:
-    ratio = theory.rairan_eq13_max_error(N1) / theory.rairan_eq04_max_error(N1)
+    ratio = rairan.rairan_eq13_max_error(N1) / rairan.rairan_eq04_max_error(N1)
     assert np.all(ratio < 0.5)
     assert ratio.min() == pytest.approx(1 / 3)
     assert set(N1[ratio < 0.334]) == {1, 2}
     assert ratio[[0, -1]].tolist() == pytest.approx([0.5, 0.5], abs=1e-3)
-    halved = theory.rairan_eq08_sup_error(theory.rairan_eq05_n2(N1)) / theory.rairan_eq04_max_error(N1)
+    halved = rairan.rairan_eq08_sup_error(rairan.rairan_eq05_n2(N1)) / rairan.rairan_eq04_max_error(N1)
     assert halved.min() == pytest.approx(0.5)
     assert halved[[0, -1]].tolist() == pytest.approx([1, 1], abs=3e-3)
 
@@ -171,8 +171,8 @@ def test_bound_of_n1_is_that_of_the_classical_methods() -> None:
         counts = np.unique(np.diff(np.floor(np.arange(300) * longer)))
         assert counts.tolist() == [shorter, shorter + 1]
         estimates = counts if speed > 1 else 1 / counts
-        bound = theory.rairan_eq04_max_error(estimates.max())
-        assert np.all(theory.rairan_eq02_error(estimates, speed) <= bound)
+        bound = rairan.rairan_eq04_max_error(estimates.max())
+        assert np.all(rairan.rairan_eq02_error(estimates, speed) <= bound)
 
 
 def test_doubling_dt_never_helps_low_speeds_nor_harms_high_ones() -> None:
@@ -181,7 +181,7 @@ def test_doubling_dt_never_helps_low_speeds_nor_harms_high_ones() -> None:
     for speed in np.random.default_rng(5).uniform(0.5, 2, 300):
         ratio = speed * 2.0**doublings
         n1 = np.where(ratio > 1, np.ceil(ratio), 1 / np.maximum(np.ceil(1 / ratio) - 1, 1))
-        bound = theory.rairan_eq13_max_error(n1)
+        bound = rairan.rairan_eq13_max_error(n1)
         high = ratio > 1
         assert np.all(np.diff(bound[high]) < 0)
         assert np.all(np.diff(bound[~high]) >= 0)
@@ -190,9 +190,9 @@ def test_doubling_dt_never_helps_low_speeds_nor_harms_high_ones() -> None:
         target = 0.02
         least = np.flatnonzero(high & (bound <= target))[0]
         assert n1[least] >= (1 + 1 / target) / 2 > n1[least - 1]
-        time = theory.rairan_update_time(speed, 1, 2.0 ** doublings[high])
+        time = rairan.rairan_update_time(speed, 1, 2.0 ** doublings[high])
         assert np.all(np.diff(time) > 0)
-        slow = theory.rairan_update_time(speed, 1 / 2.0 ** doublings[~high], 2.0 ** doublings[~high])
+        slow = rairan.rairan_update_time(speed, 1 / 2.0 ** doublings[~high], 2.0 ** doublings[~high])
         np.testing.assert_allclose(slow, 1 / speed)
 
 
@@ -206,8 +206,8 @@ def change_in_windows(acceleration: float, n_dt1: int) -> Floats:
 
 @pytest.mark.parametrize("n_dt1", [1, 2, 5, 40])
 def test_acceleration_limit_at_low_speeds(n_dt1: int) -> None:
-    width = 1 / n_dt1 - theory.rairan_eq05_n2(1 / n_dt1)
-    limit = float(theory.rairan_max_acceleration(1 / n_dt1, 1, 1))
+    width = 1 / n_dt1 - rairan.rairan_eq05_n2(1 / n_dt1)
+    limit = float(rairan.rairan_max_acceleration(1 / n_dt1, 1, 1))
     for acceleration in (-limit, limit):
         assert change_in_windows(acceleration, n_dt1).max() == pytest.approx(width)
     printed = 1 / (2 * n_dt1 * (n_dt1 + 1))
@@ -217,7 +217,7 @@ def test_acceleration_limit_at_low_speeds(n_dt1: int) -> None:
 def test_acceleration_limit_at_high_speeds() -> None:
     """Windows from a pulse to the first one after dt, before 2·dt; with that many pulses, at least two, in dt."""
     speed = np.linspace(0.5, 12, 100_001)
-    limit = float(theory.rairan_max_acceleration(2, 1, 1))
+    limit = float(rairan.rairan_max_acceleration(2, 1, 1))
     for acceleration, greatest in ((limit, 0.851), (-limit, 1.0), (-1.05 * limit, 1.05)):
         n_ep1 = np.floor(speed + acceleration / 2) + 1
         square = speed**2 + 2 * acceleration * n_ep1
@@ -228,29 +228,29 @@ def test_acceleration_limit_at_high_speeds() -> None:
 
 def test_claims_on_the_errors_at_constant_speed() -> None:
     """160 slots, dt = 2 s, 2 and 24 rev/s; every 40th of 160 slots, dt = 1 ms, up to 30 rev/s."""
-    n1 = np.ceil(np.array([2, 24]) / theory.rairan_speed_limit(160, 2))
+    n1 = np.ceil(np.array([2, 24]) / rairan.rairan_speed_limit(160, 2))
     assert n1.tolist() == [640, 7680]
-    n3 = theory.rairan_eq11_n3(n1, theory.rairan_eq05_n2(n1))
-    percent = 100 * theory.rairan_eq12_max_error(n3)
+    n3 = rairan.rairan_eq11_n3(n1, rairan.rairan_eq05_n2(n1))
+    percent = 100 * rairan.rairan_eq12_max_error(n3)
     # The paper has 0.07 for the first, cut off.
     assert percent.tolist() == pytest.approx([0.0782, 0.0065], abs=5e-5)
 
-    limit = theory.rairan_speed_limit(160 / 40, 1e-3)
+    limit = rairan.rairan_speed_limit(160 / 40, 1e-3)
     assert limit == pytest.approx(250)
     n1 = 1 / np.floor(limit / np.linspace(1, 30, 1000))
     # Less than 10 % is true of n3 alone.
-    assert theory.rairan_eq13_max_error(n1).max() == pytest.approx(1 / 17)
-    assert theory.rairan_eq08_sup_error(theory.rairan_eq05_n2(n1)).max() == pytest.approx(1 / 9)
-    assert theory.rairan_eq04_max_error(n1).max() == pytest.approx(1 / 8)
+    assert rairan.rairan_eq13_max_error(n1).max() == pytest.approx(1 / 17)
+    assert rairan.rairan_eq08_sup_error(rairan.rairan_eq05_n2(n1)).max() == pytest.approx(1 / 9)
+    assert rairan.rairan_eq04_max_error(n1).max() == pytest.approx(1 / 8)
 
 
 def test_claims_on_acceleration() -> None:
     """10,000 pulses, dt = 1 ms: 0.1 rev/s and 50 rev/s²; Fig. 5 has ramps of 8.33 and −12.5 rev/s²."""
     pulses, dt = 10_000, 1e-3
-    limit = float(theory.rairan_speed_limit(pulses, dt))
+    limit = float(rairan.rairan_speed_limit(pulses, dt))
     assert limit == pytest.approx(0.1)
-    assert theory.rairan_max_acceleration([2, 3, 100], pulses, dt).tolist() == pytest.approx([50] * 3)
-    assert theory.rairan_max_acceleration([1, 1 / 2], pulses, dt).tolist() == pytest.approx([25, 5.56], abs=5e-3)
+    assert rairan.rairan_max_acceleration([2, 3, 100], pulses, dt).tolist() == pytest.approx([50] * 3)
+    assert rairan.rairan_max_acceleration([1, 1 / 2], pulses, dt).tolist() == pytest.approx([25, 5.56], abs=5e-3)
     # 8.33 rev/s² is what the printed form allows for Ndt1 = 2; in the 3 dt of such a window it is 1.5 intervals.
     printed = limit / (2 * dt) / 6
     assert printed == pytest.approx(8.33, abs=5e-3)
@@ -258,19 +258,19 @@ def test_claims_on_acceleration() -> None:
 
 
 def test_arguments_are_broadcast_and_ranges_kept() -> None:
-    assert theory.rairan_eq03_error(np.array([2, 3]), np.full((4, 1), 1.5), 1).shape == (4, 2)
-    assert theory.rairan_max_acceleration(np.array([0.5, 3]), np.full((4, 1), 160), 1).shape == (4, 2)
+    assert rairan.rairan_eq03_error(np.array([2, 3]), np.full((4, 1), 1.5), 1).shape == (4, 2)
+    assert rairan.rairan_max_acceleration(np.array([0.5, 3]), np.full((4, 1), 160), 1).shape == (4, 2)
     for call in (
-        lambda: theory.rairan_speed_limit(160, 0),
-        lambda: theory.rairan_update_time([1, 0], 1, 1),
-        lambda: theory.rairan_eq02_error(1, -1),
-        lambda: theory.rairan_eq04_max_error([1, 1.5]),
-        lambda: theory.rairan_eq05_n2(0),
-        lambda: theory.rairan_eq06_n2(3, 2),
-        lambda: theory.rairan_eq06_n2(0, 1),
-        lambda: theory.rairan_eq08_sup_error(0.75),
-        lambda: theory.rairan_eq12_max_error(1),
-        lambda: theory.rairan_eq13_max_error(math.nan),
+        lambda: rairan.rairan_speed_limit(160, 0),
+        lambda: rairan.rairan_update_time([1, 0], 1, 1),
+        lambda: rairan.rairan_eq02_error(1, -1),
+        lambda: rairan.rairan_eq04_max_error([1, 1.5]),
+        lambda: rairan.rairan_eq05_n2(0),
+        lambda: rairan.rairan_eq06_n2(3, 2),
+        lambda: rairan.rairan_eq06_n2(0, 1),
+        lambda: rairan.rairan_eq08_sup_error(0.75),
+        lambda: rairan.rairan_eq12_max_error(1),
+        lambda: rairan.rairan_eq13_max_error(math.nan),
     ):
         with pytest.raises(ValueError, match="must be"):
             call()
@@ -278,13 +278,13 @@ def test_arguments_are_broadcast_and_ranges_kept() -> None:
 
 def test_printed_forms_of_1_and_14_against_what_table_1_does() -> None:
     ratio = np.linspace(0.05, 7, 700)
-    printed, exact = (f(ratio, 1, 1) for f in (theory.rairan_eq01_update_time, theory.rairan_update_time))
+    printed, exact = (f(ratio, 1, 1) for f in (rairan.rairan_eq01_update_time, rairan.rairan_update_time))
     assert np.all(printed >= exact - 1e-12)
     assert (printed / exact).max() == pytest.approx(1.125, abs=1e-3)  # at 1.5
     whole = np.arange(1, 9)
-    np.testing.assert_allclose(theory.rairan_eq01_update_time(whole, 1, 1), (whole + 1) / whole)
+    np.testing.assert_allclose(rairan.rairan_eq01_update_time(whole, 1, 1), (whole + 1) / whole)
     n_dt1 = np.arange(1, 30)
-    ratio = theory.rairan_eq14_max_acceleration(1 / n_dt1, 500, 1) / theory.rairan_max_acceleration(1 / n_dt1, 500, 1)
+    ratio = rairan.rairan_eq14_max_acceleration(1 / n_dt1, 500, 1) / rairan.rairan_max_acceleration(1 / n_dt1, 500, 1)
     np.testing.assert_allclose(ratio, (n_dt1 + 1) / 2)
-    assert theory.rairan_eq14_max_acceleration([2, 3, 100], 10_000, 1e-3).tolist() == pytest.approx([50] * 3)
-    assert theory.rairan_eq14_max_acceleration(0.5, 10_000, 1e-3) == pytest.approx(8.33, abs=5e-3)
+    assert rairan.rairan_eq14_max_acceleration([2, 3, 100], 10_000, 1e-3).tolist() == pytest.approx([50] * 3)
+    assert rairan.rairan_eq14_max_acceleration(0.5, 10_000, 1e-3) == pytest.approx(8.33, abs=5e-3)

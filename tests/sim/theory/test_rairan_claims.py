@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tachometry.sim import golden, theory
+from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.theory import rairan
 from tachometry.spec import Encoder, RairanTachometer, Timing
 
 DT = 2520  # divisible by 1 to 10: the ends of all intervals are met
@@ -46,13 +47,13 @@ def test_bounds_are_never_exceeded_at_any_speed_and_phase() -> None:
             shown |= set(np.unique(settled_n1(SPEC, edges)).tolist())
         # Velocities are rounded; what is meant is 1/Ndt1 or Nep1.
         (n1,) = {1 / math.floor(1 / n + 1e-3) if n < 1 else float(round(n)) for n in shown}
-        n2 = theory.rairan_eq05_n2(n1)
+        n2 = rairan.rairan_eq05_n2(n1)
         errors = {
-            "eq. (4)": (theory.rairan_eq03_error(n1, speed, 1), theory.rairan_eq04_max_error(n1)),
-            "eq. (8)": (theory.rairan_eq07_error(n2, speed, 1), theory.rairan_eq08_sup_error(n2)),
+            "eq. (4)": (rairan.rairan_eq03_error(n1, speed, 1), rairan.rairan_eq04_max_error(n1)),
+            "eq. (8)": (rairan.rairan_eq07_error(n2, speed, 1), rairan.rairan_eq08_sup_error(n2)),
             "eq. (13)": (
-                theory.rairan_eq02_error(theory.rairan_eq11_n3(n1, n2), speed),
-                theory.rairan_eq13_max_error(n1),
+                rairan.rairan_eq02_error(rairan.rairan_eq11_n3(n1, n2), speed),
+                rairan.rairan_eq13_max_error(n1),
             ),
         }
         for equation, (error, bound) in errors.items():

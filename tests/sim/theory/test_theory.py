@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tachometry.sim import golden, theory
+from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.run import Table
+from tachometry.sim.theory import tsuji
 from tachometry.spec import Encoder, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), frac_bits=20)
@@ -47,10 +48,10 @@ def test_interval_and_error_at_constant_speed(cancel: bool) -> None:
         m_s, error = updates.interval[first:], np.abs(velocity[first:] - units)
         if abs(units - round(units)) > 1 / spec.timing.max_ticks:
             far += 1
-            wanted = theory.tsuji_eq20_interval(units * spec.unit_velocity, spec.encoder.counts_per_rev, TICK)
+            wanted = tsuji.tsuji_eq20_interval(units * spec.unit_velocity, spec.encoder.counts_per_rev, TICK)
             assert not updates.forced[first:].any(), units
             assert abs(m_s.mean() - wanted) <= 1 / len(m_s) + 1e-9, units
-            bound = theory.tsuji_eq18_resolution(m_s, spec.encoder.counts_per_rev, TICK) / spec.unit_velocity
+            bound = tsuji.tsuji_eq18_resolution(m_s, spec.encoder.counts_per_rev, TICK) / spec.unit_velocity
         else:
             bound = 1 / m_s
         assert np.all(error <= bound + HALF_LSB), units
@@ -88,13 +89,13 @@ def test_standstill_reads_zero_in_one_and_a_half_times_the_maximum() -> None:
 
 def test_equations_against_their_printed_form() -> None:
     counts, tick = 500, 1e-3
-    unit = theory.unit_velocity(counts, tick)
+    unit = tsuji.unit_velocity(counts, tick)
     assert unit == pytest.approx(12.566, abs=1e-3)
-    assert theory.tsuji_eq17_velocity(13, 4, counts, tick) == pytest.approx(2 * math.pi * 13 / (4 * counts * tick))
-    assert theory.tsuji_eq18_resolution([1, 2, 5], counts, tick).tolist() == pytest.approx(
+    assert tsuji.tsuji_eq17_velocity(13, 4, counts, tick) == pytest.approx(2 * math.pi * 13 / (4 * counts * tick))
+    assert tsuji.tsuji_eq18_resolution([1, 2, 5], counts, tick).tolist() == pytest.approx(
         [math.inf, 2 * math.pi / (2 * counts * tick), 2 * math.pi / (20 * counts * tick)]
     )
-    assert theory.tsuji_eq19_measurement_time(5, tick) == pytest.approx(5e-3)
-    assert theory.tsuji_eq20_interval(unit * np.array([0.25, 3.25, 2.9, 2.0]), counts, tick).tolist() == pytest.approx(
+    assert tsuji.tsuji_eq19_measurement_time(5, tick) == pytest.approx(5e-3)
+    assert tsuji.tsuji_eq20_interval(unit * np.array([0.25, 3.25, 2.9, 2.0]), counts, tick).tolist() == pytest.approx(
         [4, 4, 10, math.inf]
     )

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from support.ideal_counts import Windows, mt_windows, positions, s_windows, speeds
 
-from tachometry.sim import theory
+from tachometry.sim.theory import tsuji
 
 COUNTS, TICK = 500, 1e-3
-UNIT = float(theory.unit_velocity(COUNTS, TICK))
+UNIT = float(tsuji.unit_velocity(COUNTS, TICK))
 N_TICKS = 3000
 ROUNDING = 1e-9
 
@@ -23,11 +23,11 @@ def windows(kind: Callable[..., Windows], *arguments: int, below: float = math.i
 
 
 def test_m_method_error_is_less_than_its_resolution_and_comes_near_to_it() -> None:
-    resolution = theory.tsuji_eq04_resolution(COUNTS, TICK)
+    resolution = tsuji.tsuji_eq04_resolution(COUNTS, TICK)
     worst = 0.0
     for p, q, c in speeds():
         m_e = np.diff(positions(p, q, c, N_TICKS))
-        error = np.abs(theory.tsuji_eq03_velocity(m_e, COUNTS, TICK) - p / q * UNIT)
+        error = np.abs(tsuji.tsuji_eq03_velocity(m_e, COUNTS, TICK) - p / q * UNIT)
         assert np.all(error < resolution)
         worst = max(worst, float(np.max(error / resolution)))
     assert worst > 0.98
@@ -35,16 +35,16 @@ def test_m_method_error_is_less_than_its_resolution_and_comes_near_to_it() -> No
 
 @pytest.mark.parametrize("n", [1, 4, 50])
 def test_averaging_makes_the_error_n_times_smaller(n: int) -> None:
-    resolution = theory.tsuji_eq07_resolution(n, COUNTS, TICK)
-    assert resolution * n == pytest.approx(theory.tsuji_eq04_resolution(COUNTS, TICK))
+    resolution = tsuji.tsuji_eq07_resolution(n, COUNTS, TICK)
+    assert resolution * n == pytest.approx(tsuji.tsuji_eq04_resolution(COUNTS, TICK))
     worst = 0.0
     for p, q, c in speeds():
         position = positions(p, q, c, N_TICKS)
-        velocity = theory.tsuji_eq06_velocity(position[n:] - position[:-n], n, COUNTS, TICK)
+        velocity = tsuji.tsuji_eq06_velocity(position[n:] - position[:-n], n, COUNTS, TICK)
         error = np.abs(velocity - p / q * UNIT)
         assert np.all(error < resolution + ROUNDING)
         if n == 1:
-            np.testing.assert_allclose(velocity, theory.tsuji_eq03_velocity(np.diff(position), COUNTS, TICK))
+            np.testing.assert_allclose(velocity, tsuji.tsuji_eq03_velocity(np.diff(position), COUNTS, TICK))
         worst = max(worst, float(np.max(error / resolution)))
     assert worst > 0.98
 
@@ -53,11 +53,11 @@ def test_t_method_error_and_mean_interval() -> None:
     worst = 0.0
     for units, t in windows(lambda position: mt_windows(position, 1), below=1):
         assert np.all(t.pulse_sum == 1)
-        error = np.abs(theory.tsuji_eq09_velocity(t.m_s, COUNTS, TICK) - units * UNIT)
-        resolution = theory.tsuji_eq10_resolution(t.m_s, COUNTS, TICK)
+        error = np.abs(tsuji.tsuji_eq09_velocity(t.m_s, COUNTS, TICK) - units * UNIT)
+        resolution = tsuji.tsuji_eq10_resolution(t.m_s, COUNTS, TICK)
         assert np.all(error < resolution)
         worst = max(worst, float(np.max(error / resolution)))
-        interval = float(theory.tsuji_eq12_interval(units * UNIT, COUNTS, TICK))
+        interval = float(tsuji.tsuji_eq12_interval(units * UNIT, COUNTS, TICK))
         assert abs(t.m_s.mean() - interval) < 1 / len(t.m_s)
         assert set(t.m_s) <= {math.floor(interval), math.ceil(interval)}
     assert worst > 0.98
@@ -67,8 +67,8 @@ def test_t_method_error_and_mean_interval() -> None:
 def test_mt_method_error_is_less_than_either_term_of_its_resolution(m_c: int) -> None:
     nearest = {True: 0.0, False: 0.0}
     for units, mt in windows(mt_windows, m_c):
-        error = np.abs(theory.tsuji_eq13_velocity(mt.pulse_sum, mt.m_s, COUNTS, TICK) - units * UNIT)
-        resolution = theory.tsuji_eq14_resolution(mt.pulse_sum, mt.m_s, m_c, COUNTS, TICK)
+        error = np.abs(tsuji.tsuji_eq13_velocity(mt.pulse_sum, mt.m_s, COUNTS, TICK) - units * UNIT)
+        resolution = tsuji.tsuji_eq14_resolution(mt.pulse_sum, mt.m_s, m_c, COUNTS, TICK)
         assert np.all(mt.m_s >= m_c)
         assert np.all(error < resolution)
         by_count = resolution == UNIT / m_c
@@ -88,20 +88,20 @@ def test_mt_method_takes_the_first_count_later_than_its_minimum_time(m_c: int) -
         count = np.arange(200) * number
         m_s = np.diff((count * q + c) // p)
         # A hair above p/q, so that rounding cannot take a whole number of counts in T_c for less.
-        interval = theory.tsuji_eq16_interval(p / q * UNIT * (1 + 1e-13), m_c, COUNTS, TICK)
+        interval = tsuji.tsuji_eq16_interval(p / q * UNIT * (1 + 1e-13), m_c, COUNTS, TICK)
         assert abs(m_s.mean() - interval) < 1 / len(m_s) + ROUNDING, (p, q)
 
 
 def test_s_method_error_and_mean_interval() -> None:
     worst = 0.0
     for units, s in windows(s_windows):
-        interval = float(theory.tsuji_eq20_interval(units * UNIT, COUNTS, TICK))
+        interval = float(tsuji.tsuji_eq20_interval(units * UNIT, COUNTS, TICK))
         if len(s.m_s) == 0:
             assert interval > N_TICKS / 4
             continue
-        resolution = theory.tsuji_eq18_resolution(s.m_s, COUNTS, TICK)
-        plain = theory.tsuji_eq17_velocity(s.pulse_sum, s.m_s, COUNTS, TICK)
-        cancelled = theory.tsuji_eq21_velocity(s.pulse_sum, s.opening, s.closing, s.m_s, COUNTS, TICK)
+        resolution = tsuji.tsuji_eq18_resolution(s.m_s, COUNTS, TICK)
+        plain = tsuji.tsuji_eq17_velocity(s.pulse_sum, s.m_s, COUNTS, TICK)
+        cancelled = tsuji.tsuji_eq21_velocity(s.pulse_sum, s.opening, s.closing, s.m_s, COUNTS, TICK)
         assert abs(s.m_s.mean() - interval) <= 1 / len(s.m_s) + ROUNDING
         for velocity in (plain, cancelled):
             error = np.abs(velocity - units * UNIT)
@@ -115,12 +115,12 @@ def test_s_method_knows_its_distance_from_the_nearest_multiple() -> None:
     distance = np.geomspace(1e-3, 0.499, 200)
     multiple = np.arange(12)[:, np.newaxis]
     for units in (multiple + distance, multiple - distance, -multiple - distance):
-        m_s = theory.tsuji_eq20_interval(units * UNIT, COUNTS, TICK)
+        m_s = tsuji.tsuji_eq20_interval(units * UNIT, COUNTS, TICK)
         np.testing.assert_allclose(
-            m_s, np.broadcast_to(theory.tsuji_eq12_interval(distance * UNIT, COUNTS, TICK), m_s.shape), rtol=1e-10
+            m_s, np.broadcast_to(tsuji.tsuji_eq12_interval(distance * UNIT, COUNTS, TICK), m_s.shape), rtol=1e-10
         )
-        resolution = theory.tsuji_eq18_resolution(m_s, COUNTS, TICK)
-        time = theory.tsuji_eq19_measurement_time(m_s, TICK)
+        resolution = tsuji.tsuji_eq18_resolution(m_s, COUNTS, TICK)
+        time = tsuji.tsuji_eq19_measurement_time(m_s, TICK)
         np.testing.assert_allclose(resolution, UNIT * distance**2 / (1 - distance) + 0 * m_s, rtol=1e-9)
         np.testing.assert_allclose(resolution * time, 2 * math.pi / COUNTS / (m_s - 1), rtol=1e-9)
         assert np.all(resolution < UNIT / 2)
@@ -128,16 +128,16 @@ def test_s_method_knows_its_distance_from_the_nearest_multiple() -> None:
 
 def test_resolution_is_the_step_between_neighbouring_velocities() -> None:
     m_s = np.arange(2, 500)
-    step = theory.tsuji_eq09_velocity(m_s - 1, COUNTS, TICK) - theory.tsuji_eq09_velocity(m_s, COUNTS, TICK)
-    np.testing.assert_allclose(theory.tsuji_eq10_resolution(m_s, COUNTS, TICK), step, rtol=1e-9)
+    step = tsuji.tsuji_eq09_velocity(m_s - 1, COUNTS, TICK) - tsuji.tsuji_eq09_velocity(m_s, COUNTS, TICK)
+    np.testing.assert_allclose(tsuji.tsuji_eq10_resolution(m_s, COUNTS, TICK), step, rtol=1e-9)
     for offset in (-7, 0, 3):
-        step = theory.tsuji_eq17_velocity((m_s - 1) * offset + 1, m_s - 1, COUNTS, TICK) - theory.tsuji_eq17_velocity(
+        step = tsuji.tsuji_eq17_velocity((m_s - 1) * offset + 1, m_s - 1, COUNTS, TICK) - tsuji.tsuji_eq17_velocity(
             m_s * offset + 1, m_s, COUNTS, TICK
         )
-        np.testing.assert_allclose(theory.tsuji_eq18_resolution(m_s, COUNTS, TICK), step, rtol=1e-6)
+        np.testing.assert_allclose(tsuji.tsuji_eq18_resolution(m_s, COUNTS, TICK), step, rtol=1e-6)
     sums = np.arange(-50, 50)
-    steps = np.diff(theory.tsuji_eq06_velocity(sums, 8, COUNTS, TICK))
-    np.testing.assert_allclose(steps, theory.tsuji_eq07_resolution(8, COUNTS, TICK))
+    steps = np.diff(tsuji.tsuji_eq06_velocity(sums, 8, COUNTS, TICK))
+    np.testing.assert_allclose(steps, tsuji.tsuji_eq07_resolution(8, COUNTS, TICK))
 
 
 def test_products_of_resolution_and_measurement_time() -> None:
@@ -146,35 +146,35 @@ def test_products_of_resolution_and_measurement_time() -> None:
     m_s = np.arange(2, 1000)
     count = 2 * math.pi / COUNTS
 
-    m = theory.tsuji_eq04_resolution(COUNTS, TICK) * theory.tsuji_eq05_measurement_time(TICK)
-    averaged = theory.tsuji_eq07_resolution(n, COUNTS, TICK) * theory.tsuji_eq08_measurement_time(n, TICK)
-    t = theory.tsuji_eq10_resolution(m_s, COUNTS, TICK) * theory.tsuji_eq11_measurement_time(m_s, TICK)
+    m = tsuji.tsuji_eq04_resolution(COUNTS, TICK) * tsuji.tsuji_eq05_measurement_time(TICK)
+    averaged = tsuji.tsuji_eq07_resolution(n, COUNTS, TICK) * tsuji.tsuji_eq08_measurement_time(n, TICK)
+    t = tsuji.tsuji_eq10_resolution(m_s, COUNTS, TICK) * tsuji.tsuji_eq11_measurement_time(m_s, TICK)
     assert m == pytest.approx(count)
     assert averaged.tolist() == pytest.approx([count] * len(n))
     np.testing.assert_allclose(t, count / (m_s - 1))
 
     counts = np.arange(1, 50)[:, np.newaxis]
-    mt = theory.tsuji_eq14_resolution(counts, m_s, 4, COUNTS, TICK) * theory.tsuji_eq15_measurement_time(m_s, TICK)
+    mt = tsuji.tsuji_eq14_resolution(counts, m_s, 4, COUNTS, TICK) * tsuji.tsuji_eq15_measurement_time(m_s, TICK)
     np.testing.assert_allclose(mt, count * np.minimum(counts / (m_s - 1), m_s / 4))
 
 
 def test_mt_method_is_t_below_and_m_above() -> None:
     m_c = 20
     slow = np.linspace(1e-3, 0.999 / m_c, 50) * UNIT
-    m_s = theory.tsuji_eq16_interval(slow, m_c, COUNTS, TICK)
-    np.testing.assert_allclose(m_s, theory.tsuji_eq12_interval(slow, COUNTS, TICK))
+    m_s = tsuji.tsuji_eq16_interval(slow, m_c, COUNTS, TICK)
+    np.testing.assert_allclose(m_s, tsuji.tsuji_eq12_interval(slow, COUNTS, TICK))
     np.testing.assert_allclose(
-        theory.tsuji_eq14_resolution(1, m_s, m_c, COUNTS, TICK), theory.tsuji_eq10_resolution(m_s, COUNTS, TICK)
+        tsuji.tsuji_eq14_resolution(1, m_s, m_c, COUNTS, TICK), tsuji.tsuji_eq10_resolution(m_s, COUNTS, TICK)
     )
 
     units = np.linspace(1, 200, 5001) + 1e-6
-    m_s = theory.tsuji_eq16_interval(units * UNIT, m_c, COUNTS, TICK)
+    m_s = tsuji.tsuji_eq16_interval(units * UNIT, m_c, COUNTS, TICK)
     counts = units * m_s
     np.testing.assert_allclose(counts, np.floor(units * m_c) + 1, rtol=1e-9)
-    np.testing.assert_allclose(theory.tsuji_eq13_velocity(counts, m_s, COUNTS, TICK), units * UNIT)
+    np.testing.assert_allclose(tsuji.tsuji_eq13_velocity(counts, m_s, COUNTS, TICK), units * UNIT)
     assert np.all((m_s > m_c) & (m_s <= m_c + 1 / units))
-    fast = theory.tsuji_eq14_resolution(counts, m_s, m_c, COUNTS, TICK)[units > m_c + 1]
-    np.testing.assert_allclose(fast, theory.tsuji_eq07_resolution(m_c, COUNTS, TICK))
+    fast = tsuji.tsuji_eq14_resolution(counts, m_s, m_c, COUNTS, TICK)[units > m_c + 1]
+    np.testing.assert_allclose(fast, tsuji.tsuji_eq07_resolution(m_c, COUNTS, TICK))
 
 
 def test_alternate_alterations_cancel_and_eq21_is_its_printed_sum() -> None:
@@ -182,13 +182,13 @@ def test_alternate_alterations_cancel_and_eq21_is_its_printed_sum() -> None:
     for _ in range(200):
         m_e = rng.integers(-5, 6, size=rng.integers(2, 12))
         printed = 2 * math.pi * (m_e[0] / 2 + m_e[1:-1].sum() + m_e[-1] / 2) / (COUNTS * (len(m_e) - 1) * TICK)
-        velocity = theory.tsuji_eq21_velocity(m_e[1:].sum(), m_e[0], m_e[-1], len(m_e) - 1, COUNTS, TICK)
+        velocity = tsuji.tsuji_eq21_velocity(m_e[1:].sum(), m_e[0], m_e[-1], len(m_e) - 1, COUNTS, TICK)
         assert velocity == pytest.approx(printed, abs=1e-9)
 
     # Offset k, an alteration up by one, and m_s ticks later one down, and the other way round.
     k, m_s = np.arange(-3, 4)[:, np.newaxis], np.arange(1, 30)
     for up in (1, -1):
-        velocity = theory.tsuji_eq21_velocity(m_s * k - up, k + up, k - up, m_s, COUNTS, TICK)
+        velocity = tsuji.tsuji_eq21_velocity(m_s * k - up, k + up, k - up, m_s, COUNTS, TICK)
         np.testing.assert_allclose(velocity, np.broadcast_to(k * UNIT, velocity.shape), atol=ROUNDING)
 
 
@@ -198,36 +198,36 @@ def test_low_pass_is_that_of_its_differential_equation() -> None:
     y = y_0
     for _ in range(steps):
         y += cutoff * (u - y) * m_s * TICK / steps
-    assert theory.tsuji_eq22_low_pass(u, y_0, m_s, cutoff, TICK) == pytest.approx(y, abs=1e-4)
+    assert tsuji.tsuji_eq22_low_pass(u, y_0, m_s, cutoff, TICK) == pytest.approx(y, abs=1e-4)
 
 
 def test_low_pass_does_not_care_how_the_time_is_divided() -> None:
     m_s = np.arange(1, 400)
-    whole = theory.tsuji_eq22_low_pass(2.0, 0.5, m_s + 7, 40, TICK)
-    parts = theory.tsuji_eq22_low_pass(2.0, theory.tsuji_eq22_low_pass(2.0, 0.5, 7, 40, TICK), m_s, 40, TICK)
+    whole = tsuji.tsuji_eq22_low_pass(2.0, 0.5, m_s + 7, 40, TICK)
+    parts = tsuji.tsuji_eq22_low_pass(2.0, tsuji.tsuji_eq22_low_pass(2.0, 0.5, 7, 40, TICK), m_s, 40, TICK)
     np.testing.assert_allclose(whole, parts, rtol=1e-12)
-    np.testing.assert_allclose(theory.tsuji_eq22_low_pass(1.0, 0.0, 1, 1e-9, TICK), 1e-12, rtol=1e-9)
-    assert theory.tsuji_eq22_low_pass(2.0, 0.5, 10**6, 40, TICK) == 2.0
+    np.testing.assert_allclose(tsuji.tsuji_eq22_low_pass(1.0, 0.0, 1, 1e-9, TICK), 1e-12, rtol=1e-9)
+    assert tsuji.tsuji_eq22_low_pass(2.0, 0.5, 10**6, 40, TICK) == 2.0
 
 
 def test_arguments_are_broadcast_and_ranges_kept() -> None:
     counts, ticks, m_s = np.array([500, 2000]), np.array([[1e-3], [2e-5], [1e-6]]), np.full((4, 1, 1), 3)
-    assert theory.tsuji_eq18_resolution(m_s, counts, ticks).shape == (4, 3, 2)
-    assert theory.tsuji_eq14_resolution(5, m_s, 2, counts, ticks).shape == (4, 3, 2)
-    assert theory.tsuji_eq10_resolution(1, COUNTS, TICK) == math.inf
-    assert theory.tsuji_eq14_resolution(3, 1, 1, COUNTS, TICK) == pytest.approx(UNIT)
-    assert theory.tsuji_eq12_interval([0, -UNIT / 8], COUNTS, TICK).tolist() == pytest.approx([math.inf, 8])
-    assert theory.tsuji_eq16_interval([0, -UNIT / 8], 4, COUNTS, TICK).tolist() == pytest.approx([math.inf, 8])
+    assert tsuji.tsuji_eq18_resolution(m_s, counts, ticks).shape == (4, 3, 2)
+    assert tsuji.tsuji_eq14_resolution(5, m_s, 2, counts, ticks).shape == (4, 3, 2)
+    assert tsuji.tsuji_eq10_resolution(1, COUNTS, TICK) == math.inf
+    assert tsuji.tsuji_eq14_resolution(3, 1, 1, COUNTS, TICK) == pytest.approx(UNIT)
+    assert tsuji.tsuji_eq12_interval([0, -UNIT / 8], COUNTS, TICK).tolist() == pytest.approx([math.inf, 8])
+    assert tsuji.tsuji_eq16_interval([0, -UNIT / 8], 4, COUNTS, TICK).tolist() == pytest.approx([math.inf, 8])
     for call in (
-        lambda: theory.unit_velocity(0, TICK),
-        lambda: theory.tsuji_eq05_measurement_time(-TICK),
-        lambda: theory.tsuji_eq07_resolution([4, 0], COUNTS, TICK),
-        lambda: theory.tsuji_eq14_resolution(0, 5, 4, COUNTS, TICK),
-        lambda: theory.tsuji_eq14_resolution(1, 5, 0, COUNTS, TICK),
-        lambda: theory.tsuji_eq16_interval(UNIT, 0, COUNTS, TICK),
-        lambda: theory.tsuji_eq18_resolution(math.nan, COUNTS, TICK),
-        lambda: theory.tsuji_eq19_measurement_time(0.5, TICK),
-        lambda: theory.tsuji_eq22_low_pass(1, 0, 1, 0, TICK),
+        lambda: tsuji.unit_velocity(0, TICK),
+        lambda: tsuji.tsuji_eq05_measurement_time(-TICK),
+        lambda: tsuji.tsuji_eq07_resolution([4, 0], COUNTS, TICK),
+        lambda: tsuji.tsuji_eq14_resolution(0, 5, 4, COUNTS, TICK),
+        lambda: tsuji.tsuji_eq14_resolution(1, 5, 0, COUNTS, TICK),
+        lambda: tsuji.tsuji_eq16_interval(UNIT, 0, COUNTS, TICK),
+        lambda: tsuji.tsuji_eq18_resolution(math.nan, COUNTS, TICK),
+        lambda: tsuji.tsuji_eq19_measurement_time(0.5, TICK),
+        lambda: tsuji.tsuji_eq22_low_pass(1, 0, 1, 0, TICK),
     ):
         with pytest.raises(ValueError, match="must be"):
             call()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from tachometry.sim import theory
+from tachometry.sim.theory import tsuji
 from tachometry.sim.theory.checks import Floats
 
 
@@ -19,27 +19,27 @@ class Performance:
 
 
 def t_method(speed: Floats, counts: int, tick: float) -> Performance:
-    m_s = theory.tsuji_eq12_interval(speed, counts, tick)
-    return Performance(theory.tsuji_eq10_resolution(m_s, counts, tick), theory.tsuji_eq11_measurement_time(m_s, tick))
+    m_s = tsuji.tsuji_eq12_interval(speed, counts, tick)
+    return Performance(tsuji.tsuji_eq10_resolution(m_s, counts, tick), tsuji.tsuji_eq11_measurement_time(m_s, tick))
 
 
 def mt_method(speed: Floats, m_c: int, counts: int, tick: float) -> Performance:
-    m_s = theory.tsuji_eq16_interval(speed, m_c, counts, tick)
-    pulse_sum = np.rint(speed / theory.unit_velocity(counts, tick) * m_s)
+    m_s = tsuji.tsuji_eq16_interval(speed, m_c, counts, tick)
+    pulse_sum = np.rint(speed / tsuji.unit_velocity(counts, tick) * m_s)
     return Performance(
-        theory.tsuji_eq14_resolution(pulse_sum, m_s, m_c, counts, tick), theory.tsuji_eq15_measurement_time(m_s, tick)
+        tsuji.tsuji_eq14_resolution(pulse_sum, m_s, m_c, counts, tick), tsuji.tsuji_eq15_measurement_time(m_s, tick)
     )
 
 
 def s_method(speed: Floats, counts: int, tick: float) -> Performance:
-    m_s = theory.tsuji_eq20_interval(speed, counts, tick)
-    return Performance(theory.tsuji_eq18_resolution(m_s, counts, tick), theory.tsuji_eq19_measurement_time(m_s, tick))
+    m_s = tsuji.tsuji_eq20_interval(speed, counts, tick)
+    return Performance(tsuji.tsuji_eq18_resolution(m_s, counts, tick), tsuji.tsuji_eq19_measurement_time(m_s, tick))
 
 
 def test_fig7_mt_beats_t_from_a_count_in_the_minimum_time_to_the_unit_velocity() -> None:
     """500 counts, 1 ms, T_c = 4 ms; the paper reads 3.2 and 12.5 rad/s off its figure."""
     counts, tick, m_c = 500, 1e-3, 4
-    unit = float(theory.unit_velocity(counts, tick))
+    unit = float(tsuji.unit_velocity(counts, tick))
     speed = np.linspace(0.01, unit, 100_000, endpoint=False)
     t, mt = t_method(speed, counts, tick), mt_method(speed, m_c, counts, tick)
     better = mt.resolution < t.resolution * (1 - 1e-9)
@@ -54,20 +54,20 @@ def test_fig7_mt_beats_t_from_a_count_in_the_minimum_time_to_the_unit_velocity()
 def test_sec_v_b_s_beats_mt_in_the_same_time_when_more_than_one_count_is_summed() -> None:
     counts, tick, m_c = 500, 1e-3, 4
     m_s = np.arange(m_c, 500)
-    s = theory.tsuji_eq18_resolution(m_s, counts, tick)
-    np.testing.assert_allclose(theory.tsuji_eq14_resolution(1, m_s, m_c, counts, tick), s)
+    s = tsuji.tsuji_eq18_resolution(m_s, counts, tick)
+    np.testing.assert_allclose(tsuji.tsuji_eq14_resolution(1, m_s, m_c, counts, tick), s)
     summed = np.arange(2, 100)[:, np.newaxis]
-    assert np.all(theory.tsuji_eq14_resolution(summed, m_s, m_c, counts, tick) > s)
+    assert np.all(tsuji.tsuji_eq14_resolution(summed, m_s, m_c, counts, tick) > s)
     # More than one count is summed above one in T_c.
     speed = np.linspace(0.5, 60, 20_000)
-    m_s_mt = theory.tsuji_eq16_interval(speed, m_c, counts, tick)
-    pulse_sum = speed / theory.unit_velocity(counts, tick) * m_s_mt
+    m_s_mt = tsuji.tsuji_eq16_interval(speed, m_c, counts, tick)
+    pulse_sum = speed / tsuji.unit_velocity(counts, tick) * m_s_mt
     np.testing.assert_array_equal(pulse_sum > 1.5, speed > 2 * math.pi / (counts * m_c * tick))
 
 
 def test_fig7_mt_is_coarse_at_high_speeds_and_s_is_not() -> None:
     counts, tick, m_c = 500, 1e-3, 4
-    unit = float(theory.unit_velocity(counts, tick))
+    unit = float(tsuji.unit_velocity(counts, tick))
     speed = np.linspace(6 * unit, 20 * unit, 50_001)[1:-1]
     s, mt = s_method(speed, counts, tick), mt_method(speed, m_c, counts, tick)
     np.testing.assert_allclose(mt.resolution, unit / m_c)
@@ -79,7 +79,7 @@ def test_fig7_mt_is_coarse_at_high_speeds_and_s_is_not() -> None:
 def test_fig8_s_against_mt_with_a_timer() -> None:
     """81,000 counts: M/T with 200 ns and T_c = 20 µs against S with 20 µs, compared by Q_V·T_m."""
     counts, tick, timer, m_c = 81_000, 20e-6, 200e-9, 100
-    unit = float(theory.unit_velocity(counts, tick))
+    unit = float(tsuji.unit_velocity(counts, tick))
     assert unit == pytest.approx(3.879, abs=1e-3)
     bands, samples = 150, 2000
     units = (np.arange(bands)[:, np.newaxis] + (np.arange(samples) + 0.5) / samples).ravel()
