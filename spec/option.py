@@ -1,10 +1,33 @@
-"""Fields of a method's spec that are options of the command line."""
+"""Options: what can be wrong with a parameter, defaults that follow from other parameters, and how texts are read."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import Field, field, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from tachometry.spec.timing import Timing
+if TYPE_CHECKING:
+    from tachometry.spec.timing import Timing
+
+
+class ParameterError(ValueError):
+    """A parameter is not what it must be; the message begins with the parameter, "max_ticks must be …".
+
+    Parameters
+    ----------
+    parameter : str
+        Name of the field, or of the option that was read; the command line shows its option in its place.
+    rest : str
+        The message behind the name.
+    """
+
+    def __init__(self, parameter: str, rest: str) -> None:
+        super().__init__(parameter, rest)
+        self.parameter = parameter
+        self.rest = rest
+
+    def __str__(self) -> str:
+        return f"{self.parameter} {self.rest}"
 
 
 def option(

@@ -51,7 +51,7 @@ class Timing:
             Also if the tick is not a whole number of clocks, or the maximum time not of ticks: the message names the
             two nearest that are.
         """
-        clock_hz = parse_frequency("clock", int(clock) if str(clock).isdecimal() else clock)
+        clock_hz = parse_frequency("clock", clock)
         if clock_hz > MAX_CLOCK_HZ:
             return cls(clock_hz, 1, 2)  # which says so
         tick_cycles = whole_clocks("tick", tick, clock_hz)

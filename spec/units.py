@@ -1,62 +1,144 @@
-"""Quantities with units, read exactly: `20us`, `48MHz`, `400rad/s`."""
+"""Quantities with units, read exactly: `20us`, `48MHz`, `400rad/s`, `5deg`."""
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
-_TIME = {"s": Fraction(1), "ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "ns": Fraction(1, 10**9)}
-_FREQUENCY = {"Hz": Fraction(1), "kHz": Fraction(10**3), "MHz": Fraction(10**6), "GHz": Fraction(10**9)}
-_SPEED = {"rad/s": (Fraction(1), True), "rev/s": (Fraction(1), False), "rpm": (Fraction(1, 60), False)}
-_QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/]*)")
+from tachometry.spec.option import ParameterError
 
 # π to 50 digits: speeds in rad/s are compared with whole counts and scaled by constants of up to 48 bits.
 PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 
+# A decimal number and its unit. Exponents beyond three digits would make numbers that fill the memory.
+QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/%]*)"
+_QUANTITY = re.compile(QUANTITY, re.ASCII)
+_LONGEST = 400  # characters of a number
 
-def ceil_log2(number: Fraction) -> int:
-    """The least k for which 2^k is at least `number`."""
-    k = number.numerator.bit_length() - number.denominator.bit_length()  # off by one at most
-    return k + 1 if number > Fraction(2) ** k else k if number > Fraction(2) ** (k - 1) else k - 1
+
+class Unit(NamedTuple):
+    """A unit: how many of the first unit of its table it is.
+
+    Parameters
+    ----------
+    size : Fraction
+        The rational factor.
+    pi : Fraction or None
+        A factor of so many π, in units that have one.
+    """
+
+    size: Fraction = Fraction(1)
+    pi: Fraction | None = None
+
+    @property
+    def exact(self) -> Fraction:
+        """The whole factor, with π to 50 digits."""
+        return self.size if self.pi is None else self.size * self.pi * PI
+
+    def nearest(self, value: Fraction) -> float:
+        """So many of this unit as a float; what has no π in it is rounded once, so 7us is exactly 7e-6."""
+        rational = float(value * self.size)
+        return rational if self.pi is None else rational * (math.pi * self.pi.numerator / self.pi.denominator)
 
 
-def _quantity(what: str, text: str, units: dict[str, object]) -> tuple[Fraction, str]:
-    match = _QUANTITY.fullmatch(text.strip())
-    if match is None or match[2] not in units:
-        raise ValueError(f"{what} must be a number with one of the units {', '.join(units)}, not {text!r}")
-    return Fraction(match[1]), match[2]
+Units = Mapping[str, Unit]
+
+
+def _decimal(**exponents: int) -> dict[str, Unit]:
+    return {name: Unit(Fraction(10) ** exponent) for name, exponent in exponents.items()}
+
+
+TIME = _decimal(s=0, ms=-3, us=-6, ns=-9)
+FREQUENCY = _decimal(Hz=0, kHz=3, MHz=6, GHz=9)
+SPEED = {"rad/s": Unit(), "rev/s": Unit(pi=Fraction(2)), "rpm": Unit(pi=Fraction(1, 30))}
+ANGLE = {**_decimal(rad=0, mrad=-3), "deg": Unit(pi=Fraction(1, 180))}
+DEGREES = {"deg": Unit()}
+BANDWIDTH = {"rad/s": Unit(), **{name: Unit(unit.size, Fraction(2)) for name, unit in FREQUENCY.items()}}
+FRACTION = {"": Unit(), "%": Unit(Fraction(1, 100))}
+
+
+def read_quantity(what: str, text: str, units: Units, default: str = "") -> tuple[Fraction, str]:
+    """The decimal number in a text, exactly, and its unit.
+
+    Parameters
+    ----------
+    what : str
+        What the message calls the quantity.
+    text : str
+    units : mapping of str to Unit
+        Those that it may have.
+    default : str
+        Unit of a number without one.
+
+    Raises
+    ------
+    ParameterError
+        If the text is not of this form.
+    """
+    number = text.strip()
+    match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
+    if match is None or (match[2] or default) not in units:
+        names = ", ".join(filter(None, units))
+        allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
+        raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
+    return Fraction(match[1]), match[2] or default
+
+
+def read_exactly(what: str, text: str, units: Units, default: str = "") -> Fraction:
+    """The quantity in the first of the units, exactly; arguments and errors as of `read_quantity`."""
+    value, unit = read_quantity(what, text, units, default)
+    return value * units[unit].exact
+
+
+def read_nearest(what: str, text: str, units: Units, default: str = "") -> float:
+    """The quantity in the first of the units as a float, which must be finite; else as `read_quantity`."""
+    value, unit = read_quantity(what, text, units, default)
+    try:
+        nearest = units[unit].nearest(value)
+    except OverflowError:
+        nearest = math.inf
+    if not math.isfinite(nearest):
+        raise ParameterError(what, f"must be finite, not {text!r}")
+    return nearest
+
+
+def ratio(unit: str, other: str) -> Fraction | None:
+    """How many of `unit` one of `other` is, exactly; None if they cannot be turned into each other so."""
+    for units in (TIME, FREQUENCY, SPEED, ANGLE):
+        if unit in units and other in units and (units[unit].pi is None) == (units[other].pi is None):
+            return units[other].exact / units[unit].exact
+    return None
 
 
 def parse_time(what: str, text: str) -> Fraction:
     """Seconds in a text such as `20us`; `what` names the quantity in the message of the ValueError."""
-    value, unit = _quantity(what, text, dict(_TIME))
-    return value * _TIME[unit]
+    return read_exactly(what, text, TIME)
 
 
 def parse_frequency(what: str, text: str | int) -> int:
-    """Hertz in a text such as `48MHz`, a whole number.
+    """Hertz in a text such as `48MHz`, a whole number; a plain number is hertz.
 
     Raises
     ------
     ValueError
         If the text is no frequency, or not a positive whole number of hertz.
     """
-    value, unit = (Fraction(text), "Hz") if isinstance(text, int) else _quantity(what, text, dict(_FREQUENCY))
-    hertz = value * _FREQUENCY[unit]
+    hertz = read_exactly(what, str(text), FREQUENCY, "Hz")
     if hertz.denominator != 1 or hertz <= 0:
-        raise ValueError(f"{what} must be a positive whole number of Hz, not {text!r}")
+        raise ParameterError(what, f"must be a positive whole number of Hz, not {text!r}")
     return int(hertz)
 
 
 def parse_bandwidth(what: str, text: str) -> Fraction:
     """rad/s in a text such as `200rad/s` or `30Hz`."""
-    value, unit = _quantity(what, text, {"rad/s": 1, **_FREQUENCY})
-    return value if unit == "rad/s" else value * _FREQUENCY[unit] * 2 * PI
+    return read_exactly(what, text, BANDWIDTH)
 
 
 def format_time(seconds: Fraction) -> str:
     """A time as people write it: the largest unit that leaves a number of at least 1."""
-    for unit, size in _TIME.items():
+    for unit, (size, _) in TIME.items():
         if seconds >= size:
             return f"{float(seconds / size):.9g}{unit}"
     return f"{float(seconds):.9g}s"
@@ -65,6 +147,17 @@ def format_time(seconds: Fraction) -> str:
 def plural(number: int, what: str) -> str:
     """So many of a thing."""
     return f"{number} {what}{'s' * (number != 1)}"
+
+
+def ceil_log2(number: Fraction) -> int:
+    """The least k for which 2^k is at least `number`."""
+    k = number.numerator.bit_length() - number.denominator.bit_length()  # off by one at most
+    return k + 1 if number > Fraction(2) ** k else k if number > Fraction(2) ** (k - 1) else k - 1
+
+
+def signed_width(limit: int) -> int:
+    """Bits of a two's complement number that holds -limit … +limit."""
+    return limit.bit_length() + 1
 
 
 @dataclass(frozen=True)
@@ -82,27 +175,26 @@ class Speed:
     unit: str = "rad/s"
 
     def __post_init__(self) -> None:
-        if self.unit not in _SPEED:
-            raise ValueError(f"unit of a speed must be one of {', '.join(_SPEED)}, not {self.unit!r}")
+        if self.unit not in SPEED:
+            raise ParameterError("unit", f"of a speed must be one of {', '.join(SPEED)}, not {self.unit!r}")
         if self.value <= 0:
-            raise ValueError(f"max_speed must be greater than 0, not {self}")
+            raise ParameterError("max_speed", f"must be greater than 0, not {self}")
 
     @classmethod
-    def parse(cls, text: str) -> "Speed":
-        """Read `400rad/s`, `50rev/s` or `3000rpm`."""
-        return cls(*_quantity("max_speed", text, dict(_SPEED)))
+    def parse(cls, text: str, default: str = "") -> "Speed":
+        """Read `400rad/s`, `50rev/s` or `3000rpm`; `default` is the unit of a plain number."""
+        return cls(*read_quantity("max_speed", text, SPEED, default))
 
     @property
     def rad_per_s(self) -> float:
         """The speed in rad/s."""
-        size, radians = _SPEED[self.unit]
-        return float(self.value * size * (1 if radians else 2 * PI))
+        return float(self.value * SPEED[self.unit].exact)
 
     def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
         """⌈speed / ω_u⌉: the most counts that one tick can hold at this speed, ω_u = 2π/(P·T_s)."""
-        size, radians = _SPEED[self.unit]
-        counts = self.value * size * counts_per_rev * tick_seconds
-        return math.ceil(counts / (2 * PI) if radians else counts)
+        size, pi = SPEED[self.unit]
+        turns = size / (2 * PI) if pi is None else size * pi / 2
+        return math.ceil(self.value * turns * counts_per_rev * tick_seconds)
 
     def __str__(self) -> str:
         number = self.value.numerator if self.value.denominator == 1 else float(self.value)

@@ -116,8 +116,8 @@ def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
         return *default_range(spec), unit if spec.unit == NATIVE else spec.unit
     low, _, high = (part.strip() for part in text.partition(":"))
     try:
-        last = Speed.parse(_with_unit(high, "rad/s"))
-        first = Speed.parse(_with_unit(low, last.unit))
+        last = Speed.parse(high, "rad/s")
+        first = Speed.parse(low, last.unit)
     except ValueError as error:
         raise ValueError(f"speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not {text!r}") from error
     counts = last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
@@ -134,10 +134,6 @@ def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
     if first.rad_per_s >= last.rad_per_s:
         raise ValueError(f"speeds must be LO:HI with LO less than HI, not {text!r}")
     return first.rad_per_s, last.rad_per_s, last.unit
-
-
-def _with_unit(number: str, unit: str) -> str:
-    return number + unit if number.endswith(tuple("0123456789.")) else number
 
 
 def _rad_per_s(unit: str) -> float:

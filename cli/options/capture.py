@@ -35,7 +35,7 @@ _OPTIONS = [
         _CAPTURE,
         "--samplerate",
         metavar="FREQUENCY",
-        help="Samplerate, in Hz (plain number), kHz, MHz or GHz, of a .sr file that does not tell it.",
+        help="Samplerate of a .sr file that does not contain it, in Hz (plain number), kHz, MHz or GHz.",
     ),
 ]
 
@@ -60,4 +60,4 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _samplerate(text: str) -> float:
-    return float(parse_frequency("samplerate", int(text) if text.isdecimal() else text))
+    return float(parse_frequency("samplerate", text))

@@ -7,8 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from tachometry.cli.options.option import all_of, option
 from tachometry.spec import TachometerSpec
+from tachometry.spec.units import DEGREES, read_nearest
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -23,7 +26,18 @@ Motions, joined by + into one:
   trapezoid:SPEED:ACCEL_TIME:HOLD_TIME
   stop:TIME
   csv:FILE    alone: a table with the header time,angle_rad in s and rad
-Units: rad/s (default), rev/s, rpm; s (default), ms, us; Hz (default), kHz."""
+Units: rad/s (default), rev/s, rpm; s (default), ms, us, ns;
+  Hz (default), kHz, MHz, GHz."""
+
+
+class Degrees(click.types.FloatParamType):
+    """A number of degrees, plain or with its unit."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            return float(value)
+        except ValueError:
+            return read_nearest("angle", value, DEGREES, "deg")
 
 
 def _motion(required: bool) -> Callable[[Any], Any]:
@@ -41,7 +55,8 @@ _OPTIONS = [
         _MOTION,
         "--vibration",
         metavar="AMPL:FREQ",
-        help="Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz or kHz); part of the truth.",
+        help="Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz, kHz, MHz or GHz). It is "
+        "part of the true motion.",
     ),
     option(
         _FAULTS,
@@ -63,24 +78,26 @@ _OPTIONS = [
     option(
         _FAULTS,
         "--phase-error",
-        type=float,
+        type=Degrees(),
         default=0,
         metavar="DEGREES",
-        help="B's pulse comes this many electrical degrees later than 90 after A's, between -90 and 90.",
+        help="B's pulse comes this many electrical degrees later than 90 after A's, such as 5 or 5deg; between -90 and "
+        "90.",
     ),
     option(
         _FAULTS,
         "--duty-error",
-        type=float,
+        type=Degrees(),
         default=0,
         metavar="DEGREES",
-        help="Pulses of A and B are this many electrical degrees wider than 180, between -90 and 90.",
+        help="Pulses of A and B are this many electrical degrees wider than 180, such as 5 or 5deg; between -90 and "
+        "90.",
     ),
     option(
         _FAULTS,
         "--bounce",
         metavar="COUNT:TIME",
-        help="Contact bounce, such as 3:500us (s, ms or us): after an edge the line falls back COUNT times within "
+        help="Contact bounce, such as 3:500us (s, ms, us or ns): after an edge the line falls back COUNT times within "
         "TIME, or within half the way to the next edge.",
     ),
     option(

@@ -15,16 +15,17 @@ from tachometry.cli.options.methods import listed_methods
 from tachometry.cli.options.option import in_terms_of_options
 from tachometry.cli.options.sweep import CORE, ENCODER, POINT_OPTIONS, by_name
 from tachometry.cli.sweeping.settings import Settings, Text, arguments
-from tachometry.sim.encoder.motion import FREQUENCY, SPEED, TIME, Units, parse_motion, parse_number
+from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.studies.sweep import COLUMNS, Point
 from tachometry.spec import METHODS, TachometerSpec
+from tachometry.spec.units import FREQUENCY, SPEED, TIME, read_nearest
 
 Words = tuple[str, ...]
 
 _MOST = 1_000_000  # points
 _PLACE = re.compile(r"\{([^{}]*)\}")
-_UNITS: Units = SPEED | TIME | FREQUENCY
+_UNITS = SPEED | TIME | FREQUENCY
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ class _Maker:
         spec = self._spec(_words(texts, CORE), method, tuple(given.items()))
         encoder, motion = self._encoder(_words(texts, ENCODER))
         places = {key: texts[key] or "" for key in _PLACE.findall(motion)}
-        values = {key: parse_number(text, _UNITS, key) for key, text in places.items()}
+        values = {key: read_nearest(key, text, _UNITS, "rad/s") for key, text in places.items()}
         motion = _PLACE.sub(lambda place: places[place[1]], motion)
         moved = self._motion(motion)
         return Point(name, spec, encoder(spec), moved, motion, values, self._earliest, self._engine)

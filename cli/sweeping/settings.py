@@ -10,14 +10,13 @@ from typing import Any
 
 import click
 
+from tachometry.spec.units import QUANTITY, ratio
+
 Text = str | None  # None: without the option
 
-_NUMBER = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/]*)"
-_RANGE = re.compile(rf"{_NUMBER}\s*\.\.\s*{_NUMBER}\s*:\s*(\d{{1,6}})\s*(log)?")
+_RANGE = re.compile(rf"{QUANTITY}\s*\.\.\s*{QUANTITY}\s*:\s*(\d{{1,6}})\s*(log)?")
 _MOST = 100_000  # values of an axis
 _DIGITS = 4  # of values between the ends of a logarithmic range
-# Powers of ten of units that can be turned into each other exactly.
-_SCALES = ({"s": 0, "ms": -3, "us": -6, "ns": -9}, {"Hz": 0, "kHz": 3, "MHz": 6, "GHz": 9}, {"rad": 0, "mrad": -3})
 _LISTS = ("methods", "axes")
 
 
@@ -151,8 +150,10 @@ def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]
         if not item:
             raise ValueError(f"values of {name} must be separated by one comma, and none may be empty")
         if match := _RANGE.fullmatch(item):
-            found += _range(name, item, match, whole=option is not None and option.type is not click.FLOAT)
-        elif re.match(rf"{_NUMBER}\s*\.\.", item):
+            found += _range(
+                name, item, match, whole=option is not None and not isinstance(option.type, click.types.FloatParamType)
+            )
+        elif re.match(rf"{QUANTITY}\s*\.\.", item):
             raise ValueError(f"a range of {name} must be LO..HI:N, or LO..HI:Nlog, not {item!r}")
         else:
             found.append(None if item == "none" and option is not None else item)
@@ -168,23 +169,23 @@ def _range(name: str, item: str, match: re.Match[str], whole: bool) -> list[str]
     low, high, count, log = Fraction(match[1]), Fraction(match[3]), int(match[5]), match[6]
     unit = match[2] or match[4]
     if match[4] != unit:
-        scale = next((scale for scale in _SCALES if unit in scale and match[4] in scale), None)
-        if scale is None:
+        factor = ratio(unit, match[4])
+        if factor is None:
             raise ValueError(f"a range of {name} must have one unit, not {item!r}")
-        high *= Fraction(10) ** (scale[match[4]] - scale[unit])
+        high *= factor
     if not 2 <= count <= _MOST:
         raise ValueError(f"a range of {name} must have 2 to {_MOST} values, not {item!r}")
     if low >= high or (log and low <= 0):
         raise ValueError(f"a range of {name} must go up{', from more than 0' * bool(log)}, not {item!r}")
     try:
-        ratio = float(high / low) if log else 1.0
+        step = float(high / low) if log else 1.0
         _ = float(low), float(high)
     except OverflowError:
         raise ValueError(
             f"a range of {name} must be of numbers, and factors between, below 1e308, not {item!r}"
         ) from None
     if log:
-        inner = [Fraction(f"{float(low) * ratio ** (k / (count - 1)):.{_DIGITS}g}") for k in range(1, count - 1)]
+        inner = [Fraction(f"{float(low) * step ** (k / (count - 1)):.{_DIGITS}g}") for k in range(1, count - 1)]
     else:
         inner = [low + (high - low) * k / (count - 1) for k in range(1, count - 1)]
     every = [low, *inner, high]

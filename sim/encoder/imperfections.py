@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.encoder.motion import TIME, FloatArray, cos2pi, parse_number
+from tachometry.sim.encoder.motion import FloatArray, cos2pi
+from tachometry.spec.units import TIME, read_nearest
 
 Rows = NDArray[np.intp]
 Levels = NDArray[np.uint8]
@@ -50,11 +51,11 @@ class Bounce:
 
     @staticmethod
     def parse(text: str) -> "Bounce":
-        """Read COUNT:TIME, such as 3:500us (s, ms or us)."""
+        """Read COUNT:TIME, such as 3:500us (s, ms, us or ns)."""
         match = re.fullmatch(r"\s*(\d{1,9}):([^:]+)", text, re.ASCII)
         if match is None:
             raise ValueError(f"bounce must be COUNT:TIME, such as 3:500us, not {text!r}")
-        return Bounce(int(match[1]), parse_number(match[2], TIME, "bounce time"))
+        return Bounce(int(match[1]), read_nearest("bounce time", match[2], TIME, "s"))
 
 
 def stream(seed: int, which: int) -> np.random.PCG64:

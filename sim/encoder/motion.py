@@ -16,14 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from tachometry.spec.units import ANGLE, FREQUENCY, SPEED, TIME, Units, read_nearest
 
-# A unit is its factor and the power of ten to apply to the decimal number before it is rounded: 7us is exactly 7e-6.
-Units = dict[str, tuple[float, int]]
-SPEED: Units = {"rad/s": (1.0, 0), "rev/s": (2 * math.pi, 0), "rpm": (math.pi / 30, 0)}
-TIME: Units = {"s": (1.0, 0), "ms": (1.0, -3), "us": (1.0, -6)}
-FREQUENCY: Units = {"Hz": (1.0, 0), "kHz": (1.0, 3)}
-_ANGLE: Units = {"rad": (1.0, 0), "mrad": (1.0, -3), "deg": (math.pi / 180, 0)}
+FloatArray = NDArray[np.float64]
 
 _FIELDS: dict[str, dict[str, Units]] = {
     "constant": {"SPEED": SPEED, "TIME": TIME},
@@ -204,13 +199,13 @@ class Vibration:
 
     @staticmethod
     def parse(text: str) -> "Vibration":
-        """Read AMPLITUDE:FREQUENCY, such as 1mrad:50Hz (rad, mrad or deg; Hz or kHz)."""
+        """Read AMPLITUDE:FREQUENCY, such as 1mrad:50Hz (rad, mrad or deg; Hz, kHz, MHz or GHz)."""
         amplitude, colon, frequency = text.partition(":")
         if not colon or ":" in frequency:
             raise ValueError(f"vibration must be AMPLITUDE:FREQUENCY, not {text!r}")
         return Vibration(
-            parse_number(amplitude, _ANGLE, "vibration amplitude"),
-            parse_number(frequency, FREQUENCY, "vibration frequency"),
+            read_nearest("vibration amplitude", amplitude, ANGLE, "rad"),
+            read_nearest("vibration frequency", frequency, FREQUENCY, "Hz"),
         )
 
     def angle(self, t: ArrayLike) -> FloatArray:
@@ -242,7 +237,8 @@ def parse_motion(text: str) -> Motion:
         Segments joined by `+`: constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME,
         trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, stop:TIME. Or csv:FILE alone: a table with the header `time,angle_rad`
         (seconds, rad) between whose rows the angle is interpolated linearly; its first time becomes 0.
-        Speeds are in rad/s (default), rev/s or rpm, times in s (default), ms or us, frequencies in Hz (default) or kHz.
+        Speeds are in rad/s (default), rev/s or rpm, times in s (default), ms, us or ns, frequencies in Hz (default),
+        kHz, MHz or GHz.
 
     Raises
     ------
@@ -267,9 +263,10 @@ def _parse_segment(text: str) -> list[_Segment]:
         raise ValueError(f"motion segment must be one of {_FORMS}, csv:FILE, not {text!r}")
     values = []
     for (name, units), number in zip(fields.items(), numbers, strict=True):
-        value = parse_number(number, units, f"{name} of {kind}")
+        default = next(iter(units))
+        value = read_nearest(f"{name} of {kind}", number, units, default)
         if units is not SPEED and value <= 0:
-            raise ValueError(f"{name} of {kind} must be more than 0 {next(iter(units))}, not {number!r}")
+            raise ValueError(f"{name} of {kind} must be more than 0 {default}, not {number!r}")
         values.append(value)
     match kind, values:
         case "constant", [speed, duration]:
@@ -282,19 +279,6 @@ def _parse_segment(text: str) -> list[_Segment]:
             return [_Segment(rise, 0.0, speed / rise), _Segment(hold, speed), _Segment(rise, speed, -speed / rise)]
         case _:
             return [_Segment(values[0])]
-
-
-def parse_number(text: str, units: Units, name: str) -> float:
-    """Value of a decimal number with one of `units` behind it, or with none: then the first of them is meant."""
-    match = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d{1,4}))?\s*([a-zA-Z/]*)", text.strip(), re.ASCII)
-    default = next(iter(units))
-    if match is None or (match[3] or default) not in units:
-        raise ValueError(f"{name} must be a number in {', '.join(units)} (default {default}), not {text!r}")
-    factor, exponent = units[match[3] or default]
-    value = float(f"{match[1]}e{int(match[2] or 0) + exponent}") * factor
-    if not math.isfinite(value):
-        raise ValueError(f"{name} must be finite, not {text!r}")
-    return value
 
 
 def _read_csv(file: str) -> Motion:

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tachometry.spec.units import PI
+from tachometry.spec.units import PI, SPEED
 
 NATIVE = "count/tick"
-# Revolutions per second in one of each unit are 1/size.
-_PER_REV_PER_SECOND = {"rad/s": 2 * PI, "rev/s": Fraction(1), "rpm": Fraction(60)}
+# So many of each unit are one revolution per second.
+_PER_REV_PER_SECOND = {name: 2 * PI / unit.exact for name, unit in SPEED.items()}
 UNITS = (NATIVE, *_PER_REV_PER_SECOND)
 
 

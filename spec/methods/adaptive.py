@@ -4,16 +4,17 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
 
+from tachometry.spec.option import ParameterError
 from tachometry.spec.timing import Timing
+from tachometry.spec.units import FRACTION, read_exactly
 
 
 def parse_target(text: str, timing: Timing) -> Fraction:
     """A fraction such as `0.1%` or `0.001`; the timing is not used."""
-    number = text.strip()
     try:
-        return Fraction(number[:-1]) / 100 if number.endswith("%") else Fraction(number)
-    except (ValueError, ZeroDivisionError):
-        raise ValueError(f"adaptive must be a fraction such as 0.1% or 0.001, not {text!r}") from None
+        return read_exactly("adaptive", text, FRACTION)
+    except ParameterError:
+        raise ParameterError("adaptive", f"must be a fraction such as 0.1% or 0.001, not {text!r}") from None
 
 
 @dataclass(frozen=True)

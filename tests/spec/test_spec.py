@@ -37,7 +37,7 @@ ERRORS = [
     (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, not 1048577"),
     (
         lambda: Timing.parse("48 m", "20us", "10ms"),
-        "clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48 m'",
+        "clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48 m'",
     ),
     (lambda: Timing.parse("0.5Hz", "20us", "10ms"), "clock must be a positive whole number of Hz, not '0.5Hz'"),
     (

@@ -113,7 +113,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr 9 --decoding 3", "--decoding must be 1, 2 or 4, not 3"),
         ("--ppr 9 --method x", "'x' is not one of 's', 'm', "),
         ("--ppr 9 --clock 48", "--tick must be a whole number of clocks, not 20us"),
-        ("--ppr 9 --clock 48mHz", "--clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48mHz'"),
+        ("--ppr 9 --clock 48mHz", "--clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48mHz'"),
         ("--ppr 9 --clock 0Hz", "--clock must be a positive whole number of Hz, not '0Hz'"),
         ("--ppr 9 --tick 20 --max-time 1s", "--max-time, in ticks, must be from 2 to 1048576, not 2400000"),
         ("--ppr 9 --tick 1s --max-time 2s", "--tick, in clocks, must be from 1 to 1048576, not 48000000"),

@@ -144,7 +144,7 @@ BAD = [
     (["--motion", "stop:1s"], "not 'speed'"),
     (["--motion", "constant:{speed}:{tick}"], "--motion must have names in braces that are no option or column, not "),
     (["--motion", "constant:{speed}:{v}"], "--vary must have values for {v} of --motion, such as --vary v=1,2,5"),
-    (["--vary", "speed=1m"], "speed must be a number in rad/s, rev/s, rpm, s, ms, us, Hz, kHz"),
+    (["--vary", "speed=1m"], "speed must be a number in rad/s, rev/s, rpm, s, ms, us, ns, Hz, kHz, MHz, GHz"),
     (["--vary", "speed=none"], "speed must be a number in"),
     (["--vary", "tick=33us"], "--max-time must be a whole number of ticks, not 20ms"),
     (["--vary", "tick=33us"], "(method s, speed=5rad/s, tick=33us)"),

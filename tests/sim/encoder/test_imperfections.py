@@ -387,7 +387,7 @@ def test_bounce_is_read_from_text() -> None:
         ("1001:1ms", "bounce count must be from 1 to 1000, not 1001"),
         ("3:0", "bounce time must be more than 0 s, not 0.0 s"),
         ("3:-1us", "bounce time must be more than 0 s, not -1e-06 s"),
-        ("3:1Hz", "bounce time must be a number in s, ms, us (default s), not '1Hz'"),
+        ("3:1Hz", "bounce time must be a number in s, ms, us, ns (default s), not '1Hz'"),
     ],
 )
 def test_texts_that_are_no_bounce(text: str, message: str) -> None:

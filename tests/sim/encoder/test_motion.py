@@ -112,12 +112,30 @@ def test_units_of_speed(text: str, speed: float) -> None:
     assert parse_motion(f"constant:{text}:1s+stop:1s").speed(0) == pytest.approx(speed, rel=1e-15)
 
 
-@pytest.mark.parametrize(("text", "time"), [("3", 3), ("3s", 3), ("9ms", 0.009), ("5us", 5e-6), ("1e-3s", 1e-3)])
+@pytest.mark.parametrize(
+    ("text", "time"), [("3", 3), ("3s", 3), ("9ms", 0.009), ("7us", 7e-6), ("50ns", 50e-9), ("1e-3s", 1e-3)]
+)
 def test_units_of_time_are_rounded_once(text: str, time: float) -> None:
     assert parse_motion(f"stop:{text}").duration == time
 
 
+@pytest.mark.parametrize("number", ["0.1", "7", "33.3", "1e-3", "1234.56789", "-0.07", "2.5e3"])
+def test_units_with_pi_are_rounded_as_ever(number: str) -> None:
+    """To the bit: recorded motions stay as they are."""
+    for unit, factor in (("rev/s", 2 * math.pi), ("rpm", math.pi / 30), ("rad/s", 1.0)):
+        assert parse_motion(f"constant:{number}{unit}:1s").start_speed[0] == float(number) * factor
+    degrees = abs(float(number))
+    assert Vibration.parse(f"{degrees}deg:1Hz").amplitude_rad == degrees * (math.pi / 180)
+
+
+def test_numbers_that_would_fill_the_memory() -> None:
+    for number in ("1e9999", "1e-9999", "1" * 500):
+        with pytest.raises(ValueError, match=r"^SPEED of constant must be a number in rad/s, rev/s, rpm"):
+            parse_motion(f"constant:{number}:1s")
+
+
 def test_units_of_frequency() -> None:
+    assert parse_motion("sine:1:2MHz:1").sine_frequency == parse_motion("sine:1:0.002GHz:1").sine_frequency == 2e6
     assert parse_motion("sine:1:2kHz:1").sine_frequency == parse_motion("sine:1:2000:1").sine_frequency == 2000
 
 
@@ -141,8 +159,8 @@ def test_max_travel_bounds_the_way(text: str) -> None:
         ("constant:nan:1", "SPEED of constant must be a number in rad/s, rev/s, rpm (default rad/s), not 'nan'"),
         ("ramp:1:2Hz:1", "TO of ramp must be a number in rad/s, rev/s, rpm (default rad/s), not '2Hz'"),
         ("ramp:1m:2:1", "FROM of ramp must be a number in rad/s, rev/s, rpm (default rad/s), not '1m'"),
-        ("sine:1:1:1h", "TIME of sine must be a number in s, ms, us (default s), not '1h'"),
-        ("sine:1:1rpm:1", "FREQUENCY of sine must be a number in Hz, kHz (default Hz), not '1rpm'"),
+        ("sine:1:1:1h", "TIME of sine must be a number in s, ms, us, ns (default s), not '1h'"),
+        ("sine:1:1rpm:1", "FREQUENCY of sine must be a number in Hz, kHz, MHz, GHz (default Hz), not '1rpm'"),
         ("sine:1:0:1", "FREQUENCY of sine must be more than 0 Hz, not '0'"),
         ("stop:0s", "TIME of stop must be more than 0 s, not '0s'"),
         ("stop:-1ms", "TIME of stop must be more than 0 s, not '-1ms'"),
@@ -233,7 +251,7 @@ def test_vibration() -> None:
         ("1mrad", "vibration must be AMPLITUDE:FREQUENCY, not '1mrad'"),
         ("1mrad:50Hz:1", "vibration must be AMPLITUDE:FREQUENCY, not '1mrad:50Hz:1'"),
         ("1m:50Hz", "vibration amplitude must be a number in rad, mrad, deg (default rad), not '1m'"),
-        ("1mrad:x", "vibration frequency must be a number in Hz, kHz (default Hz), not 'x'"),
+        ("1mrad:x", "vibration frequency must be a number in Hz, kHz, MHz, GHz (default Hz), not 'x'"),
         ("0:50Hz", "vibration amplitude must be more than 0, not 0.0"),
         ("1:-50Hz", "vibration frequency must be more than 0, not -50.0"),
     ],

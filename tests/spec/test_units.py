@@ -1,0 +1,65 @@
+"""One grammar for all quantities: every unit is right wherever the quantity fits."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from support.command import run
+
+from tachometry.sim.encoder.imperfections import Bounce
+from tachometry.sim.encoder.motion import Vibration, parse_motion
+from tachometry.spec import Speed, Timing
+from tachometry.spec.methods.adaptive import parse_target
+from tachometry.spec.units import BANDWIDTH, FREQUENCY, PI, SPEED, TIME, parse_bandwidth, ratio, read_exactly
+
+
+def test_times_frequencies_speeds_and_angles_are_read_alike() -> None:
+    timing = Timing.parse("100MHz", "50ns", "1us")
+    assert (timing.clock_hz, timing.tick_cycles, timing.max_ticks) == (10**8, 5, 20)
+    assert Timing.parse("1GHz", "50ns", "1us").tick_cycles == 50
+    assert parse_motion("constant:10rad/s:50ns").duration == 50e-9
+    assert parse_motion("sine:1:1MHz:1us").sine_frequency == 1e6
+    assert Bounce.parse("3:50ns").time_s == 50e-9
+    assert Vibration.parse("1deg:1GHz").frequency_hz == 1e9
+    assert parse_bandwidth("lowpass", "1MHz") == 2 * PI * 10**6
+
+
+@pytest.mark.parametrize("units", [TIME, FREQUENCY, SPEED, BANDWIDTH])
+@pytest.mark.parametrize("number", ["1", "+.5", "-3.25", "7e-3", "2E+2"])
+def test_numbers_are_exact(units: dict[str, object], number: str) -> None:
+    for name, unit in units.items():
+        assert read_exactly("x", f" {number} {name} ", units) == Fraction(number) * unit.exact  # type: ignore[arg-type, attr-defined]
+
+
+def test_units_of_one_kind_are_turned_into_each_other() -> None:
+    assert ratio("us", "ms") == 1000
+    assert ratio("rpm", "rev/s") == 60
+    assert ratio("deg", "rad") is None
+    assert ratio("s", "Hz") is None
+
+
+def test_speeds() -> None:
+    assert Speed.parse("3000", "rpm") == Speed.parse("3000rpm") == Speed(Fraction(3000), "rpm")
+
+
+@pytest.mark.parametrize(("text", "target"), [("0.1%", "0.001"), ("1e-3", "0.001"), (" 25 % ", "0.25")])
+def test_fractions(text: str, target: str) -> None:
+    assert parse_target(text, Timing.parse("1MHz", "1us", "1ms")) == Fraction(target)
+
+
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        ("--clock 100MHz --tick 50ns --max-time 1us --motion constant:10rad/s:500ns", 0),
+        ("--clock 0.1GHz --tick 50ns --max-time 1us --motion sine:5rpm:1MHz:1us --vibration 1deg:1MHz", 0),
+        ("--clock 0.1GHz --tick 50ns --max-time 1us --motion stop:1us --phase-error 5deg --bounce 2:50ns", 0),
+        ("--clock 1e9999Hz --motion stop:1us", 2),
+        ("--clock 1MHz --lowpass 1e9999Hz --motion stop:1us", 2),
+        ("--method rairan --adaptive 1e999999999 --motion stop:1us", 2),
+        ("--motion stop:1us --phase-error 5rpm", 2),
+    ],
+)
+def test_on_the_command_line(words: str, status: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("simulate", "--ppr", "24", "--engine", "pysim", *words.split()) == status
+    err = capsys.readouterr().err
+    assert err.count("\n") == (status > 0)
