@@ -19,7 +19,7 @@ from amaranth.back import rtlil
 from golden import BEGIN, MOTION, part_of
 from pages import markdown, write_from
 
-from tachometry.cli.reports.table import print_table
+from tachometry.cli.reports.terminal import print_table
 from tachometry.hdl import Tachometer
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion

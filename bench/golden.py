@@ -17,7 +17,7 @@ from pages import markdown, write
 from rich.console import Console
 from rich.progress import track
 
-from tachometry.cli.reports.table import print_table
+from tachometry.cli.reports.terminal import print_table
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder

@@ -9,8 +9,8 @@ from pathlib import Path
 from pages import markdown, write_from
 
 from tachometry.cli.commands.sweep import sweep
-from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
-from tachometry.cli.reports.table import print_table
+from tachometry.cli.options.sweep import by_name, point_options
+from tachometry.cli.reports.terminal import print_table
 from tachometry.cli.sweeping.points import points_of
 from tachometry.cli.sweeping.settings import of_file
 from tachometry.sim.studies import cluster
@@ -30,7 +30,7 @@ points/s, but all is in processor time, that of the scheduler too.
 
 def all_points() -> dict[str, Point]:
     """Those of the file."""
-    settings = of_file(FILE, by_name(sweep) | POINT_OPTIONS)
+    settings = of_file(FILE, by_name(sweep) | point_options())
     return points_of(settings, settings.fixed["methods"], 0.05, None).points
 
 

@@ -13,10 +13,11 @@ from tachometry.cli.commands.compare import compare
 from tachometry.cli.commands.figures import figures
 from tachometry.cli.commands.generate import generate
 from tachometry.cli.commands.plan import plan
-from tachometry.cli.commands.simulate import replay, simulate
+from tachometry.cli.commands.replay import replay
+from tachometry.cli.commands.simulate import simulate
 from tachometry.cli.commands.sweep import sweep
 from tachometry.cli.commands.verify import verify
-from tachometry.cli.options.option import INTERRUPTED, in_terms_of_options
+from tachometry.cli.options.option import INTERRUPTED, told
 
 
 @click.group(
@@ -73,7 +74,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         named = f"{error.filename}: {error.strerror}" if error.filename else str(error)
         code = _fail(f"error: {named}")
     except ValueError as error:
-        code = _fail(f"error: {in_terms_of_options(str(error))}")
+        code = _fail(f"error: {told(error)}")
     except (OverflowError, MemoryError) as error:
         code = _fail(f"error: a number is too large for this computer: {error or type(error).__name__}")
     sys.exit(code)

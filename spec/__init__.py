@@ -1,26 +1,89 @@
 """What is to be built: frozen objects that hardware, golden models, manifest and documents all read."""
 
+from collections.abc import Mapping
+
 from tachometry.spec.encoder import Encoder
 from tachometry.spec.methods.m import MTachometer
 from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.t import TTachometer
+from tachometry.spec.option import Option, ParameterError, options_of, read_options
+from tachometry.spec.parameters import TWO_TICKS
 from tachometry.spec.port import Port
 from tachometry.spec.tachometer import TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed
 
-# Every method by its name. The spec names the module that holds `Datapath` in hdl/ and `Model` in sim/golden/.
+# Every method by its name; `DATAPATHS` in hdl/ and `MODELS` in sim/golden/ hold what belongs to it.
 METHODS: dict[str, type[TachometerSpec]] = {
     spec.method: spec for spec in (STachometer, MTachometer, TTachometer, MTTachometer, RairanTachometer)
 }
 
+
+def common_options() -> tuple[Option, ...]:
+    """Options that every method has."""
+    return (*options_of(Encoder), *options_of(Timing), *options_of(TachometerSpec))
+
+
+def own_options(method: str) -> tuple[Option, ...]:
+    """Options that a method has beside these."""
+    common = {about.name for about in common_options()}
+    return tuple(about for about in options_of(METHODS[method]) if about.name not in common)
+
+
+def methods_with(name: str) -> list[str]:
+    """Methods that have an option of their own by this name."""
+    return [method for method in METHODS if any(about.name == name for about in own_options(method))]
+
+
+def spec_class(method: str) -> type[TachometerSpec]:
+    """The spec of a method; ParameterError if there is none of this name."""
+    if method not in METHODS:
+        raise ParameterError("method", f"must be one of {', '.join(METHODS)}, not {method!r}")
+    return METHODS[method]
+
+
+def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
+    """The core that texts of options describe, as on the command line, in files of sweeps and in tests.
+
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+    texts : mapping of str to str or None
+        By the names of the options without dashes, `{"ppr": "500", "max-speed": "400rad/s"}`; flags are `yes` or `no`.
+        None stands for leaving the option out.
+
+    Raises
+    ------
+    ParameterError
+        If the method has no such option, or a text is not what it must be.
+    """
+    spec = spec_class(method)
+    given = {name: text for name, text in texts.items() if text is not None}
+    known = {about.name: about for about in (*common_options(), *own_options(method))}
+    for name in given:
+        parameter = name.replace("-", "_")
+        if name not in known:
+            others = " and ".join(methods_with(name))
+            why = f"it is for {others}" if others else "there is no such option"
+            raise ParameterError(parameter, f"must not be given with method {method}: {why}")
+        if (fits := known[name].fits) is not None and not fits(spec):
+            instead = next(about.name for about in known.values() if about.field == known[name].field)
+            raise ParameterError(parameter, f"must not be given with method {method}, but {instead}")
+    encoder, timing = Encoder(**read_options(Encoder, given)), Timing(**read_options(Timing, given))
+    return spec(encoder=encoder, timing=timing, **read_options(spec, given))
+
+
 __all__ = [
     "METHODS",
+    "TWO_TICKS",
     "Encoder",
     "MTTachometer",
     "MTachometer",
+    "Option",
+    "ParameterError",
     "Port",
     "RairanTachometer",
     "STachometer",
@@ -28,4 +91,9 @@ __all__ = [
     "TTachometer",
     "TachometerSpec",
     "Timing",
+    "common_options",
+    "methods_with",
+    "of_texts",
+    "own_options",
+    "spec_class",
 ]

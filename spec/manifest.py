@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-from tachometry.spec.recovery import recovery_clocks
+from tachometry.spec.option import ParameterError
 from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END, TachometerSpec
 
 _OF_PORTS = ("name", "direction", "width", "signed")
@@ -30,9 +30,9 @@ def check_module_name(name: str) -> str:
         If it is no plain identifier, or a keyword of Verilog-2001.
     """
     if name in _KEYWORDS:
-        raise ValueError(f"name must not be a Verilog keyword, which {name!r} is")
+        raise ParameterError("name", f"must not be a Verilog keyword, which {name!r} is")
     if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,63}", name) is None:
-        raise ValueError(f"name must be a letter or _ and up to 63 letters, digits or _, not {name!r}")
+        raise ParameterError("name", f"must be a letter or _ and up to 63 letters, digits or _, not {name!r}")
     return name
 
 
@@ -45,8 +45,8 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
         If `name` cannot be the name of a module.
     """
     if name in {port.name for port in spec.ports}:
-        raise ValueError(f"name must not be that of a port, which {name!r} is")
-    recovery = recovery_clocks(spec)
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    recovery = spec.recovery_clocks
     return {
         "module": check_module_name(name),
         "method": spec.method,

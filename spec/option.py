@@ -1,13 +1,18 @@
-"""Options: what can be wrong with a parameter, defaults that follow from other parameters, and how texts are read."""
+"""Options: fields of a spec that say how they are named, read, explained and tested."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import Field, field, fields
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from fractions import Fraction
+from functools import cache
+from typing import Any
 
-if TYPE_CHECKING:
-    from tachometry.spec.timing import Timing
+_YES = frozenset(("yes", "y", "true", "t", "on", "1"))
+_NO = frozenset(("no", "n", "false", "f", "off", "0"))
+_MOST_DIGITS = 20
+
+REQUIRED: Any = MISSING  # default of an option that must be given
 
 
 class ParameterError(ValueError):
@@ -29,33 +34,194 @@ class ParameterError(ValueError):
     def __str__(self) -> str:
         return f"{self.parameter} {self.rest}"
 
+    @staticmethod
+    def longer(error: ValueError, more: str) -> ValueError:
+        """The same error with something behind its message."""
+        if isinstance(error, ParameterError):
+            return ParameterError(error.parameter, error.rest + more)
+        return ValueError(f"{error}{more}")
 
-def option(
-    default: Any,
-    help: str,
-    *,
-    name: str | None = None,
-    metavar: str | None = None,
-    choices: Sequence[str] = (),
-    parse: Callable[[str, Timing], Any] | None = None,
-) -> Any:
-    """A field with its option: what `--help` says of it, and how its text is read.
+
+@dataclass(frozen=True)
+class Derived:
+    """A value that follows from other fields: `settle` puts `of(object)` in its place."""
+
+    of: Callable[[Any], Any]
+
+
+def settle(item: Any, *names: str) -> None:
+    """Replace derived values of a frozen dataclass by what they are: those of some fields, or of all in order."""
+    for name in names or (other.name for other in fields(item)):
+        value = getattr(item, name)
+        if isinstance(value, Derived):
+            object.__setattr__(item, name, value.of(item))
+
+
+def parse_flag(what: str, text: str) -> bool:
+    """Whether a text says yes."""
+    if (word := text.strip().lower()) not in _YES | _NO:
+        raise ParameterError(what, f"must be yes or no, not {text!r}")
+    return word in _YES
+
+
+def parse_whole(what: str, text: str) -> int:
+    """A whole number."""
+    try:
+        if len(text) <= _MOST_DIGITS:
+            return int(text)
+    except ValueError:
+        pass
+    raise ParameterError(what, f"must be a whole number, not {text!r}")
+
+
+def parse_text(what: str, text: str) -> str:
+    """The text as it is."""
+    return text
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of the command line, of sweeps and of files: how a field of a spec is given as a text.
 
     Parameters
     ----------
-    default : bool, int, str or None
     help : str
-    name : str or None
-        Of the option, without dashes; None: that of the field. Of two methods' fields with one name it is one option.
+        A sentence for `--help`.
+    name : str
+        Without dashes; empty: that of the field. Fields of several methods that have one name are one option.
     metavar : str or None
-    choices : sequence of str
-    parse : callable or None
-        Makes the value of the text, given the timing; None: the text, or an int if the default is one.
+    unit : str
+        What the field's number counts: `clocks`, `ticks` or `rad/s`.
+    group : str
+        Heading in `--help`.
+    choices : tuple of str
+        All texts that it takes; empty: others.
+    shown : str or None
+        The default, as `--help` shows it.
+    parse : callable
+        Makes the value of what the message calls the option, and of the text. A value that depends on other fields is
+        a `Derived`.
+    flag : bool
+        Whether it stands alone, for yes.
+    needs : str
+        Name of the flag that must be given with it.
+    fits : callable or None
+        Tells of a method's spec whether it has the option; None: it has.
+    tests : tuple of str or None
+        Values that pairwise tests use, the empty text for leaving it out; see `sim.studies.pairs` for those in words.
+        None: both of a flag, all choices, else none.
+    few : int
+        How many of these, the first, are enough with a method that does little with the option.
+    field : str
+        Name of the field; known to `options_of`.
+    default : object
+        That of the field; known to `options_of`.
     """
-    metadata = {"help": help, "name": name, "metavar": metavar, "choices": choices, "parse": parse}
-    return field(default=default, metadata={"option": metadata})
+
+    help: str
+    name: str = ""
+    metavar: str | None = None
+    unit: str = ""
+    group: str = "Core"
+    choices: tuple[str, ...] = ()
+    shown: str | None = None
+    parse: Callable[[str, str], Any] = parse_text
+    flag: bool = False
+    needs: str = ""
+    fits: Callable[[type[Any]], bool] | None = None
+    tests: tuple[str, ...] | None = None
+    few: int = 2
+    field: str = ""
+    default: Any = None
+
+    @property
+    def parameter(self) -> str:
+        """What messages call it."""
+        return self.name.replace("-", "_")
+
+    @property
+    def required(self) -> bool:
+        """Whether it must be given."""
+        return self.default is MISSING
+
+    @property
+    def tested(self) -> tuple[str, ...]:
+        """Values that pairwise tests use."""
+        if self.tests is not None:
+            return self.tests
+        if self.flag:
+            return ("", "no" if self.default is True else "yes")
+        return tuple("" if choice == self.default else choice for choice in self.choices)
+
+    def canonical(self, value: Any) -> Any:
+        """A value of the field for a manifest."""
+        if isinstance(value, Fraction):
+            return f"{float(value)!r}{self.unit}" if self.unit else float(value)
+        return value if isinstance(value, bool | int | str | None) else str(value)
 
 
-def options_of(spec: type[Any]) -> list[Field[Any]]:
-    """Fields of a spec that are options of its method."""
-    return [item for item in fields(spec) if "option" in item.metadata]
+def option(default: Any, help: str, *, text: str | None = None, also: tuple[Option, ...] = (), **about: Any) -> Any:
+    """A field that is an option.
+
+    Parameters
+    ----------
+    default : object
+        Default of the field; not used if there is a text.
+    help : str
+    text : str or None
+        The default as a text, read as it would be if it were given.
+    also : tuple of Option
+        Other options for the same field.
+    **about
+        See `Option`. Without `parse`, the kind of the default tells how the text is read.
+    """
+    if isinstance(default, bool):
+        about = {"flag": True, "parse": parse_flag} | about
+    elif type(default) is int:
+        about = {"parse": parse_whole} | about
+    main = Option(help, shown=about.pop("shown", text), **about)
+    if text is not None:
+        default = main.parse(main.parameter, text)
+    elif main.shown is None and type(default) in (int, str):
+        main = replace(main, shown=str(default))
+    return field(default=default, metadata={"options": (main, *also)})
+
+
+def options_of(spec: Any) -> tuple[Option, ...]:
+    """Options of the fields of a class, in order."""
+    return _declared(spec)
+
+
+@cache
+def _declared(spec: Any) -> tuple[Option, ...]:
+    return tuple(_of_field(about, item) for item in fields(spec) for about in item.metadata.get("options", ()))
+
+
+def _of_field(about: Option, item: Field[Any]) -> Option:
+    return replace(about, name=about.name or item.name.replace("_", "-"), field=item.name, default=item.default)
+
+
+def read_options(spec: type[Any], texts: Mapping[str, str]) -> dict[str, Any]:
+    """Values of the fields of a class, of the texts that are given for its options.
+
+    Raises
+    ------
+    ParameterError
+        If a text cannot be read, two options for one field are given, or one is missing.
+    """
+    values: dict[str, Any] = {}
+    by: dict[str, Option] = {}
+    for about in options_of(spec):
+        if about.name not in texts:
+            continue
+        if about.needs:
+            if not parse_flag(about.needs, texts.get(about.needs, "no")):
+                raise ParameterError(about.parameter, f"must be given together with --{about.needs}")
+        elif other := by.get(about.field):
+            raise ParameterError(about.parameter, f"must not be given together with --{other.name}")
+        values[about.field] = about.parse(about.parameter, texts[about.name])
+        by[about.field] = about
+    for about in options_of(spec):
+        if about.required and about.field not in values:
+            raise ParameterError(about.parameter, "must be given")
+    return values

@@ -1,13 +1,25 @@
 """The clock, the sampling period and the longest measurement."""
 
+import re
 from dataclasses import dataclass
 from fractions import Fraction
 
+from tachometry.spec.option import Derived, Option, ParameterError, option, read_options, settle
 from tachometry.spec.units import format_time, parse_frequency, parse_time
 
 MAX_CLOCK_HZ = 10**11
 MAX_TICK_CYCLES = 1 << 20
 MAX_TICKS = 1 << 20
+
+_GROUP = "Timing"
+
+
+def _clocks(what: str, text: str) -> Derived:
+    return Derived(lambda timing: whole_clocks(what, text, timing.clock_hz))
+
+
+def _ticks(what: str, text: str) -> Derived:
+    return Derived(lambda timing: _whole(what, text, timing.tick_seconds, "tick", Fraction(1, timing.clock_hz)))
 
 
 @dataclass(frozen=True)
@@ -19,46 +31,85 @@ class Timing:
     clock_hz : int
         Frequency of `clk` in Hz.
     tick_cycles : int
-        T, clocks in a sampling period T_s.
+        T, clocks in a sampling period T_s; 20 µs, if it is not given.
     max_ticks : int
-        Ticks after which an update is forced (Tsuji 2009, Sec. V-B: 10 ms).
+        Ticks after which an update is forced (Tsuji 2009, Sec. V-B: 10 ms, which it is if it is not given).
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a parameter is out of range.
     """
 
-    clock_hz: int
-    tick_cycles: int
-    max_ticks: int
+    clock_hz: int = option(
+        None,
+        "Clock of the core, in Hz, kHz, MHz or GHz; a plain number is Hz.",
+        text="48MHz",
+        name="clock",
+        metavar="FREQUENCY",
+        group=_GROUP,
+        parse=parse_frequency,
+    )
+    tick_cycles: int = option(
+        None,
+        "Sampling period Ts, in s, ms, us or ns, a whole number of clocks; a plain number is clocks.",
+        text="20us",
+        name="tick",
+        metavar="TIME",
+        unit="clocks",
+        group=_GROUP,
+        parse=_clocks,
+        tests=("1", "3", "960", "2"),
+        few=3,
+        also=(
+            Option(
+                "Sampling period of method rairan, whose tick is called dt (instead of --tick).",
+                name="dt",
+                metavar="TIME",
+                group=_GROUP,
+                parse=_clocks,
+                fits=lambda spec: spec.own_ticks,
+            ),
+        ),
+    )
+    max_ticks: int = option(
+        None,
+        "Longest measurement: after it an update is forced, so that standstill is seen. In s, ms, us or ns, 2 to 2^20 "
+        "whole ticks; a plain number is clocks.",
+        text="10ms",
+        name="max-time",
+        metavar="TIME",
+        unit="ticks",
+        group=_GROUP,
+        parse=_ticks,
+        tests=("2", "500", "3", "65536"),
+        few=3,
+    )
 
     def __post_init__(self) -> None:
         if not 1 <= self.clock_hz <= MAX_CLOCK_HZ:
-            raise ValueError(f"clock must be from 1 Hz to 100 GHz, not {float(self.clock_hz):.6g} Hz")
+            raise ParameterError("clock", f"must be from 1 Hz to 100 GHz, not {float(self.clock_hz):.6g} Hz")
+        settle(self, "tick_cycles")
         if not 1 <= self.tick_cycles <= MAX_TICK_CYCLES:
-            raise ValueError(f"tick_cycles must be from 1 to {MAX_TICK_CYCLES}, not {self.tick_cycles}")
+            raise ParameterError("tick_cycles", f"must be from 1 to {MAX_TICK_CYCLES}, not {self.tick_cycles}")
+        settle(self)
         if not 2 <= self.max_ticks <= MAX_TICKS:
-            raise ValueError(f"max_ticks must be from 2 to {MAX_TICKS}, not {self.max_ticks}")
+            raise ParameterError("max_ticks", f"must be from 2 to {MAX_TICKS}, not {self.max_ticks}")
 
     @classmethod
-    def parse(cls, clock: str | int, tick: str | int, max_time: str | int) -> "Timing":
-        """Timing from texts (`48MHz`, `20us`, `10ms`) or whole numbers (Hz, clocks, clocks).
+    def parse(
+        cls, clock: str | int | None = None, tick: str | int | None = None, max_time: str | int | None = None
+    ) -> "Timing":
+        """Timing from texts (`48MHz`, `20us`, `10ms`) or whole numbers (Hz, clocks, clocks); None is the default.
 
         Raises
         ------
-        ValueError
+        ParameterError
             Also if the tick is not a whole number of clocks, or the maximum time not of ticks: the message names the
             two nearest that are.
         """
-        clock_hz = parse_frequency("clock", clock)
-        if clock_hz > MAX_CLOCK_HZ:
-            return cls(clock_hz, 1, 2)  # which says so
-        tick_cycles = whole_clocks("tick", tick, clock_hz)
-        max_ticks = _whole(
-            "max_time", max_time, Fraction(tick_cycles, clock_hz), "tick", given_in=Fraction(1, clock_hz)
-        )
-        return cls(clock_hz, tick_cycles, max_ticks)
+        given = {"clock": clock, "tick": tick, "max-time": max_time}
+        return cls(**read_options(cls, {name: str(value) for name, value in given.items() if value is not None}))
 
     @property
     def tick_seconds(self) -> Fraction:
@@ -66,22 +117,23 @@ class Timing:
         return Fraction(self.tick_cycles, self.clock_hz)
 
 
-def whole_clocks(what: str, given: str | int, clock_hz: int) -> int:
-    """A time such as `40us`, or a number of clocks, as a whole number of clocks; ValueError if it is none."""
-    return _whole(what, given, Fraction(1, clock_hz), "clock")
+def whole_clocks(what: str, given: str, clock_hz: int) -> int:
+    """A time such as `40us`, or a number of clocks, as a whole number of clocks; ParameterError if it is none."""
+    return _whole(what, given, Fraction(1, clock_hz), "clock", Fraction(1, clock_hz))
 
 
-def _whole(what: str, given: str | int, period: Fraction, name: str, given_in: Fraction | None = None) -> int:
+def _whole(what: str, given: str, period: Fraction, name: str, given_in: Fraction) -> int:
     """`given`, a time or a number of clocks, as a whole number of periods."""
-    number = str(given).strip()
-    seconds = int(number) * (given_in or period) if number.isdecimal() else parse_time(what, number)
+    number = given.strip()
+    plain = re.fullmatch(r"\d{1,30}", number, re.ASCII)
+    seconds = int(number) * given_in if plain else parse_time(what, number)
     if seconds <= 0:
-        raise ValueError(f"{what} must be longer than 0, not {given}")
+        raise ParameterError(what, f"must be longer than 0, not {given}")
     periods = seconds / period
     if periods.denominator == 1:
         return int(periods)
     below, above = (f"{n} {name}{'s' * (n != 1)} ({format_time(n * period)})" for n in (int(periods), int(periods) + 1))
     nearest = above if periods < 1 else f"{below} and {above}"
-    raise ValueError(
-        f"{what} must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"
+    raise ParameterError(
+        what, f"must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"
     )

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support.verilog import run_in_verilator
 
-from tachometry.cli.options.pairs import configurations, spec_of
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.signals.run import compare
+from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS
 
 CORES = [words for method in METHODS for words in configurations(method)]

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tachometry.cli.options.pairs import configurations, spec_of
 from tachometry.hdl import Tachometer
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.probes import shown
 from tachometry.sim.signals.run import Run, Table, compare
 from tachometry.sim.signals.tables import write_counts, write_events, write_trace
+from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.sim.testbench.vectors import strobe_rows
 from tachometry.spec import METHODS
 from tachometry.spec.manifest import manifest

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import capture_options
-from tachometry.cli.options.core import common_options
+from tachometry.cli.options.core import Make, common_core_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import GroupedCommand, option, output
@@ -39,7 +39,7 @@ Examples:
       --motion "sine:50rad/s:5Hz:1s" --size
   tachometry compare --ppr 500 --clock 200kHz --tick 1ms --replay ramp.sr""",
 )
-@common_options
+@common_core_options
 @option(
     "Methods",
     "--methods",
@@ -75,7 +75,7 @@ Examples:
 @output("--plot", suffixes=(".png", ".pdf"), help="Figure of all velocities and of the error of each; .png or .pdf.")
 @output("--csv", help="CSV with a row per method: the table.")
 def compare(
-    make: Callable[[str, dict[str, Any]], TachometerSpec],
+    make: Make,
     methods: str,
     record: Callable[[TachometerSpec], Encoding] | None,
     tables: list[Path],
@@ -103,7 +103,7 @@ def compare(
     source = _source(record, capture, read, spec)
     earliest = 0.0 if start is None else float(parse_time("from", start))
     if earliest < 0:
-        raise ValueError(f"from must be at least 0, not {start}")
+        raise ValueError(f"--from must be at least 0, not {start}")
     tools = _tools() if size else {}
     with outputs:
         duration = source.recording.duration
@@ -142,12 +142,12 @@ def _source(
     spec: TachometerSpec,
 ) -> _Source:
     if (record is None) == (capture is None):
-        raise ValueError("motion must be given, or --replay, and not both")
+        raise ValueError("--motion must be given, or --replay, and not both")
     if capture is not None:
         return _Source(str(capture), read(capture, spec), None)
     assert record is not None
     truth = record(spec)
-    return _Source("motion", truth.recording, truth.true_speed)
+    return _Source("--motion", truth.recording, truth.true_speed)
 
 
 def _tools() -> dict[str, str]:
@@ -164,7 +164,7 @@ def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
     """COMB, FF and Fmax of the cores on an ECP5, by name."""
     from rich.progress import MofNCompleteColumn, TextColumn
 
-    from tachometry.cli.reports.run import progress_bar
+    from tachometry.cli.reports.terminal import progress_bar
     from tachometry.hdl import export
     from tachometry.sim.studies.size import CORE, TARGETS, measure_core
 
@@ -208,19 +208,15 @@ _SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
 
 
 def _print(scores: list[Score], sizes: dict[str, Measurement], left_out: dict[str, str]) -> None:
-    from rich.table import Table
     from rich.text import Text
 
-    from tachometry.cli.reports.run import stdout_console
+    from tachometry.cli.reports.terminal import print_table, stdout_console
 
     def time(seconds: float | None) -> str:
         return "-" if seconds is None else ("-" if seconds < 0 else "") + _time(abs(seconds))
 
-    table = Table(box=None, pad_edge=False, header_style="")
-    for head in (*_HEADS, *(_SIZE if sizes else ())):
-        table.add_column(head, justify="left" if head == _HEADS[0] else "right", no_wrap=True)
-    for row in scores:
-        cells = (
+    rows = [
+        (
             row.name,
             f"{row.updates_per_second:.4g}",
             time(row.mean_time),
@@ -230,9 +226,10 @@ def _print(scores: list[Score], sizes: dict[str, Measurement], left_out: dict[st
             time(row.delay),
             *(_size_cells(sizes.get(row.name)) if sizes else ()),
         )
-        table.add_row(*map(Text, cells))
+        for row in scores
+    ]
+    print_table((*_HEADS, *(_SIZE if sizes else ())), rows)
     console = stdout_console()
-    console.print(table)
     console.print()
     for row in scores:
         console.print(Text(f"{row.name}: {row.what}"))

@@ -54,7 +54,7 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
 
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """
-    from tachometry.cli.reports.run import progress_bar
+    from tachometry.cli.reports.terminal import progress_bar
     from tachometry.sim.figures.drawing import write_claims, write_data, write_figure
     from tachometry.sim.figures.lab import Lab
 
@@ -87,7 +87,7 @@ def _chosen(only: str) -> list[Entry]:
     names = list(FIGURES) if only.strip() == "all" else list(dict.fromkeys(name.strip() for name in only.split(",")))
     for name in names:
         if name not in FIGURES:
-            raise ValueError(f"only must be of {', '.join(FIGURES)}, or all, not {name!r}")
+            raise ValueError(f"--only must be of {', '.join(FIGURES)}, or all, not {name!r}")
     return [FIGURES[name] for name in names]
 
 
@@ -97,24 +97,19 @@ def _within(report: Callable[[float], None] | None, before: float, entry: Entry)
 
 
 def _print(results: dict[str, Result], labs: dict[str, Lab], directory: Path) -> None:
-    from rich.table import Table
     from rich.text import Text
 
-    from tachometry.cli.reports.run import stdout_console
+    from tachometry.cli.reports.terminal import print_table, stdout_console
 
-    table = Table(box=None, pad_edge=False, header_style="")
-    for head in ("figure", "paper", "agrees", "hardware"):
-        table.add_column(head, no_wrap=True)
+    heads, rows = ("figure", "paper", "agrees", "hardware"), []
     for name, result in results.items():
         agreeing, lab = sum(claim.agrees for claim in result.claims), labs[name]
-        table.add_row(
-            Text(name),
-            Text(result.source),
-            Text("yes" if result.agrees else f"in {agreeing} of {len(result.claims)} claims"),
-            Text(f"{lab.mismatches} mismatches in {lab.locked} clocks" if lab.locked else "-"),
+        agrees = "yes" if result.agrees else f"in {agreeing} of {len(result.claims)} claims"
+        rows.append(
+            (name, result.source, agrees, f"{lab.mismatches} mismatches in {lab.locked} clocks" if lab.locked else "-")
         )
+    print_table(heads, rows, left=range(len(heads)))
     console = stdout_console()
-    console.print(table)
     for name, result in results.items():
         for claim in result.claims:
             if not claim.agrees:

@@ -72,7 +72,7 @@ def generate(
     """
     check_module_name(name)
     if record is not None and testbench is None:
-        raise ValueError("motion must be given together with --testbench")
+        raise ValueError("--motion must be given together with --testbench")
     files = [f"{name}.{suffix}" for suffix in ("v", "json", "core")]
     if testbench:
         files += [f"test_{name}.py", f"{name}_vectors.json"]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.core import core_and_make_options
+from tachometry.cli.options.core import Make, core_and_make_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.spec import Speed, TachometerSpec
@@ -54,7 +53,7 @@ Examples:
 @output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")
 def plan(
     spec: TachometerSpec,
-    make: Callable[[str, dict[str, Any]], TachometerSpec],
+    make: Make,
     speeds: str | None,
     methods: str | None,
     plot: Path | None,
@@ -119,20 +118,22 @@ def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
         last = Speed.parse(high, "rad/s")
         first = Speed.parse(low, last.unit)
     except ValueError as error:
-        raise ValueError(f"speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not {text!r}") from error
+        raise ValueError(
+            f"--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not {text!r}"
+        ) from error
     counts = last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
     if counts > spec.max_count or last.rad_per_s > spec.greatest_speed * (1 + 1e-12):
         greatest = spec.greatest_speed / _rad_per_s(last.unit)
         raise ValueError(
-            f"speeds must be at most {spec.greatest_speed / spec.unit_velocity:.6g} counts per tick "
+            f"--speeds must be at most {spec.greatest_speed / spec.unit_velocity:.6g} counts per tick "
             f"({greatest:.6g}{last.unit}), "
             f"the most that this core measures, not {text!r}"
         )
     if first.rad_per_s < _SLOWEST * spec.unit_velocity:
         least = _SLOWEST * spec.unit_velocity / _rad_per_s(first.unit)
-        raise ValueError(f"speeds must be at least {least:.6g}{first.unit}, not {text!r}")
+        raise ValueError(f"--speeds must be at least {least:.6g}{first.unit}, not {text!r}")
     if first.rad_per_s >= last.rad_per_s:
-        raise ValueError(f"speeds must be LO:HI with LO less than HI, not {text!r}")
+        raise ValueError(f"--speeds must be LO:HI with LO less than HI, not {text!r}")
     return first.rad_per_s, last.rad_per_s, last.unit
 
 

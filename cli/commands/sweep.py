@@ -11,7 +11,7 @@ import click
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, tables_of
 from tachometry.cli.options.option import INTERRUPTED, GroupedCommand, option, output
-from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
+from tachometry.cli.options.sweep import by_name, point_options
 from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
 from tachometry.spec.units import parse_time, plural
 
@@ -37,14 +37,14 @@ class _Command(GroupedCommand):
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         own = super().get_params(ctx)
-        return [*own, *(option for option in POINT_OPTIONS.values() if option not in own)]
+        return [*own, *(option for option in point_options().values() if option not in own)]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         raw, _, _ = self.make_parser(ctx).parse_args(list(args))
         asked = self.get_help_option(ctx)
         if asked is not None and raw.get(asked.name or ""):
             return super().parse_args(ctx, args)
-        options = by_name(self) | POINT_OPTIONS
+        options = by_name(self) | point_options()
         file = raw.get("file")
         settings = of_command_line(raw, options)
         if isinstance(file, str):
@@ -154,11 +154,11 @@ def sweep(
     cluster.require()
     earliest = 0.0 if start is None else float(parse_time("from", start))
     if earliest < 0:
-        raise ValueError(f"from must be at least 0, not {start}")
+        raise ValueError(f"--from must be at least 0, not {start}")
     if jobs is not None and scheduler is not None:
-        raise ValueError("jobs must not be given together with --scheduler")
+        raise ValueError("--jobs must not be given together with --scheduler")
     if jobs is not None and jobs < 1:
-        raise ValueError(f"jobs must be at least 1, not {jobs}")
+        raise ValueError(f"--jobs must be at least 1, not {jobs}")
 
     from tachometry.cli.reports.sweep import print_sweep
     from tachometry.cli.sweeping.points import points_of
@@ -199,7 +199,7 @@ def _run(
     """Run the points that are missing; Ctrl-C ends it early."""
     from rich.progress import MofNCompleteColumn, TextColumn
 
-    from tachometry.cli.reports.run import PerSecond, progress_bar
+    from tachometry.cli.reports.terminal import PerSecond, progress_bar
     from tachometry.sim.studies import cluster
 
     if not missing:
@@ -232,10 +232,10 @@ def _axes(text: str | None, found: Points) -> dict[str, list[str]]:
     """Axes of the heat map with their values: across, and upwards if there are two."""
     varied = {name: values for name, values in found.axes.items() if len(values) > 1}
     if not varied:
-        raise ValueError("vary must be given together with --plot, with two values or more")
+        raise ValueError("--vary must be given together with --plot, with two values or more")
     if text is None:
         return dict(list(varied.items())[:2])
     names = [name.strip() for name in text.split(",")]
     if len(names) > 2 or len(set(names)) < len(names) or not set(names) <= set(varied):
-        raise ValueError(f"axes must be one or two of {', '.join(varied)}, not {text!r}")
+        raise ValueError(f"--axes must be one or two of {', '.join(varied)}, not {text!r}")
     return {name: varied[name] for name in names}

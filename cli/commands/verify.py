@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tachometry.cli.options.option import INTERRUPTED, GroupedCommand, option, output_folder
-from tachometry.cli.options.pairs import configurations, spec_of
+from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
@@ -46,14 +46,18 @@ The first run builds every core for every engine, which takes most of the time;
 later ones find them in the cache.""",
 )
 @option(
-    _VERIFICATION, "--methods", default="all", metavar="LIST", help=f"With commas between, of {', '.join(METHODS)}."
+    _VERIFICATION,
+    "--methods",
+    default="all",
+    metavar="LIST",
+    help=lambda: f"Methods to verify: all, or names with commas between, of {', '.join(METHODS)}.",
 )
 @option(
     _VERIFICATION,
     "--engines",
     default="all",
     metavar="LIST",
-    help="With commas between, of pysim, cxxrtl, verilator; all are those that can be used here.",
+    help="Engines to verify, with commas between: pysim, cxxrtl, verilator; all are those that can be used here.",
 )
 @option(
     _VERIFICATION,
@@ -64,13 +68,13 @@ later ones find them in the cache.""",
     help="Clocks that each engine is to simulate, spread over the configurations; pysim a thousandth of them. There is "
     "one motion of each configuration at least.",
 )
-@option(_VERIFICATION, "--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Of the first motion.")
+@option(_VERIFICATION, "--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Seed of the first motion.")
 @option(
     _VERIFICATION,
     "--jobs",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Processes. [default: one for each core of the computer]",
+    help="Number of processes. [default: one for each core of the computer]",
 )
 @output_folder("build/verify", help="Folder of the captures of failing motions; it is made when there is one.")
 def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None, directory: Path) -> int:
@@ -116,7 +120,7 @@ def _listed(what: str, text: str, known: list[str]) -> list[str]:
     names = known if text.strip() == "all" else [word.strip() for word in text.split(",")]
     for name in names:
         if name not in known:
-            raise ValueError(f"{what} must be of {', '.join(known)}, or all, not {name!r}")
+            raise ValueError(f"--{what} must be of {', '.join(known)}, or all, not {name!r}")
     return [name for name in known if name in names]
 
 
@@ -172,7 +176,7 @@ def _each(
 def _progress(n_cores: int) -> AbstractContextManager[Callable[[float], None] | None]:
     from rich.progress import MofNCompleteColumn, TextColumn
 
-    from tachometry.cli.reports.run import progress_bar
+    from tachometry.cli.reports.terminal import progress_bar
 
     return progress_bar("verifying", n_cores, MofNCompleteColumn(), TextColumn("configurations"))
 
@@ -182,14 +186,11 @@ _HEADS = ("method", "engine", "configurations", "motions", "clocks", "ticks", "u
 
 def _print(found: list[_Result], methods: list[str], engines: list[str], *, whole: bool) -> bool:
     """Print the table and the verdict, if it is about the whole; whether anything differs."""
-    from rich.table import Table
     from rich.text import Text
 
-    from tachometry.cli.reports.run import stdout_console
+    from tachometry.cli.reports.terminal import print_table, stdout_console
 
-    table = Table(box=None, pad_edge=False, header_style="")
-    for head in _HEADS:
-        table.add_column(head, justify="left" if head in _HEADS[:2] else "right", no_wrap=True)
+    rows = []
     total = dict.fromkeys(_HEADS[3:], 0.0)
     for method in methods:
         for engine in engines:
@@ -198,11 +199,11 @@ def _print(found: list[_Result], methods: list[str], engines: list[str], *, whol
                 head: sum(getattr(outcome, head if head == "seconds" else f"n_{head}") for outcome in outcomes)
                 for head in total
             }
-            table.add_row(method, engine, str(len(outcomes)), *(f"{value:.0f}" for value in sums.values()))
+            rows.append((method, engine, str(len(outcomes)), *(f"{value:.0f}" for value in sums.values())))
             for head, value in sums.items():
                 total[head] += value
+    print_table(_HEADS, rows, left=(0, 1))
     console = stdout_console()
-    console.print(table)
     for failure in (failure for result in found for failure in result.failures):
         console.print(Text(f"differs: {failure}"), soft_wrap=True)
     if failed := bool(total["mismatches"]):

@@ -50,6 +50,8 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
         def read(capture: Path, spec: TachometerSpec) -> Recording:
             from tachometry.sim.captures.read import read_capture
 
+            if samplerate is not None and capture.suffix.lower() in (".csv", ".vcd"):
+                raise ValueError(f"--samplerate must not be given for {capture}: it has its times")
             index = "z" if z is None and spec.index else z
             tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
             return read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), index, tick)

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from tachometry.cli.options.option import all_of, option
-from tachometry.spec import TachometerSpec
+from tachometry.spec import ParameterError, TachometerSpec
 from tachometry.spec.units import parse_time
 
 _SIMULATION = "Simulation"
@@ -39,11 +39,11 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
             begin = 0 if vcd_from is None else _clock("vcd_from", vcd_from, spec)
             end = n_clocks if vcd_to is None else min(_clock("vcd_to", vcd_to, spec), n_clocks)
             if begin >= end:
-                raise ValueError(f"vcd_from must be before --vcd-to and the end of the run, clock {end}, not {begin}")
+                raise ValueError(f"--vcd-from must be before --vcd-to and the end of the run, clock {end}, not {begin}")
             return begin, end
 
         if (vcd_from is not None or vcd_to is not None) and "--vcd" not in others["targets"]:
-            raise ValueError("vcd must be given together with --vcd-from and --vcd-to")
+            raise ValueError("--vcd must be given together with --vcd-from and --vcd-to")
         return command(window=window, **others)
 
     return all_of(_ENGINE_OPTIONS, collect)
@@ -55,5 +55,5 @@ def _clock(what: str, text: str, spec: TachometerSpec) -> int:
         return int(text)
     seconds = parse_time(what, text)
     if seconds < 0:
-        raise ValueError(f"{what} must be at least 0, not {text}")
+        raise ParameterError(what, f"must be at least 0, not {text}")
     return int(seconds * spec.timing.clock_hz)

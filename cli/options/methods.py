@@ -1,11 +1,10 @@
 """Lists of methods, such as `s,m:average=10`, and what is left out of `all`."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import Any
 
-from tachometry.cli.options.core import method_options_of_text
-from tachometry.cli.options.option import in_terms_of_options
+from tachometry.cli.options.core import Make, Texts, own_texts
+from tachometry.cli.options.option import told
 from tachometry.spec import METHODS, TachometerSpec
 
 
@@ -25,9 +24,7 @@ class Methods:
     left_out: dict[str, str] = field(default_factory=dict)
 
 
-def named_methods(
-    text: str, make: Callable[[str, dict[str, Any]], TachometerSpec], others: Collection[str] = ()
-) -> Methods:
+def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Methods:
     """The methods of a list with commas, `all` being every method and all `others`.
 
     Parameters
@@ -35,7 +32,7 @@ def named_methods(
     text : str
         Of names, a core's with options after a colon: `m:average=10`.
     make : callable
-        See `core_options.common_options`.
+        See `core.common_core_options`.
     others : collection of str
         Names that are no methods of cores.
 
@@ -52,7 +49,7 @@ def named_methods(
             try:
                 specs[name] = make(name, {})
             except ValueError as error:
-                left_out[name] = in_terms_of_options(str(error))
+                left_out[name] = told(error)
         return Methods(specs | dict.fromkeys(others), left_out)
     specs = {}
     for name, method, given in listed_methods(text, others):
@@ -60,7 +57,7 @@ def named_methods(
     return Methods(specs)
 
 
-def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, dict[str, Any]]]:
+def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, Texts]]:
     """What is in a list with commas: each with its method, None of `others`, and what is given of its options.
 
     Raises
@@ -68,13 +65,13 @@ def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, s
     ValueError
         If a name is not known.
     """
-    found: list[tuple[str, str | None, dict[str, Any]]] = []
+    found: list[tuple[str, str | None, Texts]] = []
     for name in (word.strip() for word in text.split(",")):
         method, *words = name.split(":")
         if method in METHODS:
-            found.append((name, method, method_options_of_text(method, words)))
+            found.append((name, method, own_texts(method, words)))
         elif name in others:
             found.append((name, None, {}))
         else:
-            raise ValueError(f"methods must be of {', '.join([*METHODS, *others])}, or all, not {name!r}")
+            raise ValueError(f"--methods must be of {', '.join([*METHODS, *others])}, or all, not {name!r}")
     return found

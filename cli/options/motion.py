@@ -37,7 +37,7 @@ class Degrees(click.types.FloatParamType):
         try:
             return float(value)
         except ValueError:
-            return read_nearest("angle", value, DEGREES, "deg")
+            return read_nearest(param.name if param and param.name else "angle", value, DEGREES, "deg")
 
 
 def _motion(required: bool) -> Callable[[Any], Any]:
@@ -78,6 +78,7 @@ _OPTIONS = [
     option(
         _FAULTS,
         "--phase-error",
+        "phase_error_deg",
         type=Degrees(),
         default=0,
         metavar="DEGREES",
@@ -87,6 +88,7 @@ _OPTIONS = [
     option(
         _FAULTS,
         "--duty-error",
+        "duty_error_deg",
         type=Degrees(),
         default=0,
         metavar="DEGREES",
@@ -171,8 +173,8 @@ def _encoding(command: Callable[..., Any]) -> Callable[..., Any]:
         vibration: str | None,
         jitter: float,
         nonuniformity: float,
-        phase_error: float,
-        duty_error: float,
+        phase_error_deg: float,
+        duty_error_deg: float,
         bounce: str | None,
         lost: float,
         illegal: float,
@@ -191,8 +193,8 @@ def _encoding(command: Callable[..., Any]) -> Callable[..., Any]:
                 nonuniformity=nonuniformity,
                 illegal=illegal,
                 seed=seed,
-                phase_error_deg=phase_error,
-                duty_error_deg=duty_error,
+                phase_error_deg=phase_error_deg,
+                duty_error_deg=duty_error_deg,
                 bounce=None if bounce is None else Bounce.parse(bounce),
                 lost=lost,
                 index=spec.index,

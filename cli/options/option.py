@@ -1,76 +1,41 @@
 """Options that commands share, and how they are shown and explained."""
 
 import functools
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from tachometry.spec import METHODS
-from tachometry.spec.option import options_of
+from tachometry.spec import METHODS, ParameterError, common_options, own_options
 
 INTERRUPTED = 130  # exit status: 128 + SIGINT, as shells have it
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-# What the objects behind the options call their parameters, at the head of a message.
-_PARAMETERS = {
-    "pulses_per_rev": "--ppr",
-    "tick_cycles": "--tick, in clocks,",
-    "max_ticks": "--max-time, in ticks,",
-    "max_time": "--max-time",
-    "frac_bits": "--frac-bits",
-    "max_speed": "--max-speed",
-    "position_width": "--position-width",
-    "filter_clocks": "--filter",
-    "velocity_bits": "--velocity-width",
-    "index_reset": "--index-reset",
-    "max_tick_cycles": "--max-tick-period, in clocks,",
-    "max_tick_period": "--max-tick-period",
-    "phase_error_deg": "--phase-error",
-    "duty_error_deg": "--duty-error",
-    "vcd_from": "--vcd-from",
-    "vcd_to": "--vcd-to",
-}
-_SAME_NAME = (
-    "clock",
-    "tick",
-    "dt",
-    "decoding",
-    "name",
-    "vibration",
-    "jitter",
-    "nonuniformity",
-    "illegal",
-    "bounce",
-    "lost",
-    "seed",
-    "samplerate",
-    "motion",
-    "unit",
-    "lsb",
-    "method",
-    "methods",
-    "engines",
-    "speeds",
-    "only",
-    "from",
-    "vcd",
-    "engine",
-    "vary",
-    "axes",
-    "jobs",
-    "results",
-)
-_OPTIONS = _PARAMETERS | {name: f"--{name}" for name in _SAME_NAME}
-_OPTIONS |= {item.name: f"--{item.name.replace('_', '-')}" for spec in METHODS.values() for item in options_of(spec)}
+# Options of commands by what their values are called, for messages about these; filled as they are made.
+_OPTIONS: dict[str, str] = {}
 
 
-def in_terms_of_options(message: str) -> str:
-    """A message about a parameter, such as `max_ticks must be …`, as one about its option."""
-    return re.sub(r"^[\w-]+(?= (?:\w+ )?must )", lambda match: _OPTIONS.get(match[0], match[0]), message)
+def told(error: ValueError) -> str:
+    """What is wrong, with the option in place of a parameter: "--max-time, in ticks, must be …"."""
+    if not isinstance(error, ParameterError):
+        return str(error)
+    name, _, part = error.parameter.partition(" ")
+    return " ".join(filter(None, [_shown(name), part, error.rest]))
+
+
+def _shown(name: str) -> str:
+    parameter = name.replace("-", "_")
+    declared = [*common_options(), *(about for method in METHODS for about in own_options(method))]
+    for about in declared:
+        if about.parameter == parameter:
+            return f"--{about.name}"
+    of_field = [about for about in declared if about.field == parameter]
+    for about in of_field:
+        if about.unit:
+            return f"--{about.name}, in {about.unit},"
+    return f"--{of_field[0].name}" if of_field else _OPTIONS.get(parameter, name)
 
 
 class Option(click.Option):
@@ -80,15 +45,58 @@ class Option(click.Option):
     ----------
     group : str
         Heading of the group.
+    help, metavar : str or callable
+        A function is asked whenever the help is shown, of what may have been registered by then.
     """
 
-    def __init__(self, *args: Any, group: str = "Other", **attributes: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        group: str = "Other",
+        help: str | Callable[[], str],
+        metavar: str | Callable[[], str] | None = None,
+        **attributes: Any,
+    ) -> None:
         super().__init__(*args, **attributes)
         self.group = group
+        self._asked = (help, metavar)
+        if self.name:
+            _OPTIONS[self.name] = self.opts[0]
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        help, metavar = self._asked
+        self.help = help if isinstance(help, str) else help()
+        self.metavar = metavar() if callable(metavar) else metavar
+        return super().get_help_record(ctx)
+
+
+class Later(click.Option):
+    """Stands for options that are known when the command runs.
+
+    Parameters
+    ----------
+    make : callable
+        Gives the options.
+    """
+
+    def __init__(self, *args: Any, make: Callable[[], Sequence[click.Option]], **attributes: Any) -> None:
+        super().__init__(*args, **attributes)
+        self.make = make
+
+
+def later(name: str, make: Callable[[], Sequence[click.Option]]) -> Callable[[Command], Command]:
+    """Decorator: the options that `make` gives when the command runs, in this place."""
+    return click.option(f"--{name}", cls=Later, make=make, hidden=True)
 
 
 class GroupedCommand(click.Command):
     """A command whose help lists its options under the headings of their groups."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        found: list[click.Parameter] = []
+        for parameter in super().get_params(ctx):
+            found += parameter.make() if isinstance(parameter, Later) else [parameter]
+        return found
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         groups: dict[str, list[tuple[str, str]]] = {}

@@ -2,12 +2,10 @@
 
 import click
 
-from tachometry.cli.options.core import common_options, method_options
+from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.motion import encoder_options
 
-# Each gives what its options make; together they are the options of a point.
-CORE = click.command("sweep")(common_options(lambda make: make))
-METHOD = click.command("sweep")(method_options(lambda **given: given))
+# Gives what the options of the encoder make.
 ENCODER = click.command("sweep")(encoder_options(lambda encoder, motion: (encoder, motion)))
 
 
@@ -17,4 +15,6 @@ def by_name(command: click.Command) -> dict[str, click.Option]:
     return {option.opts[0].lstrip("-"): option for option in options}
 
 
-POINT_OPTIONS = by_name(CORE) | by_name(METHOD) | by_name(ENCODER)
+def point_options() -> dict[str, click.Option]:
+    """All of them by their names."""
+    return core_click_options() | by_name(ENCODER)

@@ -1,14 +1,13 @@
 """What `tachometry plan` prints: the configuration, and tables over speed."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 
-from rich.table import Table
 from rich.text import Text
 
-from tachometry.cli.reports.run import print_rows, stdout_console
-from tachometry.sim.studies.plan import Plan, standstill
+from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
+from tachometry.sim.studies.plan import Plan
 from tachometry.spec import Speed, TachometerSpec
 from tachometry.spec.manifest import manifest
 from tachometry.spec.units import format_time, plural
@@ -16,30 +15,15 @@ from tachometry.spec.units import format_time, plural
 _UNITS = ("rad/s", "rev/s", "rpm")
 _WIDE = ("velocity", "pulse_count", "interval", "position")
 
-# By method: what it does, and what makes its updates.
-_TOLD: dict[str, tuple[Callable[[TachometerSpec], str], str]] = {
-    "s": (
-        lambda spec: "eq. (21), cancels alternate alterations" if spec.parameters["cancel"] else "eq. (17)",
-        "alteration",
-    ),
-    "t": (lambda spec: f"eq. (9), times in {spec.parameters['timer']}s", "count"),
-    "mt": (lambda spec: f"eq. (13), times in {spec.parameters['timer']}s", "count"),
-    "rairan": (lambda spec: f"Rairan 2013, {spec.parameters['estimate']}", "count"),
-    "m": (lambda spec: f"eq. (6), mean of {plural(spec.parameters['average'], 'tick')}", "tick"),
-}
-
 
 def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:
     """Print the configuration of a core and its plan, speeds in `unit`."""
     print_rows(_configuration(spec))
     per_unit = _rad_per_s(unit)
-    _, update_by = _TOLD[spec.method]
     heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
-    table = Table(box=None, pad_edge=False, header_style="")
-    for head in heads:
-        table.add_column(head, justify="left" if head == heads[-1] else "right", no_wrap=True)
-    rows = zip(*(column.tolist() for column in vars(expected).values()), strict=True)
-    for speed, counts, m_s, t_m, q_v, forced in rows:
+    rows = []
+    columns = zip(*(column.tolist() for column in vars(expected).values()), strict=True)
+    for speed, counts, m_s, t_m, q_v, forced in columns:
         cells = (
             f"{speed / per_unit:.6g}",
             f"{counts:.6g}",
@@ -47,20 +31,15 @@ def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:
             _duration(t_m),
             _number(q_v / per_unit, ".4g"),
             _number(100 * (q_v + spec.rounding_lsb * spec.rad_per_s_per_lsb) / speed, ".3g"),
-            "maximum time (forced)" if forced else update_by,
+            "maximum time (forced)" if forced else spec.update_by,
         )
-        table.add_row(*map(Text, cells))
+        rows.append(cells)
     console = stdout_console()
     console.print()
-    console.print(table)
-    multiples = (
-        "At a multiple of the unit velocity m_s would be infinite. At one, and nearer to it than "
-        f"1/{spec.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error. "
-        if spec.method == "s"
-        else ""
-    )
+    print_table(heads, rows, left=(len(heads) - 1,))
+    remark = f"{spec.remark} " if spec.remark else ""
     console.print(
-        f"\n{multiples}error/V is Q_V and the rounding together."
+        f"\n{remark}error/V is Q_V and the rounding together."
         + ("\nTimes are those of the nominal tick; an external one may be longer." if spec.max_tick_cycles else ""),
         soft_wrap=True,
     )
@@ -76,28 +55,27 @@ def print_plans(plans: Mapping[str, Plan], left_out: Mapping[str, str], unit: st
         ("T_m", lambda plan, row: _duration(float(plan.measurement_time[row]))),
         ("Q_V T_m (rad)", lambda plan, row: _number(plan.product[row], ".4g")),
     ):
-        table = Table(box=None, pad_edge=False, header_style="")
-        for column in (f"speed ({unit})", *plans):
-            table.add_column(column, justify="right", no_wrap=True)
-        for row, speed in enumerate(next(iter(plans.values())).speed.tolist()):
-            table.add_row(f"{speed / per_unit:.6g}", *(Text(cell(plan, row)) for plan in plans.values()))
+        speeds = next(iter(plans.values())).speed.tolist()
+        rows = [
+            (f"{speed / per_unit:.6g}", *(cell(plan, row) for plan in plans.values()))
+            for row, speed in enumerate(speeds)
+        ]
         console.print(f"\n{head}")
-        console.print(table)
+        print_table((f"speed ({unit})", *plans), rows, left=())
     if any(math.isnan(value) for plan in plans.values() for value in plan.resolution.tolist()):
-        console.print("\n-: too fast for the method.")
+        console.print("\n-: too fast for the method, or there are no equations for it.")
     for name, reason in left_out.items():
         console.print(Text(f"\n{name}: left out: {reason}"))
 
 
 def _configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     encoder, timing = spec.encoder, spec.timing
-    told, _ = _TOLD[spec.method]
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
     greatest = f"{_speed(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
     latencies = manifest(spec)["latency_cycles"]
-    memory = getattr(spec, "memory", None)
+    memory = spec.memory
     return [
-        ("method", f"{spec.method.upper()}, {told(spec)}"),
+        ("method", f"{spec.method.upper()}, {spec.description}"),
         ("encoder", counts),
         ("clock", f"{timing.clock_hz:,} Hz"),
         ("tick", f"{_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
@@ -121,7 +99,7 @@ def _memory(kind: str, entries: int, width: int) -> str:
 
 
 def _standstill(spec: TachometerSpec) -> str:
-    rest = standstill(spec)
+    rest = spec.standstill_ticks
     time = _time(rest * spec.timing.tick_seconds)
     return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
 

@@ -1,71 +1,18 @@
-"""What a command tells the user: how far a simulation is, and what came of it."""
+"""What a command says of a run: what came of it."""
 
 import math
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
-from rich.table import Table
 from rich.text import Text
 
 from tachometry.cli.options.option import INTERRUPTED
+from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.signals.run import Mismatch, Run
 from tachometry.sim.signals.tables import held_velocity, velocity_error
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import format_time
-
-_PATIENCE = 2.0  # seconds of work without a bar
-_PLAIN_WIDTH = 100  # columns where there is no terminal
-
-
-@contextmanager
-def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[Callable[[float], None] | None]:
-    """A function to be called with how much of `total` is done.
-
-    It shows a bar on stderr as soon as the work is seen to take more than two seconds; None if stderr is no terminal.
-    """
-    if not sys.stderr.isatty():
-        yield None
-        return
-    begun = time.monotonic()
-    with ExitStack() as stack:
-        bar = Progress(
-            TextColumn(verb),
-            BarColumn(),
-            *columns,
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        task = bar.add_task(verb, total=total)
-
-        def update(done: float) -> None:
-            if not bar.live.is_started and (time.monotonic() - begun) * total > _PATIENCE * done:
-                stack.enter_context(bar)
-            bar.update(task, completed=done)
-
-        yield update
-
-
-def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
-    """The same, of clocks that are simulated."""
-    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), PerSecond("clocks"))
-
-
-class PerSecond(ProgressColumn):
-    """How fast it goes."""
-
-    def __init__(self, what: str) -> None:
-        super().__init__()
-        self._what = what
-
-    def render(self, task: Task) -> Text:
-        return Text("" if task.speed is None else f"{task.speed:.3g} {self._what}/s")
 
 
 def interrupted(n_clocks: int, wanted: int) -> int:
@@ -83,21 +30,6 @@ def print_summary(
     for mismatch in first:
         console.print(Text(f"first mismatch in {mismatch}"))
     console.print(_verdict(run, n_mismatches))
-
-
-def stdout_console() -> Console:
-    """Where to print: as wide as the terminal, or the same everywhere if there is none."""
-    return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
-
-
-def print_rows(rows: list[tuple[str, str]]) -> None:
-    """Print a table of names and values on stdout."""
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, value in rows:
-        table.add_row(Text(name), Text(value))
-    stdout_console().print(table)
 
 
 def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int) -> list[tuple[str, str]]:

@@ -7,10 +7,9 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-from rich.table import Table
 from rich.text import Text
 
-from tachometry.cli.reports.run import stdout_console
+from tachometry.cli.reports.terminal import print_table, stdout_console
 from tachometry.spec.units import format_time, plural
 
 if TYPE_CHECKING:
@@ -28,9 +27,7 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
     )
     checked = [wrong for wrong in columns["mismatches"] if wrong is not None]
     heads = (*_HEADS, *(["differ"] if checked else []))
-    table = Table(box=None, pad_edge=False, header_style="")
-    for head in heads:
-        table.add_column(head, justify="left" if head == heads[0] else "right", no_wrap=True)
+    table = []
     for method in dict.fromkeys(columns["method"]):
         rows = [k for k, name in enumerate(columns["method"]) if name == method]
         of = {name: [values[k] for k in rows if values[k] is not None] for name, values in columns.items()}
@@ -45,9 +42,9 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
             _number(_median(of["updates_per_s"])),
             *([str(sum(of["mismatches"]))] if checked else []),
         )
-        table.add_row(*map(Text, cells))
+        table.append(cells)
+    print_table(heads, table)
     console = stdout_console()
-    console.print(table)
     console.print("\nMedians of all points, and the worst. error/V: RMS error over RMS of the true speed.")
     for name, reason in found.left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))

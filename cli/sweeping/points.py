@@ -6,19 +6,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import product
-from typing import Any
 
 import click
 
-from tachometry.cli.options.core import method_options_of_text, methods_with
+from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.methods import listed_methods
-from tachometry.cli.options.option import in_terms_of_options
-from tachometry.cli.options.sweep import CORE, ENCODER, POINT_OPTIONS, by_name
+from tachometry.cli.options.option import told
+from tachometry.cli.options.sweep import ENCODER, by_name, point_options
 from tachometry.cli.sweeping.settings import Settings, Text, arguments
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.studies.sweep import COLUMNS, Point
-from tachometry.spec import METHODS, TachometerSpec
+from tachometry.spec import METHODS, TachometerSpec, methods_with, of_texts
 from tachometry.spec.units import FREQUENCY, SPEED, TIME, read_nearest
 
 Words = tuple[str, ...]
@@ -80,7 +79,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     own = [[name for name in settings.vary if _has(settings, str(method), name)] for _, method, _ in listed]
     count = sum(math.prod(len(settings.vary[name]) for name in names) for names in own)
     if count > _MOST:
-        raise ValueError(f"vary must give at most {_MOST} points, not {count}")
+        raise ValueError(f"--vary must give at most {_MOST} points, not {count}")
     maker = _Maker(earliest, engine)
     found = Points({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
     for (name, method, given), names in zip(listed, own, strict=True):
@@ -91,9 +90,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
             try:
                 point = maker.point(name, method, given, fixed | at)
             except (ValueError, click.UsageError) as error:
-                message = in_terms_of_options(
-                    error.format_message() if isinstance(error, click.UsageError) else str(error)
-                )
+                message = error.format_message() if isinstance(error, click.UsageError) else told(error)
                 where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
                 message += f" (method {name}{', ' * bool(where)}{where})"
                 if everything and name != listed[0][0]:
@@ -118,20 +115,21 @@ def _has(settings: Settings, method: str, name: str) -> bool:
 def _check_axes(settings: Settings, methods: set[str]) -> None:
     motions = settings.vary.get("motion") or [settings.fixed.get("motion")]
     places = {name for motion in motions for name in _PLACE.findall(motion or "")}
+    options = point_options()
     for name in settings.vary:
-        if name not in POINT_OPTIONS and name not in places:
+        if name not in options and name not in places:
             raise ValueError(
-                f"vary must be of {', '.join(POINT_OPTIONS)}, or of a name in braces within --motion, such as "
+                f"--vary must be of {', '.join(options)}, or of a name in braces within --motion, such as "
                 f"{{speed}}, not {name!r}"
             )
     for name in places:
-        if re.fullmatch(r"[a-z]\w*", name, re.ASCII) is None or name in POINT_OPTIONS or name in COLUMNS:
-            raise ValueError(f"motion must have names in braces that are no option or column, not {name!r}")
+        if re.fullmatch(r"[a-z]\w*", name, re.ASCII) is None or name in options or name in COLUMNS:
+            raise ValueError(f"--motion must have names in braces that are no option or column, not {name!r}")
         if name not in settings.vary:
-            raise ValueError(f"vary must have values for {{{name}}} of --motion, such as --vary {name}=1,2,5")
+            raise ValueError(f"--vary must have values for {{{name}}} of --motion, such as --vary {name}=1,2,5")
     for name in (*settings.fixed, *settings.vary):
         if (has := methods_with(name)) and not methods & set(has):
-            raise ValueError(f"{name} must be given with a method that has it: {', '.join(has)}")
+            raise ValueError(f"--{name} must be given with a method that has it: {', '.join(has)}")
 
 
 class _Maker:
@@ -141,14 +139,13 @@ class _Maker:
         self._earliest, self._engine = earliest, engine
         self._spec, self._encoder, self._motion = cache(_spec), cache(_parsed_encoder), cache(parse_motion)
 
-    def point(self, name: str, method: str, given: Mapping[str, Any], texts: Mapping[str, Text]) -> Point:
+    def point(self, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> Point:
         """The point of a method, of whose options some are given, with texts of options and of names in the motion."""
-        own = {key: text for key, text in texts.items() if methods_with(key) and key not in given and text is not None}
-        given = dict(given) | method_options_of_text(method, [f"{key}={text}" for key, text in own.items()])
-        spec = self._spec(_words(texts, CORE), method, tuple(given.items()))
+        core = {key: texts[key] for key in core_click_options() if key in texts} | dict(given)
+        spec = self._spec(method, tuple(core.items()))
         encoder, motion = self._encoder(_words(texts, ENCODER))
         places = {key: texts[key] or "" for key in _PLACE.findall(motion)}
-        values = {key: read_nearest(key, text, _UNITS, "rad/s") for key, text in places.items()}
+        values = {key: read_nearest(f"{{{key}}}", text, _UNITS, "rad/s") for key, text in places.items()}
         motion = _PLACE.sub(lambda place: places[place[1]], motion)
         moved = self._motion(motion)
         return Point(name, spec, encoder(spec), moved, motion, values, self._earliest, self._engine)
@@ -159,17 +156,11 @@ def _words(texts: Mapping[str, Text], command: click.Command) -> Words:
     return tuple(arguments({name: text for name, text in texts.items() if name in options}, options))
 
 
-def _spec(words: Words, method: str, given: tuple[tuple[str, Any], ...]) -> TachometerSpec:
-    make = _invoked(CORE, words)
-    spec: TachometerSpec = make(method, dict(given))
-    return spec
+def _spec(method: str, texts: tuple[tuple[str, Text], ...]) -> TachometerSpec:
+    return of_texts(method, dict(texts))
 
 
 def _parsed_encoder(words: Words) -> tuple[Callable[[TachometerSpec], VirtualEncoder], str]:
-    found: tuple[Callable[[TachometerSpec], VirtualEncoder], str] = _invoked(ENCODER, words)
-    return found
-
-
-def _invoked(command: click.Command, words: Words) -> Any:
-    with command.make_context("sweep", list(words)) as context:
-        return command.invoke(context)
+    with ENCODER.make_context("sweep", list(words)) as context:
+        found: tuple[Callable[[TachometerSpec], VirtualEncoder], str] = ENCODER.invoke(context)
+        return found

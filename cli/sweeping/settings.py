@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from tachometry.spec.option import ParameterError, parse_flag
 from tachometry.spec.units import QUANTITY, ratio
 
 Text = str | None  # None: without the option
@@ -56,9 +57,9 @@ def of_command_line(raw: Mapping[str, Any], options: Mapping[str, click.Option])
     for text in raw.get("vary") or ():
         name, equals, values = text.partition("=")
         if not equals:
-            raise ValueError(f"vary must be NAME=VALUES, not {text!r}")
+            raise ValueError(f"--vary must be NAME=VALUES, not {text!r}")
         if name.strip() in vary:
-            raise ValueError(f"vary must be given once for {name.strip()}")
+            raise ValueError(f"--vary must be given once for {name.strip()}")
         vary[name.strip()] = _values(name.strip(), values.split(","), options)
     return _checked(Settings(fixed, vary))
 
@@ -110,16 +111,13 @@ def arguments(texts: Mapping[str, Text], options: Mapping[str, click.Option]) ->
 
 def yes(name: str, text: str) -> bool:
     """What the text of a flag says."""
-    try:
-        return bool(click.BOOL.convert(text, None, None))
-    except click.BadParameter:
-        raise ValueError(f"--{name} must be yes or no, not {text!r}") from None
+    return parse_flag(f"--{name}", text)
 
 
 def _checked(settings: Settings) -> Settings:
     for name in settings.vary:
         if name in settings.fixed:
-            raise ValueError(f"{name} must be given or varied, not both")
+            raise ParameterError(name, "must be given or varied, not both")
     return settings
 
 
@@ -132,7 +130,7 @@ def _of_toml(name: str, value: Any) -> str:
         return ",".join(_of_toml(name, item) for item in value)
     if not isinstance(value, str | int | float):
         instead = ": a list belongs into [vary]" if isinstance(value, list) else ""
-        raise ValueError(f"{name} must be a text, a number, true or false, not {value!r}{instead}")
+        raise ParameterError(name, f"must be a text, a number, true or false, not {value!r}{instead}")
     return _text(value)
 
 
@@ -158,9 +156,9 @@ def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]
         else:
             found.append(None if item == "none" and option is not None else item)
     if not found:
-        raise ValueError(f"{name} must have values to be varied")
+        raise ParameterError(name, "must have values to be varied")
     if len(found) > _MOST:
-        raise ValueError(f"{name} must have at most {_MOST} values, not {len(found)}")
+        raise ParameterError(name, f"must have at most {_MOST} values, not {len(found)}")
     return list(dict.fromkeys(found))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.encoder.motion import FloatArray, cos2pi
+from tachometry.spec.option import ParameterError
 from tachometry.spec.units import TIME, read_nearest
 
 Rows = NDArray[np.intp]
@@ -45,16 +46,16 @@ class Bounce:
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MAX_BOUNCES:
-            raise ValueError(f"bounce count must be from 1 to {MAX_BOUNCES}, not {self.count}")
+            raise ParameterError("bounce count", f"must be from 1 to {MAX_BOUNCES}, not {self.count}")
         if not 0 < self.time_s < math.inf:
-            raise ValueError(f"bounce time must be more than 0 s, not {self.time_s} s")
+            raise ParameterError("bounce time", f"must be more than 0 s, not {self.time_s} s")
 
     @staticmethod
     def parse(text: str) -> "Bounce":
         """Read COUNT:TIME, such as 3:500us (s, ms, us or ns)."""
         match = re.fullmatch(r"\s*(\d{1,9}):([^:]+)", text, re.ASCII)
         if match is None:
-            raise ValueError(f"bounce must be COUNT:TIME, such as 3:500us, not {text!r}")
+            raise ParameterError("bounce", f"must be COUNT:TIME, such as 3:500us, not {text!r}")
         return Bounce(int(match[1]), read_nearest("bounce time", match[2], TIME, "s"))
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tachometry.spec.option import ParameterError
 from tachometry.spec.units import ANGLE, FREQUENCY, SPEED, TIME, Units, read_nearest
 
 FloatArray = NDArray[np.float64]
@@ -195,14 +196,14 @@ class Vibration:
     def __post_init__(self) -> None:
         for name, value in (("amplitude", self.amplitude_rad), ("frequency", self.frequency_hz)):
             if not 0 < value < math.inf:
-                raise ValueError(f"vibration {name} must be more than 0, not {value}")
+                raise ParameterError(f"vibration {name}", f"must be more than 0, not {value}")
 
     @staticmethod
     def parse(text: str) -> "Vibration":
         """Read AMPLITUDE:FREQUENCY, such as 1mrad:50Hz (rad, mrad or deg; Hz, kHz, MHz or GHz)."""
         amplitude, colon, frequency = text.partition(":")
         if not colon or ":" in frequency:
-            raise ValueError(f"vibration must be AMPLITUDE:FREQUENCY, not {text!r}")
+            raise ParameterError("vibration", f"must be AMPLITUDE:FREQUENCY, not {text!r}")
         return Vibration(
             read_nearest("vibration amplitude", amplitude, ANGLE, "rad"),
             read_nearest("vibration frequency", frequency, FREQUENCY, "Hz"),
@@ -260,7 +261,7 @@ def _parse_segment(text: str) -> list[_Segment]:
         raise ValueError(f"csv:FILE must be the whole motion, not a segment of it: {text!r}")
     fields = _FIELDS.get(kind)
     if fields is None or len(numbers) != len(fields):
-        raise ValueError(f"motion segment must be one of {_FORMS}, csv:FILE, not {text!r}")
+        raise ParameterError("motion segment", f"must be one of {_FORMS}, csv:FILE, not {text!r}")
     values = []
     for (name, units), number in zip(fields.items(), numbers, strict=True):
         default = next(iter(units))

@@ -4,7 +4,6 @@ import numpy as np
 
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import TachometerSpec
-from tachometry.spec.methods.timed import TimedTachometer
 
 _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
 
@@ -37,10 +36,8 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     level = quadrature(np.append(0, np.cumsum(np.concatenate(turns))))
     clock = np.append(0, clock)
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
-    rest = 22 if isinstance(spec, TimedTachometer) else 17
-    trace = PinTrace(
-        clock, level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + rest * longest // 10 + 40 * cycles + 300, z
-    )
+    n_clocks = int(clock[-1]) + spec.rest_tenths * longest // 10 + 40 * cycles + 300
+    trace = PinTrace(clock, level & np.uint8(1), level >> np.uint8(1), n_clocks, z)
     if spec.max_tick_cycles is None:
         return trace
     apart = np.full(trace.n_clocks // cycles + 1, cycles)

@@ -15,6 +15,7 @@ from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY, Bounce
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration
 from tachometry.sim.signals.recording import Recording, quadrature
+from tachometry.spec.option import ParameterError
 
 MAX_EDGES = 200_000_000
 MAX_PULSES_PER_REV = 1 << 26
@@ -116,16 +117,16 @@ class VirtualEncoder:
 
     def __post_init__(self) -> None:
         if not 1 <= self.pulses_per_rev <= MAX_PULSES_PER_REV:
-            raise ValueError(f"pulses_per_rev must be from 1 to {MAX_PULSES_PER_REV}, not {self.pulses_per_rev}")
+            raise ParameterError("pulses_per_rev", f"must be from 1 to {MAX_PULSES_PER_REV}, not {self.pulses_per_rev}")
         for name, value in (("jitter", self.jitter), ("nonuniformity", self.nonuniformity)):
             if not 0 <= value < 0.5:
-                raise ValueError(f"{name} must be from 0 to less than 0.5, not {value}")
+                raise ParameterError(name, f"must be from 0 to less than 0.5, not {value}")
         for name, value in (("illegal", self.illegal), ("lost", self.lost)):
             if not 0 <= value <= 1:
-                raise ValueError(f"{name} must be from 0 to 1, not {value}")
+                raise ParameterError(name, f"must be from 0 to 1, not {value}")
         for name, value in (("phase_error_deg", self.phase_error_deg), ("duty_error_deg", self.duty_error_deg)):
             if not -90 < value < 90:
-                raise ValueError(f"{name} must be more than -90 and less than 90, not {value}")
+                raise ParameterError(name, f"must be more than -90 and less than 90, not {value}")
         errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * self.nonuniformity
         if not errors < 90:
             raise ValueError(
@@ -135,7 +136,7 @@ class VirtualEncoder:
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
         if self.seed < 0:
-            raise ValueError(f"seed must be at least 0, not {self.seed}")
+            raise ParameterError("seed", f"must be at least 0, not {self.seed}")
 
     @cached_property
     def disc(self) -> Disc:
@@ -161,9 +162,10 @@ class VirtualEncoder:
         shaft = _VibratingShaft(motion, self.vibration, self.start_angle_rad)
         n_edges = shaft.reach / self.disc.pitch_rad * (1 + 2 * self.bounce.count if self.bounce else 1)
         if not n_edges <= MAX_EDGES:
-            raise ValueError(
-                f"motion must be of at most {MAX_EDGES} encoder edges, start angle {'and bounce ' * bool(self.bounce)}"
-                f"included, not {n_edges:.3g}"
+            raise ParameterError(
+                "motion",
+                f"must be of at most {MAX_EDGES} encoder edges, start angle {'and bounce ' * bool(self.bounce)}"
+                f"included, not {n_edges:.3g}",
             )
         time, quarter = find_crossings(shaft, self.disc)
         if self.jitter:
@@ -226,7 +228,7 @@ class Encoding:
         transitions, which are faults of the lines, are not.
         """
         if decoding not in (1, 2, 4):
-            raise ValueError(f"decoding must be 1, 2 or 4, not {decoding}")
+            raise ParameterError("decoding", f"must be 1, 2 or 4, not {decoding}")
         lead, shift = {4: (0, 0), 2: (1, 1), 1: (3, 2)}[decoding]
         now, start = (self.encoder.disc.quarter(self._shaft.angle(time)) for time in (t, 0.0))
         return ((now + lead) >> shift) - ((start + lead) >> shift)

@@ -99,9 +99,8 @@ def place_panels(
 
 def _title(spec: TachometerSpec, what: str | None) -> str:
     timing = spec.timing
-    equation = f", eq. ({21 if spec.parameters['cancel'] else 17})" if "cancel" in spec.parameters else ""
     return (
-        f"{what or f'{spec.method.upper()} method{equation}'}: "
+        f"{what or spec.heading}: "
         f"{spec.encoder.pulses_per_rev} PPR ×{spec.encoder.decoding}, "
         f"$T_s$ = {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
         f"clock {_frequency(timing.clock_hz)}, $ω_u$ = {spec.unit_velocity:.5g} rad/s"

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
+from tachometry.spec.option import ParameterError
 from tachometry.spec.units import plural
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
         failed.append(error)
     if failed:
         first = failed[0]
-        kind = next((kind for kind in (ValueError, OSError) if isinstance(first, kind)), None)
-        if kind is None:
+        if not isinstance(first, ValueError | OSError):
             raise first
-        raise kind(f"{first}; {len(failed)} of {plural(len(points), 'point')} could not be run")
+        more = f"; {len(failed)} of {plural(len(points), 'point')} could not be run"
+        raise ParameterError.longer(first, more) if isinstance(first, ValueError) else OSError(f"{first}{more}")

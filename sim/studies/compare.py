@@ -14,6 +14,7 @@ from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies import baselines as rivals
 from tachometry.spec import TachometerSpec
+from tachometry.spec.option import ParameterError
 
 TrueSpeed = Callable[[FloatArray], FloatArray]
 
@@ -119,7 +120,9 @@ def rival_curve(name: str, recording: Recording, counts_per_rev: int, decoding: 
     what, model = RIVALS[name]
     estimate = model(rivals.Steps.of_recording(recording, counts_per_rev, decoding))
     if len(estimate.time) < 2:
-        raise ValueError(f"motion must last at least two control periods of {name}, not {recording.duration:.6g} s")
+        raise ParameterError(
+            "motion", f"must last at least two control periods of {name}, not {recording.duration:.6g} s"
+        )
     return Curve(name, what, estimate, np.empty(0))
 
 

@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.signals.tables import write_csv
-from tachometry.sim.theory.performance import (
-    Performance,
-    m_performance,
-    mt_performance,
-    rairan_performance,
-    s_performance,
-    t_performance,
-)
+from tachometry.sim.theory.performance import PERFORMANCES, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
-from tachometry.spec import MTachometer, MTTachometer, RairanTachometer, STachometer, TachometerSpec
-from tachometry.spec.methods.timed import TimedTachometer
+from tachometry.spec import TachometerSpec
 
 _UNITS = 10  # of the default range
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
@@ -41,7 +33,7 @@ class Plan:
         T_m.
     resolution : float64 array, shape (n,), rad/s
         Q_V. No error is greater, but for the rounding, once the method has settled (the S method: once two successive
-        ticks have counted alike). NaN, as the times, where the method cannot measure.
+        ticks have counted alike). NaN, as the times, where the method cannot measure, or nothing is known of it.
     forced : bool array, shape (n,)
         The maximum time ends the measurement.
     """
@@ -67,13 +59,11 @@ class Plan:
 def plan_at(spec: TachometerSpec, speed: ArrayLike) -> Plan:
     """What to expect of a core at speeds in rad/s, from the equations of its method, see `sim.theory.performance`.
 
-    The S method nearer to a multiple of ω_u than ω_u/max_ticks: updates are forced, and eq. (18) does not hold. With
-    m_s ≥ kept + 1 in the window after a forced one, in which eq. (21) weights the only alteration by one half and
-    eq. (17) by one, the error is at most ω_u/max_ticks with eq. (21), ω_u/(kept + 1) with eq. (17).
+    A method that has none there has NaN for times and resolution.
     """
     speed = np.atleast_1d(np.asarray(speed, dtype=np.float64))
     tick_seconds = float(spec.timing.tick_seconds)
-    found = _performance(spec, speed, tick_seconds)
+    found = PERFORMANCES.get(spec.method, unknown)(spec, speed)
     return Plan(
         speed=speed,
         counts_per_tick=speed / unit_velocity(spec.encoder.counts_per_rev, tick_seconds),
@@ -82,57 +72,6 @@ def plan_at(spec: TachometerSpec, speed: ArrayLike) -> Plan:
         resolution=found.resolution,
         forced=found.forced,
     )
-
-
-def _performance(spec: TachometerSpec, speed: NDArray[np.float64], tick_seconds: float) -> Performance:
-    counts, longest = spec.encoder.counts_per_rev, spec.timing.max_ticks
-    if isinstance(spec, STachometer):
-        found = s_performance(speed, counts, tick_seconds, longest)
-        if spec.cancel:
-            return found
-        worst = unit_velocity(counts, tick_seconds) / (spec.kept_ticks + 1)
-        return replace(found, resolution=np.where(found.forced, worst, found.resolution))
-    if isinstance(spec, MTachometer):
-        return m_performance(speed, spec.average, counts, tick_seconds)
-    if isinstance(spec, RairanTachometer):
-        if spec.adaptive is None:
-            return rairan_performance(speed, spec.estimate, counts, tick_seconds, longest)
-        shift = _steady_shift(spec, speed / spec.unit_velocity)
-        each = [
-            rairan_performance(speed, spec.estimate, counts, tick_seconds * 2**k, longest >> k)
-            for k in range(spec.max_shift + 1)
-        ]
-        columns = (
-            np.choose(shift, [getattr(found, name) for found in each]) for name in ("resolution", "time", "forced")
-        )
-        return Performance(*columns)
-    assert isinstance(spec, TimedTachometer)
-    timer_seconds, longest = tick_seconds / spec.timer_periods, spec.max_periods
-    if isinstance(spec, MTTachometer):
-        return mt_performance(speed, spec.min_periods, counts, timer_seconds, longest)
-    return t_performance(speed, counts, timer_seconds, longest)
-
-
-def _steady_shift(spec: RairanTachometer, ratio: NDArray[np.float64]) -> NDArray[np.int64]:
-    """k of an adaptive dt that comes from shorter ones, at speeds in counts per tick."""
-    rule = spec.adaptive_dt
-    doubled = np.ceil(np.log2((rule.fewest - 1) / ratio) + 1e-12)
-    return np.where(ratio * rule.slow <= 1, 0, np.clip(doubled, 0, rule.max_shift)).astype(np.int64)
-
-
-def standstill_ticks(spec: STachometer) -> int:
-    """Ticks from that of the last count to the one whose update reads 0, at most: 1.5·max_ticks, rounded up.
-
-    The count opens a window; the forced update at its end still weights it by one half, the next has it no more.
-    """
-    return 2 * spec.timing.max_ticks - spec.kept_ticks
-
-
-def standstill(spec: TachometerSpec) -> int:
-    """Ticks from that of the last count to the update that reads 0, at most."""
-    if isinstance(spec, STachometer):
-        return standstill_ticks(spec)
-    return spec.average if isinstance(spec, MTachometer) else spec.timing.max_ticks
 
 
 def default_range(spec: TachometerSpec) -> tuple[float, float]:

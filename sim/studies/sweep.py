@@ -4,6 +4,7 @@ import functools
 import hashlib
 import pickle
 import platform
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib.util import find_spec
@@ -20,14 +21,14 @@ from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.compare import common_instants, run_curve, score
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.spec import TachometerSpec
-from tachometry.spec.option import options_of
+from tachometry.spec import METHODS, Option, TachometerSpec, own_options
+from tachometry.spec.option import ParameterError
 from tachometry.spec.units import format_time
 
 Row = dict[str, Any]
 
-# Every column of the results: its kind, and what is in it, with its unit. Empty is what is not there or cannot be told.
-COLUMNS: dict[str, tuple[str, str]] = {
+# Columns of what a point is, and what came of it.
+_RESULTS: dict[str, tuple[str, str]] = {
     "point": ("text", "digest of all that decides the row"),
     "method": ("text", "as in `methods`"),
     "motion": ("text", "as in `motion`, its values in place"),
@@ -61,14 +62,8 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "age": ("bool", "as the option"),
     "bounds": ("bool", "as the option"),
     "lowpass_rad_s": ("float", "rad/s"),
-    "cancel": ("bool", "as the option"),
-    "average": ("int", "ticks"),
-    "timer": ("text", "as the option"),
-    "min_time_s": ("float", "s"),
-    "bound_decay": ("bool", "as the option"),
-    "paper_exact": ("bool", "as the option"),
-    "estimate": ("text", "as the option"),
-    "adaptive": ("float", "relative error"),
+}
+_ENCODER: dict[str, tuple[str, str]] = {
     "vibration_rad": ("float", "rad, amplitude"),
     "vibration_hz": ("float", "Hz"),
     "jitter": ("float", "fraction of a gap"),
@@ -82,6 +77,39 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "seed": ("int", "as the option"),
     "from_s": ("float", "s, errors before are left out"),
 }
+_KINDS = {bool: "bool", int: "int", str: "text"}
+
+
+class _Columns(Mapping[str, tuple[str, str]]):
+    """All columns; among them those of the options that methods have of their own, as they are declared."""
+
+    def __getitem__(self, name: str) -> tuple[str, str]:
+        return self._all()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def _all(self) -> dict[str, tuple[str, str]]:
+        own = {_column(about): _content(about) for method in METHODS for about in own_options(method)}
+        return _RESULTS | own | _ENCODER
+
+
+# Every column of the results: its kind, and what is in it, with its unit. Empty is what is not there or cannot be told.
+COLUMNS = _Columns()
+
+
+def _column(about: Option) -> str:
+    """Name of the column of a method's option; clocks are shown as seconds."""
+    return f"{about.field}_s" if about.unit == "clocks" else about.field
+
+
+def _content(about: Option) -> tuple[str, str]:
+    if about.unit == "clocks":
+        return "float", "s"
+    return _KINDS.get(type(about.default), "float"), about.unit or "as the option"
 
 
 @dataclass(frozen=True)
@@ -123,11 +151,13 @@ class Point:
         needed = self.spec.longest_tick + self.spec.tick_latency
         if self.motion.duration * self.spec.timing.clock_hz < needed:
             least = format_time(self.spec.seconds(needed))
-            raise ValueError(f"motion must last at least {needed} clocks of --clock ({least}), a tick and its latency")
+            raise ParameterError(
+                "motion", f"must last at least {needed} clocks of --clock ({least}), a tick and its latency"
+            )
         duration = self.motion.duration
         if self.earliest and duration - self.earliest < 2 * float(self.spec.timing.tick_seconds):
             lasts = format_time(Fraction(f"{duration:.6g}"))
-            raise ValueError(f"motion must last two ticks or more beyond --from, longer than {lasts}")
+            raise ParameterError("motion", f"must last two ticks or more beyond --from, longer than {lasts}")
 
     @functools.cached_property
     def digest(self) -> str:
@@ -195,7 +225,7 @@ def run_packed(code: str, packed: bytes) -> Row:
     try:
         return run_point(point)
     except ValueError as error:
-        raise ValueError(f"{error} (method {point.method}, motion {point.text})") from None
+        raise ParameterError.longer(error, f" (method {point.method}, motion {point.text})") from None
 
 
 def run_point(point: Point) -> Row:
@@ -251,9 +281,10 @@ def _core(spec: TachometerSpec) -> Row:
         return None if clocks is None else float(spec.seconds(clocks))
 
     timing = spec.timing
-    own = {item.name: spec.parameters[item.name] for item in options_of(type(spec))}
-    if "min_time" in own:
-        own["min_time_s"] = seconds(own.pop("min_time"))
+    own = {}
+    for about in own_options(spec.method):
+        value = spec.parameters[about.field]
+        own[_column(about)] = seconds(value) if about.unit == "clocks" else value
     return {
         "ppr": spec.encoder.pulses_per_rev,
         "decoding": spec.encoder.decoding,
@@ -272,7 +303,7 @@ def _core(spec: TachometerSpec) -> Row:
         "age": spec.age,
         "bounds": spec.bounds,
         "lowpass_rad_s": None if spec.lowpass is None else float(spec.lowpass),
-    } | {name: float(value) if isinstance(value, Fraction) else value for name, value in own.items()}
+    } | own
 
 
 def _encoder(encoder: VirtualEncoder) -> Row:

@@ -15,6 +15,7 @@ from filelock import FileLock, Timeout
 
 from tachometry.sim.files import replacing
 from tachometry.sim.studies.sweep import COLUMNS, Row, code_digest
+from tachometry.spec.option import ParameterError
 
 _KINDS = {"text": pa.string(), "int": pa.int64(), "float": pa.float64(), "bool": pa.bool_()}
 _MADE_BY = "tachometry.code"
@@ -68,7 +69,7 @@ class Results:
         try:
             lock.acquire()
         except Timeout:
-            raise ValueError(f"results must be of one sweep at a time: {self._path} is in use") from None
+            raise ParameterError("results", f"must be of one sweep at a time: {self._path} is in use") from None
         self._lock = lock
         try:
             for torn in self._path.parent.glob(f".{escape(self._path.name)}.*.part"):  # by one that was killed
@@ -205,10 +206,10 @@ def _read(path: Path) -> pa.Table:
     try:
         table = pq.read_table(path)
     except pa.ArrowInvalid:
-        raise ValueError(f"results must be a Parquet file of a sweep, which {path} is not") from None
+        raise ParameterError("results", f"must be a Parquet file of a sweep, which {path} is not") from None
     made_by = (table.schema.metadata or {}).get(_MADE_BY.encode())
     if made_by is None:
-        raise ValueError(f"results must be a Parquet file of a sweep, which {path} is not")
+        raise ParameterError("results", f"must be a Parquet file of a sweep, which {path} is not")
     _check_code(path, made_by.decode(), table["engine"].to_pylist() if "engine" in table.column_names else [])
     return table
 
@@ -225,8 +226,9 @@ def _read_journal(path: Path) -> list[Row]:
 def _check_code(path: Path, made_by: str, engines: Sequence[str | None]) -> None:
     parts = 2 if any(engines) else 1
     if made_by.split()[:parts] != _made_by().split()[:parts]:
-        raise ValueError(
-            f"results must be of this version of tachometry, and {path} is of another: remove it, or take another file"
+        raise ParameterError(
+            "results",
+            f"must be of this version of tachometry, and {path} is of another: remove it, or take another file",
         )
 
 

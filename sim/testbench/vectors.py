@@ -14,6 +14,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.run import Run
 from tachometry.spec import TachometerSpec
+from tachometry.spec.option import ParameterError
 
 # Clocks of the motion, and of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING, _STANDING = 160_000, 800_000
@@ -41,7 +42,7 @@ def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = 
         trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
     run = golden.run(spec, trace)
     if not len(run.ticks.clock):
-        raise ValueError(f"motion must last for a tick, not for {trace.n_clocks} clocks")
+        raise ParameterError("motion", f"must last for a tick, not for {trace.n_clocks} clocks")
     vectors = {
         "clocks": trace.n_clocks,
         "pins": list(trace.lines),

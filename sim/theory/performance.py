@@ -5,13 +5,16 @@ which a value is given by force (Sec. V-B); None: there is none.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.theory import rairan, tsuji
 from tachometry.sim.theory.checks import Floats
+from tachometry.spec import MTachometer, MTTachometer, RairanTachometer, STachometer, TachometerSpec, TTachometer
 
 # An interval of just `max_ticks` is to be no longer for the rounding of a double.
 _SLACK = 1e-9
@@ -122,3 +125,69 @@ def _or_forced(
     if max_ticks is None:
         return resolution
     return np.where(forced, tsuji.unit_velocity(counts_per_rev, tick_seconds) / max_ticks, resolution)
+
+
+def _of_s(spec: STachometer, speed: Floats) -> Performance:
+    """With eq. (17), too.
+
+    Nearer to a multiple of ω_u than ω_u/max_ticks updates are forced, and eq. (18) does not hold. With m_s ≥ kept + 1
+    in the window after a forced one, in which eq. (21) weights the only alteration by one half and eq. (17) by one, the
+    error is at most ω_u/max_ticks with eq. (21), ω_u/(kept + 1) with eq. (17).
+    """
+    counts, tick_seconds = spec.encoder.counts_per_rev, float(spec.timing.tick_seconds)
+    found = s_performance(speed, counts, tick_seconds, spec.timing.max_ticks)
+    if spec.cancel:
+        return found
+    worst = tsuji.unit_velocity(counts, tick_seconds) / (spec.kept_ticks + 1)
+    return replace(found, resolution=np.where(found.forced, worst, found.resolution))
+
+
+def _of_m(spec: MTachometer, speed: Floats) -> Performance:
+    return m_performance(speed, spec.average, spec.encoder.counts_per_rev, float(spec.timing.tick_seconds))
+
+
+def _of_t(spec: TTachometer, speed: Floats) -> Performance:
+    timer_seconds = float(spec.timing.tick_seconds) / spec.timer_periods
+    return t_performance(speed, spec.encoder.counts_per_rev, timer_seconds, spec.max_periods)
+
+
+def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
+    timer_seconds = float(spec.timing.tick_seconds) / spec.timer_periods
+    return mt_performance(speed, spec.min_periods, spec.encoder.counts_per_rev, timer_seconds, spec.max_periods)
+
+
+def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:
+    """With an adaptive dt, too, that comes from shorter ones."""
+    counts, tick_seconds, longest = spec.encoder.counts_per_rev, float(spec.timing.tick_seconds), spec.timing.max_ticks
+    if spec.adaptive is None:
+        return rairan_performance(speed, spec.estimate, counts, tick_seconds, longest)
+    shift = _steady_shift(spec, speed / spec.unit_velocity)
+    each = [
+        rairan_performance(speed, spec.estimate, counts, tick_seconds * 2**k, longest >> k)
+        for k in range(spec.max_shift + 1)
+    ]
+    columns = (np.choose(shift, [getattr(found, name) for found in each]) for name in ("resolution", "time", "forced"))
+    return Performance(*columns)
+
+
+def _steady_shift(spec: RairanTachometer, ratio: Floats) -> NDArray[np.int64]:
+    """k of an adaptive dt that comes from shorter ones, at speeds in counts per tick."""
+    rule = spec.adaptive_dt
+    doubled = np.ceil(np.log2((rule.fewest - 1) / ratio) + 1e-12)
+    return np.where(ratio * rule.slow <= 1, 0, np.clip(doubled, 0, rule.max_shift)).astype(np.int64)
+
+
+def unknown(spec: TachometerSpec, speed: Floats) -> Performance:
+    """Of a method that has no equations here."""
+    nothing = np.full(len(speed), math.nan)
+    return Performance(nothing, nothing, np.zeros(len(speed), dtype=np.bool_))
+
+
+# What a core of a method measures at speeds in rad/s, by the name of the method.
+PERFORMANCES: dict[str, Callable[[Any, Floats], Performance]] = {
+    "s": _of_s,
+    "m": _of_m,
+    "t": _of_t,
+    "mt": _of_mt,
+    "rairan": _of_rairan,
+}

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from tachometry.spec.option import ParameterError
 from tachometry.spec.units import PI, SPEED
 
 NATIVE = "count/tick"
@@ -13,11 +14,11 @@ _PER_REV_PER_SECOND = {name: 2 * PI / unit.exact for name, unit in SPEED.items()
 UNITS = (NATIVE, *_PER_REV_PER_SECOND)
 
 
-def parse_lsb(text: str) -> int:
-    """Fraction bits N of an LSB such as `2^-10`, 2^−N; ValueError if it is no power of two."""
+def parse_lsb(what: str, text: str) -> int:
+    """Fraction bits N of an LSB such as `2^-10`, 2^−N; ParameterError if it is no power of two."""
     match = re.fullmatch(r"2\^([+-]?[0-9]{1,3})", text.strip())
     if match is None:
-        raise ValueError(f"lsb must be a power of two such as 2^-10, not {text!r}")
+        raise ParameterError(what, f"must be a power of two such as 2^-10, not {text!r}")
     return -int(match[1])
 
 

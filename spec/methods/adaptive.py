@@ -5,16 +5,15 @@ from fractions import Fraction
 from math import isqrt
 
 from tachometry.spec.option import ParameterError
-from tachometry.spec.timing import Timing
 from tachometry.spec.units import FRACTION, read_exactly
 
 
-def parse_target(text: str, timing: Timing) -> Fraction:
-    """A fraction such as `0.1%` or `0.001`; the timing is not used."""
+def parse_target(what: str, text: str) -> Fraction:
+    """A fraction such as `0.1%` or `0.001`."""
     try:
-        return read_exactly("adaptive", text, FRACTION)
+        return read_exactly(what, text, FRACTION)
     except ParameterError:
-        raise ParameterError("adaptive", f"must be a fraction such as 0.1% or 0.001, not {text!r}") from None
+        raise ParameterError(what, f"must be a fraction such as 0.1% or 0.001, not {text!r}") from None
 
 
 @dataclass(frozen=True)

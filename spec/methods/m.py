@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 from tachometry.spec.formats.reciprocal import Reciprocal
-from tachometry.spec.option import option
-from tachometry.spec.tachometer import TachometerSpec, signed_width
+from tachometry.spec.option import ParameterError, option
+from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.units import plural, signed_width
 
 MAX_AVERAGE = 256
 
@@ -26,14 +27,24 @@ class MTachometer(TachometerSpec):
         If a parameter is out of range.
     """
 
-    average: int = option(1, "Ticks that are averaged, 1 to 256.", metavar="N")
+    average: int = option(1, "Ticks that are averaged, 1 to 256.", metavar="N", unit="ticks", tests=("", "2", "3", "8"))
 
     method = "m"
+    summary = "counts the pulses of one tick, or of several"
+    pairs_with = TachometerSpec.pairs_with | {"external-tick", "age", "lowpass"}
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 1 <= self.average <= MAX_AVERAGE:
-            raise ValueError(f"average must be from 1 to {MAX_AVERAGE}, not {self.average}")
+            raise ParameterError("average", f"must be from 1 to {MAX_AVERAGE}, not {self.average}")
+
+    @property
+    def description(self) -> str:
+        return f"eq. (6), mean of {plural(self.average, 'tick')}"
+
+    @property
+    def standstill_ticks(self) -> int:
+        return self.average
 
     @property
     def max_sum(self) -> int:

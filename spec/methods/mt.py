@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from tachometry.spec.methods.timed import TimedTachometer
-from tachometry.spec.option import option
-from tachometry.spec.timing import Timing, whole_clocks
+from tachometry.spec.option import Derived, ParameterError, option
+from tachometry.spec.timing import whole_clocks
 
 
-def _parse_min_time(text: str, timing: Timing) -> int:
-    return whole_clocks("min_time", text, timing.clock_hz)
+def _clocks(what: str, text: str) -> Derived:
+    return Derived(lambda spec: whole_clocks(what, text, spec.timing.clock_hz))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,21 +32,29 @@ class MTTachometer(TimedTachometer):
 
     min_time: int | None = option(
         None,
-        "Tc: a measurement lasts longer than that. In s, ms, us or ns, or clocks. [default: a tick]",
+        "Tc: a measurement lasts longer than this. In s, ms, us or ns; a plain number is clocks.",
+        shown="a tick",
         metavar="TIME",
-        parse=_parse_min_time,
+        unit="clocks",
+        parse=_clocks,
+        tests=("", "longest"),
     )
 
     method = "mt"
+    summary = "takes the time of many counts"
+    equation = 13
 
     def __post_init__(self) -> None:
         super().__post_init__()
         longest = self.timing.max_ticks * self.timing.tick_cycles
         if not 1 <= self._min_time <= longest:
-            raise ValueError(f"min_time must be from 1 to {longest} clocks, the maximum time, not {self.min_time}")
+            raise ParameterError(
+                "min_time", f"must be from 1 to {longest} clocks, the maximum time, not {self.min_time}"
+            )
         if self._min_time % self.timer_cycles:
-            raise ValueError(
-                f"min_time must be a multiple of {self.timer_cycles} clocks with times in ticks, not {self.min_time}"
+            raise ParameterError(
+                "min_time",
+                f"must be a multiple of {self.timer_cycles} clocks with times in ticks, not {self.min_time}",
             )
 
     @property

@@ -3,10 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target
-from tachometry.spec.option import option
+from tachometry.spec.option import ParameterError, option
 from tachometry.spec.port import UPDATE, Port, held
 from tachometry.spec.tachometer import TachometerSpec
 
@@ -41,55 +40,76 @@ class RairanTachometer(TachometerSpec):
     """
 
     estimate: str = option(
-        "n3", "n1, the upper bound, n2, the lower, or n3, their harmonic mean, eq. (11).", choices=ESTIMATES
+        "n3",
+        "Which estimate the velocity is: n1, the upper bound, n2, the lower, or n3, their harmonic mean, eq. (11).",
+        choices=ESTIMATES,
     )
     paper_exact: bool = option(False, "The published algorithm and nothing else: no direction, no standstill.")
-    bound_decay: bool = option(True, "Let the velocity fall with the time since the last count.")
+    bound_decay: bool = option(True, "While no count comes, let the velocity decay with the time since the last one.")
     adaptive: Fraction | None = option(  # noqa: RUF009
         None,
         "Longer dt, 2^k ticks: the shortest with which the relative error of n3, eq. (13), is at most this, such as 1% "
         "or 0.01.",
         metavar="TARGET",
         parse=parse_target,
+        tests=("", "25%"),
     )
 
     method = "rairan"
+    summary = "begins its ticks with a count (Rairán 2013)"
+    update_by = "count"
     own_ticks = True
+    pairs_with = TachometerSpec.pairs_with | {"index", "index-reset", "lowpass"}
     last_when_stalled = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.estimate not in ESTIMATES:
-            raise ValueError(f"estimate must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
+            raise ParameterError("estimate", f"must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
         if self.bounds and self.paper_exact:
-            raise ValueError("bounds must not be given with paper_exact, which leaves its own")
+            raise ParameterError("bounds", "must not be given with paper_exact, which leaves its own")
         if self.timing.max_ticks >= MAX_TABLE:
-            raise ValueError(
-                f"max_ticks must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
+            raise ParameterError(
+                "max_ticks", f"must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
             )
         if (self.estimate == "n3" or self.bounds) and self.max_count > MAX_TABLE:
             why = "estimate n3" if self.estimate == "n3" else "bounds"
-            raise ValueError(f"max_speed must be at most {MAX_TABLE} counts per tick with {why}, not {self.max_count}")
+            raise ParameterError(
+                "max_speed", f"must be at most {MAX_TABLE} counts per tick with {why}, not {self.max_count}"
+            )
         if self.adaptive is not None:
             self._check_adaptive(self.adaptive)
 
     def _check_adaptive(self, target: Fraction) -> None:
         if self.paper_exact:
-            raise ValueError("adaptive must not be given with paper_exact, which has one dt")
+            raise ParameterError("adaptive", "must not be given with paper_exact, which has one dt")
         if self.lowpass is not None:
-            raise ValueError(
-                "lowpass must not be given with adaptive, whose ticks differ: its time is counted in ticks"
+            raise ParameterError(
+                "lowpass", "must not be given with adaptive, whose ticks differ: its time is counted in ticks"
             )
         if not 0 < target < Fraction(1, 3):
-            raise ValueError(f"adaptive must be more than 0 and less than 1/3, not {float(target):.9g}")
+            raise ParameterError("adaptive", f"must be more than 0 and less than 1/3, not {float(target):.9g}")
         if self.timing.max_ticks < 4:
-            raise ValueError(f"max_ticks must be at least 4 with adaptive, not {self.timing.max_ticks}")
+            raise ParameterError("max_ticks", f"must be at least 4 with adaptive, not {self.timing.max_ticks}")
         if not self.max_shift:
             most = MAX_TABLE // 2
-            raise ValueError(f"max_speed must be at most {most} counts per tick with adaptive, not {self.max_count}")
+            raise ParameterError(
+                "max_speed", f"must be at most {most} counts per tick with adaptive, not {self.max_count}"
+            )
         if self.adaptive_dt.fewest > self.max_pulse_count:
             least = f"{1 / (2 * self.max_pulse_count - 1):.4g}"
-            raise ValueError(f"adaptive must be at least {least} with this speed and time, not {float(target):.9g}")
+            raise ParameterError(
+                "adaptive", f"must be at least {least} with this speed and time, not {float(target):.9g}"
+            )
+
+    @property
+    def description(self) -> str:
+        return f"Rairan 2013, {self.estimate}"
+
+    @property
+    def recovery_clocks(self) -> int | None:
+        # Table 1 to the letter recovers only with counts.
+        return None if self.paper_exact else super().recovery_clocks
 
     @property
     def max_shift(self) -> int:
@@ -236,10 +256,6 @@ class RairanTachometer(TachometerSpec):
                 else []
             ),
         )
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        return super().parameters | {"adaptive": None if self.adaptive is None else float(self.adaptive)}
 
     @property
     def update_spacing(self) -> int:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.option import option
-from tachometry.spec.tachometer import TachometerSpec, signed_width
+from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.units import signed_width
 
 # Up to this many ticks 1/m_s is looked up in a table of block RAM; for longer measurements it is carried along.
 MAX_TABLE = 2048
@@ -31,6 +32,29 @@ class STachometer(TachometerSpec):
     cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).")
 
     method = "s"
+    summary = "averages in step with the alterations of the pulse number"
+    update_by = "alteration"
+    pairs_all = True
+
+    @property
+    def description(self) -> str:
+        return "eq. (21), cancels alternate alterations" if self.cancel else "eq. (17)"
+
+    @property
+    def heading(self) -> str:
+        return f"{super().heading}, eq. ({21 if self.cancel else 17})"
+
+    @property
+    def remark(self) -> str:
+        return (
+            "At a multiple of the unit velocity m_s would be infinite. At one, and nearer to it than "
+            f"1/{self.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error."
+        )
+
+    @property
+    def standstill_ticks(self) -> int:
+        # The count opens a window; the forced update at its end still weights it by one half, the next has it no more.
+        return 2 * self.timing.max_ticks - self.kept_ticks
 
     @property
     def kept_ticks(self) -> int:

@@ -14,6 +14,8 @@ class TTachometer(TimedTachometer):
     """
 
     method = "t"
+    summary = "takes the time between two counts"
+    equation = 9
 
     @property
     def max_interval(self) -> int:

@@ -1,9 +1,9 @@
 """What the methods that measure the time between counts share (Tsuji 2009, Sec. IV-B and C)."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from tachometry.spec.option import option
+from tachometry.spec.option import ParameterError, option
 from tachometry.spec.port import UPDATE, Port, held
 from tachometry.spec.tachometer import TachometerSpec
 
@@ -31,16 +31,28 @@ class TimedTachometer(TachometerSpec):
 
     timer: str = option("clock", "What times are counted in: clocks, or ticks as in the paper.", choices=_TIMERS)
     bound_decay: bool = option(
-        True, "While no count comes, let the velocity sink with the greatest speed that this allows."
+        True, "While no count comes, let the velocity decay as the greatest speed that the silence allows."
     )
-    paper_exact: bool = option(False, "The published algorithm and nothing else.")
+    paper_exact: bool = option(
+        False, "The published algorithm and nothing else: no decay, and a reversal is no special case."
+    )
+
+    # Number of its equation in Tsuji 2009.
+    equation: ClassVar[int]
+    update_by = "count"
+    rest_tenths = 22
+    pairs_with = TachometerSpec.pairs_with | {"external-tick", "lowpass"}
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.bounds and self.paper_exact:
-            raise ValueError("bounds must not be given with paper_exact, which has none")
+            raise ParameterError("bounds", "must not be given with paper_exact, which has none")
         if self.timer not in _TIMERS:
-            raise ValueError(f"timer must be clock or tick, not {self.timer!r}")
+            raise ParameterError("timer", f"must be clock or tick, not {self.timer!r}")
+
+    @property
+    def description(self) -> str:
+        return f"eq. ({self.equation}), times in {self.timer}s"
 
     @property
     def on_lattice(self) -> bool:
@@ -49,7 +61,7 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def decays(self) -> bool:
-        """Whether the velocity sinks while no count comes."""
+        """Whether the velocity decays while no count comes."""
         return self.bound_decay and not self.paper_exact
 
     @property

@@ -7,6 +7,7 @@ from importlib.metadata import version
 import pytest
 
 from tachometry.cli.main import main
+from tachometry.spec import METHODS, common_options, own_options
 
 
 def shown(capsys: pytest.CaptureFixture[str], *args: str) -> str:
@@ -69,6 +70,20 @@ def test_every_option_is_explained(
     for default in DEFAULTS:
         assert f"[default: {default}]" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture[str]) -> None:
+    text = " ".join(shown(capsys, "plan", "--help").split())
+    for method in METHODS:
+        assert f"{method} {METHODS[method].summary}" in text
+        for about in own_options(method):
+            assert about.help in text, (method, about.name)
+    for about in common_options():
+        assert about.help in text
+    assert "Method t and mt and rairan:" in text
+    assert "t, mt: While no count comes, " in text
+    assert " rairan: While no count comes, " in text
+    assert text.count("[default: bound-decay]") == 1
 
 
 def test_help_loads_nothing_heavy() -> None:

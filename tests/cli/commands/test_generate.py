@@ -108,10 +108,10 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
     ("options", "message"),
     [
         ("--ppr 0", "--ppr must be from 1 to 4194304 with x4 decoding, not 0"),
-        ("--ppr many", "Invalid value for '--ppr': 'many' is not a valid integer."),
+        ("--ppr many", "--ppr must be a whole number, not 'many'"),
         ("", "Missing option '--ppr'."),
         ("--ppr 9 --decoding 3", "--decoding must be 1, 2 or 4, not 3"),
-        ("--ppr 9 --method x", "'x' is not one of 's', 'm', "),
+        ("--ppr 9 --method x", "--method must be one of s, m, t, mt, rairan, not 'x'"),
         ("--ppr 9 --clock 48", "--tick must be a whole number of clocks, not 20us"),
         ("--ppr 9 --clock 48mHz", "--clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48mHz'"),
         ("--ppr 9 --clock 0Hz", "--clock must be a positive whole number of Hz, not '0Hz'"),
@@ -128,7 +128,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr 9 --name module", "--name must not be a Verilog keyword, which 'module' is"),
         ("--ppr 9 --name 9lives", "--name must be a letter or _ and up to 63 letters, digits or _, not '9lives'"),
         ("--ppr 9 --name ../x", "--name must be a letter or _"),
-        ("--ppr 9 --unit m/s", "'m/s' is not one of 'count/tick', 'rad/s', 'rev/s', 'rpm'."),
+        ("--ppr 9 --unit m/s", "--unit must be one of count/tick, rad/s, rev/s, rpm, not 'm/s'"),
         ("--ppr 9 --lsb 0.5", "--lsb must be a power of two such as 2^-10, not '0.5'"),
         ("--ppr 9 --lsb 2^-10 --frac-bits 10", "--lsb must not be given together with --frac-bits"),
         (
@@ -139,7 +139,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr 9 --velocity-width 65", "--velocity-width must be from 8 to 64, not 65"),
         ("--ppr 9 --position-width 7", "--position-width must be from 8 to 48, not 7"),
         ("--ppr 9 --filter 256", "--filter must be from 0 to 255, not 256"),
-        ("--ppr 9 --index-reset", "--index-reset must be given together with an index"),
+        ("--ppr 9 --index-reset", "--index-reset must be given together with --index"),
         ("--ppr 9 --max-tick-period 30us", "--max-tick-period must be given together with --external-tick"),
         (
             "--ppr 9 --external-tick --max-tick-period 1us",

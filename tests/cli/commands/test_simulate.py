@@ -247,7 +247,7 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
         ("--motion stop:1s --phase-error 90", "--phase-error must be more than -90 and less than 90, not 90.0"),
         ("--motion stop:1s --duty-error nan", "--duty-error must be more than -90 and less than 90, not nan"),
         ("--motion stop:1s --duty-error 50 --phase-error -50", "must be less than 90 electrical degrees, not 100"),
-        ("--motion stop:1s --phase-error 20deg", "Invalid value for '--phase-error': '20deg' is not a valid float"),
+        ("--motion stop:1s --phase-error 20rpm", "--phase-error must be a number in deg (default deg), not '20rpm'"),
         ("--motion stop:1s --bounce 1ms", "--bounce must be COUNT:TIME, such as 3:500us, not '1ms'"),
         ("--motion stop:1s --bounce 0:1ms", "--bounce count must be from 1 to 1000, not 0"),
         ("--motion stop:1s --bounce 3:0us", "--bounce time must be more than 0 s, not 0.0 s"),

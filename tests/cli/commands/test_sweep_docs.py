@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from tachometry.cli.commands.sweep import sweep
-from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
+from tachometry.cli.options.sweep import by_name, point_options
 from tachometry.cli.sweeping.points import points_of
 from tachometry.cli.sweeping.settings import of_command_line, of_file
 from tachometry.sim.studies.sweep import COLUMNS, run_point
@@ -28,7 +28,7 @@ def test_the_file_is_shown_as_it_is() -> None:
 
 
 def test_the_options_beside_it_mean_the_same() -> None:
-    options = by_name(sweep) | POINT_OPTIONS
+    options = by_name(sweep) | point_options()
     command = re.search(r"^    tachometry sweep (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
     assert command is not None
     words = shlex.split(command[1].replace("\\\n", ""))
@@ -49,7 +49,7 @@ def shown(values: list[float]) -> str:
 
 
 def test_how_far_off_the_methods_are_is_what_the_sweep_gives() -> None:
-    settings = of_file(DOCS / "sweep.toml", by_name(sweep) | POINT_OPTIONS)
+    settings = of_file(DOCS / "sweep.toml", by_name(sweep) | point_options())
     places: dict[float, dict[str, float]] = {}
     for point in points_of(settings, ",".join(METHODS), 0.05, None).points.values():
         row = run_point(point)

@@ -2,7 +2,6 @@
 
 import re
 import shlex
-from itertools import combinations, product
 from pathlib import Path
 
 import pytest
@@ -10,9 +9,9 @@ from support.command import run
 from support.mutant import mutant
 
 from tachometry.cli.commands import verify as command
-from tachometry.cli.options.pairs import APART, FACTORS, configurations, spec_of
 from tachometry.hdl.methods.m import MovingSum
 from tachometry.sim.encoder.stress import stress
+from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.sim.studies.verify import motions
 from tachometry.spec import METHODS
 
@@ -25,31 +24,6 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
         return [words for words in configurations(method) if "--tick 1 " in " ".join(words)][:2]
 
     monkeypatch.setattr(command, "configurations", short)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_every_two_options_meet(method: str) -> None:
-    """As far as they can be together at all."""
-    seen = [" ".join(core) + " " for core in configurations(method)]
-    assert len(set(seen)) == len(seen)
-    shown = {
-        name: values
-        for name, values in FACTORS[method].items()
-        if all(value == "" or value.startswith("--") for value in values)
-    }
-    for one, other in combinations(shown, 2):
-        for pair in product(filter(None, shown[one]), filter(None, shown[other])):
-            there = any(all(f"{value} " in text for value in pair) for text in seen)
-            possible = not any({(one, pair[0]), (other, pair[1])} == set(apart) for apart in APART)
-            assert there == possible, pair
-
-
-def test_all_that_it_makes_can_be_given_on_the_command_line() -> None:
-    for method in METHODS:
-        for words in configurations(method):
-            spec = spec_of(words)
-            assert spec.method == method
-            assert spec.velocity_bits is not None or "--velocity-width" not in words
 
 
 def test_all_engines_and_methods(few: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from tachometry.cli.commands.sweep import sweep
-from tachometry.cli.options.sweep import POINT_OPTIONS, by_name
+from tachometry.cli.options.sweep import by_name, point_options
 from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
 
-OPTIONS = by_name(sweep) | POINT_OPTIONS
+OPTIONS = by_name(sweep) | point_options()
 
 
 def vary(*texts: str) -> dict[str, list[str | None]]:
@@ -52,7 +52,7 @@ def test_values_of_an_axis(text: str, values: list[str | None], tmp_path: Path) 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("tick", "vary must be NAME=VALUES, not 'tick'"),
+        ("tick", "--vary must be NAME=VALUES, not 'tick'"),
         ("tick=1us,,2us", "values of tick must be separated by one comma, and none may be empty"),
         ("tick=", "values of tick must be separated by one comma, and none may be empty"),
         ("tick=1us..2us", "a range of tick must be LO..HI:N, or LO..HI:Nlog, not '1us..2us'"),
@@ -69,7 +69,7 @@ def test_what_is_no_axis(text: str, message: str) -> None:
 
 
 def test_an_axis_twice() -> None:
-    with pytest.raises(ValueError, match=r"^vary must be given once for tick$"):
+    with pytest.raises(ValueError, match=r"^--vary must be given once for tick$"):
         vary("tick=1us", "tick=2us")
 
 
@@ -88,7 +88,8 @@ speed = [1, 2.5, "3rad/s"]
 bounds = [true, false]
 """
     line = {
-        **{"ppr": "500", "clock": "10MHz", "tick": "200", "jitter": "0.02", "index": True, "method_cancel": False},
+        **{"core_ppr": "500", "core_clock": "10MHz", "core_tick": "200", "jitter": "0.02"},
+        **{"core_index": True, "core_cancel": False},
         **{"methods": "s,m:average=8", "motion": "constant:{speed}:1s"},
         "vary": ("speed=1,2.5,3rad/s", "bounds=yes,no"),
     }

@@ -17,7 +17,6 @@ from tachometry.spec import (
     TTachometer,
 )
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal as CarriedSpec
-from tachometry.spec.recovery import recovery_clocks
 
 
 def core(
@@ -278,7 +277,7 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
     Neither core nor checker is reset, so what holds in one clock after any state holds in all that follow.
     """
     parameters = proof.parameters | ({} if proof.checker == "m_method" else {"UPSET": 1})
-    clocks = recovery_clocks(proof.spec)
+    clocks = proof.spec.recovery_clocks
     assert clocks is not None
     return replace(
         proof, name=name, parameters=parameters, depth=1, recovers=clocks, only=f"p* {lemmas}", without=without
@@ -300,7 +299,7 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
     From any state that is given which holds some clocks before the end; at the end what is shown is of a division that
     began since then; and what such a division shows is right, by induction.
     """
-    spec, clocks = proof.spec, recovery_clocks(proof.spec)
+    spec, clocks = proof.spec, proof.spec.recovery_clocks
     assert isinstance(spec, MTTachometer)
     assert clocks is not None
     settled = clocks - spec.max_periods - spec.max_interval - spec.division_clocks - 1

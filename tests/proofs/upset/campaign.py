@@ -13,7 +13,6 @@ from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
-from tachometry.spec.recovery import recovery_clocks
 
 TICK_CYCLES, MAX_TICKS = 100, 20
 _OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 10}}
@@ -102,7 +101,7 @@ class Campaign:
     @property
     def bound(self) -> int:
         """Clocks after which the outputs must be right."""
-        return recovery_clocks(self.spec)
+        return self.spec.recovery_clocks
 
     @property
     def fine(self) -> bool:
@@ -135,7 +134,7 @@ def upsets(method: str, n: int, seed: int = 1, n_cycles: int = 40) -> Campaign:
     spec, trace = spec_of(method), motion(n_cycles, seed)
     core = Upsettable(spec, trace)
     rng = np.random.default_rng(seed)
-    length = recovery_clocks(spec) + 3 * spec.timing.tick_cycles
+    length = spec.recovery_clocks + 3 * spec.timing.tick_cycles
     clock = np.sort(rng.integers(200 * TICK_CYCLES, trace.n_clocks - length, n))
     bit = rng.permutation(np.resize(rng.permutation(len(core.bits)), n))
     outputs = [port.name for port in spec.ports if port.direction == "output"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.methods.s import Model
 from tachometry.sim.signals.run import Table
-from tachometry.sim.studies.plan import Plan, default_range, dense_speeds, plan_at, standstill_ticks, write_plan
+from tachometry.sim.studies.plan import Plan, default_range, dense_speeds, plan_at, write_plan
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 50), frac_bits=24)
@@ -104,9 +104,9 @@ def test_standstill(max_ticks: int, cancel: bool) -> None:
         last = updates.clock[np.flatnonzero(updates.velocity)[-1]]
         zero = updates.clock[updates.clock > last][0]
         longest = max(longest, zero - len(moving))
-    assert longest <= standstill_ticks(spec)
+    assert longest <= spec.standstill_ticks
     if cancel:
-        assert longest == standstill_ticks(spec)
+        assert longest == spec.standstill_ticks
 
 
 @pytest.mark.parametrize(

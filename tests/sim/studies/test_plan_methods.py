@@ -8,7 +8,7 @@ import pytest
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.studies.plan import plan_at, standstill
+from tachometry.sim.studies.plan import plan_at
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 
 TICKS = 3000
@@ -62,7 +62,9 @@ def test_standstill(method: str) -> None:
         motion = f"constant:{units * spec.unit_velocity!r}rad/s:{moving * tick!r}s+stop:{300 * tick!r}s"
         recording = VirtualEncoder(500).record(parse_motion(motion)).recording
         run = golden.run(spec, recording.place(spec.timing.clock_hz))
-        latest = (moving + standstill(spec) + 1) * spec.timing.tick_cycles + spec.tick_latency + spec.tick_to_velocity
+        latest = (
+            (moving + spec.standstill_ticks + 1) * spec.timing.tick_cycles + spec.tick_latency + spec.tick_to_velocity
+        )
         zero = run.updates.clock > latest
         held = run.updates.velocity[~zero][-1]
         assert held == 0

@@ -1,0 +1,59 @@
+"""`tachometry replay`: a core on captured signals, against its golden model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tachometry.cli.commands.running import run_and_report
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.capture import capture_options
+from tachometry.cli.options.core import core_options
+from tachometry.cli.options.engine import engine_options
+from tachometry.cli.options.option import GroupedCommand, output_options
+from tachometry.spec import TachometerSpec
+
+if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
+    from tachometry.cli.commands.running import Window
+    from tachometry.sim.signals.recording import Recording
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Run a core on captured encoder signals, against the golden model.",
+    epilog="""\b
+Examples:
+  tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv
+  tachometry replay scope.csv --a CH1 --b CH2 --ppr 1024 \\
+      --clock 500kHz --tick 100us --plot run.png
+
+Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
+a --clock that is a few times the edge rate then. Edges closer than a clock are flagged as errors or lost.""",
+)
+@click.argument("capture", type=click.Path(path_type=Path))
+@core_options
+@capture_options
+@output_options
+@engine_options
+def replay(
+    spec: TachometerSpec,
+    capture: Path,
+    read: Callable[[Path, TachometerSpec], Recording],
+    targets: dict[str, Path],
+    engine: str,
+    window: Window,
+) -> int:
+    """Run a core on captured encoder signals, against the golden model.
+
+    CAPTURE is a sigrok session (.sr), a text (.csv) with the header time,a,b, times in seconds and levels 0 or 1, or a
+    waveform (.vcd), whose one-bit variables are named with their scopes: --a top.a --b top.b.
+    Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
+
+    Ctrl-C ends the simulation, and what was simulated so far is told and written. Equal options and captures give equal
+    files. Exit status 1 if hardware and golden model differ.
+    """
+    outputs = Outputs(targets, inputs=[capture])
+    return run_and_report(spec, str(capture), read(capture, spec), None, outputs, engine, window)

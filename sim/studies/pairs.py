@@ -1,0 +1,133 @@
+"""Configurations of every method in which every two options meet, as words of the command line.
+
+The factors are the options that a method declares, with the values that these declare for tests. What two values cannot
+be together is found by trying.
+"""
+
+from fractions import Fraction
+from itertools import combinations, product
+
+from tachometry.spec import TachometerSpec, common_options, of_texts, own_options, spec_class
+from tachometry.spec.option import Option
+
+_PPR = 500
+_CLOCK_HZ = 48_000_000
+
+Texts = dict[str, str]  # values of options by their names
+
+
+def factors(method: str) -> dict[str, tuple[str, ...]]:
+    """Options of a method with the values that they take; the empty text leaves the option out.
+
+    Values in words depend on the rest: `most - 20` fraction bits, 20 less than there can be; `needed - 2` bits of the
+    velocity, two less than it can need; `some counts per tick`, about the speed of the motions; the `longest` minimum
+    time. The maximum time is in ticks. A flag that needs another is a value of that: `yes index-reset`.
+    """
+    spec = spec_class(method)
+    found = {about.name: about.tested for about in own_options(method)}
+    for about in common_options():
+        if spec.pairs_all:
+            found[about.name] = about.tested
+        elif about.name in spec.pairs_with:
+            found[about.name] = about.tested[: about.few]
+    known = _known(method)
+    for name in [name for name in found if known[name].needs]:
+        values = found.pop(name)
+        if known[name].needs in found and values:
+            found[known[name].needs] += (f"yes {name}",)
+    return {name: values for name, values in found.items() if len(values) > 1}
+
+
+def apart(method: str) -> set[frozenset[tuple[str, str]]]:
+    """Pairs of options with their values that cannot be together."""
+    found = set()
+    for (one, its), (other, others) in combinations(factors(method).items(), 2):
+        for pair in product(its, others):
+            row = dict(zip((one, other), pair, strict=True))
+            try:
+                of_texts(method, _texts(method, row))
+            except ValueError:
+                found.add(frozenset(row.items()))
+    return found
+
+
+def configurations(method: str) -> list[tuple[str, ...]]:
+    """Words of the command line, for each configuration of a method."""
+    from covertable import make
+
+    never = [
+        {
+            "operator": "not",
+            "condition": {
+                "operator": "and",
+                "conditions": [{"operator": "eq", "left": name, "value": value} for name, value in sorted(pair)],
+            },
+        }
+        for pair in sorted(apart(method), key=sorted)
+    ]
+    every = {name: list(values) for name, values in factors(method).items()}
+    return [words_of(method, _texts(method, dict(row))) for row in make(every, constraints=never)]
+
+
+def words_of(method: str, texts: Texts) -> tuple[str, ...]:
+    """The same options as words of the command line."""
+    known = _known(method)
+    words = ["--method", method]
+    for name, text in texts.items():
+        if known[name].flag:
+            words.append(f"--{name}" if text == "yes" else f"--no-{name}")
+        else:
+            words += [f"--{name}", text]
+    return tuple(words)
+
+
+def spec_of(words: tuple[str, ...]) -> TachometerSpec:
+    """The core that the command line makes of these words."""
+    first, method, *rest = words
+    assert first == "--method"
+    known = _known(method)
+    texts: Texts = {}
+    each = iter(rest)
+    for word in each:
+        name = word.removeprefix("--")
+        if name.startswith("no-") and name not in known:
+            texts[name.removeprefix("no-")] = "no"
+        else:
+            texts[name] = "yes" if known[name].flag else next(each)
+    return of_texts(method, texts)
+
+
+def _known(method: str) -> dict[str, Option]:
+    return {about.name: about for about in (*common_options(), *own_options(method))}
+
+
+def _texts(method: str, row: Texts) -> Texts:
+    """The options of a row, with numbers where it says what is special about them."""
+    texts = {"ppr": str(_PPR), "clock": str(_CLOCK_HZ)}
+    for name, value in row.items():
+        if value.startswith("yes "):
+            texts |= {name: "yes", value.removeprefix("yes "): "yes"}
+        elif value:
+            texts[name] = value
+    cycles, decoding = int(texts.get("tick", "960")), int(texts.get("decoding", "4"))
+    longest = str(cycles * int(texts.get("max-time", "500")))
+    texts["max-time"] = longest
+    if "min-time" in texts:
+        texts["min-time"] = longest
+    if "max-speed" in texts:
+        counts = Fraction(9, 4) if cycles > 2 else Fraction(3, 4)
+        texts["max-speed"] = f"{float(counts * _CLOCK_HZ / (cycles * _PPR * decoding))}rev/s"
+    frac_bits, width = texts.pop("frac-bits", ""), texts.pop("velocity-width", "")
+    if frac_bits:
+        spec = of_texts(method, texts)
+        fewest, most = spec.frac_bits_range(spec.unit)
+        bits = max(fewest, most - _less(frac_bits)) if "-" in frac_bits else min(int(frac_bits), most)
+        texts["frac-bits"] = str(bits)
+    if width:
+        texts["velocity-width"] = str(max(8, of_texts(method, texts).velocity_width - _less(width)))
+    return texts
+
+
+def _less(text: str) -> int:
+    """How much less than the most: 20 of "most - 20"."""
+    return int(text.split()[-1])

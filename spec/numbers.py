@@ -1,0 +1,202 @@
+"""What follows from the parameters of a core: widths, formats and latencies."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tachometry.spec.formats.low_pass import LowPass
+from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput, per_count
+from tachometry.spec.parameters import Parameters
+from tachometry.spec.units import ceil_log2, signed_width
+
+MAX_NATIVE_FRAC_BITS = 24
+
+
+@dataclass(frozen=True, kw_only=True)
+class Numbers(Parameters):
+    """Parameters, and the numbers that hardware, golden models and manifest take from them."""
+
+    @property
+    def default_frac_bits(self) -> int:
+        """Fraction bits of the velocity if nothing is said of them."""
+        coarsest, finest = self.frac_bits_range(self.unit)
+        return 16 if self.unit == NATIVE else max(coarsest, min(10, finest))
+
+    def frac_bits_range(self, unit: str) -> tuple[int, int]:
+        """Fewest and most fraction bits of the velocity in `unit`."""
+        if unit == NATIVE:
+            return 4, MAX_NATIVE_FRAC_BITS
+        # The greatest speed must be at least one LSB, and one count per tick at most 2^22.
+        count = per_count(unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
+        return 1 - ceil_log2(count * self.max_count), MAX_NATIVE_FRAC_BITS - 2 - ceil_log2(count)
+
+    @property
+    def native_frac_bits(self) -> int:
+        """Fraction bits of the velocity in counts per tick, of which one in another unit is made."""
+        if self.unit == NATIVE:
+            return self.frac_bits
+        return max(4, ceil_log2(self._lsb_per_count) + 2)
+
+    @property
+    def native_width(self) -> int:
+        """Bits of the velocity in counts per tick: a mean of pulse numbers never exceeds the largest of them."""
+        return signed_width(self.max_count) + self.native_frac_bits
+
+    @property
+    def output(self) -> VelocityOutput | None:
+        """How `velocity` is made of the native velocity; None if that is the output."""
+        if self.unit == NATIVE and self.velocity_bits is None:
+            return None
+        native = 1 << self.native_frac_bits
+        largest = self.bound_limit if self.bounds else self.max_count * native
+        return VelocityOutput(self._lsb_per_count / native, largest, self.velocity_bits, self.bounds)
+
+    @property
+    def max_bound(self) -> int:
+        """Largest bound in counts per tick, rounded up: a window may have missed a count at its ends."""
+        return self.max_count + 1
+
+    @property
+    def bound_width(self) -> int:
+        """Bits of a bound in counts per tick."""
+        return signed_width(self.max_bound) + self.native_frac_bits
+
+    @property
+    def bound_limit(self) -> int:
+        """Magnitude of a bound in counts per tick that there is none."""
+        return (1 << (self.bound_width - 1)) - 1
+
+    @property
+    def shown_bound_limit(self) -> int:
+        """The same at the ports: `velocity_lower` of −limit and `velocity_upper` of limit are none."""
+        return self.bound_limit if self.output is None else self.output.limit
+
+    @property
+    def update_spacing(self) -> int:
+        """Fewest clocks between two updates."""
+        return self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
+
+    @property
+    def _lsb_per_count(self) -> Fraction:
+        count = per_count(self.unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
+        return count * Fraction(2) ** self.frac_bits
+
+    @property
+    def low_pass(self) -> LowPass:
+        """The low-pass filter, of which there must be one."""
+        assert self.lowpass is not None
+        # Those that wait for the filter add up, at most a tick in each of its clocks.
+        longest = max((1 << self.timing.max_ticks.bit_length()) - 1, 255)
+        return LowPass(self.lowpass * self.timing.tick_seconds, longest, self.native_width)
+
+    @property
+    def low_pass_latency(self) -> int:
+        """Clocks from the velocity as measured to the filtered one, if they are no closer."""
+        return 0 if self.lowpass is None else self.low_pass.latency
+
+    @property
+    def greatest_speed(self) -> float:
+        """Greatest speed, in rad/s, that `velocity` can show; ticks are as long as nominal."""
+        counted = self.max_count * self.unit_velocity
+        return counted if self.output is None else min(counted, self.output.limit * self.rad_per_s_per_lsb)
+
+    @property
+    def rounding_lsb(self) -> float:
+        """Most that rounding takes from `velocity` or adds to it, in its LSB."""
+        return 0.5 if self.unit == NATIVE else 0.7
+
+    @property
+    def longest_tick(self) -> int:
+        """Most clocks in a tick."""
+        return self.timing.tick_cycles if self.max_tick_cycles is None else self.max_tick_cycles
+
+    @property
+    def min_tick_cycles(self) -> int:
+        """Fewest clocks between two external ticks: what works step by step must be done."""
+        output = self.output_latency if self.output_serial else 0
+        return max(2, self.datapath_latency if self.serial else 0, output)
+
+    def has_room(self, clocks: int) -> bool:
+        """Whether a tick is long enough for work of so many clocks; external ones may come in half the time."""
+        return self.timing.tick_cycles >= (clocks if self.max_tick_cycles is None else 2 * clocks)
+
+    @property
+    def pin_to_count(self) -> int:
+        """Clocks from the sampling of a level to its step: the two synchroniser flip-flops and the filter."""
+        return 2 + self.filter_clocks
+
+    @property
+    def max_count(self) -> int:
+        """Largest |m_e|: ⌈max_speed/ω_u⌉, for the longest tick, at most one count per clock."""
+        cycles = self.longest_tick
+        if self.max_speed is None:
+            return cycles
+        return min(cycles, self.max_speed.ceil_counts(self.encoder.counts_per_rev, self.seconds(cycles)))
+
+    @property
+    def unit_velocity(self) -> float:
+        """ω_u = 2π/(P·T_s) in rad/s, one count per tick (Tsuji 2009, Sec. V-A)."""
+        return 2 * math.pi / float(self.encoder.counts_per_rev * self.timing.tick_seconds)
+
+    @property
+    def rad_per_s_per_lsb(self) -> float:
+        """Value of one LSB of `velocity` in rad/s."""
+        return float(self.unit_velocity / self._lsb_per_count)
+
+    @property
+    def max_pulse_count(self) -> int:
+        """Largest |m_e| of the longest tick that a method with its own makes, but for a wait for a count."""
+        return self.max_count
+
+    @property
+    def count_width(self) -> int:
+        """Bits of `pulse_count`."""
+        return signed_width(self.max_pulse_count)
+
+    @property
+    def velocity_width(self) -> int:
+        """Bits of `velocity`."""
+        return self.native_width if self.output is None else self.output.port_width
+
+    @property
+    def interval_width(self) -> int:
+        """Bits of `interval`, unsigned."""
+        return self.timing.max_ticks.bit_length()
+
+    @property
+    def interval_unit_cycles(self) -> int:
+        """Clocks in one unit of `interval`."""
+        return self.timing.tick_cycles
+
+    @property
+    def serial(self) -> bool:
+        """Whether the datapath needs the time between two ticks."""
+        raise NotImplementedError
+
+    @property
+    def datapath_latency(self) -> int:
+        """Clocks from `tick` to the native velocity."""
+        raise NotImplementedError
+
+    @property
+    def output_serial(self) -> bool:
+        """Whether `velocity` is made of the native one bit by bit."""
+        output = self.output
+        return output is not None and len(output.digits) > 2 and self.has_room(output.serial_latency)
+
+    @property
+    def output_latency(self) -> int:
+        """Clocks from the native velocity to `velocity`."""
+        output = self.output
+        if output is None:
+            return 0
+        return output.serial_latency if self.output_serial else output.pipelined_latency
+
+    @property
+    def tick_to_velocity(self) -> int:
+        """Clocks from `tick` to `velocity_valid`."""
+        return self.datapath_latency + self.low_pass_latency + self.output_latency
+
+    def seconds(self, clocks: int) -> Fraction:
+        """A number of clocks in seconds, exactly."""
+        return Fraction(clocks, self.timing.clock_hz)

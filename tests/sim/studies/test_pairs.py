@@ -1,0 +1,83 @@
+"""Configurations of every method in which every two options meet."""
+
+from itertools import combinations, product
+
+import pytest
+
+from tachometry.sim.studies.pairs import apart, configurations, factors, spec_of
+from tachometry.spec import METHODS, TachometerSpec, common_options, own_options
+
+# What cannot be together at all, of every method that has both.
+APART = {
+    frozenset({("tick", "1"), ("external-tick", "yes")}),
+    frozenset({("paper-exact", "yes"), ("bounds", "yes")}),
+    frozenset({("paper-exact", "yes"), ("adaptive", "25%")}),
+    frozenset({("adaptive", "25%"), ("max-time", "2")}),
+    frozenset({("adaptive", "25%"), ("max-time", "3")}),
+    frozenset({("adaptive", "25%"), ("lowpass", "20kHz")}),
+}
+IN_WORDS = {"max-time", "min-time", "max-speed", "frac-bits", "velocity-width"}
+
+
+def shown(name: str, value: str) -> str:
+    """What is in the words of a configuration; empty if it cannot be told."""
+    if value == "" or name in IN_WORDS:
+        return ""
+    if value.startswith("yes "):
+        return f"--{name} --{value.removeprefix('yes ')} "
+    return f"--{name} " if value == "yes" else f"--no-{name} " if value == "no" else f"--{name} {value} "
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_two_options_meet(method: str) -> None:
+    """As far as they can be together at all."""
+    seen = [" ".join(core) + " " for core in configurations(method)]
+    assert len(set(seen)) == len(seen)
+    for (one, its), (other, others) in combinations(factors(method).items(), 2):
+        for pair in product(its, others):
+            here = [shown(name, value) for name, value in zip((one, other), pair, strict=True)]
+            if all(here):
+                there = any(all(word in text for word in here) for text in seen)
+                assert there == (frozenset(zip((one, other), pair, strict=True)) not in APART), pair
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_cannot_be_together_is_known(method: str) -> None:
+    assert apart(method) <= APART
+
+
+def test_the_extremes_are_there() -> None:
+    cores = {method: [spec_of(words) for words in configurations(method)] for method in METHODS}
+    assert sum(map(len, cores.values())) >= 73
+
+    def values(method: str, *names: str) -> set[tuple[object, ...]]:
+        def value(spec: TachometerSpec, name: str) -> object:
+            return getattr(spec.timing, name) if hasattr(spec.timing, name) else getattr(spec, name)
+
+        return {tuple(value(spec, name) for name in names) for spec in cores[method]}
+
+    assert values("s", "tick_cycles", "max_ticks") == set(product((1, 2, 3, 960), (2, 3, 500, 65536)))
+    assert values("s", "index", "index_reset") == {(False, False), (True, False), (True, True)}
+    for method in METHODS:
+        assert values(method, "tick_cycles") >= {(1,), (3,), (960,)}
+        widths = [spec for spec in cores[method] if spec.velocity_bits is not None]
+        assert 0 < len(widths) < len(cores[method])
+        assert any(spec.native_frac_bits == 24 for spec in cores[method])
+        assert any(spec.max_speed for spec in cores[method])
+
+
+def test_every_option_of_a_method_is_a_factor() -> None:
+    for method in METHODS:
+        assert {about.name for about in own_options(method)} <= set(factors(method))
+    reset = {about.name for about in common_options() if about.needs}
+    without = {about.name for about in common_options()} - set(factors("s")) - reset
+    assert without == {"ppr", "clock", "dt", "lsb"}
+    assert "yes index-reset" in factors("s")["index"]
+
+
+def test_words_and_specs_are_the_same() -> None:
+    for method in METHODS:
+        for words in configurations(method):
+            spec = spec_of(words)
+            assert spec.method == method
+            assert spec.velocity_bits is not None or "--velocity-width" not in words
