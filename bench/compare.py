@@ -39,7 +39,7 @@ SITUATIONS = (
         "The paper's experiment",
         """500 counts per revolution and a tick of 1 ms, which is also the unit of time of T and M/T: the setting
 that the S method was made for. It has half the error of M and of M/T in the same measurement time; T
-has no value above the unit velocity. The rivals are not bound to the lattice: LinuxCNC's timestamps of
+has no value above the unit velocity. The baselines are not bound to the lattice: LinuxCNC's timestamps of
 0.5 µs win by far.""",
         "--methods s,m:average=4,t:timer=tick,mt:timer=tick:min-time=3ms,rairan,hostmot2,simplefoc,odrive "
         "--motion ramp:0:40rad/s:5s --from 100ms --vibration 1mrad:50Hz --seed 1",

@@ -45,8 +45,8 @@ Examples:
     "--methods",
     default="all",
     metavar="LIST",
-    help="Names with commas between: methods of cores, with options as in m:average=10 or s:cancel=no, and difference, "
-    "hostmot2, simplefoc, odrive, moteus: float models of what is in use.",
+    help="Methods to compare: all, or names with commas between. Methods of cores take options, as in m:average=10 or "
+    "s:cancel=no; difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use.",
 )
 @optional_motion_options
 @option(
@@ -63,14 +63,14 @@ Examples:
     "--from",
     "start",
     metavar="TIME",
-    help="Leave out errors before this time, in s, ms, us or ns: what it takes to get going. "
-    "[default: until every method has a value]",
+    help="Leave out errors before this time, in s, ms, us or ns. [default: until every method has a value]",
 )
 @option(
     "Methods",
     "--size",
     is_flag=True,
-    help="Also measure the cores on an ECP5: COMB, FF, Fmax. Takes half a minute a core, and the extra `size`.",
+    help="Also measure the cores on an ECP5: COMB, FF, Fmax. It takes half a minute a core, and needs the extra "
+    "`size`.",
 )
 @output("--plot", suffixes=(".png", ".pdf"), help="Figure of all velocities and of the error of each; .png or .pdf.")
 @output("--csv", help="CSV with a row per method: the table.")
@@ -93,12 +93,12 @@ def compare(
     method has given its first value; the delay is the shift of the true speed that comes closest. A capture does not
     tell the true speed, so there are no errors.
     """
-    from tachometry.sim.studies.compare import RIVALS, common_instants, score
+    from tachometry.sim.studies.compare import BASELINES, common_instants, score
 
     given = {"--plot": plot, "--csv": csv}
     inputs = tables if capture is None else [capture]
     outputs = Outputs({name: path for name, path in given.items() if path is not None}, inputs=inputs)
-    named = named_methods(methods, make, RIVALS)
+    named = named_methods(methods, make, BASELINES)
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
     source = _source(record, capture, read, spec)
     earliest = 0.0 if start is None else float(parse_time("from", start))
@@ -192,15 +192,15 @@ def _time(seconds: float) -> str:
 def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Recording], Curve]]:
     """What is to be compared, each from what the encoder gave."""
     from tachometry.sim.signals.recording import PinTrace
-    from tachometry.sim.studies.compare import core_curve, rival_curve
+    from tachometry.sim.studies.compare import baseline_curve, core_curve
 
     def core(name: str, spec: TachometerSpec) -> Callable[[Recording], Curve]:
         return lambda recording: core_curve(name, spec, PinTrace.of(recording, spec))
 
-    def rival(name: str) -> Callable[[Recording], Curve]:
-        return lambda recording: rival_curve(name, recording, encoder.counts_per_rev, encoder.decoding)
+    def baseline(name: str) -> Callable[[Recording], Curve]:
+        return lambda recording: baseline_curve(name, recording, encoder.counts_per_rev, encoder.decoding)
 
-    return [rival(name) if spec is None else core(name, spec) for name, spec in named.specs.items()]
+    return [baseline(name) if spec is None else core(name, spec) for name, spec in named.specs.items()]
 
 
 _HEADS = ("method", "updates/s", "T_m mean", "T_m worst", "RMS (rad/s)", "max (rad/s)", "delay")

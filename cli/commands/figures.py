@@ -22,7 +22,7 @@ _SUMMARY = "claims.csv"
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Draw the papers' figures anew, and tell which agree.",
+    short_help="Draw the papers' figures anew, and say which agree.",
     epilog="""\b
 Examples:
   tachometry figures
@@ -33,14 +33,15 @@ Examples:
     "--only",
     default="all",
     metavar="LIST",
-    help="Names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12 (Tsuji 2009), rairan2, rairan3, "
-    "rairan5, rairan7 (Rairán 2013).",
+    help="Figures to draw: all, or names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12 (Tsuji "
+    "2009), rairan2, rairan3, rairan5, rairan7 (Rairán 2013).",
 )
 @option(
     _FIGURES,
     "--hdl/--no-hdl",
     default=True,
-    help="Simulate the hardware beside the golden models of tsuji12, rairan5 and rairan7: most of the time.",
+    help="Simulate the hardware beside the golden models of tsuji12, rairan5 and rairan7, which takes most of "
+    "the time.",
 )
 @output_folder(
     "build/figures",
@@ -50,7 +51,7 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
     """Draw the papers' figures anew, and tell which agree.
 
     Each is computed from the equations and the golden models, and held against what its paper says of it: the table at
-    the end tells what came out. See docs/figures.md.
+    the end shows what came out. See docs/figures.md.
 
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """

@@ -42,14 +42,14 @@ Examples:
     type=click.Path(path_type=Path),
     required=True,
     metavar="DIR",
-    help="Directory to write to; made if it does not exist, files in it are overwritten.",
+    help="Directory to write to; it is made if it does not exist, and files in it are overwritten.",
 )
 @option(
     "Files",
     "--testbench",
     type=click.Choice(["cocotb"]),
-    help="Also a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. Without a "
-    "--motion the shaft goes fast and slow, to and fro, and stops, fitted to the core.",
+    help="Also write a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. Without a "
+    "--motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the core.",
 )
 @optional_motion_options
 def generate(

@@ -27,7 +27,7 @@ _SLOWEST = 1e-9  # counts per tick; keeps every number printable
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Tell what a core can measure: resolution and time over speed.",
+    short_help="Show what a core can measure: resolution and time over speed.",
     epilog="""\b
 Examples:
   tachometry plan --ppr 500 --max-speed 400rad/s
@@ -47,7 +47,7 @@ Examples:
     "Range",
     "--methods",
     metavar="LIST",
-    help="Methods to be put beside each other: all, or names with commas between, with options as in m:average=10.",
+    help="Methods to compare beside each other: all, or names with commas between, with options as in m:average=10.",
 )
 @output("--plot", suffixes=(".png", ".pdf"), help="Figure of resolution and measurement time; .png or .pdf.")
 @output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")

@@ -52,8 +52,8 @@ def replay(
     waveform (.vcd), whose one-bit variables are named with their scopes: --a top.a --b top.b.
     Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
 
-    Ctrl-C ends the simulation, and what was simulated so far is told and written. Equal options and captures give equal
-    files. Exit status 1 if hardware and golden model differ.
+    Ctrl-C ends the simulation, and what was simulated so far is reported and written. Equal options and captures give
+    equal files. Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=[capture])
     return run_and_report(spec, str(capture), read(capture, spec), None, outputs, engine, window)

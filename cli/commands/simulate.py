@@ -54,10 +54,10 @@ def simulate(
     """Run a core on a virtual encoder, against the golden model and the truth.
 
     The hardware is simulated clock by clock and compared with the golden model in every bit of every update and tick.
-    The table at the end also tells what was lost on the way, and how far the velocity is from the shaft's.
+    The table at the end also shows what was lost on the way, and how far the velocity is from the shaft's.
 
-    Ctrl-C ends the simulation, and what was simulated so far is told and written. Equal options give equal files. Exit
-    status 1 if hardware and golden model differ.
+    Ctrl-C ends the simulation, and what was simulated so far is reported and written. Equal options give equal files.
+    Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=tables)
     truth = record(spec)

@@ -75,16 +75,16 @@ Examples:
     "--vary",
     multiple=True,
     metavar="NAME=VALUES",
-    help="An axis: the name of an option of cores, methods, motion or encoder, or a name in braces within --motion. "
-    "Values with commas between; LO..HI:N are N of them, evenly spaced, LO..HI:Nlog as their logarithms are; none "
-    "is without the option. May be given several times: all combinations are run.",
+    help="An axis: the name of an option of cores, methods, motion or encoder, or a name in braces within --motion, "
+    "and its values with commas between. LO..HI:N stands for N values, evenly spaced, and LO..HI:Nlog for N whose "
+    "logarithms are; none leaves the option out. It may be given several times: all combinations are run.",
 )
 @option(
     "Sweep",
     "--methods",
     default="all",
     metavar="LIST",
-    help="Names with commas between, with options as in m:average=10.",
+    help="Methods to run: all, or names with commas between, with options as in m:average=10.",
 )
 @option(
     "Sweep",
@@ -97,15 +97,21 @@ Examples:
     "Sweep",
     "--engine",
     type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"]),
-    help="Run the hardware, too, as simulate does, in lockstep with the golden model. [default: the golden model, "
-    "which it equals bit for bit]",
+    help="Also run the hardware, as simulate does, in lockstep with the golden model. [default: only the golden model, "
+    "which the hardware equals bit for bit]",
 )
-@option("Machines", "--jobs", type=int, metavar="N", help="Processes on this machine. [default: one for each core]")
+@option(
+    "Machines",
+    "--jobs",
+    type=int,
+    metavar="N",
+    help="Number of processes on this machine. [default: one for each core]",
+)
 @option(
     "Machines",
     "--scheduler",
     metavar="ADDRESS",
-    help="Workers of a Dask scheduler instead, such as tcp://host:8786, with the same version of tachometry.",
+    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry.",
 )
 @output(
     "--results",

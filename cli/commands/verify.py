@@ -65,8 +65,9 @@ later ones find them in the cache.""",
     type=click.IntRange(min=0),
     default=0,
     metavar="N",
-    help="Clocks that each engine is to simulate, spread over the configurations; pysim a thousandth of them. There is "
-    "one motion of each configuration at least.",
+    help="Clocks that each engine simulates, spread over the configurations; pysim simulates a thousandth of them. "
+    "Every "
+    "configuration runs one motion at least.",
 )
 @option(_VERIFICATION, "--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Seed of the first motion.")
 @option(
@@ -76,7 +77,7 @@ later ones find them in the cache.""",
     metavar="N",
     help="Number of processes. [default: one for each core of the computer]",
 )
-@output_folder("build/verify", help="Folder of the captures of failing motions; it is made when there is one.")
+@output_folder("build/verify", help="Folder of the captures of failing motions; it is made if a motion fails.")
 def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None, directory: Path) -> int:
     """Hold all engines against the golden models, in many configurations.
 
@@ -85,7 +86,7 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
     tick and update is compared.
 
     Exit status 1 if any differs: the first motion on which it does is saved as a capture, and the command that replays
-    it is told.
+    it is printed.
     """
     from tachometry.sim.engines.pick import ENGINES, pick, present
 

@@ -17,19 +17,21 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 _CAPTURE = "Capture"
 
 _OPTIONS = [
-    option(_CAPTURE, "--a", metavar="CHANNEL", help="Line A: name of the channel, or its number from 0."),
+    option(_CAPTURE, "--a", metavar="CHANNEL", help="Channel of line A: its name, or its number from 0."),
     option(
         _CAPTURE,
         "--b",
         metavar="CHANNEL",
-        help="Line B. Without both options: the channels named A and B, else the first two.",
+        help="Channel of line B. [default of --a and --b: the channels named A and B, else the first two]",
     ),
-    option(_CAPTURE, "--z", metavar="CHANNEL", help="Line Z, the index. With --index: z, if it is not given."),
+    option(
+        _CAPTURE, "--z", metavar="CHANNEL", help="Channel of line Z, the index. [default: z with --index, else none]"
+    ),
     option(
         _CAPTURE,
         "--tick-in",
         metavar="CHANNEL",
-        help="The external tick. With --external-tick: tick_in, if it is not given.",
+        help="Channel of the external tick. [default: tick_in with --external-tick, else none]",
     ),
     option(
         _CAPTURE,

@@ -18,12 +18,22 @@ _ENGINE_OPTIONS = [
         "--engine",
         type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"]),
         default="auto",
-        help="pysim is Amaranth's simulator, some 10,000 clocks a second; cxxrtl is compiled, some 10,000,000 and "
-        "more, needs a C++ compiler, and some seconds when a core is new. auto is cxxrtl with a compiler, else "
-        "pysim. verilator is compiled from the exported Verilog.",
+        help="What simulates the hardware: pysim is Amaranth's simulator and runs some 10,000 clocks a second; "
+        "cxxrtl is compiled and runs 10,000,000 and more, but needs a C++ compiler and some seconds for a new core; "
+        "verilator is compiled from the exported Verilog; auto is cxxrtl if there is a compiler, else pysim.",
     ),
-    option(_SIMULATION, "--vcd-from", metavar="TIME", help="Where --vcd begins; a plain number is clocks."),
-    option(_SIMULATION, "--vcd-to", metavar="TIME", help="Where it ends."),
+    option(
+        _SIMULATION,
+        "--vcd-from",
+        metavar="TIME",
+        help="Time at which the waveform of --vcd begins; a plain number is clocks.",
+    ),
+    option(
+        _SIMULATION,
+        "--vcd-to",
+        metavar="TIME",
+        help="Time at which the waveform of --vcd ends; a plain number is clocks.",
+    ),
 ]
 
 

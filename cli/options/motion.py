@@ -64,7 +64,7 @@ _OPTIONS = [
         type=float,
         default=0,
         metavar="FRACTION",
-        help="Gaussian jitter of each edge in time: standard deviation over the gap to the nearer neighbour, below "
+        help="Gaussian jitter of each edge in time: its standard deviation over the gap to the nearer neighbour, below "
         "0.5.",
     ),
     option(
@@ -73,7 +73,7 @@ _OPTIONS = [
         type=float,
         default=0,
         metavar="FRACTION",
-        help="Edges of the disc are off by up to this many edge pitches, below 0.5, the same in every turn.",
+        help="Edges of the disc are displaced by up to this many edge pitches, below 0.5, the same in every turn.",
     ),
     option(
         _FAULTS,
@@ -119,7 +119,12 @@ _OPTIONS = [
         help="Probability that an edge comes together with the next one: both lines change at once.",
     ),
     option(
-        _FAULTS, "--seed", type=int, default=0, metavar="N", help="Of all random numbers; equal seeds, equal files."
+        _FAULTS,
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="Seed of all random numbers; equal seeds give equal files.",
     ),
 ]
 

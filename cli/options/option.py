@@ -150,7 +150,8 @@ _OUTPUT_OPTIONS = [
     output(
         "--vcd",
         suffixes=(".vcd",),
-        help="Waveform of pins, ports and inner values, with a GTKWave save file (.gtkw) beside it: open that.",
+        help="Waveform of pins, ports and inner values, with a GTKWave save file (.gtkw) beside it, which GTKWave "
+        "opens.",
     ),
     output(
         "--plot",
@@ -167,7 +168,7 @@ _OUTPUT_OPTIONS = [
     output(
         "--save-capture",
         suffixes=(".sr",),
-        help="Encoder lines as the core samples them, as a sigrok capture: open in PulseView or replay it.",
+        help="Encoder lines as the core samples them, as a sigrok capture, for PulseView or `tachometry replay`.",
     ),
 ]
 

@@ -12,7 +12,7 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.run import Run
-from tachometry.sim.studies import baselines as rivals
+from tachometry.sim.studies import baselines
 from tachometry.spec import TachometerSpec
 from tachometry.spec.option import ParameterError
 
@@ -23,23 +23,23 @@ _LONGEST_DELAY = 0.02  # seconds, that is looked for
 _ALIKE = 1e-9  # of a speed; a constant one has no delay
 
 
-def _simplefoc(steps: rivals.Steps) -> rivals.Estimate:
-    raw = rivals.mixed_method(steps, 1e-3)
-    return rivals.Estimate(raw.time, rivals.low_pass(raw.velocity, 1e-3, 5e-3))
+def _simplefoc(steps: baselines.Steps) -> baselines.Estimate:
+    raw = baselines.mixed_method(steps, 1e-3)
+    return baselines.Estimate(raw.time, baselines.low_pass(raw.velocity, 1e-3, 5e-3))
 
 
 # What people use now: how it is described, and its float model with the settings that its project comes with.
-RIVALS: dict[str, tuple[str, Callable[[rivals.Steps], rivals.Estimate]]] = {
-    "difference": ("counts in 1 ms, 5 ms low-pass", partial(rivals.finite_difference, period_s=1e-3)),
-    "hostmot2": ("LinuxCNC: timestamps, 1 ms", partial(rivals.timestamp_method, period_s=1e-3)),
+BASELINES: dict[str, tuple[str, Callable[[baselines.Steps], baselines.Estimate]]] = {
+    "difference": ("counts in 1 ms, 5 ms low-pass", partial(baselines.finite_difference, period_s=1e-3)),
+    "hostmot2": ("LinuxCNC: timestamps, 1 ms", partial(baselines.timestamp_method, period_s=1e-3)),
     "simplefoc": ("SimpleFOC: mixed time and frequency, 1 ms, 5 ms low-pass", _simplefoc),
-    "odrive": ("ODrive: tracking loop, 1000 rad/s, 125 us", partial(rivals.tracking_loop, period_s=125e-6)),
+    "odrive": ("ODrive: tracking loop, 1000 rad/s, 125 us", partial(baselines.tracking_loop, period_s=125e-6)),
     "moteus": (
         "moteus: tracking loop, 400 Hz, 33 us",
         partial(
-            rivals.tracking_loop,
+            baselines.tracking_loop,
             period_s=1 / 30e3,
-            bandwidth_rad_s=2 * math.pi * 400 / rivals.MOTEUS_3DB_RATIO,
+            bandwidth_rad_s=2 * math.pi * 400 / baselines.MOTEUS_3DB_RATIO,
             whole_counts=False,
         ),
     ),
@@ -53,7 +53,7 @@ class Curve:
     Parameters
     ----------
     name, what : str
-    estimate : rivals.Estimate
+    estimate : baselines.Estimate
         Velocity in rad/s, held from each time (s) on.
     measurement_time : float64 array, shape (n,), seconds
         Of each update; empty where the method has none.
@@ -61,7 +61,7 @@ class Curve:
 
     name: str
     what: str
-    estimate: rivals.Estimate
+    estimate: baselines.Estimate
     measurement_time: FloatArray
 
 
@@ -104,21 +104,21 @@ def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
     return Curve(
         name,
         f"{spec.method} method, tick {spec.timing.tick_cycles} clocks",
-        rivals.Estimate(updates.clock / clock_hz, velocity),
+        baselines.Estimate(updates.clock / clock_hz, velocity),
         updates.interval.astype(np.float64) * (spec.interval_unit_cycles / clock_hz),
     )
 
 
-def rival_curve(name: str, recording: Recording, counts_per_rev: int, decoding: int) -> Curve:
-    """What one of the `RIVALS` shows, with an ideal decoder.
+def baseline_curve(name: str, recording: Recording, counts_per_rev: int, decoding: int) -> Curve:
+    """What one of the `BASELINES` shows, with an ideal decoder.
 
     Raises
     ------
     ValueError
         If it is shorter than two of its periods.
     """
-    what, model = RIVALS[name]
-    estimate = model(rivals.Steps.of_recording(recording, counts_per_rev, decoding))
+    what, model = BASELINES[name]
+    estimate = model(baselines.Steps.of_recording(recording, counts_per_rev, decoding))
     if len(estimate.time) < 2:
         raise ParameterError(
             "motion", f"must last at least two control periods of {name}, not {recording.duration:.6g} s"
@@ -145,7 +145,7 @@ def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueS
         reach = min(_LONGEST_DELAY, (instants[-1] - instants[0]) / 4)
         if np.ptp(truth) > _ALIKE * np.max(np.abs(truth)):
             with suppress(ValueError):  # a motion that looks alike at several shifts
-                delay = rivals.delay_seconds(instants, held, truth, reach)
+                delay = baselines.delay_seconds(instants, held, truth, reach)
     return Score(
         curve.name,
         curve.what,

@@ -7,7 +7,7 @@ import pytest
 from support.command import run
 
 from tachometry.sim.studies import size as synthesis
-from tachometry.sim.studies.compare import RIVALS
+from tachometry.sim.studies.compare import BASELINES
 from tachometry.spec import METHODS, TachometerSpec
 
 CORE = "--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms".split()
@@ -18,8 +18,8 @@ def test_all_methods_in_one_table(tmp_path: Path, capsys: pytest.CaptureFixture[
     files = ["--csv", tmp_path / "c.csv", "--plot", tmp_path / "c.png"]
     assert run("compare", *CORE, *MOTION, *files) == 0
     told = capsys.readouterr().out.splitlines()
-    names = [line.split()[0] for line in told[1 : 1 + len(METHODS) + len(RIVALS)]]
-    assert names == [*METHODS, *RIVALS]
+    names = [line.split()[0] for line in told[1 : 1 + len(METHODS) + len(BASELINES)]]
+    assert names == [*METHODS, *BASELINES]
     with (tmp_path / "c.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["name"] for row in rows] == names

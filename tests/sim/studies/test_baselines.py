@@ -1,4 +1,4 @@
-"""The rivals: against naive transcriptions of their descriptions, exact cases, and the weaknesses users know."""
+"""The baselines: against naive transcriptions of their descriptions, exact cases, and the weaknesses users know."""
 
 import math
 from collections.abc import Callable

@@ -7,13 +7,13 @@ import pytest
 from support.lines import PPR, record
 
 from tachometry.sim.plots.compare import save_comparison
-from tachometry.sim.studies import baselines as rivals
-from tachometry.sim.studies.compare import RIVALS, Curve, common_instants, core_curve, rival_curve, score
+from tachometry.sim.studies import baselines
+from tachometry.sim.studies.compare import BASELINES, Curve, baseline_curve, common_instants, core_curve, score
 from tachometry.spec import METHODS, Encoder, Timing
 
 
 def curve(time: np.ndarray, velocity: np.ndarray) -> Curve:
-    return Curve("x", "a curve", rivals.Estimate(time, velocity), np.full(len(time), 2e-3))
+    return Curve("x", "a curve", baselines.Estimate(time, velocity), np.full(len(time), 2e-3))
 
 
 def test_a_late_curve_has_that_delay_and_no_other_error() -> None:
@@ -48,7 +48,7 @@ def test_every_method_follows_a_constant_speed(tmp_path: Path) -> None:
     specs = {name: spec(encoder=Encoder(PPR), timing=timing) for name, spec in METHODS.items()}
     trace = truth.recording.place(timing.clock_hz)
     curves = [core_curve(name, spec, trace) for name, spec in specs.items()]
-    curves += [rival_curve(name, truth.recording, 4 * PPR, 4) for name in RIVALS]
+    curves += [baseline_curve(name, truth.recording, 4 * PPR, 4) for name in BASELINES]
     instants = common_instants(curves, 0.4, 1e-3)
     instants = instants[instants > 0.2]  # filters have settled
     scores = [score(each, 0.4, instants, truth.true_speed) for each in curves]
@@ -64,4 +64,4 @@ def test_every_method_follows_a_constant_speed(tmp_path: Path) -> None:
 
 def test_too_short_for_a_control_period() -> None:
     with pytest.raises(ValueError, match=r"^motion must last at least two control periods of hostmot2, not 0.001 s$"):
-        rival_curve("hostmot2", record("stop:1ms").recording, 400, 4)
+        baseline_curve("hostmot2", record("stop:1ms").recording, 400, 4)
