@@ -125,6 +125,7 @@ Examples:
 @click.pass_obj
 def sweep(
     settings: Settings,
+    /,
     file: Path | None,
     methods: str,
     start: str | None,

@@ -177,7 +177,7 @@ def _method_options() -> dict[str, dict[str, Field[Any]]]:
     return found
 
 
-def _kind(item: Field[Any]) -> click.ParamType:
+def _kind(item: Field[Any]) -> "click.ParamType[Any]":
     """What texts the option of a field takes."""
     if choices := item.metadata["option"]["choices"]:
         return click.Choice(choices)

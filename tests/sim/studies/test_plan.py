@@ -3,6 +3,7 @@
 from dataclasses import replace
 from fractions import Fraction as F
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,8 @@ def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Updates
     position = (np.arange(n_ticks + 1) * units.numerator + units.denominator // 3) // units.denominator
     updates = updates_of(spec, np.diff(position))
     settled = updates.clock > 200  # more than two windows, and two equal pulse numbers
-    updates = Updates(*(row[settled] for row in vars(updates).values() if isinstance(row, np.ndarray)))
+    rows: Any = [row[settled] for row in vars(updates).values() if isinstance(row, np.ndarray)]
+    updates = Updates(*rows)
     return updates, np.abs(updates.velocity / 2.0**spec.frac_bits - float(units))
 
 
@@ -63,7 +65,7 @@ def test_updates_by_alteration(units: F, cancel: bool) -> None:
 def test_forced_updates(max_ticks: int, cancel: bool) -> None:
     spec = with_max_ticks(max_ticks, cancel=cancel)
     beside = [F(1, max_ticks + 1), F(5, 7 * max_ticks + 3), F(1, 3 * max_ticks - 1), F(1, 10 * max_ticks + 3)]
-    distances = [0, *beside, *(-distance for distance in beside)]
+    distances = [F(0), *beside, *(-distance for distance in beside)]
     used = 0.0
     for units in (multiple + distance for multiple in (0, 1, 17) for distance in distances):
         if units <= 0:

@@ -1,6 +1,7 @@
 """The golden model of Rairán's method: against Table 1 to the letter, and against its description, clock by clock."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,7 +102,7 @@ def test_adaptive_dt_clock_by_clock(dt: int, max_ticks: int, target: str, bound_
             ("n_dt1", [row.n_dt1 for row in rows]),
             ("dt_shift", [row.k for row in rows]),
         ):
-            assert getattr(updates, name, updates.more.get(name)).tolist() == wanted, name
+            assert (updates.more | vars(updates))[name].tolist() == wanted, name
         exactly = [row.sign * exact(estimate, row.n_ep1, row.n_dt1) / 2**row.k for row in rows]
         assert updates.velocity.tolist() == [rounded(value, spec.frac_bits) for value in exactly]
         assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
@@ -286,7 +287,7 @@ def test_a_burst_after_standstill() -> None:
         ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own"),
     ],
 )
-def test_bad_parameters(parameters: dict, message: str) -> None:
+def test_bad_parameters(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=f"^{message}$"):
         make_spec(**({"dt": 40} | parameters))
 
@@ -325,7 +326,7 @@ def test_at_a_steady_speed_eq13_is_within_the_target_and_dt_no_longer_than_that_
         if true * 2**most > rule.fewest or (rule.slow == rule.fewest - 1 and gap > (rule.slow + 1) * dt):
             looked_at += 1
             shifts.add(shift)
-            assert (error <= target).all(), gap
+            assert (error <= float(target)).all(), gap
             # Half as long, dt has fewer counts than it takes, or the last of them late: in the last half gap.
             assert shift == 0 or true * 2 ** (shift - 1) <= rule.fewest - 0.5 + 0.05, gap
     assert looked_at > 10
