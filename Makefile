@@ -84,10 +84,11 @@ api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	$(BIN)/pdoc --docformat numpy -o build/api $(addprefix tachometry.,$(LAYERS)) \
 	  $(addprefix tachometry.,$(subst /,.,$(filter-out %/py %/export,$(basename $(wildcard spec/[a-z]* hdl/[a-z]*)))))
 
-lint: $(VENV)/.test ## ruff and mypy
+lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks and tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy $(addprefix -p tachometry.,$(LAYERS))
+	$(BIN)/mypy bench tests
 
 clean: ## remove what was built, and the environment
 	rm -rf build $(VENV) *.egg-info

@@ -232,7 +232,7 @@ def main() -> None:
     output = parser.parse_args().output
     encoder = VirtualEncoder(500, jitter=0.02, vibration=Vibration(1e-3, 50), seed=1)
     trace = encoder.record(parse_motion(MOTION)).recording.place(48_000_000)
-    common = {"encoder": Encoder(500), "timing": Timing.parse("48MHz", "20us", "10ms")}
+    common: dict[str, Any] = {"encoder": Encoder(500), "timing": Timing.parse("48MHz", "20us", "10ms")}
     cores = {name: method(**common) for name, method in METHODS.items()}
     speeds = [speed(name, spec, trace).cells for name, spec in cores.items()]
     print_table(SPEED_COLUMNS, speeds)

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from pages import markdown, write
 from rich.console import Console
@@ -106,7 +107,7 @@ def measure(name: str, spec: TachometerSpec, trace: PinTrace) -> Result:
 
 def cores() -> dict[str, TachometerSpec]:
     """Every method, and the S method with what costs the golden model time."""
-    common = {"encoder": Encoder(500), "timing": Timing.parse(CLOCK, "20us", "10ms")}
+    common: dict[str, Any] = {"encoder": Encoder(500), "timing": Timing.parse(CLOCK, "20us", "10ms")}
     found = {name: method(**common) for name, method in METHODS.items()}
     return found | {
         "s, in rad/s": replace(found["s"], unit="rad/s", frac_bits=10),

@@ -1,13 +1,14 @@
 #!/bin/sh
 # The experiment of Tsuji 2009: 500 counts per revolution, Ts = 1 ms, 10 ms at most, from 0 to 40 rad/s in 5 s.
-# Run by `make demo`; BIN is the folder of the command `tachometry`, OUT where the results go.
+# Run by `make demo`; BIN is the folder of the command `tachometry`, OUT where the results go, TIME how long the ramp is.
 set -eu
 
 BIN=${BIN:-.venv/bin}
 OUT=${OUT:-build/demo}
+TIME=${TIME:-5s}
 common="--ppr 500 --decoding 1 --clock 50kHz --tick 1ms --max-time 10ms --max-speed 60rad/s"
 core="--method s $common"
-motion="--motion ramp:0:40rad/s:5s --vibration 1mrad:50Hz --seed 1"
+motion="--motion ramp:0:40rad/s:$TIME --vibration 1mrad:50Hz --seed 1"
 
 echo "Verilog, manifest and FuseSoC file:"
 # shellcheck disable=SC2086 # options are words

@@ -131,6 +131,7 @@ Examples:
 @click.pass_obj
 def sweep(
     settings: Settings,
+    /,
     file: Path | None,
     methods: str,
     start: str | None,

@@ -2,6 +2,7 @@
 
 import pickle
 import re
+from fractions import Fraction
 
 import pytest
 
@@ -10,6 +11,7 @@ from tachometry.spec import (
     TWO_TICKS,
     Encoder,
     ParameterError,
+    STachometer,
     Timing,
     common_options,
     of_texts,
@@ -45,7 +47,7 @@ def test_every_option_does_what_it_says() -> None:
         lsb=2^-3 velocity-width=20 max-speed=900rpm position-width=20 filter=3 index=yes index-reset=on age=1
         bounds=true lowpass=50rad/s cancel=no"""
     spec = of_texts("s", dict(word.split("=") for word in texts.split()))
-    assert spec == METHODS["s"](
+    assert spec == STachometer(
         encoder=Encoder(24, 2),
         timing=Timing(1_000_000, 100, 50),
         max_tick_cycles=150,
@@ -59,7 +61,7 @@ def test_every_option_does_what_it_says() -> None:
         index_reset=True,
         age=True,
         bounds=True,
-        lowpass=50,
+        lowpass=Fraction(50),
         cancel=False,
     )
     assert {about.name for about in (*common_options(), *own_options("s"))} - {"dt", "frac-bits"} == {

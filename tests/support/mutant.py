@@ -13,6 +13,7 @@ import pytest
 
 import tachometry.hdl
 from tachometry.hdl.methods import DATAPATHS
+from tachometry.sim.golden.methods import MODELS
 
 
 @contextmanager
@@ -34,9 +35,11 @@ def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
                 for name, value in list(vars(user).items()):
                     if value is box:
                         patch.setattr(user, name, getattr(changed, box.__name__))
-        for method, datapath in DATAPATHS.items():
-            if datapath is box:
-                patch.setitem(DATAPATHS, method, getattr(changed, box.__name__))
+        tables: tuple[dict[str, Any], ...] = (DATAPATHS, MODELS)
+        for table in tables:
+            for method, used in table.items():
+                if used is box:
+                    patch.setitem(table, method, getattr(changed, box.__name__))
         yield
 
 

@@ -9,6 +9,7 @@ from support import command
 from tachometry.sim.figures import FIGURES
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.golden.methods import m as m_method
+from tachometry.sim.golden.quotient import round_quotient
 
 
 def run(*args: str | Path) -> int:
@@ -52,7 +53,7 @@ def test_a_mismatch_of_the_hardware_is_told(
     """A golden model with a fault, on a short run: the hardware differs, and the exit status is 1."""
     turn = Lab.turn
     monkeypatch.setattr(Lab, "turn", lambda lab, spec, motion, **more: turn(lab, spec, "ramp:0:40:400ms", **more))
-    true_quotient = m_method.round_quotient
+    true_quotient = round_quotient
     monkeypatch.setattr(m_method, "round_quotient", lambda *args: true_quotient(*args) + 1)
     assert run("--only", "tsuji12", "-o", tmp_path) == 1
     told = capsys.readouterr().out

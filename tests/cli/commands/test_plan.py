@@ -127,9 +127,9 @@ def test_csv_holds_the_dense_samples(tmp_path: Path) -> None:
     assert float(rows[-1]["speed_rad_s"]) == 400
     assert {row["forced"] for row in rows} == {"0", "1"}
     for row in rows:
-        m_s = min(tsuji.tsuji_eq20_interval(float(row["speed_rad_s"]), 2000, 20e-6), 500)
-        assert float(row["interval_ticks"]) == pytest.approx(float(m_s))
-        assert float(row["measurement_time_s"]) == pytest.approx(20e-6 * float(m_s))
+        m_s = min(float(tsuji.tsuji_eq20_interval(float(row["speed_rad_s"]), 2000, 20e-6)), 500)
+        assert float(row["interval_ticks"]) == pytest.approx(m_s)
+        assert float(row["measurement_time_s"]) == pytest.approx(20e-6 * m_s)
 
 
 def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

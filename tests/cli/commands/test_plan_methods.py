@@ -14,7 +14,7 @@ OPTIONS = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400ra
 UNIT = 50 * math.pi
 
 
-def run(*args: str | Path) -> int:
+def run(*args: object) -> int:
     return command.run("plan", *OPTIONS, *args)
 
 

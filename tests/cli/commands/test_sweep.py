@@ -21,7 +21,7 @@ MOTION = ["--motion", "constant:{speed}:100ms", "--from", "40ms"]
 AXES = ["--vary", "speed=5rad/s,50rad/s", "--vary", "tick=100us,1ms", "--methods", "s,m:average=2"]
 
 
-def run(*args: str | Path) -> int:
+def run(*args: object) -> int:
     return command.run("sweep", *args)
 
 
@@ -114,7 +114,7 @@ def test_the_hardware_in_lockstep(
     scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     line = ["--ppr", "20", "--clock", "20kHz", "--tick", "1ms", "--motion", "constant:{speed}:100ms"]
-    line += ["--vary", "speed=5,50", "--methods", "m", "--engine", "pysim", "--results", tmp_path / "r.parquet"]
+    line += ["--vary", "speed=5,50", "--methods", "m", "--engine", "pysim", "--results", str(tmp_path / "r.parquet")]
     assert run(*line, *scheduler) == 0
     assert capsys.readouterr().out.endswith(
         "PASS: hardware and golden model agree in every bit of 2 points, 4000 clocks\n"

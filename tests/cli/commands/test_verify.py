@@ -72,7 +72,7 @@ def test_motions_last_as_long_as_is_wanted_and_differ() -> None:
 def test_ctrl_c_tells_what_was_done(
     few: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    checked = []
+    checked: list[object] = []
 
     def check(core: object, **options: object) -> object:
         if checked:

@@ -300,11 +300,11 @@ def test_nothing_is_left_of_a_failed_write(tmp_path: Path, monkeypatch: pytest.M
 def test_long_capture_takes_little_time_and_memory(tmp_path: Path) -> None:
     n_clocks = 50_000_000
     trace = random_trace(1000, n_clocks)
-    start = time.perf_counter()
+    start = time.process_time()
     write_sr(tmp_path / "x.sr", trace, 50 * MEGAHERTZ)
     assert (tmp_path / "x.sr").stat().st_size < n_clocks / 150
     recording = read_capture(tmp_path / "x.sr")
-    assert time.perf_counter() - start < 10  # measured: below 1 s
+    assert time.process_time() - start < 10  # seconds of the processor; measured: below 1
     assert_same(recording.place(50 * MEGAHERTZ), trace)
     tracemalloc.start()
     try:

@@ -70,8 +70,9 @@ def test_the_waveform_is_that_of_pysim(name: str, window: tuple[int, int] | None
 @pytest.mark.parametrize("name", COMPILED)
 def test_memory_and_python_calls_do_not_grow_with_clocks(name: str) -> None:
     spec = replace(SPEC, timing=Timing(20_000, 1_000_000, 10))
-    trace = PinTrace(*(np.zeros(1, dtype=kind) for kind in (np.int64, np.uint8, np.uint8)), n_clocks=20_000_000)
-    engine, seen = pick(name), []
+    low = np.zeros(1, dtype=np.uint8)
+    trace = PinTrace(np.zeros(1, dtype=np.int64), low, low, 20_000_000)
+    engine, seen = pick(name), list[int]()
     engine.run(spec, replace(trace, n_clocks=1))
     tracemalloc.start()
     run = engine.run(spec, trace, progress=seen.append)
@@ -129,10 +130,12 @@ def test_the_compiler_is_that_of_cxx_or_the_systems_or_ziglangs(
     assert build.find_compiler() == (str(tool), "-v")
     monkeypatch.delenv("CXX")
     monkeypatch.setenv("PATH", os.devnull)
-    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert build.find_compiler() is None
-    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: object())
-    assert build.find_compiler()[1:] == ("-m", "ziglang", "c++")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: object())
+    found = build.find_compiler()
+    assert found is not None
+    assert found[1:] == ("-m", "ziglang", "c++")
 
 
 def test_every_engine_is_one() -> None:

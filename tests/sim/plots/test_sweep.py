@@ -10,6 +10,7 @@ AXES = {"speed": ["1rad/s", "2rad/s", "4rad/s"], "tick": ["10us", "20us"]}
 
 
 def test_a_field_is_the_median_of_its_points() -> None:
+    points: list[tuple[dict[str, str], float | None]]
     points = [({"speed": "1rad/s", "tick": "20us", "seed": str(seed)}, float(seed)) for seed in (1, 2, 30)]
     points += [({"speed": "4rad/s", "tick": "10us"}, None), ({"speed": "4rad/s", "tick": "20us"}, 5.0)]
     np.testing.assert_array_equal(_field(points, AXES), [[np.nan] * 3, [2, np.nan, 5]])

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from support.lines import decode, record
 
 from tachometry.sim.encoder.motion import FloatArray
@@ -339,10 +340,10 @@ def test_shaft_that_rests_on_an_edge() -> None:
 
 @pytest.mark.parametrize("delay_s", [-3.3e-3, 0, 0.4e-3, 2.25e-3, 17.7e-3])
 def test_delay_of_a_shifted_signal(delay_s: float) -> None:
-    def signal(t: FloatArray) -> FloatArray:
+    def signal(t: NDArray[np.float64]) -> NDArray[np.float64]:
         return 100 + 30 * np.sin(40 * t) + 20 * np.sin(97 * t + 1) + 5 * np.sin(211 * t)
 
-    t = np.arange(1, 1001) * PERIOD
+    t = np.arange(1, 1001, dtype=np.float64) * PERIOD
     noise = np.random.default_rng(3).normal(0, 1, len(t))
     assert delay_seconds(t, signal(t - delay_s), signal(t)) == pytest.approx(delay_s, abs=2e-5)
     assert delay_seconds(t, signal(t - delay_s) + noise, signal(t)) == pytest.approx(delay_s, abs=2e-4)
@@ -372,7 +373,7 @@ def test_delay_of_each_method(method: Method, period: float, delay_ms: float) ->
 
 def test_refusals() -> None:
     steps = steps_at(0.5)
-    t = np.arange(100) * PERIOD
+    t = np.arange(100, dtype=np.float64) * PERIOD
     for refused, text in (
         (lambda: steps_at(0.5, signs="++"), "one for each time"),
         (lambda: Steps(np.array([0.5]), np.array([2]), 1.0, CPR), "must be \\+1 or -1"),

@@ -23,7 +23,8 @@ def test_a_late_curve_has_that_delay_and_no_other_error() -> None:
     assert found.delay == pytest.approx(5e-3, abs=1e-4)
     assert found.max == pytest.approx(2 * np.sin(2 * np.pi * 3 * 2.5e-3), rel=1e-3)
     assert found.rms == pytest.approx(found.max / np.sqrt(2), rel=1e-2)
-    assert (found.mean_time, found.worst_time) == (pytest.approx(2e-3), 2e-3)
+    assert found.mean_time == pytest.approx(2e-3)
+    assert found.worst_time == 2e-3
     assert found.updates_per_second == len(time) / 2
 
 

@@ -61,7 +61,7 @@ def test_updates_by_alteration(units: F, cancel: bool) -> None:
 def test_forced_updates(max_ticks: int, cancel: bool) -> None:
     spec = with_max_ticks(max_ticks, cancel=cancel)
     beside = [F(1, max_ticks + 1), F(5, 7 * max_ticks + 3), F(1, 3 * max_ticks - 1), F(1, 10 * max_ticks + 3)]
-    distances = [0, *beside, *(-distance for distance in beside)]
+    distances = [F(0), *beside, *(-distance for distance in beside)]
     used = 0.0
     for units in (multiple + distance for multiple in (0, 1, 17) for distance in distances):
         if units <= 0:

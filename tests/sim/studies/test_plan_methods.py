@@ -1,6 +1,7 @@
 """What plans of all methods promise, measured on their golden models with the virtual encoder."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from tachometry.sim.studies.plan import plan_at
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 
 TICKS = 3000
-OPTIONS: dict[str, dict[str, object]] = {"m": {"average": 3}, "adaptive": {"adaptive": Fraction(1, 20)}}
+OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 3}, "adaptive": {"adaptive": Fraction(1, 20)}}
 
 
 def spec_of(method: str) -> TachometerSpec:

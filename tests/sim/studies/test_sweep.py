@@ -82,7 +82,7 @@ def test_the_hardware_runs_beside_it() -> None:
     assert (row["engine"], row["mismatches"], row["clocks"]) == ("pysim", 0, 10_000)
 
 
-DIFFERENT = [
+DIFFERENT: list[dict[str, Any]] = [
     {"method": "x"},
     {"spec": replace(SPEC, cancel=False)},
     {"spec": replace(SPEC, frac_bits=15)},

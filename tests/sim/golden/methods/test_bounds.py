@@ -18,7 +18,9 @@ PLAIN = replace(S, cancel=False, frac_bits=8)
 M = MTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 32, 500), bounds=True)
 
 
-def true_travel(spec: TachometerSpec, angle: NDArray[np.int64], at: NDArray[np.int64], m_s: NDArray) -> NDArray:
+def true_travel(
+    spec: TachometerSpec, angle: NDArray[np.int64], at: NDArray[np.int64], m_s: NDArray[np.int64]
+) -> NDArray[np.int64]:
     """Twice the angle travelled in the windows that close with the ticks `at`, in 1/`SUBCOUNTS`.
 
     The angles begin a tick before the first that is counted. Eq. (21) is the mean of two windows, of which one lies a
@@ -37,7 +39,7 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
         updates = model(spec).updates(ticks_of(angle[1:]), None, 1 << 40)
         at = updates.clock - spec.tick_to_velocity
         m_s, valid = updates.interval, updates["bounds_valid"]
-        windows += np.count_nonzero(valid)
+        windows += int(np.count_nonzero(valid))
         # Twice the travel in LSB · ticks, so that all is whole.
         travel = true_travel(spec, angle, at, m_s) << spec.native_frac_bits
         above = (2 * updates["velocity_upper"] * m_s * SUBCOUNTS - travel)[valid]

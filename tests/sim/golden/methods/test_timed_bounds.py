@@ -1,6 +1,7 @@
 """The bounds of the methods that measure times enclose the true mean speed, by whole numbers."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ Ints = NDArray[np.int64]
 def edges(n: int, seed: int) -> tuple[Ints, Ints]:
     """When an ideal shaft passes edges, in 1/`INSTANTS` clocks, at most one a clock, and in which direction."""
     rng = np.random.default_rng(seed)
-    parts = []
+    parts: list[NDArray[Any]] = []
     while sum(map(len, parts)) < n:
         m = int(rng.integers(1, 3000))
         gap = 10.0 ** rng.uniform(0, 2.5) * np.linspace(1, rng.uniform(0.3, 3), m)
@@ -97,7 +98,7 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     return len(way), float(nearest), float(np.median((upper - lower) / np.abs(exact)))
 
 
-OPTIONS = {"encoder": Encoder(500), "timing": Timing(1_000_000, TICK, 500), "bounds": True}
+OPTIONS: dict[str, Any] = {"encoder": Encoder(500), "timing": Timing(1_000_000, TICK, 500), "bounds": True}
 T, MT = TTachometer(**OPTIONS), MTTachometer(**OPTIONS, min_time=100)
 
 
