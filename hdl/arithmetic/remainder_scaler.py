@@ -10,6 +10,7 @@ from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 
 
@@ -90,37 +91,29 @@ class PipelinedRemainderScaler(_RemainderScaler):
     def elaborate(self, platform: object) -> Module:
         m = Module()
 
-        def later(*values: Value, only_if: Value | None = None) -> list[Signal]:
-            registers = [Signal.like(value) for value in values]
-            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
-            if only_if is not None:  # the reset of a flip-flop is free, where a gate is not
-                with m.If(~only_if):
-                    m.d.sync += [register.eq(0) for register in registers]
-            return registers
-
-        valid, bits, base, tag = later(self.start, self.numerator, self.base, self.tag)
+        valid, bits, base, tag = delay(m, self.start, self.numerator, self.base, self.tag)
         q, r = self.q, self.r
         total = (base << self._frac_bits) + (q & bits[0].replicate(len(q)))
         product = Cat(r & bits[0].replicate(len(r)), 0).as_signed()
         for step in range(1, self._steps):
-            step_q, step_r = later(q, r, only_if=bits[step])
-            valid, bits, tag, total, product, q, r = later(valid, bits, tag, total, product, q, r)
+            step_q, step_r = delay(m, q, r, only_if=bits[step])
+            valid, bits, tag, total, product, q, r = delay(m, valid, bits, tag, total, product, q, r)
             if step < self._steps - 1:
                 total, product = total + (step_q << step), product + (step_r << step)
             else:
                 total, product = total - (step_q << step), product - (step_r << step)
             total = total[: len(self.velocity)].as_signed()  # all is modulo the width of the result, which fits
 
-        valid, tag, total, remainder = later(valid, tag, total, product)
+        valid, tag, total, remainder = delay(m, valid, tag, total, product)
         quotient = remainder[-1]  # its digits, the sign first
         for place in reversed(range(self._digits)):
             divisor = tag[: len(r)] << place
-            valid, tag, total, quotient, remainder = later(
-                valid, tag, total, quotient, _reduce(remainder, divisor)[: len(r) + place + 1].as_signed()
+            valid, tag, total, quotient, remainder = delay(
+                m, valid, tag, total, quotient, _reduce(remainder, divisor)[: len(r) + place + 1].as_signed()
             )
             quotient = Cat(~remainder[-1], quotient)
         up = self._up(_reduce(remainder << 1, tag[: len(r)]), tag[: len(r)])
-        valid, tag, total, quotient, up = later(valid, tag, total, quotient, up)
+        valid, tag, total, quotient, up = delay(m, valid, tag, total, quotient, up)
         m.d.sync += self.done.eq(valid)
         with m.If(valid):
             m.d.sync += [self.velocity.eq(_rounded(total, quotient.as_signed(), up)), self.tag_out.eq(tag)]

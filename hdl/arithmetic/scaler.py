@@ -10,6 +10,7 @@ from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
 from tachometry.spec.formats.reciprocal import Reciprocal
 
 
@@ -127,20 +128,15 @@ class PipelinedScaler(_Scaler):
     def elaborate(self, platform: object) -> Module:
         m = Module()
 
-        def delay(*values: Signal) -> list[Signal]:
-            registers = [Signal.like(value) for value in values]
-            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
-            return registers
-
-        valid, bits, base, tag = delay(self.start, self.numerator, self.base, self.tag)
-        valid, bits, base, tag, q = delay(valid, bits, base, tag, self.q)
+        valid, bits, base, tag = delay(m, self.start, self.numerator, self.base, self.tag)
+        valid, bits, base, tag, q = delay(m, valid, bits, base, tag, self.q)
         total: ValueLike = self._rounding
         for step in range(self._steps):
             sum_ = Signal(self._total_shape)
             last = step == self._steps - 1
             m.d.sync += sum_.eq(Mux(bits[step], total - q if last else total + q, total) >> 1)
             total = sum_
-            valid, bits, base, tag, q = delay(valid, bits, base, tag, q)
+            valid, bits, base, tag, q = delay(m, valid, bits, base, tag, q)
         m.d.sync += self.done.eq(valid)
         with m.If(valid):
             m.d.sync += [self.velocity.eq(self._result(base, total)), self.tag_out.eq(tag)]

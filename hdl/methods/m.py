@@ -93,7 +93,7 @@ class MovingSum(wiring.Component):
         return Mux(full, read.data, 0)
 
 
-class Datapath(wiring.Component):
+class MMethod(wiring.Component):
     """M-method datapath, eq. (6) of Tsuji 2009: the mean of the last n pulse numbers, every tick.
 
     A mean over a power of two is a shift; otherwise the sum is multiplied by a constant, step by step, as in the

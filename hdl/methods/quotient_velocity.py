@@ -5,20 +5,20 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.divider import Divider
-from tachometry.hdl.front_end.pulse_counter import saturate
+from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.output.members import update_members
 from tachometry.spec.methods.timed import TimedTachometer
 from tachometry.spec.tachometer import BOUNDS
 
 
 class QuotientVelocity(wiring.Component):
-    """Divides, rounds, and holds the result; in between it looks whether the velocity has to sink.
+    """Divides distance by time, rounds, and holds the result; between measurements the velocity may decay.
 
-    A measurement may begin when `free` is high. Where `sink` is high and nothing is divided, the greatest speed that
-    the time since the last count allows is: if that, rounded, is nearer to 0 than the velocity, it becomes the
-    velocity. A measurement that begins meanwhile takes the divider, and nothing sinks.
+    A measurement may begin when `free` is high. When `decay` is high and the divider is idle, it finds the greatest
+    speed that the time since the last count allows. If that, rounded, is nearer to 0 than the velocity, it becomes the
+    velocity. A measurement that begins meanwhile takes the divider, and the velocity does not decay.
 
-    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after `measure` or `sink`.
+    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after `measure` or `decay`.
 
     Parameters
     ----------
@@ -28,14 +28,14 @@ class QuotientVelocity(wiring.Component):
     -------
     measure : In(1)
         Only if `free`; `dividend` is valid.
-    sink : In(1)
+    decay : In(1)
         `divisor` is the time since the last count.
     dividend : In(signed)
         Distance in counts, times the timer periods in a tick.
     divisor : In(spec.interval_width)
         Time in timer periods.
     forced_in, stalled_in, beyond_in : In(1)
-        Valid with `measure` and `sink`, as `divisor`.
+        Valid with `measure` and `decay`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
     less, more : In(1)
@@ -65,7 +65,7 @@ class QuotientVelocity(wiring.Component):
         super().__init__(
             {
                 "measure": In(1),
-                "sink": In(1),
+                "decay": In(1),
                 "dividend": In(self.divider.dividend.shape()),
                 "divisor": In(spec.interval_width),
                 "forced_in": In(1),
@@ -84,15 +84,15 @@ class QuotientVelocity(wiring.Component):
         m.submodules.divider = divider = self.divider
         measuring, rounds, compared = (Signal(name=name) for name in ("measuring", "rounds", "compared"))
         # Not before the result of the last division is in `velocity`.
-        sinks = Signal()
+        decays = Signal()
         if spec.decays:
-            m.d.comb += sinks.eq(self.sink & ~self.measure & ~divider.busy & ~rounds & ~compared)
+            m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.busy & ~rounds & ~compared)
         backward = self.velocity[-1]
         greatest = Mux(backward, -spec.timer_periods, spec.timer_periods)
         m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(rounds & ~self.measure)]
         m.d.comb += [
             self.free.eq(~(measuring & (divider.busy | rounds))),
-            divider.start.eq(self.measure | sinks),
+            divider.start.eq(self.measure | decays),
             divider.divisor.eq(self.divisor),
             divider.dividend.eq(Mux(self.measure, self.dividend, greatest) if spec.decays else self.dividend),
         ]
@@ -127,10 +127,10 @@ class QuotientVelocity(wiring.Component):
                 self.out_of_range.eq(beyond | saturated),
             ]
         if spec.bounds:
-            self._bounds(m, sinks, update)
+            self._bounds(m, decays, update)
         return m
 
-    def _bounds(self, m: Module, sinks: Value, update: Value) -> None:
+    def _bounds(self, m: Module, decays: Value, update: Value) -> None:
         """Two more dividers, as long as the first, for the ends of what the velocity can have been."""
         counted = Signal()
         greatest = self._spec.timer_periods
@@ -143,9 +143,9 @@ class QuotientVelocity(wiring.Component):
             upper = name == "velocity_upper"
             # The upper bound is rounded up: as the negative of what is rounded down.
             distance = -(self.dividend + self.more) if upper else self.dividend - self.less
-            # While it sinks, the shaft is no farther back than its last edge.
+            # While the velocity decays, the shaft is no farther back than its last edge.
             signs = self.velocity[-1], self.was_negative
-            still = sinks & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
+            still = decays & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
             end, none = Signal.like(box.dividend), Signal(reset_less=True)
             m.d.comb += [
                 end.eq(Mux(counted, distance, Mux(still, 0, -greatest))),

@@ -17,7 +17,7 @@ from tachometry.spec.formats import carried_reciprocal
 from tachometry.spec.tachometer import BOUNDS
 
 
-class Datapath(wiring.Component):
+class SMethod(wiring.Component):
     """S-method datapath, eqs. (17) and (21) of Tsuji 2009: from pulse numbers to velocity without a divider.
 
     Latency: `velocity_valid` is high `spec.tick_to_velocity` clocks after `tick`. The velocity is correctly rounded:

@@ -95,7 +95,7 @@ class TimedDatapath(wiring.Component):
             timer.count.eq(timer.period & size.any()),
             timer.negative.eq(size[-1]),
             quotient.measure.eq(timer.overdue | ends),
-            quotient.sink.eq(self.tick & ~timer.count),
+            quotient.decay.eq(self.tick & ~timer.count),
             quotient.dividend.eq(Mux(timer.count, distance, 0)),
             quotient.divisor.eq(time),
             quotient.forced_in.eq(~timer.count),

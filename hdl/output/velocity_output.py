@@ -12,7 +12,8 @@ from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.front_end.pulse_counter import saturate
+from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.spec.formats import velocity_output
 
 
@@ -113,11 +114,6 @@ class PipelinedVelocityOutput(_VelocityOutput):
     def elaborate(self, platform: object) -> Module:
         m = Module()
 
-        def later(*values: Value) -> list[Signal]:
-            registers = [Signal.like(value) for value in values]
-            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
-            return registers
-
         valid, native, tag = self.start, self.native, self.tag
         (place, sign), *others = self._output.digits
         low = self._rounding & ((1 << self._output.digits[-1][0]) - 1)
@@ -126,11 +122,11 @@ class PipelinedVelocityOutput(_VelocityOutput):
         for next_place, digit in others:
             gap = next_place - place
             sum_ = total + (native << gap) if digit > 0 else total - (native << gap)
-            valid, native, tag, total = later(valid, native, tag, (sum_ >> gap)[:width].as_signed())
+            valid, native, tag, total = delay(m, valid, native, tag, (sum_ >> gap)[:width].as_signed())
             place = next_place
         left = self._output.shift - place
         if left:
-            valid, tag, total = later(valid, tag, ((total + (self._rounding >> place)) >> left).as_signed())
+            valid, tag, total = delay(m, valid, tag, ((total + (self._rounding >> place)) >> left).as_signed())
         # As long as `native` and `tag` stay, so does what they become.
         m.d.sync += [self.done.eq(valid), *self._shown(m, total, tag)]
         return m

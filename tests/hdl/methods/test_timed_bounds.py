@@ -83,7 +83,7 @@ MUTANTS = {
     "it is widened in silence": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "Mux(end[-1], -1, 1)"),
     "over its last edge": ("Mux(still, 0, -greatest)", "-greatest"),
     "not over it after a reversal": ("~(signs[0] | signs[1])", "~signs[0]"),
-    "still in a forced 0": ("still = sinks & (", "still = ("),
+    "still in a forced 0": ("still = decays & (", "still = ("),
     "none is a number": ("Mux(none, limit, box.quotient)", "box.quotient"),
     "none after two": ("(self.divisor == 1)", "(self.divisor <= 2)"),
     "always known": ("self.bounds_valid.eq(known)", "self.bounds_valid.eq(1)"),
@@ -110,5 +110,5 @@ def test_mutants_of_the_quotients_are_caught(name: str) -> None:
     ],
 )
 def test_mutants_of_the_ends_of_a_window_are_caught(right: str, wrong: str) -> None:
-    with mutant(mt_method.Datapath, right, wrong), caught():
+    with mutant(mt_method.MTMethod, right, wrong), caught():
         check("mt", "tick")

@@ -225,7 +225,7 @@ _TIMED_PROBES = {
 _WINDOW_OF_MT_PROBES = {
     "core_length": "datapath.length",
     "core_late": "datapath.late",
-    "core_way": "datapath.way",
+    "core_travelled": "datapath.travelled",
 }
 
 
@@ -290,7 +290,7 @@ _MT_GIVEN = (
     "lemma_idle lemma_age lemma_timer lemma_since lemma_free lemma_running lemma_silent lemma_many lemma_left "
     "lemma_steps lemma_rest lemma_rested lemma_length lemma_unopened lemma_core_length lemma_window_free "
     "pt_update pt_held pt_spacing pt_rest",
-    "lemma_way",
+    "lemma_travelled",
 )
 
 
@@ -309,7 +309,7 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
     return [
         *(
             replace(upset, name=f"{name}: {part}", depth=1, recovers=settled, only=given)
-            for part, given in zip(("given", "way"), _MT_GIVEN, strict=True)
+            for part, given in zip(("given", "travelled"), _MT_GIVEN, strict=True)
         ),
         replace(upset, name=f"{name}: since", parameters=late, depth=1, recovers=clocks, only="lemma_fresh"),
         replace(upset, name=name, given=" ".join(_MT_GIVEN), without="lemma_fresh"),
