@@ -10,7 +10,8 @@ def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
     if limit >> (len(value) - 1):  # no value is as large
         m.d.comb += held.eq(value)
         return held, changed
-    above, below = Signal(), Signal()
+    above = Signal()
+    below = Signal()
     m.d.comb += [
         above.eq(value > Const(limit, value.shape())),
         below.eq(value < Const(-limit, value.shape())),

@@ -72,7 +72,8 @@ class PulseCounter(wiring.Component):
         overflow: Value = Const(0)
         if self._stretched:
             # Beyond its bound the sum stays where it is.
-            left, beyond = Signal(), Signal()
+            left = Signal()
+            beyond = Signal()
             m.d.comb += left.eq((count == most) | (count == -most))
             m.d.sync += beyond.eq(self.beyond)
             with m.If(left):

@@ -1,7 +1,8 @@
 """From counts to velocity: a datapath for each method, and the boxes that it is made of."""
 
-from typing import Any
+from collections.abc import Callable
 
+from tachometry.hdl.methods.datapath import Datapath
 from tachometry.hdl.methods.m import MMethod
 from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.rairan import RairanMethod
@@ -9,7 +10,7 @@ from tachometry.hdl.methods.s import SMethod
 from tachometry.hdl.methods.t import TMethod
 
 # By the name of the method.
-DATAPATHS: dict[str, Any] = {
+DATAPATHS: dict[str, Callable[..., Datapath]] = {
     "s": SMethod,
     "m": MMethod,
     "t": TMethod,

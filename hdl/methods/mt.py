@@ -23,7 +23,8 @@ class MTMethod(TimedDatapath):
         late = Signal()
         travelled = Signal.like(self.quotient_velocity.dividend)
         total = Signal.like(travelled)
-        ends, opens = Signal(), Signal()
+        ends = Signal()
+        opens = Signal()
         m.d.comb += [
             ends.eq(timer.count & timer.opened & late),
             opens.eq(ends | ~timer.opened),
@@ -39,7 +40,8 @@ class MTMethod(TimedDatapath):
             m.d.sync += travelled.eq(Mux(opens, 0, total))
         if spec.bounds and spec.on_lattice:
             # Between the last edges of two ticks of opposite sign lies a count more or less than in the ticks after.
-            quotient, opening = self.quotient_velocity, Signal()
+            quotient = self.quotient_velocity
+            opening = Signal()
             with m.If(timer.count & opens):
                 m.d.sync += opening.eq(timer.negative)
             m.d.comb += [quotient.less.eq(opening & ~timer.negative), quotient.more.eq(~opening & timer.negative)]

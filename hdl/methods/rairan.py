@@ -1,20 +1,21 @@
 """The method of Rairán 2013."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.delay import delay
-from tachometry.hdl.methods.rairan_counters import RairanCounters, ratio_members
-from tachometry.hdl.output.members import tick_members, update_members
+from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.methods.datapath import datapath_members
+from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.spec import RairanTachometer
 
 
 class RairanMethod(wiring.Component):
     """Datapath of Rairán 2013: from steps to velocity with a table, without a divider and without a multiplier.
 
-    Latency: `velocity_valid` is high four clocks after the count or the end of dt that causes it, and that is
+    Latency: an update comes four clocks after the count or the end of dt that causes it, and that is
     `spec.datapath_latency` clocks after `tick` if it comes with one. There may be an update in every clock. The
     velocity is correctly rounded: within half an LSB of the exact quotient, ties towards +∞.
 
@@ -31,18 +32,10 @@ class RairanMethod(wiring.Component):
         And Nep1 is saturated.
     tick, pulse_count : In
         Not used.
-    velocity : Out(signed)
-        In counts per tick with `native_frac_bits` fraction bits; this and all below are held until the next update.
-    velocity_valid : Out(1)
-    interval : Out
-        Ndt1 at low speeds, else 1.
-    forced, stalled : Out(1)
-    n_ep1, n_dt1 : Out
-        n1 = Nep1/Ndt1 of the velocity; 0 and 1 for the velocity 0. With `paper_exact` as in Table 1.
-    dt_shift : Out
-        Only if dt is adaptive: both are of dt·2^dt_shift.
-    velocity_lower, velocity_upper, bounds_valid : Out
-        With `spec.bounds`: n2 and n1, a clock wider and rounded outward.
+    updates : Out(stream)
+        `interval` is Ndt1 at low speeds, else 1. n1 = `n_ep1`/`n_dt1` of the velocity, 0 and 1 for the velocity 0; with
+        `paper_exact` as in Table 1. If dt is adaptive, both are of dt·2^`dt_shift`. The bounds are n2 and n1, a clock
+        wider and rounded outward.
     """
 
     def __init__(self, spec: RairanTachometer) -> None:
@@ -51,9 +44,7 @@ class RairanMethod(wiring.Component):
                 "step_now": In(signed(2)),
                 "last": Out(1),
                 "beyond": Out(1),
-                **tick_members(spec),
-                **ratio_members(spec),
-                **update_members(spec),
+                **datapath_members(spec),
             }
         )
         self._spec = spec
@@ -84,28 +75,30 @@ class RairanMethod(wiring.Component):
             self.beyond.eq(counters.beyond),
             read.addr.eq(counters.n[: len(read.addr)]),
         ]
-        m.d.sync += self.velocity_valid.eq(update)
+        m.d.sync += self.updates.valid.eq(update)
         shift = more[0] if spec.adaptive else 0
-        low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())[: len(self.n_ep1)]
+        low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())
+        new = registers(self.updates.p.shape(), "new", init={"n_dt1": 1})
+        m.d.comb += self.updates.p.eq(new)
         # At rest no update mends what an upset has done to the outputs.
         shown = update | stalled
         with m.If(shown):
             m.d.sync += [
-                self.velocity.eq(self._velocity(n, high, backward, entry, shift)),
-                self.interval.eq(low << shift if spec.adaptive else low),
-                self.forced.eq(forced),
-                self.stalled.eq(stalled),
-                Cat(self.n_ep1, self.n_dt1).eq(
-                    Cat(*more) if spec.paper_exact else Cat(counts, low[: spec.interval_width])
+                new.velocity.eq(self._velocity(n, high, backward, entry, shift)),
+                new.interval.eq(low << shift if spec.adaptive else low),
+                new.forced.eq(forced),
+                new.stalled.eq(stalled),
+                Cat(new.n_ep1, new.n_dt1).eq(
+                    Cat(*more) if spec.paper_exact else Cat(counts[: len(new.n_ep1)], low[: spec.interval_width])
                 ),
             ]
             if spec.adaptive:
-                m.d.sync += self.dt_shift.eq(shift)
+                m.d.sync += new.dt_shift.eq(shift)
         if spec.bounds:
-            self._bounds(m, shown=shown, backward=backward)
+            self._bounds(m, new, shown=shown, backward=backward)
         return m
 
-    def _bounds(self, m: Module, *, shown: Value, backward: Signal) -> None:
+    def _bounds(self, m: Module, new: data.View, *, shown: Value, backward: Signal) -> None:
         """Both looked up; backwards, the negative of each is the other."""
         spec, counters = self._spec, self.counters
         width = spec.bound_width - 1
@@ -128,9 +121,9 @@ class RairanMethod(wiring.Component):
         (valid,) = delay(m, valid, clocks=2)
         with m.If(shown):
             m.d.sync += [
-                self.velocity_lower.eq(Mux(backward, -entries["upper"], entries["lower"])),
-                self.velocity_upper.eq(Mux(backward, -entries["lower"], entries["upper"])),
-                self.bounds_valid.eq(valid),
+                new.velocity_lower.eq(Mux(backward, -entries["upper"], entries["lower"])),
+                new.velocity_upper.eq(Mux(backward, -entries["lower"], entries["upper"])),
+                new.bounds_valid.eq(valid),
             ]
 
     def _velocity(self, n: Signal, high: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:

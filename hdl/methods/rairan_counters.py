@@ -4,15 +4,10 @@ from collections.abc import Callable
 
 from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Member, Out
+from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.methods.dt_shift import DtShift
 from tachometry.spec import RairanTachometer
-
-
-def ratio_members(spec: RairanTachometer) -> dict[str, Member]:
-    """Nep1 and Ndt1, with the values that they have before anything has come."""
-    return {port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in spec.method_ports}
 
 
 class RairanCounters(wiring.Component):
@@ -50,6 +45,7 @@ class RairanCounters(wiring.Component):
 
     def __init__(self, spec: RairanTachometer) -> None:
         self._spec = spec
+        ratio = spec.method_ports if spec.paper_exact else ()
         super().__init__(
             {
                 "step": In(signed(2)),
@@ -61,7 +57,8 @@ class RairanCounters(wiring.Component):
                 "backward": Out(1),
                 "forced": Out(1),
                 "stalled": Out(1),
-                **(ratio_members(spec) if spec.paper_exact else {}),
+                # Nep1 and Ndt1 as they are before anything has come.
+                **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
                 **({"shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
                 **({name: Out(1) for name in ("loose", "unsynced", "known")} if spec.bounds else {}),
             }
@@ -75,7 +72,8 @@ class RairanCounters(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        pulse, opens = Signal(), Signal()
+        pulse = Signal()
+        opens = Signal()
         late = Signal()  # dt has ended since the last count, Cdt ≠ 0
         due = self._clock(m, opens)
         if self.dt is not None:

@@ -53,11 +53,14 @@ _METHOD_PROBES = {
     "core_previous": "datapath.alteration.previous",
     "core_offset": "datapath.alteration.offset",
 }
-_SERIAL_PROBES = {"core_running": "datapath.scaler.running", "core_step": "datapath.scaler.step"}
+_SERIAL_PROBES = {
+    "core_running": "datapath.quotient.scaler_velocity.running",
+    "core_step": "datapath.quotient.scaler_velocity.step",
+}
 _CARRIED_PROBES = {
-    "core_carried": "datapath.reciprocal.carried",
-    "core_q": "datapath.scaler.q",
-    "core_r": "datapath.scaler.r",
+    "core_carried": "datapath.quotient.reciprocal.carried",
+    "core_q": "datapath.quotient.scaler_velocity.q",
+    "core_r": "datapath.quotient.scaler_velocity.r",
 }
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
 

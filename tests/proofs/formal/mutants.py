@@ -107,8 +107,10 @@ MUTANTS = [
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
     Mutant("M of 4", "pm_stalled", MovingSum, "(quiet >= last)", "(quiet >= last - 1)"),
-    Mutant("M of 3", "pm_bounds", MMethod, "numerator.eq(total + bounds.get(name, 0))", "numerator.eq(total)"),
-    Mutant("M of 4", "pm_known", MMethod, "known.append(seen >= spec.average)", "known.append(seen != 0)"),
+    Mutant("M of 3", "pm_bounds", MMethod, "margin=1", "margin=0"),
+    Mutant(
+        "M of 4", "pm_known", MMethod, "known.bounds_valid.eq(seen >= spec.average)", "known.bounds_valid.eq(seen != 0)"
+    ),
     Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
     Mutant("Rairán", "pr_tick", RairanCounters, "start = cycles - 2", "start = cycles - 1"),
     Mutant("Rairán", "pr_update", RairanCounters, "pulse & (late | due) | turns", "pulse & late | turns"),
@@ -133,7 +135,7 @@ MUTANTS = [
     ),
     Mutant("T", "pt_flag", QuotientVelocity, "beyond | saturated", "beyond"),
     Mutant("T in ticks", "pt_flag", QuotientVelocity, "beyond | saturated", "saturated"),
-    Mutant("T", "pt_saturated", QuotientVelocity, "self.velocity.eq(shown)", "self.velocity.eq(rounded)"),
+    Mutant("T", "pt_saturated", QuotientVelocity, "new.velocity.eq(shown)", "new.velocity.eq(rounded)"),
     Mutant("T in ticks", "pt_decays", QuotientVelocity, "change.any(), change[-1])", "change.any(), 1)"),
     Mutant("T in ticks", "pt_bound", QuotientVelocity, "compared & (measuring | nearer)", "compared & measuring", 32),
     Mutant(
@@ -149,8 +151,8 @@ MUTANTS = [
         "T",
         "pt_held",
         QuotientVelocity,
-        "velocity_valid.eq(update)",
-        "velocity_valid.eq(update & ~forced)",
+        "updates.valid.eq(update)",
+        "updates.valid.eq(update & ~forced)",
         32,
     ),
     Mutant("upset, x4, filter 3", "p3_count", GlitchFilter, "held.eq(held + 1)", "held.eq(held + (held != 3))"),
