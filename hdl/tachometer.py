@@ -1,11 +1,10 @@
 """The whole core."""
 
-from typing import Any
-
-from amaranth import Cat, Module, Signal, signed
+from amaranth import Module, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
 from tachometry.hdl.front_end.external_tick import ExternalTick
@@ -14,11 +13,12 @@ from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods import DATAPATHS
+from tachometry.hdl.methods.datapath import OwnTicks, TickSource
 from tachometry.hdl.output.low_pass import LowPass
+from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.spec import TachometerSpec
-from tachometry.spec.tachometer import BOUNDS
 
 
 class Tachometer(wiring.Component):
@@ -56,27 +56,19 @@ class Tachometer(wiring.Component):
         self.position_counter = PositionCounter(spec.position_width)
         self.index_capture = IndexCapture(spec.position_width) if spec.index else None
         self.datapath = DATAPATHS[spec.method](spec)
-        self.sampling_clock: Any = (
-            self.datapath
-            if spec.own_ticks
-            else ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles)
-            if spec.max_tick_cycles
-            else SamplingClock(spec.timing.tick_cycles)
-        )
-        self.low_pass: LowPass | None = None
-        self.velocity_output: Any = None
-        self.bound_outputs: dict[str, Any] = {}
-        tags = spec.interval_width + 2 + sum(port.width for port in spec.method_ports) + spec.bounds
-        if spec.lowpass is not None:
-            self.low_pass = LowPass(spec.low_pass, tag_width=tags + 2 * spec.bound_width * spec.bounds)
+        self.sampling_clock: TickSource
+        if isinstance(self.datapath, OwnTicks):
+            self.sampling_clock = self.datapath
+        elif spec.max_tick_cycles:
+            self.sampling_clock = ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles)
+        else:
+            self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
+        layout = update_layout(spec)
+        self.low_pass = None if spec.lowpass is None else LowPass(spec.low_pass, layout, clears=spec.last_when_stalled)
+        self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
         if spec.output is not None:
             box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
-            self.velocity_output = box(spec.output, native_width=spec.native_width, tag_width=tags)
-            if spec.bounds:
-                self.bound_outputs = {
-                    name: box(spec.output, native_width=spec.bound_width, tag_width=1, towards=towards)
-                    for name, towards in BOUNDS.items()
-                }
+            self.velocity_output = box(spec.output, layout)
 
     @property
     def spec(self) -> TachometerSpec:
@@ -107,15 +99,15 @@ class Tachometer(wiring.Component):
             self.tick.eq(pulse_counter.tick),
             self.pulse_count.eq(pulse_counter.pulse_count),
             self.overflow.eq(pulse_counter.overflow),
-            datapath.tick.eq(self.tick),
-            datapath.pulse_count.eq(self.pulse_count),
         ]
-        if self._spec.own_ticks:
-            m.d.comb += [datapath.step_now.eq(decoder.step), pulse_counter.beyond.eq(datapath.beyond)]
-        if "step" in datapath.signature.members:
+        taken = {"tick": self.tick, "pulse_count": self.pulse_count, "step_now": decoder.step}
+        inputs = datapath.signature.members
+        if "step" in inputs:
             # As late as `tick`: with it, all steps of the window have come.
-            late = Signal.like(decoder.step)
-            m.d.sync += [late.eq(decoder.step), datapath.step.eq(late)]
+            (taken["step"],) = delay(m, decoder.step, clocks=self._spec.tick_latency)
+        m.d.comb += [getattr(datapath, name).eq(value) for name, value in taken.items() if name in inputs]
+        if isinstance(datapath, OwnTicks):
+            m.d.comb += pulse_counter.beyond.eq(datapath.beyond)
         self._output(m)
         if self._spec.age:
             m.submodules.age = age = UpdateAge(self._spec.timing.max_ticks)
@@ -131,7 +123,7 @@ class Tachometer(wiring.Component):
                 self.index_position.eq(index.index_position),
                 self.index_valid.eq(index.index_valid),
             ]
-        if self._spec.max_tick_cycles:
+        if isinstance(sampling_clock, ExternalTick):
             m.d.comb += [sampling_clock.tick_in.eq(self.tick_in), self.tick_error.eq(sampling_clock.tick_error)]
         if self._spec.filter_clocks:
             m.d.comb += self.swallowed_edges.eq(conditioner.swallowed_edges)
@@ -139,39 +131,15 @@ class Tachometer(wiring.Component):
 
     def _output(self, m: Module) -> None:
         """From the datapath to the ports, by way of the low-pass filter and of the unit if they are there."""
-        spec, datapath = self._spec, self.datapath
-        velocity, valid = datapath.velocity, datapath.velocity_valid
-        bounds = [(name, getattr(datapath, name)) for name in BOUNDS if spec.bounds]
-        names = ["interval", "forced", "stalled", *(port.name for port in spec.method_ports)]
-        names += ["bounds_valid"] * spec.bounds
-        tags, found = (Cat(getattr(side, name) for name in names) for side in (self, datapath))
+        updates = self.datapath.updates
         if self.low_pass is not None:
             m.submodules.low_pass = low_pass = self.low_pass
-            m.d.comb += [
-                low_pass.start.eq(valid),
-                low_pass.native.eq(velocity),
-                low_pass.tick.eq(self.tick),
-                low_pass.clear.eq(datapath.stalled & int(spec.last_when_stalled)),
-                low_pass.tag.eq(Cat(found, *(value for _, value in bounds))),
-            ]
-            velocity, valid, found = low_pass.velocity, low_pass.done, low_pass.tag_out[: len(tags)]
-            ends = low_pass.tag_out[len(tags) :]
-            width = spec.bound_width
-            bounds = [(name, ends[k * width : (k + 1) * width].as_signed()) for k, (name, _) in enumerate(bounds)]
-        if self.velocity_output is None:
-            m.d.comb += [self.velocity.eq(velocity), self.velocity_valid.eq(valid), tags.eq(found)]
-            m.d.comb += [getattr(self, name).eq(value) for name, value in bounds]
-            return
-        m.submodules.velocity_output = output = self.velocity_output
-        m.d.comb += [
-            output.start.eq(valid),
-            output.native.eq(velocity),
-            output.tag.eq(found),
-            self.velocity.eq(output.velocity),
-            tags.eq(output.tag_out),
-            self.velocity_valid.eq(output.done),
-            self.velocity_overflow.eq(output.velocity_overflow),
-        ]
-        for name, value in bounds:
-            m.submodules[name] = box = self.bound_outputs[name]
-            m.d.comb += [box.start.eq(valid), box.native.eq(value), getattr(self, name).eq(box.velocity)]
+            wiring.connect(m, updates, low_pass.updates)
+            m.d.comb += low_pass.tick.eq(self.tick)
+            updates = low_pass.filtered
+        if self.velocity_output is not None:
+            m.submodules.velocity_output = output = self.velocity_output
+            wiring.connect(m, updates, output.updates)
+            updates = output.shown
+        m.d.comb += self.velocity_valid.eq(updates.valid)
+        m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in updates.p.shape().members]

@@ -1,5 +1,6 @@
 """A method is one object: a sixth one, registered in the three tables, goes through every command."""
 
+import csv
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,15 +8,20 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from amaranth import Module
 from distributed import LocalCluster
 from support.command import run
 
-from tachometry.hdl.methods import DATAPATHS, m
+from tachometry.hdl.methods import DATAPATHS
+from tachometry.hdl.methods.m import MMethod
+from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.methods import m as golden_m
+from tachometry.sim.signals.run import Table
 from tachometry.sim.studies.pairs import configurations, factors
 from tachometry.spec import METHODS, MTachometer, common_options
 from tachometry.spec.option import option
+from tachometry.spec.port import UPDATE, Port, held
 
 CORE = "--ppr 24 --clock 100kHz --tick 1ms --max-time 20ms".split()
 X = ["--method", "x", "--doubled"]
@@ -24,27 +30,50 @@ MOTION = ["--motion", "constant:600rpm:200ms"]
 
 @dataclass(frozen=True, kw_only=True)
 class XTachometer(MTachometer):
-    """The M method by another name, with an option more."""
+    """The M method by another name, with an option more, that has an output."""
 
     doubled: bool = option(False, "Everything is measured twice, which changes nothing.")
 
     method = "x"
     summary = "does what m does"
 
+    @property
+    def method_ports(self) -> tuple[Port, ...]:
+        return (held(UPDATE, "odd", help="The native velocity is odd."),) if self.doubled else ()
+
 
 class XModel(golden_m.Model):
     """Its golden model."""
 
+    def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
+        updates = super().updates(ticks, steps, n_clocks)
+        return updates.having(odd=updates.velocity & 1 == 1)
 
-class XDatapath(m.Datapath):
+
+class XMethod(MMethod):
     """Its hardware."""
+
+    def elaborate(self, platform: object) -> Module:
+        m = super().elaborate(platform)
+        if self._spec.doubled:  # type: ignore[attr-defined]
+            m.d.comb += self.updates.p.odd.eq(self.updates.p.velocity[0])
+        return m
+
+
+class Wrong(XMethod):
+    """The same with an output that is wrong."""
+
+    def elaborate(self, platform: object) -> Module:
+        m = super().elaborate(platform)
+        m.d.comb += self.updates.p.odd.eq(1)
+        return m
 
 
 @pytest.fixture(autouse=True)
 def registered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(METHODS, "x", XTachometer)
     monkeypatch.setitem(MODELS, "x", XModel)
-    monkeypatch.setitem(DATAPATHS, "x", XDatapath)
+    monkeypatch.setitem(DATAPATHS, "x", XMethod)
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +110,9 @@ def test_generate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     manifest = json.loads((tmp_path / "tachometer.json").read_text())
     assert manifest["method"] == "x"
     assert manifest["parameters"]["doubled"] is True
+    assert {"name": "odd", "direction": "output", "width": 1, "signed": False} in manifest["ports"]
+    vectors = json.loads((tmp_path / "tachometer_vectors.json").read_text())
+    assert "odd" in vectors["strobes"]["velocity_valid"]["ports"]
     assert "module tachometer" in (tmp_path / "tachometer.v").read_text()
 
 
@@ -91,6 +123,18 @@ def test_simulate_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "PASS: hardware and golden model agree" in told(capsys)
     assert run("replay", tmp_path / "x.sr", *CORE, *X, *engine, "--trace", tmp_path / "2.csv") == 0
     assert (tmp_path / "1.csv").read_text() == (tmp_path / "2.csv").read_text()
+    with (tmp_path / "1.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert all(int(row["odd"]) == int(row["velocity_raw"]) % 2 for row in rows)
+    assert " odd $end" in (tmp_path / "x.vcd").read_text()
+
+
+def test_an_output_of_the_method_is_compared(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(DATAPATHS, "x", Wrong)
+    assert run("simulate", *CORE, *X, *MOTION, "--engine", "pysim") == 1
+    assert "first mismatch in velocity_valid.odd[0]: expected 0, got 1" in told(capsys)
 
 
 def test_plan_has_all_but_the_equations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,9 +7,12 @@ it. The one scaler does a step a clock on one pair of adders, the other all step
 """
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.arithmetic.scaled import scaled_stream
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 
 
@@ -33,8 +36,8 @@ class _RemainderScaler(wiring.Component):
     reciprocal : spec.carried_reciprocal.CarriedReciprocal
     base_width, numerator_width : int
         Bits of `base` and `numerator`, both signed.
-    tag_width : int
-        Bits that travel along with a value; m comes first.
+    tag : data.StructLayout
+        What travels along with a value; `m` is a field of it.
     towards : int
         Round to the nearest (0), down (−1) or up (1).
 
@@ -47,17 +50,21 @@ class _RemainderScaler(wiring.Component):
     base, numerator, tag : In
     q, r : In
         Quotient and remainder, valid in the clock after `start`.
-    done : Out(1)
-    velocity, tag_out : Out
-        Valid with `done`, and held until the next.
+    results : Out(stream)
+        `quotient` and `tag`, held until the next.
     """
 
     def __init__(
-        self, reciprocal: CarriedReciprocal, *, base_width: int, numerator_width: int, tag_width: int, towards: int = 0
+        self,
+        reciprocal: CarriedReciprocal,
+        *,
+        base_width: int,
+        numerator_width: int,
+        tag: data.StructLayout,
+        towards: int = 0,
     ) -> None:
         self._towards = towards
         self._frac_bits = reciprocal.frac_bits
-        self._m_width = reciprocal.remainder_width
         self._steps = numerator_width
         self._digits = reciprocal.digits
         super().__init__(
@@ -66,12 +73,10 @@ class _RemainderScaler(wiring.Component):
                 "start": In(1),
                 "base": In(signed(base_width)),
                 "numerator": In(signed(numerator_width)),
-                "tag": In(tag_width),
+                "tag": In(tag),
                 "q": In(reciprocal.quotient_width),
                 "r": In(reciprocal.remainder_width),
-                "done": Out(1),
-                "velocity": Out(signed(base_width + reciprocal.frac_bits)),
-                "tag_out": Out(tag_width),
+                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),
             }
         )
 
@@ -84,69 +89,72 @@ class _RemainderScaler(wiring.Component):
 class PipelinedRemainderScaler(_RemainderScaler):
     """A stage for every step: `start` may be high in every clock.
 
-    Latency: `done` is high as many clocks after `start` as N has bits and ⌊N·R/m⌋ has digits, and three more.
+    Latency: a result comes as many clocks after `start` as N has bits and ⌊N·R/m⌋ has digits, and three more.
     """
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
+        result = registers(self.results.p.shape(), "result")
+        m.d.comb += self.results.p.eq(result)
 
-        def later(*values: Value, only_if: Value | None = None) -> list[Signal]:
-            registers = [Signal.like(value) for value in values]
-            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
-            if only_if is not None:  # the reset of a flip-flop is free, where a gate is not
-                with m.If(~only_if):
-                    m.d.sync += [register.eq(0) for register in registers]
-            return registers
-
-        valid, bits, base, tag = later(self.start, self.numerator, self.base, self.tag)
+        valid, bits, base, tag = delay(m, self.start, self.numerator, self.base, self.tag)
         q, r = self.q, self.r
         total = (base << self._frac_bits) + (q & bits[0].replicate(len(q)))
         product = Cat(r & bits[0].replicate(len(r)), 0).as_signed()
         for step in range(1, self._steps):
-            step_q, step_r = later(q, r, only_if=bits[step])
-            valid, bits, tag, total, product, q, r = later(valid, bits, tag, total, product, q, r)
+            step_q, step_r = delay(m, q, r, only_if=bits[step])
+            valid, bits, tag, total, product, q, r = delay(m, valid, bits, tag, total, product, q, r)
             if step < self._steps - 1:
                 total, product = total + (step_q << step), product + (step_r << step)
             else:
                 total, product = total - (step_q << step), product - (step_r << step)
-            total = total[: len(self.velocity)].as_signed()  # all is modulo the width of the result, which fits
+            total = total[
+                : len(self.results.p.quotient)
+            ].as_signed()  # all is modulo the width of the result, which fits
 
-        valid, tag, total, remainder = later(valid, tag, total, product)
+        valid, tag, total, remainder = delay(m, valid, tag, total, product)
         quotient = remainder[-1]  # its digits, the sign first
         for place in reversed(range(self._digits)):
-            divisor = tag[: len(r)] << place
-            valid, tag, total, quotient, remainder = later(
-                valid, tag, total, quotient, _reduce(remainder, divisor)[: len(r) + place + 1].as_signed()
+            divisor = tag.m << place
+            valid, tag, total, quotient, remainder = delay(
+                m, valid, tag, total, quotient, _reduce(remainder, divisor)[: len(r) + place + 1].as_signed()
             )
             quotient = Cat(~remainder[-1], quotient)
-        up = self._up(_reduce(remainder << 1, tag[: len(r)]), tag[: len(r)])
-        valid, tag, total, quotient, up = later(valid, tag, total, quotient, up)
-        m.d.sync += self.done.eq(valid)
+        up = self._up(_reduce(remainder << 1, tag.m), tag.m)
+        valid, tag, total, quotient, up = delay(m, valid, tag, total, quotient, up)
+        m.d.sync += self.results.valid.eq(valid)
         with m.If(valid):
-            m.d.sync += [self.velocity.eq(_rounded(total, quotient.as_signed(), up)), self.tag_out.eq(tag)]
+            m.d.sync += [
+                result.quotient.eq(_rounded(total, quotient.as_signed(), up)),
+                result.tag.eq(tag),
+            ]
         return m
 
 
 class SerialRemainderScaler(_RemainderScaler):
-    """A step a clock. `load` may come again as soon as `done` has.
+    """A step a clock. `load` may come again as soon as the result has.
 
-    Latency: `done` is high twice as many clocks after `start` as N has bits, and four more.
+    Latency: a result comes twice as many clocks after `start` as N has bits, and four more.
     """
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
+        result = registers(self.results.p.shape(), "result")
+        m.d.comb += self.results.p.eq(result)
         # Only what says that something is under way needs a reset; the rest is loaded before it is used.
         running = Signal()
         step = Signal(range(2 * self._steps + 4), reset_less=True)
         tag = Signal.like(self.tag, reset_less=True)
         # Two products, each above and, what the shifts have brought there, below.
-        total = Signal(signed(len(self.velocity) + 1), reset_less=True)
+        total = Signal(signed(len(self.results.p.quotient) + 1), reset_less=True)
         total_low = Signal(self._steps, reset_less=True)
         remainder = Signal(signed(len(self.r) + 1), reset_less=True)
         low = Signal(self._steps, reset_less=True)  # N goes out at its low end, and the quotient comes in after it
 
         sign = step == self._steps - 1
-        multiplied, dividing, divided = (Signal(reset_less=True) for _ in range(3))
+        multiplied = Signal(reset_less=True)
+        dividing = Signal(reset_less=True)
+        divided = Signal(reset_less=True)
         with m.If(sign):
             m.d.sync += multiplied.eq(1)
         m.d.sync += [step.eq(step + 1), dividing.eq(multiplied), divided.eq(dividing)]
@@ -157,7 +165,7 @@ class SerialRemainderScaler(_RemainderScaler):
         borrow = Signal(reset_less=True)
         m.d.sync += [
             step_q.eq(self.q ^ sign.replicate(len(self.q))),
-            step_r.eq(Mux(multiplied, tag[: len(self.r)], self.r)),
+            step_r.eq(Mux(multiplied, tag.m, self.r)),
             borrow.eq(sign & low[0]),
         ]
         with m.If(~multiplied & ~low[0]):
@@ -178,14 +186,14 @@ class SerialRemainderScaler(_RemainderScaler):
                 Cat(total_low, total).eq(Cat(total_low[1:], sum_q)),
             ]
 
-        up = self._up(remainder, tag[: len(self.r)])
+        up = self._up(remainder, tag.m)
         last = running & (step == 2 * self._steps + 2)
-        m.d.sync += self.done.eq(last)
+        m.d.sync += self.results.valid.eq(last)
         with m.If(last):
             m.d.sync += [
                 running.eq(0),
-                self.velocity.eq(_rounded(Cat(total_low, total).as_signed(), low.as_signed(), up)),
-                self.tag_out.eq(tag),
+                result.quotient.eq(_rounded(Cat(total_low, total).as_signed(), low.as_signed(), up)),
+                result.tag.eq(tag),
             ]
         with m.If(self.load):
             m.d.sync += [

@@ -7,24 +7,27 @@ rate. Their latency is the same.
 """
 
 from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
-from amaranth.lib import wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.arithmetic.scaled import scaled_stream
 from tachometry.spec.formats.reciprocal import Reciprocal
 
 
 class _Scaler(wiring.Component):
     """What both scalers share.
 
-    Latency: `done` is high as many clocks after `start` as N has bits, and three more.
+    Latency: a result comes as many clocks after `start` as N has bits, and three more.
 
     Parameters
     ----------
     reciprocal : spec.reciprocal.Reciprocal
     base_width, numerator_width : int
         Bits of `base` and `numerator`, both signed.
-    tag_width : int
-        Bits that travel along with a value.
+    tag : data.StructLayout
+        What travels along with a value.
     towards : int
         Round to the nearest (0), down (−1) or up (1).
 
@@ -37,13 +40,18 @@ class _Scaler(wiring.Component):
     base, numerator, tag : In
     q : In(reciprocal.width)
         Reciprocal, valid in the clock after `start`.
-    done : Out(1)
-    velocity, tag_out : Out
-        Valid with `done`, and held until the next.
+    results : Out(stream)
+        `quotient` and `tag`, held until the next.
     """
 
     def __init__(
-        self, reciprocal: Reciprocal, *, base_width: int, numerator_width: int, tag_width: int, towards: int = 0
+        self,
+        reciprocal: Reciprocal,
+        *,
+        base_width: int,
+        numerator_width: int,
+        tag: data.StructLayout,
+        towards: int = 0,
     ) -> None:
         self._steps = numerator_width
         self._rounding = reciprocal.rounding(towards)
@@ -57,28 +65,31 @@ class _Scaler(wiring.Component):
                 "start": In(1),
                 "base": In(signed(base_width)),
                 "numerator": In(signed(numerator_width)),
-                "tag": In(tag_width),
+                "tag": In(tag),
                 "q": In(reciprocal.width),
-                "done": Out(1),
-                "velocity": Out(signed(base_width + reciprocal.frac_bits)),
-                "tag_out": Out(tag_width),
+                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),
             }
         )
 
     def _result(self, base: Signal, total: Signal) -> ValueLike:
-        """The velocity, from a total of which a bit has been dropped for every bit of N."""
-        shape = self.velocity.shape()
+        """The quotient, from a total of which a bit has been dropped for every bit of N."""
+        width = len(self.results.p.quotient)
         # Both terms may be taken modulo the width of the sum, which is known to fit.
-        return (base << self._frac_bits) + Value.cast(total >> self._surplus)[: shape.width].as_signed()
+        return (base << self._frac_bits) + Value.cast(total >> self._surplus)[:width].as_signed()
 
 
 class SerialScaler(_Scaler):
-    """One bit of N a clock. `load` may come again as soon as `done` has."""
+    """One bit of N a clock. `load` may come again as soon as the result has."""
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
+        result = registers(self.results.p.shape(), "result")
+        m.d.comb += self.results.p.eq(result)
         # Only what says that something is under way needs a reset; the rest is loaded before it is used.
-        running, adding, last, added = Signal(), Signal(), Signal(), Signal()
+        running = Signal()
+        adding = Signal()
+        last = Signal()
+        added = Signal()
         total = Signal(self._total_shape, reset_less=True)
         bits = Signal(self._steps, reset_less=True)
         step = Signal(range(self._steps + 1), reset_less=True)
@@ -97,7 +108,7 @@ class SerialScaler(_Scaler):
             adding.eq(running),
             last.eq(running & sign),
             added.eq(last),
-            self.done.eq(added),
+            self.results.valid.eq(added),
         ]
         with m.If(~bits[0]):
             m.d.sync += addend.eq(0)
@@ -108,7 +119,7 @@ class SerialScaler(_Scaler):
             sum_ = Cat(1, total).as_signed() + Cat(borrow, addend, borrow).as_signed()
             m.d.sync += total.eq(sum_ >> 2)
         with m.If(added):
-            m.d.sync += [self.velocity.eq(self._result(base, total)), self.tag_out.eq(tag)]
+            m.d.sync += [result.quotient.eq(self._result(base, total)), result.tag.eq(tag)]
         with m.If(self.load):
             m.d.sync += [
                 total.eq(self._rounding),
@@ -126,22 +137,19 @@ class PipelinedScaler(_Scaler):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
+        result = registers(self.results.p.shape(), "result")
+        m.d.comb += self.results.p.eq(result)
 
-        def delay(*values: Signal) -> list[Signal]:
-            registers = [Signal.like(value) for value in values]
-            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
-            return registers
-
-        valid, bits, base, tag = delay(self.start, self.numerator, self.base, self.tag)
-        valid, bits, base, tag, q = delay(valid, bits, base, tag, self.q)
+        valid, bits, base, tag = delay(m, self.start, self.numerator, self.base, self.tag)
+        valid, bits, base, tag, q = delay(m, valid, bits, base, tag, self.q)
         total: ValueLike = self._rounding
         for step in range(self._steps):
             sum_ = Signal(self._total_shape)
             last = step == self._steps - 1
             m.d.sync += sum_.eq(Mux(bits[step], total - q if last else total + q, total) >> 1)
             total = sum_
-            valid, bits, base, tag, q = delay(valid, bits, base, tag, q)
-        m.d.sync += self.done.eq(valid)
+            valid, bits, base, tag, q = delay(m, valid, bits, base, tag, q)
+        m.d.sync += self.results.valid.eq(valid)
         with m.If(valid):
-            m.d.sync += [self.velocity.eq(self._result(base, total)), self.tag_out.eq(tag)]
+            m.d.sync += [result.quotient.eq(self._result(base, total)), result.tag.eq(tag)]
         return m

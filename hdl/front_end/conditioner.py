@@ -60,7 +60,8 @@ class InputConditioner(wiring.Component):
                 ]
                 swallowed.append(line.swallowed)
         if self._filter_clocks:
-            glitches, sum_ = Signal(15), Signal(16)
+            glitches = Signal(15)
+            sum_ = Signal(16)
             m.d.comb += [sum_.eq(glitches + sum(swallowed)), self.swallowed_edges.eq(Cat(0, glitches))]
             m.d.sync += glitches.eq(sum_)
             with m.If(sum_[-1]):

@@ -50,7 +50,8 @@ class QuadratureDecoder(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        past_a, past_b = Signal(), Signal()
+        past_a = Signal()
+        past_b = Signal()
         m.d.sync += [past_a.eq(self.level_a), past_b.eq(self.level_b)]
         change_a = self.level_a ^ past_a
         change_b = self.level_b ^ past_b

@@ -44,7 +44,8 @@ class ExternalTick(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        level, past = Signal(), Signal()
+        level = Signal()
+        past = Signal()
         m.submodules.sync = FFSynchronizer(self.tick_in, level)
         # Two clocks for the synchroniser, which has no reset, one for the level before.
         clocks_since_reset = Signal(3)

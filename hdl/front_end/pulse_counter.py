@@ -4,22 +4,7 @@ from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-
-def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
-    """`value` held within −limit … +limit, and a flag that is high where that changed it."""
-    held = Signal(signed(limit.bit_length() + 1))
-    changed = Signal()
-    if limit >> (len(value) - 1):  # no value is as large
-        m.d.comb += held.eq(value)
-        return held, changed
-    above, below = Signal(), Signal()
-    m.d.comb += [
-        above.eq(value > Const(limit, value.shape())),
-        below.eq(value < Const(-limit, value.shape())),
-        held.eq(Mux(above, limit, Mux(below, -limit, value))),
-        changed.eq(above | below),
-    ]
-    return held, changed
+from tachometry.hdl.arithmetic.saturate import saturate
 
 
 class PulseCounter(wiring.Component):
@@ -87,7 +72,8 @@ class PulseCounter(wiring.Component):
         overflow: Value = Const(0)
         if self._stretched:
             # Beyond its bound the sum stays where it is.
-            left, beyond = Signal(), Signal()
+            left = Signal()
+            beyond = Signal()
             m.d.comb += left.eq((count == most) | (count == -most))
             m.d.sync += beyond.eq(self.beyond)
             with m.If(left):

@@ -61,7 +61,9 @@ class DtShift(wiring.Component):
         with m.If(self.last | self.opens):
             m.d.sync += passed.eq(0)
         rare, slow = (self._soon(m, self.of(limit), limit(0)) for limit in (rule.rare_to, rule.slow_from))
-        down, up, falls = Signal(), Signal(), Signal()
+        down = Signal()
+        up = Signal()
+        falls = Signal()
         falling = Signal()  # to 0, unless there are enough counts on the way
         m.d.comb += [
             up.eq(~self.high | (self.n < rule.fewest - 1)),

@@ -1,16 +1,15 @@
 """The M method."""
 
-from typing import Any
-
-from amaranth import Cat, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
+from amaranth import Module, Mux, Signal, Value, signed
+from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
-from tachometry.hdl.output.members import tick_members, update_members
+from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.quotient import Quotient
+from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.methods.datapath import datapath_members, quotients
 from tachometry.spec import MTachometer
-from tachometry.spec.tachometer import BOUNDS
 
 
 class MovingSum(wiring.Component):
@@ -70,7 +69,8 @@ class MovingSum(wiring.Component):
             m.d.comb += self.total.eq(previous + self.m_e)
             return m
         # All numbers up to the last tick, and up to this one.
-        before, through = Signal.like(self.total), Signal.like(self.total)
+        before = Signal.like(self.total)
+        through = Signal.like(self.total)
         m.d.comb += [through.eq(before + self.m_e), self.total.eq(through - self._earlier(m, before, last))]
         with m.If(self.tick):
             m.d.sync += before.eq(through)
@@ -79,8 +79,11 @@ class MovingSum(wiring.Component):
     def _earlier(self, m: Module, value: Signal, last: int) -> Value:
         """What `value` was `last` ticks ago, valid with `tick`."""
         m.submodules.past = memory = Memory(shape=value.shape(), depth=last, init=[])
-        write, read = memory.write_port(), memory.read_port()
-        place, following, full = Signal(range(last)), Signal(range(last)), Signal()
+        write = memory.write_port()
+        read = memory.read_port()
+        place = Signal(range(last))
+        following = Signal(range(last))
+        full = Signal()
         wrap = place >= last - 1
         m.d.comb += [
             following.eq(Mux(self.tick, Mux(wrap, 0, place + 1), place)),
@@ -93,13 +96,13 @@ class MovingSum(wiring.Component):
         return Mux(full, read.data, 0)
 
 
-class Datapath(wiring.Component):
+class MMethod(wiring.Component):
     """M-method datapath, eq. (6) of Tsuji 2009: the mean of the last n pulse numbers, every tick.
 
-    A mean over a power of two is a shift; otherwise the sum is multiplied by a constant, step by step, as in the
-    S method's scaler, and correctly rounded like there.
+    A mean over a power of two is a shift; otherwise the sum is multiplied by a constant, as in the S method, and
+    correctly rounded like there.
 
-    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after `tick`.
+    Latency: an update comes `spec.datapath_latency` clocks after `tick`.
 
     Parameters
     ----------
@@ -110,35 +113,28 @@ class Datapath(wiring.Component):
     tick : In(1)
     pulse_count : In(signed)
         m_e, valid with `tick`.
-    velocity : Out(signed)
-        In counts per tick with `native_frac_bits` fraction bits; this and all below are held until the next update.
-    velocity_valid : Out(1)
-    interval : Out
-        n.
-    forced : Out(1)
-        Never.
-    stalled : Out(1)
-        None of the n ticks counted anything.
-    velocity_lower, velocity_upper, bounds_valid : Out
-        With `spec.bounds`: one count more and less in n ticks, rounded outward; valid when none of them is the first.
+    updates : Out(stream)
+        `velocity` has `native_frac_bits` fraction bits, `interval` is n, `forced` is never high, and `stalled` is high
+        if none of the n ticks counted anything. The bounds are those of one count more and less in n ticks, rounded
+        outward; they are valid when none of the n ticks is the first. All is held until the next update.
     """
 
     def __init__(self, spec: MTachometer) -> None:
-        super().__init__(tick_members(spec) | update_members(spec))
+        super().__init__(datapath_members(spec))
         self._spec = spec
+        self._tag = data.StructLayout({"stalled": 1, **({"bounds_valid": 1} if spec.bounds else {})})
         self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
-        self.scaler: Any = None
-        self.bound_scalers: dict[str, Any] = {}
+        self.quotient: Quotient | None = None
         if spec.shift is None:
-            scaler = SerialScaler if spec.serial else PipelinedScaler
-            shape = {"numerator_width": spec.numerator_width, "tag_width": 1 + spec.bounds}
-            self.scaler = scaler(spec.reciprocal, base_width=spec.count_width, **shape)
-            if spec.bounds:
-                base_width = spec.bound_width - spec.native_frac_bits
-                self.bound_scalers = {
-                    name: scaler(spec.reciprocal, base_width=base_width, towards=towards, **shape)
-                    for name, towards in BOUNDS.items()
-                }
+            self.quotient = Quotient(
+                spec.reciprocal,
+                quotients=quotients(spec),
+                numerator_width=spec.numerator_width,
+                tag=self._tag,
+                serial=spec.serial,
+                margin=1,
+                constant=spec.average,
+            )
 
     @property
     def probes(self) -> dict[str, Value]:
@@ -149,39 +145,44 @@ class Datapath(wiring.Component):
         m = Module()
         spec = self._spec
         m.submodules.moving_sum = moving_sum = self.moving_sum
+        known = Signal(self._tag)
         m.d.comb += [
             moving_sum.tick.eq(self.tick),
             moving_sum.m_e.eq(self.pulse_count),
-            self.interval.eq(spec.average),
+            known.stalled.eq(moving_sum.empty),
+            self.updates.p.interval.eq(spec.average),
         ]
-        known, tags = [moving_sum.empty], [self.stalled]
         if spec.bounds:
             # Of the first tick not all was seen.
             seen = Signal(range(spec.average + 1))
             with m.If(self.tick & (seen < spec.average)):
                 m.d.sync += seen.eq(seen + 1)
-            known.append(seen >= spec.average)
-            tags.append(self.bounds_valid)
-        bounds = BOUNDS if spec.bounds else {}
-        if self.scaler is None:
-            m.d.sync += self.velocity_valid.eq(self.tick)
-            with m.If(self.tick):
-                m.d.sync += [self.velocity.eq(moving_sum.total << spec.shift), Cat(tags).eq(Cat(known))]
-                m.d.sync += [
-                    getattr(self, name).eq((moving_sum.total + one) << spec.shift) for name, one in bounds.items()
-                ]
-            return m
-        # The sum has a clock of its own, then the scalers begin.
-        start, total, tag = Signal(), Signal.like(moving_sum.total), Signal(len(known))
-        m.d.sync += [start.eq(self.tick), total.eq(moving_sum.total), tag.eq(Cat(known))]
-        for name, box in {"velocity": self.scaler, **self.bound_scalers}.items():
-            m.submodules[name if name in bounds else "scaler"] = box
-            m.d.comb += [
-                Cat(box.load, box.start).eq(start.replicate(2)),
-                box.numerator.eq(total + bounds.get(name, 0)),
-                box.tag.eq(tag),
-                box.q.eq(spec.reciprocal.value(spec.average)),
-                getattr(self, name).eq(box.velocity),
-            ]
-        m.d.comb += [self.velocity_valid.eq(self.scaler.done), Cat(tags).eq(self.scaler.tag_out)]
+            m.d.comb += known.bounds_valid.eq(seen >= spec.average)
+        valid, new = self._divided(m, known)
+        m.d.comb += self.updates.valid.eq(valid)
+        m.d.comb += [self.updates.p[name].eq(new[name]) for name in new.shape().members]
         return m
+
+    def _divided(self, m: Module, known: data.View) -> tuple[Signal, data.View]:
+        """The mean and its bounds, with what is known of the sum."""
+        total, shift = self.moving_sum.total, self._spec.shift
+        if self.quotient is not None:
+            m.submodules.quotient = quotient = self.quotient
+            # The sum has a clock of its own.
+            start, total, known = delay(m, self.tick, total, known)
+            m.d.comb += [
+                quotient.load.eq(start),
+                quotient.start.eq(start),
+                quotient.numerator.eq(total),
+                quotient.tag.eq(known),
+            ]
+            return quotient.results.valid, quotient.results.p
+        velocities = quotients(self._spec)
+        valid = Signal()
+        layout = {name: signed(width) for name, (width, _) in velocities.items()} | self._tag.members
+        new = registers(data.StructLayout(layout), "new")
+        m.d.sync += valid.eq(self.tick)
+        with m.If(self.tick):
+            m.d.sync += [new[name].eq((total + count) << shift) for name, (_, count) in velocities.items()]
+            m.d.sync += [new[name].eq(known[name]) for name in self._tag.members]
+        return valid, new

@@ -6,7 +6,7 @@ from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
 
 
-class Datapath(TimedDatapath):
+class MTMethod(TimedDatapath):
     """M/T-method datapath, eqs. (13) to (16) of Tsuji 2009: counts over the time that they take, longer than T_c.
 
     ½·s(opening) + counts between + ½·s(closing) is a sum over pairs of consecutive counts: a count of the same sign as
@@ -21,12 +21,14 @@ class Datapath(TimedDatapath):
         spec, timer = self._spec, self.gap_timer
         length = Signal(spec.interval_width, init=1)
         late = Signal()
-        way, total = (Signal.like(self.quotient_velocity.dividend, name=name) for name in ("way", "total"))
-        ends, opens = Signal(), Signal()
+        travelled = Signal.like(self.quotient_velocity.dividend)
+        total = Signal.like(travelled)
+        ends = Signal()
+        opens = Signal()
         m.d.comb += [
             ends.eq(timer.count & timer.opened & late),
             opens.eq(ends | ~timer.opened),
-            total.eq(way + (self._size if spec.on_lattice else Mux(self._same, self._one, 0))),
+            total.eq(travelled + (self._size if spec.on_lattice else Mux(self._same, self._one, 0))),
         ]
         with m.If(timer.period):
             m.d.sync += length.eq(length + 1)
@@ -35,10 +37,11 @@ class Datapath(TimedDatapath):
             with m.If(opens):
                 m.d.sync += [length.eq(1), late.eq(0)]
         with m.If(timer.count):
-            m.d.sync += way.eq(Mux(opens, 0, total))
+            m.d.sync += travelled.eq(Mux(opens, 0, total))
         if spec.bounds and spec.on_lattice:
             # Between the last edges of two ticks of opposite sign lies a count more or less than in the ticks after.
-            quotient, opening = self.quotient_velocity, Signal()
+            quotient = self.quotient_velocity
+            opening = Signal()
             with m.If(timer.count & opens):
                 m.d.sync += opening.eq(timer.negative)
             m.d.comb += [quotient.less.eq(opening & ~timer.negative), quotient.more.eq(~opening & timer.negative)]

@@ -1,24 +1,25 @@
 """Velocity as a quotient of distance and time."""
 
 from amaranth import Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.divider import Divider
-from tachometry.hdl.front_end.pulse_counter import saturate
-from tachometry.hdl.output.members import update_members
+from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.output.update import update_layout, update_stream
 from tachometry.spec.methods.timed import TimedTachometer
 from tachometry.spec.tachometer import BOUNDS
 
 
 class QuotientVelocity(wiring.Component):
-    """Divides, rounds, and holds the result; in between it looks whether the velocity has to sink.
+    """Divides distance by time, rounds, and holds the result; between measurements the velocity may decay.
 
-    A measurement may begin when `free` is high. Where `sink` is high and nothing is divided, the greatest speed that
-    the time since the last count allows is: if that, rounded, is nearer to 0 than the velocity, it becomes the
-    velocity. A measurement that begins meanwhile takes the divider, and nothing sinks.
+    A measurement may begin when `free` is high. When `decay` is high and the divider is idle, it finds the greatest
+    speed that the time since the last count allows. If that, rounded, is nearer to 0 than the velocity, it becomes the
+    velocity. A measurement that begins meanwhile takes the divider, and the velocity does not decay.
 
-    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after `measure` or `sink`.
+    Latency: an update comes `spec.datapath_latency` clocks after `measure` or `decay`.
 
     Parameters
     ----------
@@ -28,22 +29,21 @@ class QuotientVelocity(wiring.Component):
     -------
     measure : In(1)
         Only if `free`; `dividend` is valid.
-    sink : In(1)
+    decay : In(1)
         `divisor` is the time since the last count.
     dividend : In(signed)
         Distance in counts, times the timer periods in a tick.
     divisor : In(spec.interval_width)
         Time in timer periods.
     forced_in, stalled_in, beyond_in : In(1)
-        Valid with `measure` and `sink`, as `divisor`.
+        Valid with `measure` and `decay`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
     less, more : In(1)
         With `spec.bounds`: the distance may also have been a count less, or more.
     known, was_negative : In(1)
         With `spec.bounds`: there are bounds; sign of the last count.
-    velocity, velocity_valid, interval, forced, stalled, out_of_range : Out
-    velocity_lower, velocity_upper, bounds_valid : Out
+    updates : Out(stream)
         As those of the datapath.
     """
 
@@ -65,34 +65,35 @@ class QuotientVelocity(wiring.Component):
         super().__init__(
             {
                 "measure": In(1),
-                "sink": In(1),
+                "decay": In(1),
                 "dividend": In(self.divider.dividend.shape()),
                 "divisor": In(spec.interval_width),
                 "forced_in": In(1),
                 "stalled_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
-                "out_of_range": Out(1),
                 **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
-                **update_members(spec),
+                "updates": Out(update_stream(update_layout(spec))),
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         spec = self._spec
+        new = registers(self.updates.p.shape(), "new")
+        m.d.comb += self.updates.p.eq(new)
         m.submodules.divider = divider = self.divider
         measuring, rounds, compared = (Signal(name=name) for name in ("measuring", "rounds", "compared"))
         # Not before the result of the last division is in `velocity`.
-        sinks = Signal()
+        decays = Signal()
         if spec.decays:
-            m.d.comb += sinks.eq(self.sink & ~self.measure & ~divider.busy & ~rounds & ~compared)
-        backward = self.velocity[-1]
+            m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.busy & ~rounds & ~compared)
+        backward = new.velocity[-1]
         greatest = Mux(backward, -spec.timer_periods, spec.timer_periods)
         m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(rounds & ~self.measure)]
         m.d.comb += [
             self.free.eq(~(measuring & (divider.busy | rounds))),
-            divider.start.eq(self.measure | sinks),
+            divider.start.eq(self.measure | decays),
             divider.divisor.eq(self.divisor),
             divider.dividend.eq(Mux(self.measure, self.dividend, greatest) if spec.decays else self.dividend),
         ]
@@ -113,24 +114,25 @@ class QuotientVelocity(wiring.Component):
             saturate(m, rounded, spec.max_count << spec.native_frac_bits) if spec.saturates else (rounded, 0)
         )
         change = Signal(signed(max(len(shown), spec.native_width) + 1))
-        m.d.comb += change.eq(shown - self.velocity)
+        m.d.comb += change.eq(shown - new.velocity)
         nearer = Signal(reset_less=True)
         m.d.sync += nearer.eq(Mux(backward, ~change[-1] & change.any(), change[-1]))
         update = compared & (measuring | nearer) if spec.decays else compared
-        m.d.sync += self.velocity_valid.eq(update)
+        m.d.sync += self.updates.valid.eq(update)
         with m.If(update):
             m.d.sync += [
-                self.velocity.eq(shown),
-                self.interval.eq(divider.by),
-                self.forced.eq(forced),
-                self.stalled.eq(stalled),
-                self.out_of_range.eq(beyond | saturated),
+                new.velocity.eq(shown),
+                new.interval.eq(divider.by),
+                new.forced.eq(forced),
+                new.stalled.eq(stalled),
             ]
+            if spec.flags_range:
+                m.d.sync += new.out_of_range.eq(beyond | saturated)
         if spec.bounds:
-            self._bounds(m, sinks, update)
+            self._bounds(m, new, decays, update)
         return m
 
-    def _bounds(self, m: Module, sinks: Value, update: Value) -> None:
+    def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
         """Two more dividers, as long as the first, for the ends of what the velocity can have been."""
         counted = Signal()
         greatest = self._spec.timer_periods
@@ -143,10 +145,11 @@ class QuotientVelocity(wiring.Component):
             upper = name == "velocity_upper"
             # The upper bound is rounded up: as the negative of what is rounded down.
             distance = -(self.dividend + self.more) if upper else self.dividend - self.less
-            # While it sinks, the shaft is no farther back than its last edge.
-            signs = self.velocity[-1], self.was_negative
-            still = sinks & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
-            end, none = Signal.like(box.dividend), Signal(reset_less=True)
+            # While the velocity decays, the shaft is no farther back than its last edge.
+            signs = new.velocity[-1], self.was_negative
+            still = decays & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
+            end = Signal.like(box.dividend)
+            none = Signal(reset_less=True)
             m.d.comb += [
                 end.eq(Mux(counted, distance, Mux(still, 0, -greatest))),
                 box.start.eq(self.divider.start),
@@ -161,6 +164,6 @@ class QuotientVelocity(wiring.Component):
             with m.If(box.done):
                 m.d.sync += lower.eq(Mux(none, limit, box.quotient))
             with m.If(update):
-                m.d.sync += getattr(self, name).eq(-lower if upper else lower)
+                m.d.sync += new[name].eq(-lower if upper else lower)
         with m.If(update):
-            m.d.sync += self.bounds_valid.eq(known)
+            m.d.sync += new.bounds_valid.eq(known)

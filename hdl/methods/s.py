@@ -1,27 +1,20 @@
 """The S method."""
 
-from typing import Any
+from amaranth import Module, Signal, Value
+from amaranth.lib import data, wiring
 
-from amaranth import Cat, Module, Signal, Value
-from amaranth.lib import wiring
-
-from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
-from tachometry.hdl.arithmetic.reciprocal import Reciprocal
-from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
-from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.alteration import AlterationDetector
+from tachometry.hdl.methods.datapath import datapath_members, quotients
 from tachometry.hdl.methods.interval import IntervalAccumulator
-from tachometry.hdl.output.members import tick_members, update_members
 from tachometry.spec import STachometer
-from tachometry.spec.formats import carried_reciprocal
-from tachometry.spec.tachometer import BOUNDS
 
 
-class Datapath(wiring.Component):
+class SMethod(wiring.Component):
     """S-method datapath, eqs. (17) and (21) of Tsuji 2009: from pulse numbers to velocity without a divider.
 
-    Latency: `velocity_valid` is high `spec.tick_to_velocity` clocks after `tick`. The velocity is correctly rounded:
-    within half an LSB of the exact quotient, ties towards +∞.
+    Latency: an update comes `spec.datapath_latency` clocks after `tick`. The velocity is correctly rounded: within half
+    an LSB of the exact quotient, ties towards +∞.
 
     Parameters
     ----------
@@ -32,19 +25,14 @@ class Datapath(wiring.Component):
     tick : In(1)
     pulse_count : In(signed)
         m_e, valid with `tick`.
-    velocity : Out(signed)
-        In counts per tick with `native_frac_bits` fraction bits; this and all below are held until the next update.
-    velocity_valid : Out(1)
-        One clock per update.
-    interval : Out
-        m_s in ticks.
-    forced, stalled : Out(1)
-    velocity_lower, velocity_upper, bounds_valid : Out
-        With `spec.bounds`: one count more and less in the window, rounded outward; not valid for the first window.
+    updates : Out(stream)
+        `velocity` has `native_frac_bits` fraction bits, `interval` is m_s in ticks. The bounds are those of one count
+        more and less in the window, rounded outward; they are not valid for the first window. All is held until the
+        next update.
     """
 
     def __init__(self, spec: STachometer) -> None:
-        super().__init__(tick_members(spec) | update_members(spec))
+        super().__init__(datapath_members(spec))
         self._spec = spec
         self.alteration = AlterationDetector(spec.count_width)
         self.interval_accumulator = IntervalAccumulator(
@@ -54,20 +42,14 @@ class Datapath(wiring.Component):
             numerator_width=spec.numerator_width,
             cancel=spec.cancel,
         )
-        self._carried = isinstance(spec.reciprocal, carried_reciprocal.CarriedReciprocal)
-        if isinstance(spec.reciprocal, carried_reciprocal.CarriedReciprocal):
-            self.reciprocal: Any = CarriedReciprocal(spec.reciprocal)
-            scaler: Any = SerialRemainderScaler if spec.serial else PipelinedRemainderScaler
-        else:
-            self.reciprocal = Reciprocal(spec.reciprocal)
-            scaler = SerialScaler if spec.serial else PipelinedScaler
-        shape = {"numerator_width": spec.numerator_width, "tag_width": spec.interval_width + 2 + spec.bounds}
-        self.scaler = scaler(spec.reciprocal, base_width=spec.count_width, **shape)
-        self.bound_scalers = {
-            name: scaler(spec.reciprocal, base_width=spec.bound_width - spec.native_frac_bits, towards=towards, **shape)
-            for name, towards in BOUNDS.items()
-            if spec.bounds
-        }
+        self.quotient = Quotient(
+            spec.reciprocal,
+            quotients=quotients(spec),
+            numerator_width=spec.numerator_width,
+            tag=data.StructLayout({"forced": 1, "stalled": 1, **({"bounds_valid": 1} if spec.bounds else {})}),
+            serial=spec.serial,
+            margin=spec.whole,
+        )
 
     @property
     def probes(self) -> dict[str, Value]:
@@ -82,17 +64,8 @@ class Datapath(wiring.Component):
         m = Module()
         m.submodules.alteration = alteration = self.alteration
         m.submodules.interval = interval = self.interval_accumulator
-        m.submodules.reciprocal = reciprocal = self.reciprocal
-        m.submodules.scaler = scaler = self.scaler
-        known = [interval.m_s, interval.forced, interval.stalled]
-        tags = [self.interval, self.forced, self.stalled]
-        if self._spec.bounds:
-            # The first window has begun before there was anything to be seen.
-            later = Signal()
-            with m.If(interval.update):
-                m.d.sync += later.eq(1)
-            known.append(later)
-            tags.append(self.bounds_valid)
+        m.submodules.quotient = quotient = self.quotient
+        found, new = quotient.results, self.updates.p
         m.d.comb += [
             alteration.tick.eq(self.tick),
             alteration.m_e.eq(self.pulse_count),
@@ -100,27 +73,22 @@ class Datapath(wiring.Component):
             interval.m_e.eq(self.pulse_count),
             interval.previous.eq(alteration.previous),
             interval.alteration.eq(alteration.alteration),
-            reciprocal.m.eq(interval.m_s),
-            reciprocal.enable.eq(self.tick),
-            self.velocity.eq(scaler.velocity),
-            self.velocity_valid.eq(scaler.done),
-            Cat(tags).eq(scaler.tag_out),
+            quotient.m.eq(interval.m_s),
+            quotient.enable.eq(self.tick),
+            quotient.load.eq(self.tick),
+            quotient.start.eq(interval.update),
+            quotient.base.eq(alteration.previous),
+            quotient.numerator.eq(interval.numerator),
+            quotient.tag.forced.eq(interval.forced),
+            quotient.tag.stalled.eq(interval.stalled),
+            self.updates.valid.eq(found.valid),
+            new.interval.eq(found.p.m),
+            *(new[name].eq(found.p[name]) for name in found.p.shape().members if name != "m"),
         ]
-
-        def feed(scaler: Any, numerator: Value) -> None:
-            m.d.comb += [
-                scaler.load.eq(self.tick),
-                scaler.start.eq(interval.update),
-                scaler.base.eq(alteration.previous),
-                scaler.numerator.eq(numerator),
-                scaler.tag.eq(Cat(known)),
-                scaler.q.eq(reciprocal.q),
-                *([scaler.r.eq(reciprocal.r)] if self._carried else []),
-            ]
-
-        feed(scaler, interval.numerator)
-        for name, box in self.bound_scalers.items():
-            m.submodules[name] = box
-            feed(box, interval.numerator + BOUNDS[name] * self._spec.whole)
-            m.d.comb += getattr(self, name).eq(box.velocity)
+        if self._spec.bounds:
+            # The first window has begun before there was anything to be seen.
+            later = Signal()
+            with m.If(interval.update):
+                m.d.sync += later.eq(1)
+            m.d.comb += quotient.tag.bounds_valid.eq(later)
         return m

@@ -5,7 +5,7 @@ from amaranth import Module, Mux, Value
 from tachometry.hdl.methods.timed import TimedDatapath
 
 
-class Datapath(TimedDatapath):
+class TMethod(TimedDatapath):
     """T-method datapath, eq. (9) of Tsuji 2009: one count over the time since the count before."""
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:

@@ -2,19 +2,18 @@
 
 from amaranth import Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In
 
+from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
-from tachometry.hdl.output.members import tick_members, update_members
 from tachometry.spec.methods.timed import TimedTachometer
-from tachometry.spec.tachometer import BOUNDS
 
 
 class TimedDatapath(wiring.Component):
     """From counts to velocities; `_window` of a method says when a measurement ends. docs/timed.md has the rules.
 
-    Latency: `velocity_valid` is high `spec.datapath_latency` clocks after the `step`, or the `tick`, that causes it.
+    Latency: an update comes `spec.datapath_latency` clocks after the `step`, or the `tick`, that causes it.
 
     Parameters
     ----------
@@ -27,19 +26,10 @@ class TimedDatapath(wiring.Component):
         m_e, valid with `tick`.
     step : In(signed(2))
         As late as `tick`; only if times are counted in clocks.
-    velocity : Out(signed)
-        In counts per tick with `native_frac_bits` fraction bits; this and all below are held until the next update.
-    velocity_valid : Out(1)
-    interval : Out
-        Timer periods.
-    forced : Out(1)
-        Silence alone caused the update.
-    stalled : Out(1)
-        And there was no count in the maximum time before it either.
-    out_of_range : Out(1)
-        The velocity was too high to be measured, and is saturated; only if that can be.
-    velocity_lower, velocity_upper, bounds_valid : Out
-        With `spec.bounds`.
+    updates : Out(stream)
+        `interval` is in timer periods. `forced`: silence alone caused the update. `stalled`: and there was no count in
+        the maximum time before it either. `out_of_range`, only if that can be: the velocity was too high to be
+        measured, and is saturated.
     """
 
     def __init__(self, spec: TimedTachometer) -> None:
@@ -48,10 +38,8 @@ class TimedDatapath(wiring.Component):
         self.quotient_velocity = QuotientVelocity(spec)
         super().__init__(
             {
-                **tick_members(spec),
+                **datapath_members(spec),
                 **({} if spec.on_lattice else {"step": In(signed(2))}),
-                **{port.name: Out(port.width) for port in spec.method_ports},
-                **update_members(spec),
             }
         )
 
@@ -90,19 +78,17 @@ class TimedDatapath(wiring.Component):
         m.submodules.quotient_velocity = quotient = self.quotient_velocity
         size = self._size
         ends, distance, time = self._window(m)
+        wiring.connect(m, quotient.updates, wiring.flipped(self.updates))
         m.d.comb += [
             timer.period.eq(self.tick if spec.on_lattice else 1),
             timer.count.eq(timer.period & size.any()),
             timer.negative.eq(size[-1]),
             quotient.measure.eq(timer.overdue | ends),
-            quotient.sink.eq(self.tick & ~timer.count),
+            quotient.decay.eq(self.tick & ~timer.count),
             quotient.dividend.eq(Mux(timer.count, distance, 0)),
             quotient.divisor.eq(time),
             quotient.forced_in.eq(~timer.count),
             quotient.stalled_in.eq(~timer.count & ~timer.opened),
-            *(getattr(self, name).eq(getattr(quotient, name)) for name in ("velocity", "velocity_valid", "interval")),
-            *(getattr(self, name).eq(getattr(quotient, name)) for name in ("forced", "stalled")),
-            *(getattr(self, port.name).eq(getattr(quotient, port.name)) for port in spec.method_ports),
         ]
         if spec.bounds:
             # Of the first period after reset not all was seen.
@@ -112,6 +98,5 @@ class TimedDatapath(wiring.Component):
             m.d.comb += [
                 quotient.was_negative.eq(timer.was_negative),
                 quotient.known.eq(~quotient.beyond_in & (begun | timer.opened)),
-                *(getattr(self, name).eq(getattr(quotient, name)) for name in (*BOUNDS, "bounds_valid")),
             ]
         return m

@@ -1,10 +1,12 @@
 """The low-pass filter for fluctuating measurement time."""
 
-from amaranth import Cat, Module, Mux, Signal, signed
-from amaranth.lib import wiring
+from amaranth import Cat, Const, Module, Mux, Signal, signed
+from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.output.update import update_stream
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.spec.formats import low_pass
 
@@ -16,78 +18,69 @@ class LowPass(wiring.Component):
     An update that comes while the filter works waits; one that comes while another waits takes its place and adds its
     ticks.
 
-    Latency: `done` is high `spec.latency` clocks after `start`, if the filter was at rest.
+    Latency: an update is handed on `spec.latency` clocks after it comes, if the filter was at rest.
 
     Parameters
     ----------
     spec : spec.low_pass.LowPass
-    tag_width : int
-        Bits that travel along with a value.
+    layout : data.StructLayout
+        Of an update; all of it but the velocity is handed on as it is.
+    clears : bool
+        A `stalled` update is taken as it is, for whatever time.
 
     Members
     -------
     tick : In(1)
-    start : In(1)
-        `native`, `clear` and `tag` are new.
-    native, tag : In
-    clear : In(1)
-        This is taken as it is, for whatever time.
-    done : Out(1)
-    velocity, tag_out : Out
-        Valid with `done`, and held until the next.
+    updates : In(stream)
+    filtered : Out(stream)
+        Held until the next.
     """
 
-    def __init__(self, spec: low_pass.LowPass, *, tag_width: int) -> None:
+    def __init__(self, spec: low_pass.LowPass, layout: data.StructLayout, *, clears: bool = False) -> None:
         self._spec = spec
-        super().__init__(
-            {
-                "start": In(1),
-                "tick": In(1),
-                "native": In(signed(spec.native_width)),
-                "clear": In(1),
-                "tag": In(tag_width),
-                "done": Out(1),
-                "velocity": Out(signed(spec.native_width)),
-                "tag_out": Out(tag_width),
-            }
-        )
+        self._clears = clears
+        super().__init__({"tick": In(1), "updates": In(update_stream(layout)), "filtered": Out(update_stream(layout))})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        spec = self._spec
+        spec, layout = self._spec, self.updates.p.shape()
+        filtered = registers(layout, "filtered")
+        m.d.comb += self.filtered.p.eq(filtered)
         extra, bits = spec.extra_bits, spec.factor_bits
 
         # Ticks from the clock of the update before on.
         elapsed = UpdateAge(spec.max_interval)
         m.submodules.elapsed = elapsed
-        m.d.comb += [elapsed.tick.eq(self.tick), elapsed.update.eq(self.start)]
+        m.d.comb += [elapsed.tick.eq(self.tick), elapsed.update.eq(self.updates.valid)]
 
         # The update that waits.
-        waiting, take = Signal(), Signal()
-        next_u, next_tag = Signal.like(self.native, reset_less=True), Signal.like(self.tag, reset_less=True)
-        next_interval, next_clear = Signal.like(elapsed.age, reset_less=True), Signal(reset_less=True)
+        waiting = Signal()
+        take = Signal()
+        following = registers(layout, "following", reset_less=True)
+        interval = Signal.like(elapsed.age, reset_less=True)
         with m.If(take):
             m.d.sync += waiting.eq(0)
-        with m.If(self.start):
+        with m.If(self.updates.valid):
             m.d.sync += [
                 waiting.eq(1),
-                next_u.eq(self.native),
-                next_tag.eq(self.tag),
-                next_clear.eq(self.clear),
+                following.eq(self.updates.p),
                 # No overflow: those that wait have come since the filter began, fewer clocks ago than it can count.
-                next_interval.eq(elapsed.before + Mux(waiting & ~take, next_interval, 0)),
+                interval.eq(elapsed.before + Mux(waiting & ~take, interval, 0)),
             ]
 
         # The state, in 2^−extra of an LSB, and what it differs by from the update.
-        working, adding, rounding = Signal(), Signal(), Signal()
-        u, tag = Signal.like(self.native, reset_less=True), Signal.like(self.tag, reset_less=True)
+        working = Signal()
+        adding = Signal()
+        rounding = Signal()
+        update = registers(layout, "update", reset_less=True)
         y = Signal(signed(spec.native_width + extra))
         d = Signal(signed(spec.native_width + extra + 1), reset_less=True)
         total = Signal.like(d, reset_less=True)
         factor = Signal(bits, reset_less=True)
         step = Signal(range(bits + 2), reset_less=True)
         second = Signal(reset_less=True)
-        low, *high = self._factors(m, take, next_interval)
+        clear = following.stalled if self._clears else Const(0)
+        low, *high = self._factors(m, take, interval)
         last = step == bits + 1
         m.d.comb += take.eq(waiting & ~working & ~adding)
         m.d.sync += [
@@ -97,7 +90,7 @@ class LowPass(wiring.Component):
             total.eq((Cat(step == bits, total).as_signed() + Cat(step == bits, Mux(factor[0], d, 0)).as_signed()) >> 2),
             adding.eq(working & last & (second if high else 1)),
             rounding.eq(adding),
-            self.done.eq(rounding),
+            self.filtered.valid.eq(rounding),
         ]
         with m.If(step == 0):
             m.d.sync += [factor.eq(Mux(second, high[0], low) if high else low), total.eq(0)]
@@ -113,14 +106,16 @@ class LowPass(wiring.Component):
                 working.eq(1),
                 step.eq(0),
                 second.eq(0),
-                u.eq(next_u),
-                tag.eq(next_tag),
-                d.eq(Mux(next_clear, 0, y - (next_u << extra))),
+                update.eq(following),
+                d.eq(Mux(clear, 0, y - (following.velocity << extra))),
             ]
         with m.If(adding):
-            m.d.sync += y.eq((u << extra) + d)
+            m.d.sync += y.eq((update.velocity << extra) + d)
         with m.If(rounding):
-            m.d.sync += [self.velocity.eq((y + (1 << (extra - 1))) >> extra), self.tag_out.eq(tag)]
+            m.d.sync += [
+                filtered.eq(update),
+                filtered.velocity.eq((y + (1 << (extra - 1))) >> extra),
+            ]
         return m
 
     def _factors(self, m: Module, take: Signal, interval: Signal) -> list[Signal]:

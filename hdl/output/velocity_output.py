@@ -6,13 +6,14 @@ dropped on the way, which does not change the floor. The one adds v for a bit a 
 digit of the multiplier's canonical form and takes any update rate.
 """
 
-from typing import Any
-
 from amaranth import Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.front_end.pulse_counter import saturate
+from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.output.update import VELOCITIES, shown_layout, update_stream
 from tachometry.spec.formats import velocity_output
 
 
@@ -22,115 +23,124 @@ class _VelocityOutput(wiring.Component):
     Parameters
     ----------
     output : spec.velocity_output.VelocityOutput
-    native_width : int
-        Bits of v.
-    tag_width : int
-        Bits that travel along with a value.
-    towards : int
-        Round to the nearest (0), down (−1) or up (1).
+    layout : data.StructLayout
+        Of an update in counts per tick. All its velocities become those of the unit, bounds rounded outward; the rest
+        is handed on as it is.
 
     Members
     -------
-    start : In(1)
-        `native` and `tag` are new; they stay until the next.
-    native, tag : In
-    done : Out(1)
-    velocity, velocity_overflow, tag_out : Out
-        Valid with `done`, and held until the next.
+    updates : In(stream)
+        An update stays until the next.
+    shown : Out(stream)
+        The same, and `velocity_overflow`; held until the next.
     """
 
-    def __init__(
-        self, output: velocity_output.VelocityOutput, *, native_width: int, tag_width: int, towards: int = 0
-    ) -> None:
+    def __init__(self, output: velocity_output.VelocityOutput, layout: data.StructLayout) -> None:
         self._output = output
-        self._rounding = output.rounding(towards)
+        # What rounds each velocity.
+        self._rounding = {
+            name: output.rounding(towards) for name, towards in VELOCITIES.items() if name in layout.members
+        }
         super().__init__(
-            {
-                "start": In(1),
-                "native": In(signed(native_width)),
-                "tag": In(tag_width),
-                "done": Out(1),
-                "velocity": Out(signed(output.port_width)),
-                "velocity_overflow": Out(1),
-                "tag_out": Out(tag_width),
-            }
+            {"updates": In(update_stream(layout)), "shown": Out(update_stream(shown_layout(layout, output)))}
         )
 
-    def _shown(self, m: Module, total: Value, tag: Value) -> list[Any]:
-        """What lets the outputs take `total`."""
-        rounded = Signal.like(total)
-        m.d.comb += rounded.eq(total)
-        velocity, overflow = rounded, Const(0)
-        if self._output.limit < self._output.greatest:
-            velocity, overflow = saturate(m, rounded, self._output.limit)
-        return [self.velocity.eq(velocity), self.velocity_overflow.eq(overflow), self.tag_out.eq(tag)]
+    def _show(self, m: Module, update: data.View, totals: dict[str, Value]) -> data.View:
+        """What the outputs take: each velocity from its total, and the rest of the update."""
+        shown = registers(self.shown.p.shape(), "taken")
+        for name, total in totals.items():
+            rounded = Signal.like(total, name=f"rounded_{name}")
+            m.d.comb += rounded.eq(total)
+            velocity, overflow = rounded, Const(0)
+            if self._output.limit < self._output.greatest:
+                velocity, overflow = saturate(m, rounded, self._output.limit)
+            m.d.comb += shown[name].eq(velocity)
+            if name == "velocity":
+                m.d.comb += shown.velocity_overflow.eq(overflow)
+        m.d.comb += [shown[name].eq(update[name]) for name in update.shape().members if name not in totals]
+        return shown
 
 
 class SerialVelocityOutput(_VelocityOutput):
     """A bit of the multiplier a clock.
 
-    Latency: `done` is high as many clocks after `start` as the multiplier has bits, and three more; `start` may come
-    again then.
+    Latency: an update is shown as many clocks after it comes as the multiplier has bits, and three more; the next may
+    come then.
     """
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        output = self._output
+        output, update = self._output, self.updates.p
         bits = output.multiplier.bit_length()
-        running, rounding, complete = Signal(), Signal(), Signal()
+        running = Signal()
+        rounding = Signal()
+        complete = Signal()
         step = Signal(range(bits + 1), reset_less=True)
         bit = Signal(reset_less=True)
-        total = Signal(signed(max(len(self.native), bits) + 1), reset_less=True)
-        # The low bits of what rounds are there from the start, as bits of the product are dropped on the way.
-        high, low = self._rounding >> bits, self._rounding & ((1 << bits) - 1)
-        addend = Signal.like(self.native)
-        m.d.comb += addend.eq(Mux(rounding, high, Mux(bit, self.native, 0)))
         m.d.sync += [
             step.eq(step + 1),
             bit.eq(Const(output.multiplier >> 1, bits + 1).bit_select(step, 1)),
-            total.eq((total + addend) >> 1),
             rounding.eq(running & (step == bits - 1)),
             complete.eq(rounding),
+            self.shown.valid.eq(complete),
         ]
         with m.If(rounding):
             m.d.sync += running.eq(0)
-        with m.If(self.start):
-            m.d.sync += [running.eq(1), step.eq(0), bit.eq(output.multiplier & 1), total.eq(low)]
-        m.d.sync += self.done.eq(complete)
-        shown = self._shown(m, total >> (output.shift - bits - 1), self.tag)
+        with m.If(self.updates.valid):
+            m.d.sync += [running.eq(1), step.eq(0), bit.eq(output.multiplier & 1)]
+        totals = {}
+        for name, half in self._rounding.items():
+            native = update[name]
+            # The low bits of what rounds are there from the start, as bits of the product are dropped on the way.
+            high, low = half >> bits, half & ((1 << bits) - 1)
+            total = Signal(signed(max(len(native), bits) + 1), name=f"total_{name}", reset_less=True)
+            addend = Signal.like(native, name=f"addend_{name}")
+            m.d.comb += addend.eq(Mux(rounding, high, Mux(bit, native, 0)))
+            m.d.sync += total.eq((total + addend) >> 1)
+            with m.If(self.updates.valid):
+                m.d.sync += total.eq(low)
+            totals[name] = total >> (output.shift - bits - 1)
+        shown = self._show(m, update, totals)
+        new = registers(self.shown.p.shape(), "new")
+        m.d.comb += self.shown.p.eq(new)
         with m.If(complete):
-            m.d.sync += shown
+            m.d.sync += new.eq(shown)
         return m
 
 
 class PipelinedVelocityOutput(_VelocityOutput):
-    """An adder for every digit of the multiplier: `start` may be high in every clock.
+    """An adder for every digit of the multiplier: there may be an update in every clock.
 
-    Latency: `done` is high a clock after `start` for every digit but the first, one to round (if anything is to be
+    Latency: an update is shown a clock after it comes for every digit but the first, one to round (if anything is to be
     rounded), and one to hold.
     """
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-
-        def later(*values: Value) -> list[Signal]:
-            registers = [Signal.like(value) for value in values]
-            m.d.sync += [register.eq(value) for register, value in zip(registers, values, strict=True)]
-            return registers
-
-        valid, native, tag = self.start, self.native, self.tag
+        valid, update = self.updates.valid, self.updates.p
         (place, sign), *others = self._output.digits
-        low = self._rounding & ((1 << self._output.digits[-1][0]) - 1)
-        width = max(len(native), low.bit_length()) + 2
-        total: Value = (native if sign > 0 else -native) + low
+        totals, widths = {}, {}
+        for name, half in self._rounding.items():
+            low = half & ((1 << self._output.digits[-1][0]) - 1)
+            widths[name] = max(len(update[name]), low.bit_length()) + 2
+            totals[name] = (update[name] if sign > 0 else -update[name]) + low
         for next_place, digit in others:
             gap = next_place - place
-            sum_ = total + (native << gap) if digit > 0 else total - (native << gap)
-            valid, native, tag, total = later(valid, native, tag, (sum_ >> gap)[:width].as_signed())
+            for name, total in totals.items():
+                native = update[name]
+                sum_ = total + (native << gap) if digit > 0 else total - (native << gap)
+                totals[name] = (sum_ >> gap)[: widths[name]].as_signed()
+            valid, update, *delayed = delay(m, valid, update, *totals.values())
+            totals = dict(zip(totals, delayed, strict=True))
             place = next_place
         left = self._output.shift - place
         if left:
-            valid, tag, total = later(valid, tag, ((total + (self._rounding >> place)) >> left).as_signed())
-        # As long as `native` and `tag` stay, so does what they become.
-        m.d.sync += [self.done.eq(valid), *self._shown(m, total, tag)]
+            for name, half in self._rounding.items():
+                totals[name] = ((totals[name] + (half >> place)) >> left).as_signed()
+            valid, update, *delayed = delay(m, valid, update, *totals.values())
+            totals = dict(zip(totals, delayed, strict=True))
+        # As long as an update stays, so does what becomes of it.
+        new = registers(self.shown.p.shape(), "new")
+        m.d.comb += self.shown.p.eq(new)
+        m.d.sync += [self.shown.valid.eq(valid), new.eq(self._show(m, update, totals))]
         return m

@@ -1,3 +1,4 @@
+import importlib.metadata
 import json
 import os
 import re
@@ -8,6 +9,8 @@ import pytest
 
 from tachometry.hdl import export
 from tachometry.spec import Encoder, Speed, STachometer, Timing
+
+VERSION = importlib.metadata.version("tachometry")
 
 
 def make_spec(tick: str = "20us", **options: object) -> STachometer:
@@ -27,7 +30,9 @@ def test_files(spec: STachometer) -> None:
     assert {(name, direction, int(high or 0) + 1) for direction, high, name in found} == {
         (port["name"], port["direction"], port["width"]) for port in described["ports"]
     }
-    assert files["speed_meter.core"].startswith("CAPI=2:\nname: ::speed_meter:0\n")
+    assert files["speed_meter.core"].startswith(f"CAPI=2:\nname: ::speed_meter:{VERSION}\n")
+    assert described["generator"] == f"tachometry {VERSION}"
+    assert f"// Made by tachometry {VERSION}.\n" in files["speed_meter.v"]
     assert "toplevel: speed_meter" in files["speed_meter.core"]
 
 
@@ -43,11 +48,17 @@ def test_no_divider(tick_cycles: int) -> None:
     assert "$mod" not in code
 
 
-def test_no_absolute_path_and_no_warning_switched_off_but_four() -> None:
+def test_no_absolute_path_and_no_warning_switched_off_but_five() -> None:
     text = export(make_spec())["tachometer.v"]
     assert os.sep + "work" not in text
     assert "(* src" not in text
-    assert re.findall(r"lint_off (\w+)", text) == ["DECLFILENAME", "PROCASSINIT", "UNUSEDSIGNAL", "WIDTHTRUNC"]
+    assert re.findall(r"lint_off (\w+)", text) == [
+        "DECLFILENAME",
+        "PROCASSINIT",
+        "UNUSEDSIGNAL",
+        "WIDTHEXPAND",
+        "WIDTHTRUNC",
+    ]
 
 
 _PROGRAM = """

@@ -1,64 +1,47 @@
-"""Reciprocal and scaler as the S method wires them, and all their answers from a compiled simulation."""
+"""The quotient of the S method, and all its answers from a compiled simulation."""
 
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from amaranth import Module
-from amaranth.lib import wiring
+from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 from numpy.typing import NDArray
 
 from support.compiled import build
-from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
-from tachometry.hdl.arithmetic.reciprocal import Reciprocal
-from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
-from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.spec import STachometer
 
 
-class Quotient(wiring.Component):
-    """base + N/(2^s·m): the reciprocal takes `m` with `enable`, the scaler its operands with `load` and `start`."""
+class FlatQuotient(wiring.Component):
+    """base + N/(2^s·m) of the S method, whose results are scalar ports; a margin of 0 lets bounds be those of N."""
 
     def __init__(self, spec: STachometer, *, serial: bool, towards: int = 0) -> None:
-        self._carried = spec.carried
-        if spec.carried:
-            self.reciprocal: Any = CarriedReciprocal(spec.reciprocal)
-            scaler: Any = SerialRemainderScaler if serial else PipelinedRemainderScaler
-        else:
-            self.reciprocal = Reciprocal(spec.reciprocal)
-            scaler = SerialScaler if serial else PipelinedScaler
-        self.scaler = scaler(
+        self.box = Quotient(
             spec.reciprocal,
-            base_width=spec.count_width,
+            quotients={"velocity": (spec.velocity_width, towards)},
             numerator_width=spec.numerator_width,
-            tag_width=spec.interval_width,
-            towards=towards,
+            tag=data.StructLayout({"mark": 1}),
+            serial=serial,
         )
-        inputs = ("load", "start", "base", "numerator")
-        outputs = ("done", "velocity", "tag_out")
-        members: dict[str, Any] = {"m": In(spec.interval_width), "enable": In(1)}
-        members |= {name: In(getattr(self.scaler, name).shape()) for name in inputs}
-        members |= {name: Out(getattr(self.scaler, name).shape()) for name in outputs}
-        self._wires = inputs, outputs
-        super().__init__(members)
+        self._inputs = ("m", "enable", "load", "start", "base", "numerator")
+        results = self.box.results.p.shape().members
+        super().__init__(
+            {name: In(getattr(self.box, name).shape()) for name in self._inputs}
+            | {"done": Out(1), "velocity": Out(results["velocity"]), "m_out": Out(results["m"])}
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        m.submodules.reciprocal, m.submodules.scaler = self.reciprocal, self.scaler
+        m.submodules.box = box = self.box
+        m.d.comb += [getattr(box, name).eq(getattr(self, name)) for name in self._inputs]
         m.d.comb += [
-            self.reciprocal.m.eq(self.m),
-            self.reciprocal.enable.eq(self.enable),
-            self.scaler.tag.eq(self.m),
-            self.scaler.q.eq(self.reciprocal.q),
+            self.done.eq(box.results.valid),
+            self.velocity.eq(box.results.p.velocity),
+            self.m_out.eq(box.results.p.m),
         ]
-        if self._carried:
-            m.d.comb += self.scaler.r.eq(self.reciprocal.r)
-        inputs, outputs = self._wires
-        m.d.comb += [getattr(self.scaler, name).eq(getattr(self, name)) for name in inputs]
-        m.d.comb += [getattr(self, name).eq(getattr(self.scaler, name)) for name in outputs]
         return m
 
 
@@ -116,6 +99,6 @@ def every_quotient(
         distance=distance,
     )
     answers = folder / "answers"
-    subprocess.run([build(Quotient(spec, serial=distance > 1, towards=towards), main, folder), answers], check=True)
+    subprocess.run([build(FlatQuotient(spec, serial=distance > 1, towards=towards), main, folder), answers], check=True)
     m, n = np.meshgrid(np.arange(1, spec.timing.max_ticks + 1), np.array(numerators), indexing="ij")
     return -(n.ravel() >> shift), n.ravel(), m.ravel(), np.fromfile(answers, dtype=np.int64)

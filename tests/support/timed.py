@@ -55,7 +55,7 @@ def speed(counts: int, clocks: int) -> int:
 
 
 def decay(last_count: int, velocity: int, until: int) -> list[Row]:
-    """The updates with which a velocity sinks: at the tick, 1 count over the time since the last count."""
+    """The updates with which a velocity decays: at the tick, 1 count over the time since the last count."""
     rows = []
     for clock in range(last_count + 1, until):
         if clock % TICK == TICK - 1:

@@ -93,7 +93,7 @@ MUTANTS: dict[str, tuple[Any, str, str, str]] = {
     "index forgotten": (PositionCounter, "self.position.eq(0)", "self.position.eq(1)", "s"),
     "no error": (QuadratureDecoder, "self.ready & change_a & change_b", "0", "s in rpm"),
     "error too often": (QuadratureDecoder, "self.ready & change_a & change_b", "change_a & past_b", "s in rpm"),
-    "no sign rule": (mt_method.Datapath, "Mux(self._same, self._one, 0)", "self._one", "mt"),
+    "no sign rule": (mt_method.MTMethod, "Mux(self._same, self._one, 0)", "self._one", "mt"),
 }
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
-from support.quotient import Quotient, every_quotient
+from support.quotient import FlatQuotient, every_quotient
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic import carried_reciprocal, remainder_scaler
@@ -74,8 +74,8 @@ def check_starts_over(*, serial: bool, frac_bits: int) -> None:
     for row in zip(m, base.tolist(), n.tolist(), strict=True):
         rows += [{"load": 1, "start": 1, "enable": 1, **dict(zip(("m", "base", "numerator"), row, strict=True))}]
         rows += off * (distance - 1)
-    seen = clock_by_clock(Quotient(spec, serial=serial), rows + off * 40, ["done", "velocity", "tag_out"])
-    got = [(row["velocity"], row["tag_out"]) for row in seen if row["done"]]
+    seen = clock_by_clock(FlatQuotient(spec, serial=serial), rows + off * 40, ["done", "velocity", "m_out"])
+    got = [(row["velocity"], row["m_out"]) for row in seen if row["done"]]
     assert got == list(zip(wanted(spec, base, n, np.array(m)).tolist(), m, strict=True))
 
 

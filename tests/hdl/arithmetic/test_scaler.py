@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
-from support.quotient import Quotient, every_quotient
+from support.quotient import FlatQuotient, every_quotient
 from support.sequences import rounded
 from support.simulate import clock_by_clock
 
@@ -60,11 +60,11 @@ def check_ties(*, serial: bool) -> None:
     for n, m in pairs:
         rows += [{"load": 1, "start": 1, "enable": 1, "m": m, "numerator": n, "base": base(n)}] + [off] * (pause - 1)
     seen = clock_by_clock(
-        Quotient(spec, serial=serial),
+        FlatQuotient(spec, serial=serial),
         rows + [off] * (spec.tick_to_velocity + 1),
-        ["done", "velocity", "tag_out"],
+        ["done", "velocity", "m_out"],
     )
-    got = [(row["velocity"], row["tag_out"]) for row in seen if row["done"]]
+    got = [(row["velocity"], row["m_out"]) for row in seen if row["done"]]
     assert got == [(rounded(Fraction(n, 2 * m) + base(n), 4), m) for n, m in pairs]
     assert seen[spec.tick_to_velocity]["done"] == 1
 

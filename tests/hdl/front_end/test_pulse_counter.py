@@ -5,6 +5,7 @@ import pytest
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
+from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.spec import TachometerSpec
 
@@ -44,7 +45,7 @@ def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
 
 
 def test_mutant_that_saturates_one_late_is_caught() -> None:
-    with mutant(PulseCounter, "value > Const(limit, ", "value > Const(limit + 1, "), caught():
+    with mutant(saturate, "value > Const(limit, ", "value > Const(limit + 1, "), caught():
         check_counts(16, 4, seed=0)
 
 

@@ -29,7 +29,7 @@ def check(average: int, *, tick_cycles: int = 3, frac_bits: int = 4, n: int = 30
     rows: list[dict[str, int]] = []
     for number in m_e:
         rows += [{"tick": 1, "pulse_count": number}, *[{"tick": 0}] * (tick_cycles - 1)]
-    seen = clock_by_clock(m_method.Datapath(spec), rows + [{"tick": 0}] * spec.datapath_latency, OUTPUTS)
+    seen = clock_by_clock(m_method.MMethod(spec), rows + [{"tick": 0}] * spec.datapath_latency, OUTPUTS)
     got = [(clock, *list(row.values())[1:]) for clock, row in enumerate(seen) if row["velocity_valid"]]
     wanted = []
     for tick in range(len(m_e)):

@@ -96,10 +96,10 @@ def test_bad_options(options: dict, message: str) -> None:
 MUTANTS = {
     "as late as T_c": ("length == self._min_periods", "length == self._min_periods - 1", check_windows),
     "opening count counted": ("Mux(opens, 0, total)", "Mux(opens, self._one, total)", check_windows),
-    "way goes on": ("Mux(opens, 0, total)", "total", check_windows),
+    "distance goes on": ("Mux(opens, 0, total)", "total", check_windows),
     "no sign rule": ("Mux(self._same, self._one, 0)", "self._one", check_reversals),
     "open after a silence": ("timer.count & timer.opened & late", "timer.count & late", check_silence_in_a_window),
-    "way kept through silence": ("ends | ~timer.opened", "ends", check_silence_in_a_window),
+    "distance kept through silence": ("ends | ~timer.opened", "ends", check_silence_in_a_window),
     "age for the length": ("Mux(ends, length, timer.age)", "timer.age", check_windows),
     "one for m_e": ("self._size if spec.on_lattice", "self._one if spec.on_lattice", check_lattice),
 }
@@ -108,5 +108,5 @@ MUTANTS = {
 @pytest.mark.parametrize("name", MUTANTS)
 def test_mutants_are_caught(name: str) -> None:
     right, wrong, check = MUTANTS[name]
-    with mutant(mt_method.Datapath, right, wrong), caught():
+    with mutant(mt_method.MTMethod, right, wrong), caught():
         check()

@@ -9,6 +9,7 @@ from support.rairan import DELAY, golden_updates, make_spec, random_steps, steps
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.methods import dt_shift, rairan
+from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.sim.golden.methods.rairan import Model
 from tachometry.spec import Speed
 from tachometry.spec.tachometer import BOUNDS
@@ -21,7 +22,7 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
     spec = make_spec(dt, max_ticks, **options)
     names = NAMES + [*BOUNDS, "bounds_valid"] * spec.bounds + ["dt_shift"] * (spec.adaptive is not None)
     rows = [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
-    seen = clock_by_clock(rairan.Datapath(spec), rows, ["velocity_valid", "last", "beyond", *names])
+    seen = clock_by_clock(rairan.RairanMethod(spec), rows, ["velocity_valid", "last", "beyond", *names])
     got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
     updates = golden_updates(spec, step)
     columns = [updates[name].astype(int).tolist() for name in names]
@@ -106,13 +107,16 @@ MUTANTS = {
 
 @pytest.mark.parametrize("name", MUTANTS)
 def test_mutants_are_caught(name: str) -> None:
-    box = rairan.Datapath if "carry" in name else rairan.Counters
+    box = rairan.RairanMethod if "carry" in name else RairanCounters
     with mutant(box, *MUTANTS[name]), caught():
         check(steps())
 
 
 def test_mutant_of_the_letter_is_caught() -> None:
-    with mutant(rairan.Counters, "opens.eq(pulse & late), self", "opens.eq(pulse & (late | due)), self"), caught():
+    with (
+        mutant(RairanCounters, "opens.eq(pulse & late), self", "opens.eq(pulse & (late | due)), self"),
+        caught(),
+    ):
         check(steps(), paper_exact=True)
 
 
@@ -127,12 +131,12 @@ def test_mutant_of_the_letter_is_caught() -> None:
     ],
 )
 def test_mutants_of_bounds_are_caught(right: str, wrong: str) -> None:
-    with mutant(rairan.Counters, right, wrong), caught():
+    with mutant(RairanCounters, right, wrong), caught():
         check(steps(), bounds=True)
 
 
 def test_mutant_of_a_tie_is_caught() -> None:
-    with mutant(rairan.Datapath, "if not ties:", "if True:"), caught():
+    with mutant(rairan.RairanMethod, "if not ties:", "if True:"), caught():
         test_every_estimate("n1", 4)
 
 
@@ -177,7 +181,7 @@ def test_mutants_of_adaptive_dt_are_caught(right: str, wrong: str) -> None:
     ],
 )
 def test_mutants_of_what_depends_on_dt_are_caught(right: str, wrong: str) -> None:
-    with mutant(rairan.Counters, right, wrong), caught():
+    with mutant(RairanCounters, right, wrong), caught():
         check_adaptive()
 
 
@@ -192,5 +196,5 @@ def test_mutants_of_what_depends_on_dt_are_caught(right: str, wrong: str) -> Non
     ],
 )
 def test_mutants_of_the_shifted_estimate_are_caught(right: str, wrong: str) -> None:
-    with mutant(rairan.Datapath, right, wrong), caught():
+    with mutant(rairan.RairanMethod, right, wrong), caught():
         check_adaptive()

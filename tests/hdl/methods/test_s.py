@@ -8,7 +8,7 @@ from support.sequences import MAX_TICKS, PAPER, rounded
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.methods.interval import IntervalAccumulator
-from tachometry.hdl.methods.s import Datapath
+from tachometry.hdl.methods.s import SMethod
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
 OUTPUTS = ["velocity_valid", "velocity", "interval", "forced", "stalled"]
@@ -28,7 +28,7 @@ def run(spec: STachometer, m_e: list[int]) -> list[dict[str, int]]:
     rows = []
     for number in m_e:
         rows += [{"tick": 1, "pulse_count": number}] + [{"tick": 0}] * pause
-    return clock_by_clock(Datapath(spec), rows + [{}] * spec.tick_to_velocity, OUTPUTS)
+    return clock_by_clock(SMethod(spec), rows + [{}] * spec.tick_to_velocity, OUTPUTS)
 
 
 def check_paper_sequences(*, cancel: bool = True, serial: bool = True) -> None:

@@ -52,5 +52,5 @@ MUTANTS = {
 
 @pytest.mark.parametrize("name", MUTANTS)
 def test_mutants_are_caught(name: str) -> None:
-    with mutant(t_method.Datapath, *MUTANTS[name]), caught():
+    with mutant(t_method.TMethod, *MUTANTS[name]), caught():
         check_lattice()

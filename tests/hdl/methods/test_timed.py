@@ -40,15 +40,15 @@ def test_reversal(method: str) -> None:
 
 
 def check_standstill(method: str, sign: int = 1) -> None:
-    """The speed sinks tick by tick as 1 count over the silence, and is 0 when the maximum time is over."""
+    """The speed decays tick by tick as 1 count over the silence, and is 0 when the maximum time is over."""
     steps = {5: sign, 25: sign, 45: sign}
     n = 45 + 3 * SILENCE
     v = sign * speed(1, 20)
     moving = [(25, v, 20, False, False), (45, v, 20, False, False)]
     spec = timed(method)
     # The 0 takes the divider from the last of them.
-    sinking = decay(45, v, 45 + SILENCE - spec.division_clocks + 1)
-    assert run(spec, steps, n) == moving + sinking + silence(45, n)
+    decaying = decay(45, v, 45 + SILENCE - spec.division_clocks + 1)
+    assert run(spec, steps, n) == moving + decaying + silence(45, n)
     without = run(timed(method, bound_decay=False), steps, n)
     assert without == moving + silence(45, n)
 
@@ -167,7 +167,7 @@ MUTANTS = {
         "forced.eq(forced)",
         check_standstill,
     ),
-    "sinking too early": (quotient_velocity.QuotientVelocity, " & ~rounds & ~compared", "", check_turning_tail),
+    "decaying too early": (quotient_velocity.QuotientVelocity, " & ~rounds & ~compared", "", check_turning_tail),
 }
 
 

@@ -80,14 +80,14 @@ MUTANTS = {
     "a count less is not seen": ("else self.dividend - self.less", "else self.dividend"),
     "a count more is not seen": ("-(self.dividend + self.more)", "-self.dividend"),
     "the time is not widened": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "0"),
-    "it is widened one way": ("Mux(end[-1], -1, 1), 0)", "1, 0)"),
+    "it is widened on one side": ("Mux(end[-1], -1, 1), 0)", "1, 0)"),
     "it is widened in silence": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "Mux(end[-1], -1, 1)"),
     "over its last edge": ("Mux(still, 0, -greatest)", "-greatest"),
     "not over it after a reversal": ("~(signs[0] | signs[1])", "~signs[0]"),
-    "still in a forced 0": ("still = sinks & (", "still = ("),
+    "still in a forced 0": ("still = decays & (", "still = ("),
     "none is a number": ("Mux(none, limit, box.quotient)", "box.quotient"),
     "none after two": ("(self.divisor == 1)", "(self.divisor <= 2)"),
-    "always known": ("self.bounds_valid.eq(known)", "self.bounds_valid.eq(1)"),
+    "always known": ("new.bounds_valid.eq(known)", "new.bounds_valid.eq(1)"),
 }
 
 
@@ -111,5 +111,5 @@ def test_mutants_of_the_quotients_are_caught(name: str) -> None:
     ],
 )
 def test_mutants_of_the_ends_of_a_window_are_caught(right: str, wrong: str) -> None:
-    with mutant(mt_method.Datapath, right, wrong), caught():
+    with mutant(mt_method.MTMethod, right, wrong), caught():
         check("mt", "tick")

@@ -5,6 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from amaranth import signed
+from amaranth.lib import data
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
@@ -22,6 +24,10 @@ class Resting(STachometer):
 
 ONE_TABLE = Resting(encoder=Encoder(500), timing=Timing(48_000_000, 20, 60), frac_bits=6, lowpass=Fraction(100_000))
 TWO_TABLES = replace(ONE_TABLE, timing=Timing(48_000_000, 20, 5000), lowpass=Fraction(2000))
+
+
+LAYOUT = data.StructLayout({"velocity": signed(ONE_TABLE.native_width), "stalled": 1, "tag": 4})
+COLUMNS = ("filtered.p.velocity", "filtered.p.tag")
 
 
 def check(spec: STachometer, n: int = 150) -> None:
@@ -46,10 +52,10 @@ def check(spec: STachometer, n: int = 150) -> None:
     rows = []
     for clock in range(n_clocks):
         k = at.get(clock, 0)
-        known = {"native": int(velocity[k]), "clear": int(clears[k]), "tag": k % 16}
-        rows.append({"start": int(clock in at), "tick": int(clock in ticks), **known})
-    seen = clock_by_clock(low_pass.LowPass(form, tag_width=4), rows, ["done", "velocity", "tag_out"])
-    got = [(k, row["velocity"], row["tag_out"]) for k, row in enumerate(seen) if row["done"]]
+        known = {"velocity": int(velocity[k]), "stalled": int(clears[k]), "tag": k % 16}
+        rows.append({"velocity_valid": int(clock in at), "tick": int(clock in ticks), **known})
+    seen = clock_by_clock(low_pass.LowPass(form, LAYOUT, clears=True), rows, ["filtered.valid", *COLUMNS])
+    got = [(k, *(row[name] for name in COLUMNS)) for k, row in enumerate(seen) if row["filtered.valid"]]
     columns = (wanted.clock, wanted.velocity, wanted["tag"])
     assert got == list(zip(*(column.tolist() for column in columns), strict=True))
     assert len(got) < n
@@ -63,9 +69,9 @@ def test_as_the_golden_one(spec: STachometer) -> None:
 
 MUTANTS = {
     "not rounded": ("Cat(step == bits, total).as_signed()", "Cat(0, total).as_signed()"),
-    "intervals of the first alone": ("Mux(waiting & ~take, next_interval, 0)", "0"),
+    "intervals of the first alone": ("Mux(waiting & ~take, interval, 0)", "0"),
     "taken too early": ("waiting & ~working & ~adding", "waiting & ~working"),
-    "not cleared": ("Mux(next_clear, 0, y - (next_u << extra))", "y - (next_u << extra)"),
+    "not cleared": ("Mux(clear, 0, y - (following.velocity << extra))", "y - (following.velocity << extra)"),
     "one factor": ("working & last & (second if high else 1)", "working & last"),
     "no rounding of the output": ("(y + (1 << (extra - 1)))", "y"),
 }

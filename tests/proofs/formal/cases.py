@@ -52,11 +52,14 @@ _METHOD_PROBES = {
     "core_previous": "datapath.alteration.previous",
     "core_offset": "datapath.alteration.offset",
 }
-_SERIAL_PROBES = {"core_running": "datapath.scaler.running", "core_step": "datapath.scaler.step"}
+_SERIAL_PROBES = {
+    "core_running": "datapath.quotient.scaler_velocity.running",
+    "core_step": "datapath.quotient.scaler_velocity.step",
+}
 _CARRIED_PROBES = {
-    "core_carried": "datapath.reciprocal.carried",
-    "core_q": "datapath.scaler.q",
-    "core_r": "datapath.scaler.r",
+    "core_carried": "datapath.quotient.reciprocal.carried",
+    "core_q": "datapath.quotient.scaler_velocity.q",
+    "core_r": "datapath.quotient.scaler_velocity.r",
 }
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
 
@@ -224,7 +227,7 @@ _TIMED_PROBES = {
 _WINDOW_OF_MT_PROBES = {
     "core_length": "datapath.length",
     "core_late": "datapath.late",
-    "core_way": "datapath.way",
+    "core_travelled": "datapath.travelled",
 }
 
 
@@ -289,7 +292,7 @@ _MT_GIVEN = (
     "lemma_idle lemma_age lemma_timer lemma_since lemma_free lemma_running lemma_silent lemma_many lemma_left "
     "lemma_steps lemma_rest lemma_rested lemma_length lemma_unopened lemma_core_length lemma_window_free "
     "pt_update pt_held pt_spacing pt_rest",
-    "lemma_way",
+    "lemma_travelled",
 )
 
 
@@ -308,7 +311,7 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
     return [
         *(
             replace(upset, name=f"{name}: {part}", depth=1, recovers=settled, only=given)
-            for part, given in zip(("given", "way"), _MT_GIVEN, strict=True)
+            for part, given in zip(("given", "travelled"), _MT_GIVEN, strict=True)
         ),
         replace(upset, name=f"{name}: since", parameters=late, depth=1, recovers=clocks, only="lemma_fresh"),
         replace(upset, name=name, given=" ".join(_MT_GIVEN), without="lemma_fresh"),

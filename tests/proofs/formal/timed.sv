@@ -78,17 +78,17 @@ module timed #(
       was_negative <= count ? negative : last_negative;
     end
 
-  // The window of M/T: its length, and its way so far, in counts.
-  reg signed [W-1:0] way = 0;
+  // The window of M/T: its length, and what it has travelled so far, in counts.
+  reg signed [W-1:0] travelled = 0;
   wire signed [W-1:0] pair = MT && LATTICE ? size : negative != last_negative ? 0 : negative ? -1 : 1;
   wire closes = MT && count && opened && lasted > MIN_PERIODS;
   always @(posedge clk)
     if (rst) begin
-      way <= 0;
+      travelled <= 0;
       length <= 1;
     end else begin
       if (period) length <= closes || !opened || overdue ? 1 : length + 1;
-      if (count) way <= closes || !opened ? 0 : way + pair;
+      if (count) travelled <= closes || !opened ? 0 : travelled + pair;
     end
 
   // The division under way: clocks since it began, whether it is of a measurement, its distance and time.
@@ -99,13 +99,13 @@ module timed #(
   wire free = UPSET ? !core_measuring || !(core_running || core_rounds) : since == 0 || since == B || !measuring;
   wire idles = UPSET ? !(core_running || core_rounds || core_compared) : since == 0;
   wire measured = MT ? closes : count && free && (opened || many);
-  wire sinks = tick && !count && !overdue && idles;
-  wire signed [W-1:0] pairs = MT ? way + pair : many ? (negative ? -1 : 1) : pair;
+  wire decays = tick && !count && !overdue && idles;
+  wire signed [W-1:0] pairs = MT ? travelled + pair : many ? (negative ? -1 : 1) : pair;
   always @(posedge clk)
     if (rst) since <= 0;
     else begin
-      since <= overdue || measured || sinks ? 1 : since == 0 || since == B ? 0 : since + 1;
-      if (overdue || measured || sinks) begin
+      since <= overdue || measured || decays ? 1 : since == 0 || since == B ? 0 : since + 1;
+      if (overdue || measured || decays) begin
         measuring <= overdue || measured;
         silent <= !count;
         still <= !count && !opened;
@@ -158,7 +158,7 @@ module timed #(
   wire fresh_now = fresh_clocks == SETTLED, fresh = due ? fresh_due : fresh_before;
   always @(posedge clk) begin
     if (!fresh_now) fresh_clocks <= fresh_clocks + 1;
-    if (fresh_now && (rst || overdue || measured || sinks)) fresh_division <= 1;
+    if (fresh_now && (rst || overdue || measured || decays)) fresh_division <= 1;
     fresh_due <= fresh_division;
     if (fresh_now && rst) {fresh_before, fresh_past} <= 2'b11;
     else begin
@@ -209,7 +209,7 @@ module timed #(
         && core_remainder >= -$signed({1'b0, times})));
     lemma_quotient: assert (!fresh_division || !core_running || taken == core_remainder + passed);
     lemma_rounded: assert (!fresh_division || since < N + 2 || (found <= asked && asked < found + twice));
-    lemma_sinks: assert (!fresh_division || since == 0 || measuring || (distance == (velocity < 0 ? -P : P) && silent));
+    lemma_decays: assert (!fresh_division || since == 0 || measuring || (distance == (velocity < 0 ? -P : P) && silent));
     lemma_sunk: assert (!fresh_due || !due || due_measuring || (due_distance == (past < 0 ? -P : P) && due_silent));
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
@@ -243,14 +243,14 @@ module timed #(
     if (MT) begin : mt
       wire [I-1:0] core_length;
       wire core_late;
-      wire signed [I+Q:0] core_way;
+      wire signed [I+Q:0] core_travelled;
       assign lasted = UPSET ? core_length : length;
       always @* begin
         lemma_length: assert (length >= 1 && (!opened || (length <= MIN_PERIODS + age && core_length == length
             && core_late == (length > MIN_PERIODS))));
         lemma_unopened: assert (opened || length == 1);
         lemma_core_length: assert (opened || age == 1 || (core_length == 1 && !core_late));
-        lemma_way: assert (!opened || (core_way == P * way && way <= farthest && -way <= farthest));
+        lemma_travelled: assert (!opened || (core_travelled == P * travelled && travelled <= farthest && -travelled <= farthest));
         lemma_window_free: assert (since == 0 || !measuring || since >= (length - 1) * PHASES + phase);
       end
     end else assign lasted = length;
@@ -264,7 +264,7 @@ module timed #(
         || (shown_times == 0 && velocity == 0));
     pt_flag: assert (!fresh || kept || shown_times == 0 || beyond == (FLAGS && (!fits || shown_many)));
     pt_saturated: assert (!fresh || fits || kept || shown_times == 0 || velocity == (shown_distance < 0 ? -LIMIT : LIMIT));
-    pt_sinks: assert (!fresh_past || !fresh_due || !velocity_valid || due_measuring || (forced && !stalled
+    pt_decays: assert (!fresh_past || !fresh_due || !velocity_valid || due_measuring || (forced && !stalled
         && (past < 0 ? velocity <= 0 && velocity > past : velocity >= 0 && velocity < past)));
     pt_bound: assert (!fresh_due || !due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
     pt_rest: assert (idle < LONG + B || velocity == 0);

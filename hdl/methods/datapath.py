@@ -1,0 +1,54 @@
+"""What every datapath has in common."""
+
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
+
+from amaranth import Signal, Value, signed
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Member, Out
+
+from tachometry.hdl.output.update import VELOCITIES, update_layout, update_stream
+from tachometry.spec import TachometerSpec
+
+
+class Datapath(Protocol):
+    """From pulse numbers to updates.
+
+    Among its members are `updates`, and those inputs that it needs: `tick` and `pulse_count`, `step` (as late as
+    `tick`), or `step_now` (as early as the decoder has it).
+    """
+
+    signature: wiring.Signature
+    updates: stream.Interface
+
+    @property
+    def probes(self) -> Mapping[str, Value]:
+        """What a waveform should show of the inside."""
+
+
+class TickSource(Protocol):
+    """Says which clocks are the last ones of their windows."""
+
+    last: Signal
+
+
+@runtime_checkable
+class OwnTicks(Datapath, TickSource, Protocol):
+    """A datapath that makes the ticks itself; `beyond` says that a window had more counts than it can hold."""
+
+    beyond: Signal
+
+
+def datapath_members(spec: TachometerSpec) -> dict[str, Member]:
+    """Members of every datapath: `tick`, `pulse_count` with it, and the updates."""
+    return {
+        "tick": In(1),
+        "pulse_count": In(signed(spec.count_width)),
+        "updates": Out(update_stream(update_layout(spec))),
+    }
+
+
+def quotients(spec: TachometerSpec) -> dict[str, tuple[int, int]]:
+    """Bits of each velocity of an update, and which way it is rounded."""
+    members = update_layout(spec).members
+    return {name: (members[name].width, towards) for name, towards in VELOCITIES.items() if name in members}

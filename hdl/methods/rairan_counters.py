@@ -1,0 +1,230 @@
+"""The counters of Rairán 2013, Table 1."""
+
+from collections.abc import Callable
+
+from amaranth import Const, Module, Mux, Signal, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.methods.dt_shift import DtShift
+from tachometry.spec import RairanTachometer
+
+
+class RairanCounters(wiring.Component):
+    """Table 1 of Rairán 2013 at every clock: Cep, Cdt, the clock of dt, and what they make of Nep1 and Ndt1.
+
+    Latency: `update` is high in the clock after the count, or the end of dt, that causes it.
+
+    Parameters
+    ----------
+    spec : RairanTachometer
+
+    Members
+    -------
+    step : In(signed(2))
+    last : Out(1)
+        High in the clock in which dt ends; without latency.
+    beyond : Out(1)
+        There were more counts in this dt than Cep can hold; valid with `last`.
+    update : Out(1)
+        A new estimate, or an old one found too large.
+    n : Out
+        Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. This and all below are held until the next update.
+    high, backward : Out(1)
+        The regime, and the direction.
+    forced, stalled : Out(1)
+        Of the last update: it came without a count; and it is that of the maximum time.
+    n_ep1, n_dt1 : Out
+        Only with `paper_exact`: as in Table 1.
+    shift : Out
+        Only if dt is adaptive: n is of dt·2^shift.
+    loose, unsynced, known : Out(1)
+        Only with bounds: n says nothing of the least speed; what it measures did not begin in step with dt; there has
+        been a count that dt was in step with.
+    """
+
+    def __init__(self, spec: RairanTachometer) -> None:
+        self._spec = spec
+        ratio = spec.method_ports if spec.paper_exact else ()
+        super().__init__(
+            {
+                "step": In(signed(2)),
+                "last": Out(1),
+                "beyond": Out(1),
+                "update": Out(1),
+                "n": Out(range(max(spec.max_pulse_count, spec.timing.max_ticks) + 1)),
+                "high": Out(1),
+                "backward": Out(1),
+                "forced": Out(1),
+                "stalled": Out(1),
+                # Nep1 and Ndt1 as they are before anything has come.
+                **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
+                **({"shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
+                **({name: Out(1) for name in ("loose", "unsynced", "known")} if spec.bounds else {}),
+            }
+        )
+        # Cep − 1, and whether there is any.
+        self.c_more = Signal(range(max(spec.max_pulse_count, 2)))
+        self.any = Signal()
+        self.c_dt = Signal(range(spec.timing.max_ticks + 1))
+        self.rest = Signal()  # it has come to its end
+        self.dt = DtShift(spec, len(self.n)) if spec.adaptive else None
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        pulse = Signal()
+        opens = Signal()
+        late = Signal()  # dt has ended since the last count, Cdt ≠ 0
+        due = self._clock(m, opens)
+        if self.dt is not None:
+            m.submodules.dt = self.dt
+            m.d.comb += [self.dt.nominal.eq(due), self.dt.opens.eq(opens)]
+            due = self.dt.last
+        m.d.comb += pulse.eq(self.step.any())
+        self._count(m, pulse, opens)
+        if self._spec.paper_exact:
+            # A count at the end of dt is in neither window.
+            m.d.comb += [opens.eq(pulse & late), self.last.eq(due & ~opens)]
+            with m.If(self.last):
+                m.d.sync += late.eq(1)
+            with m.Elif(pulse):
+                m.d.sync += late.eq(0)
+            self._update_to_the_letter(m, opens)
+            return m
+        moved = Signal()
+        turns = Signal()
+        m.d.comb += [
+            turns.eq(pulse & moved & (self.step[1] ^ self.backward)),
+            self.last.eq(due & ~(pulse & late) & ~turns),
+            opens.eq(pulse & (late | due) | turns),
+        ]
+        with m.If(pulse):
+            m.d.sync += [moved.eq(1), self.backward.eq(self.step[1]), late.eq(0)]
+        with m.Elif(self.last):
+            m.d.sync += late.eq(1)
+        if self.dt is not None:
+            # With the decay it is low from the second dt on.
+            several, stays = self.c_more.any(), self.high & (self._spec.bound_decay | (self.c_dt == 1))
+            measured = Mux(late, Mux(stays, self.n, self.c_dt), Mux(several, self.c_more, 1))
+            m.d.comb += [self.dt.turns.eq(turns), self.dt.high.eq(Mux(late, stays, several)), self.dt.n.eq(measured)]
+        self._update(m, pulse=pulse, opens=opens, turns=turns)
+        return m
+
+    def _of_dt(self, constant: Callable[[int], int]) -> Value | int:
+        """A constant that depends on k of dt·2^k."""
+        return constant(0) if self.dt is None else self.dt.of(constant)
+
+    def _clock(self, m: Module, opens: Signal) -> Value:
+        """Count dt from where a window opens, and on; whether it is over."""
+        cycles = self._spec.timing.tick_cycles
+        if cycles == 1:
+            return Const(1)
+        # Counts down to −1, as the sampling clock does.
+        start = cycles - 2
+        left = Signal(signed(start.bit_length() + 1), init=start)
+        m.d.sync += left.eq(left - Const(1, left.shape()))
+        with m.If(left[-1] | opens):
+            m.d.sync += left.eq(start)
+        return left[-1]
+
+    def _count(self, m: Module, pulse: Signal, opens: Signal) -> None:
+        """Cep, which a window that a count opens begins with that count, and Cdt since the last count."""
+        c_more, c_dt, most = self.c_more, self.c_dt, self._spec.max_count
+        full: Value = Const(0)
+        if most < self._spec.timing.tick_cycles:
+            full = self.any & (c_more == self._of_dt(lambda k: (most << k) - 1))
+        with m.If(pulse):
+            m.d.sync += self.any.eq(1)
+            with m.If(full):
+                m.d.sync += self.beyond.eq(1)
+            with m.Else():
+                m.d.sync += c_more.eq(c_more + self.any)
+        with m.If(self.last):
+            m.d.sync += [c_more.eq(0), self.any.eq(0), self.beyond.eq(0)]
+            m.d.sync += self.rest.eq(self._is_longest())
+            with m.If(~self._is(self._spec.max_dt)):
+                m.d.sync += c_dt.eq(c_dt + 1)
+        with m.If(opens):
+            m.d.sync += [c_more.eq(0), self.any.eq(1), self.beyond.eq(0)]
+        with m.If(pulse & ~self.last if self._spec.paper_exact else pulse):
+            m.d.sync += [c_dt.eq(0), self.rest.eq(0)]
+
+    def _is(self, constant: Callable[[int], int]) -> Value:
+        """Cdt is a constant that depends on k of dt·2^k."""
+        return self.c_dt == self._of_dt(constant)
+
+    def _is_longest(self) -> Value:
+        """With this end of dt Cdt is what the maximum time has dt, or has been so before."""
+        return self._is(self._spec.max_dt) | self._is(lambda k: self._spec.max_dt(k) - 1)
+
+    def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal) -> None:
+        """What a count or the end of dt makes of the estimate."""
+        spec = self._spec
+        several, one = self.c_more.any(), self.any
+        in_step = Signal()  # the last count opened its window
+        waits = Signal()  # dt ends without a count
+        with m.If(pulse):
+            m.d.sync += in_step.eq(opens)
+        known = Signal()
+        with m.If(opens):
+            m.d.sync += known.eq(1)
+        waited = self.c_dt + in_step
+        m.d.comb += waits.eq(self.last & ~pulse)
+        n: Value = self.n
+        if self.dt is not None:
+            # n is that of the window before, whose k may be one more or less, until this one has measured.
+            differs = (self.shift - self.dt.shift)[:2]
+            n = Mux(differs[0], Mux(differs[1], n >> 1, n << 1), n)
+
+        def set_(
+            n: Value | int,
+            *,
+            update: Value | int = 1,
+            high: int = 0,
+            forced: int = 0,
+            stalled: int = 0,
+            loose: Value | int = 0,
+            unsynced: Value | int = 0,
+        ) -> None:
+            if self.dt is not None:
+                m.d.sync += self.shift.eq(self.dt.shift)
+            if spec.bounds:
+                m.d.sync += [self.loose.eq(loose), self.unsynced.eq(unsynced), self.known.eq(known)]
+            m.d.sync += [
+                self.update.eq(update),
+                self.n.eq(n),
+                self.high.eq(high),
+                self.forced.eq(forced),
+                self.stalled.eq(stalled),
+            ]
+
+        m.d.sync += self.update.eq(0)
+        with m.If(turns):
+            set_(0)
+        with m.Elif(self.last & several):
+            set_(self.c_more, high=1)
+        with m.Elif(self.last & (pulse | (one & self.high))):
+            # Ndt1 ← 1 by a count just at the end of dt, or Nep1 ← 1.
+            set_(1, loose=~pulse)
+        with m.Elif(opens & ((self.c_dt != 1) | ~self.high)):
+            set_(self.c_dt, loose=self.rest, unsynced=~in_step)
+        with m.Elif(waits & self._is_longest()):
+            # At rest no update would mend it after an upset.
+            set_(0, update=~self.rest, forced=1, stalled=1)
+        if spec.bound_decay:
+            with m.Elif(waits & Mux(self.high, waited != 0, (waited > n) & self.n.any())):
+                set_(waited, forced=1, loose=1)
+
+    def _update_to_the_letter(self, m: Module, opens: Signal) -> None:
+        """Lines 5 to 9 of Table 1."""
+        m.d.sync += self.update.eq(opens | (self.last & self.any))
+        with m.If(opens):
+            m.d.sync += self.n_dt1.eq(self.c_dt)
+            with m.If((self.c_dt != 1) | ~self.high):
+                m.d.sync += [self.n.eq(self.c_dt), self.high.eq(0)]
+        with m.Elif(self.last & self.any):
+            m.d.sync += self.n_ep1.eq(self.c_more + 1)
+            with m.If(self.c_more.any()):
+                m.d.sync += [self.n.eq(self.c_more), self.high.eq(1)]
+            with m.Elif(self.high | ~self.n.any()):
+                m.d.sync += [self.n.eq(1), self.high.eq(0)]

@@ -1,0 +1,31 @@
+"""An update of the velocity, as one typed payload on its way from the method to the ports."""
+
+from amaranth import signed
+from amaranth.lib import data, stream
+
+from tachometry.spec import TachometerSpec
+from tachometry.spec.formats.velocity_output import VelocityOutput
+from tachometry.spec.tachometer import BOUNDS
+
+# The velocities of an update, and which way each is rounded: to the nearest (0), down (−1) or up (1).
+VELOCITIES = {"velocity": 0, **BOUNDS}
+
+
+def update_layout(spec: TachometerSpec) -> data.StructLayout:
+    """What a method hands on: all outputs that change only with `velocity_valid`, velocities in counts per tick."""
+    fields = {"velocity": signed(spec.native_width), "interval": spec.interval_width, "forced": 1, "stalled": 1}
+    if spec.bounds:
+        fields |= {name: signed(spec.bound_width) for name in BOUNDS} | {"bounds_valid": 1}
+    fields |= {port.name: signed(port.width) if port.signed else port.width for port in spec.method_ports}
+    return data.StructLayout(fields)
+
+
+def shown_layout(layout: data.StructLayout, output: VelocityOutput) -> data.StructLayout:
+    """What the output stage makes of such an update: velocities in another unit, and whether one was saturated."""
+    shown = {name: signed(output.port_width) for name in layout.members if name in VELOCITIES}
+    return data.StructLayout({**layout.members, **shown, "velocity_overflow": 1})
+
+
+def update_stream(layout: data.StructLayout) -> stream.Signature:
+    """Updates, each valid for a clock; nothing can hold them up."""
+    return stream.Signature(layout, always_ready=True)
