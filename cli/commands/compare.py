@@ -244,15 +244,13 @@ def _size_cells(size: Measurement | None) -> list[str]:
 
 
 def _write(path: Path, scores: list[Score], sizes: dict[str, Measurement]) -> None:
-    import csv
+    from tachometry.sim.signals.files import write_csv
 
     names = [name for name in vars(scores[0]) if name != "what"]
     figures = list(_SIZE) if sizes else []
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*names, *figures])
-        for row in scores:
-            cells = [getattr(row, name) for name in names]
-            size = sizes.get(row.name)
-            cells += [None if size is None else size.figures[figure] for figure in figures]
-            writer.writerow(["" if cell is None else cell for cell in cells])
+
+    def cells(row: Score) -> list[object]:
+        size = sizes.get(row.name)
+        return [getattr(row, name) for name in names] + [size and size.figures[figure] for figure in figures]
+
+    write_csv(path, [*names, *figures], map(cells, scores))

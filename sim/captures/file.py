@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from tachometry.sim.files import replacing
+from tachometry.sim.signals.files import replacing
 
 Channel = str | int
 NONE: Mapping[str, Channel] = {}

@@ -9,8 +9,8 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim import files
 from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, writing
+from tachometry.sim.signals import files
 from tachometry.sim.signals.recording import Recording
 
 BLOCK = 4 << 20  # bytes of text parsed at once

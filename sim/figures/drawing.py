@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tachometry.sim.figures.result import Curve, Panel, Result
-from tachometry.sim.files import write_csv
 from tachometry.sim.plots.style import columns, save_figure
+from tachometry.sim.signals.files import write_csv
 
 _COLOURS = ("#2a78c8", "#d9730d", "#2e6b3e", "#7b3fa0", "#b3261e", "#00838f")
 GOLDEN = ", golden"  # at the end of a label: measured, in the colour of the line that it belongs to

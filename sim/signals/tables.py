@@ -1,9 +1,7 @@
 """A run as tables: updates, ticks, and the held velocity with its error."""
 
-import csv
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -11,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.run import Run
 from tachometry.spec import TachometerSpec
 from tachometry.spec.port import TICK, UPDATE
-
-_ROWS = 1 << 16  # rows written at once
 
 
 @dataclass(frozen=True)
@@ -87,13 +84,13 @@ def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
         "velocity_rad_s": updates.velocity * spec.rad_per_s_per_lsb,
     }
     columns |= {name: updates[name].astype(np.int64) for name in updates.columns if name not in (*columns, "velocity")}
-    write_csv(path, ",".join(columns), columns.values())
+    write_csv(path, tuple(columns), rows_of(list(columns.values())))
 
 
 def write_counts(path: Path, run: Run) -> None:
     """Write a CSV with a row per tick: its number, then what all ports say that are held by the tick."""
     columns = {"tick": np.arange(len(run.ticks)), **run.ticks.columns}
-    write_csv(path, ",".join(columns), (column.astype(np.int64) for column in columns.values()))
+    write_csv(path, tuple(columns), rows_of([column.astype(np.int64) for column in columns.values()]))
 
 
 def write_events(path: Path, run: Run) -> None:
@@ -105,20 +102,7 @@ def write_events(path: Path, run: Run) -> None:
     columns = [name for table in tables.values() for name in table.columns]
     rows: list[tuple[Any, ...]] = []
     for event, table in tables.items():
-        cells = [table[name].tolist() if name in table.columns else [""] * len(table) for name in columns]
+        cells = [table[name].tolist() if name in table.columns else [None] * len(table) for name in columns]
         rows += [(clock, event, *values) for clock, *values in zip(table.clock.tolist(), *cells, strict=True)]
     rows.sort(key=itemgetter(0))
-    with path.open("w", encoding="ascii", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["clock", "event", *columns])
-        writer.writerows(rows)
-
-
-def write_csv(path: Path, header: str, columns: Iterable[NDArray[np.generic]]) -> None:
-    """Write a CSV. Numbers are the shortest that read back as the same, equal on every machine."""
-    table = list(columns)
-    with path.open("w", encoding="ascii", newline="\n") as file:
-        file.write(f"{header}\n")
-        for first in range(0, len(table[0]), _ROWS):
-            rows = zip(*(column[first : first + _ROWS].tolist() for column in table), strict=True)
-            file.writelines(chain.from_iterable((",".join(map(repr, row)), "\n") for row in rows))
+    write_csv(path, ("clock", "event", *columns), rows)

@@ -1,6 +1,5 @@
 """What the methods promise at each speed, from the equations alone."""
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tachometry.sim.signals.tables import write_csv
+from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.theory.performance import PERFORMANCES, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import TachometerSpec
@@ -104,19 +103,15 @@ def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.fl
 
 def write_plan(path: Path, plan: Plan) -> None:
     """Write a CSV with a row per speed."""
-    write_csv(path, ",".join(_columns(plan)), _columns(plan).values())
+    columns = _columns(plan)
+    write_csv(path, tuple(columns), rows_of(list(columns.values())))
 
 
 def write_plans(path: Path, plans: Mapping[str, Plan]) -> None:
     """Write a CSV with a row per method and speed."""
     columns = [_columns(plan) | {"product_rad": plan.product} for plan in plans.values()]
-    names = np.repeat(list(plans), [len(plan.speed) for plan in plans.values()])
-    joined = {head: np.concatenate([one[head] for one in columns]) for head in columns[0]}
-    rows = zip(names.tolist(), *(column.tolist() for column in joined.values()), strict=True)
-    with path.open("w", encoding="ascii", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["method", *joined])
-        writer.writerows([name, *map(repr, row)] for name, *row in rows)
+    rows = ((name, *row) for name, one in zip(plans, columns, strict=True) for row in rows_of(list(one.values())))
+    write_csv(path, ("method", *columns[0]), rows)
 
 
 def _columns(plan: Plan) -> dict[str, NDArray[Any]]:

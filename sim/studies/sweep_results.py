@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
-from tachometry.sim.files import replacing
+from tachometry.sim.signals.files import replacing
 from tachometry.sim.studies.sweep import COLUMNS, Row, code_digest
 from tachometry.spec.option import ParameterError
 

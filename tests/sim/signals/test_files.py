@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tachometry.sim import files
-from tachometry.sim.files import replacing, rows_of, write_csv
+from tachometry.sim.signals import files
+from tachometry.sim.signals.files import replacing, rows_of, write_csv
 
 
 def test_a_file_is_replaced_at_the_end(tmp_path: Path) -> None:
