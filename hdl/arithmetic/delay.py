@@ -8,13 +8,13 @@ from amaranth import Module, Signal, Value, ValueLike
 def delay(m: Module, *values: ValueLike, clocks: int = 1, only_if: Value | None = None) -> Sequence[Signal]:
     """Registers that follow the values so many clocks later; where `only_if` is low, they become 0 instead.
 
-    A register has the name of what it follows, if that is a signal.
+    A register is named after what it follows, if that is a signal.
     """
     for _ in range(clocks):
         registers = []
         for value in values:
-            name = getattr(Value.cast(value), "name", "delayed")
-            register = Signal.like(value, name=name)
+            name = getattr(Value.cast(value), "name", "value").removesuffix("_late")
+            register = Signal.like(value, name=f"{name}_late")
             m.d.sync += register.eq(value)
             if only_if is not None:  # the reset of a flip-flop is free, where a gate is not
                 with m.If(~only_if):

@@ -103,7 +103,7 @@ MUTANTS = [
         "~self.previous.any()",
     ),
     Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
-    Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & ~moving_sum.empty)"),
+    Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & ~known.stalled)"),
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
     Mutant("M of 4", "pm_stalled", MovingSum, "(quiet >= last)", "(quiet >= last - 1)"),
