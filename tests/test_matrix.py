@@ -4,29 +4,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.verilog import run_in_verilator
+from support.verilog import lint_exported
 
-from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.cxxrtl import Cxxrtl
-from tachometry.sim.signals.run import compare
+from tachometry.sim.engines.verilator import Verilator
+from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS
 
 CORES = [words for method in METHODS for words in configurations(method)]
+# A build takes seconds, a motion milliseconds: as many motions as these numbers allow are played on every core.
+MOTIONS, CLOCKS, EDGES = 50, 30_000_000, 100
 
 
 @pytest.mark.parametrize("words", CORES, ids=" ".join)
 def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     spec = spec_of(words)
+    lint_exported(spec, tmp_path)
     trace = stress(spec, seed=1)
     # The longest would take Verilator half a minute.
-    fast = trace.n_clocks > 1e8
-    actual = Cxxrtl().run(spec, trace) if fast else run_in_verilator(spec, tmp_path, trace)
-    count, first = compare(golden.run(spec, trace), actual)
-    assert count == 0, first
+    engine = Cxxrtl() if trace.n_clocks > 1e8 else Verilator()
+    found = lockstep(spec, trace, engine)
+    assert found.n_mismatches == 0, found.first
     # All that the configuration can show has happened.
-    updates = actual.updates
+    actual, updates = found.actual, found.actual.updates
     # Long windows and what waits for the filter give few updates.
     few = {"--min-time", "--lowpass"} & {*words}
     assert np.count_nonzero(~updates.forced) > (5 if few else 100)
@@ -37,3 +39,11 @@ def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     assert bool(len(actual.index.clock)) == spec.index
     assert bool(len(actual.tick_errors)) == (spec.max_tick_cycles is not None)
     assert updates.get("velocity_overflow").any() <= ("--velocity-width" in words)
+    left = CLOCKS
+    for seed in range(2, MOTIONS + 1):
+        trace = stress(spec, seed, EDGES)
+        left -= trace.n_clocks
+        if left < 0:
+            break
+        found = lockstep(spec, trace, engine)
+        assert found.n_mismatches == 0, f"seed {seed}: {found.first}"

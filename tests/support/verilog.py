@@ -62,10 +62,15 @@ def _changes(pins: list[Port], trace: PinTrace) -> np.ndarray:
     return np.stack([trace.clock, *(trace.lines[pin.name] for pin in pins)], axis=1).astype(np.int64)
 
 
-def run_in_verilator(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
-    """Read the exported Verilog with -Wall, any warning an error, and play a trace on it."""
+def lint_exported(spec: TachometerSpec, folder: Path) -> None:
+    """Let Verilator read the exported Verilog with -Wall; any warning is an error."""
     (folder / "tachometer.v").write_text(export(spec)["tachometer.v"])
     lint(["tachometer.v"], "tachometer", folder)
+
+
+def run_in_verilator(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
+    """Read the exported Verilog with -Wall, any warning an error, and play a trace on it."""
+    lint_exported(spec, folder)
     return Verilator().run(spec, trace)
 
 
