@@ -179,7 +179,7 @@ class OtherCode(ImportError):
 # Code that decides the row of a point, and, where an engine runs the hardware beside the golden model, that, too.
 _CODE = (
     *("spec", "sim/golden", "sim/encoder", "sim/signals"),
-    *(f"sim/studies/{name}.py" for name in ("__init__", "sweep", "compare", "baselines")),
+    *(f"sim/studies/{name}.py" for name in ("__init__", "sweep", "compare", "baselines", "lockstep")),
 )
 _HARDWARE_CODE = ("hdl", "sim/engines")
 

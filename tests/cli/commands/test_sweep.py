@@ -124,7 +124,7 @@ def test_the_hardware_in_lockstep(
     told = capsys.readouterr().out
     assert "\n1 point, none run anew; " in told
     assert "in every bit of 1 point, 2000 clocks" in told
-    monkeypatch.setattr(sweep, "compare", lambda *_: (3, []))
+    monkeypatch.setattr("tachometry.sim.studies.lockstep.compare", lambda *_: (3, []))
     assert run(*line, *scheduler, "--seed", "1") == 1
     assert "FAIL: hardware and golden model differ in 6 values" in capsys.readouterr().out
 

@@ -227,7 +227,7 @@ def test_the_core_comes_out_even_after_bounce(filter_clocks: int) -> None:
     behind = run.ticks.position - true
     assert np.max(np.abs(behind)) <= 1  # an edge of this moment
     assert np.count_nonzero(behind) < len(behind) / 3
-    assert (run.ticks.swallowed_edges[-1] > 100) == bool(filter_clocks)
+    assert (run.ticks.get("swallowed_edges")[-1] > 100) == bool(filter_clocks)
 
 
 def test_edges_that_come_together_do_not_bounce() -> None:

@@ -173,7 +173,7 @@ def test_code_that_decides_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     assert folders(golden) == {"spec", "golden", "encoder", "signals", "studies"}
     assert folders(hardware) == folders(golden) | {"hdl", "engines"}
     studies = {file.stem for file in golden if file.parent == start.parent}
-    assert studies == {"__init__", "sweep", "compare", "baselines"}
+    assert studies == {"__init__", "sweep", "compare", "baselines", "lockstep"}
 
 
 def test_code_that_decides_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
