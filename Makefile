@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test verify formal mutate upset bench size api lint clean
+.PHONY: help venv demo figures compare icarus test verify formal mutate upset bench size docs api lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -79,6 +79,9 @@ compare: $(VENV)/.run ## all methods and what others use in several situations, 
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
 	$(BIN)/python bench/size.py -o docs/size.md
+
+docs: $(VENV)/.run ## the tables of all options and ports, written to docs/options.md and docs/ports.md
+	$(BIN)/python bench/reference.py
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	$(BIN)/pdoc --docformat numpy -o build/api $(addprefix tachometry.,$(LAYERS)) \

@@ -150,17 +150,16 @@ class TachometerSpec(Numbers):
         if not self.bounds:
             return ()
         width = self.bound_width if self.output is None else self.output.port_width
-        none = self.shown_bound_limit
         return (
             *(
                 held(
                     *(UPDATE, name, width),
                     signed=True,
                     unit=f"2^{-self.frac_bits} {self.unit}",
-                    help=f"{side} end of what the true mean speed over the measured window was; {towards * none} means "
-                    "that there is none.",
+                    help=f"{side} end of what the true mean speed over the measured window was; {sign} bounds.none of "
+                    "the manifest means that there is none.",
                 )
-                for (name, towards), side in zip(BOUNDS.items(), ("Lower", "Upper"), strict=True)
+                for name, side, sign in zip(BOUNDS, ("Lower", "Upper"), ("minus", "plus"), strict=True)
             ),
             held(UPDATE, "bounds_valid", help="There are bounds; not yet for the first measurement."),
         )

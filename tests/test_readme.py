@@ -16,8 +16,8 @@ TEXT = (ROOT / "README.md").read_text()
 RUN_BY = "make test"  # this is part of it
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", TEXT, re.DOTALL)
+def blocks(language: str, text: str = TEXT) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
 def commands() -> list[str]:
@@ -66,9 +66,10 @@ def test_demo_without_a_compiler(tmp_path: Path) -> None:
 
 
 def test_python_examples(capsys: pytest.CaptureFixture[str]) -> None:
-    """The examples build on each other; the last one runs the simulation."""
+    """The examples build on each other; the one of docs/testbench.md runs the simulation."""
     namespace: dict[str, object] = {"__name__": "readme"}
-    for number, block in enumerate(blocks("python")):
+    page = (ROOT / "docs" / "testbench.md").read_text(encoding="utf-8")
+    for number, block in enumerate([*blocks("python"), *blocks("python", page)]):
         exec(compile(block, f"<README example {number}>", "exec"), namespace)
     speed = re.search(r"the alarm came at ([\d.]+) rad/s", capsys.readouterr().out)
     assert speed is not None
@@ -78,3 +79,29 @@ def test_python_examples(capsys: pytest.CaptureFixture[str]) -> None:
 def test_pictures_are_there() -> None:
     for name in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", TEXT):
         assert (ROOT / name).stat().st_size > 1000, name
+
+
+def test_it_is_short() -> None:
+    assert len(TEXT.splitlines()) <= 150
+
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for link in re.findall(r"\]\((?!https?:)([^)#\s]*)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        assert not link or (page.parent / link).exists(), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_that_are_named_are_there(page: Path) -> None:
+    layers = "spec|hdl|sim|cli|tests|bench|docs"
+    named = re.findall(rf"`((?:{layers})/[\w/]+\.(?:py|md|h|sv|toml))`", page.read_text("utf-8"))
+    for file in named:
+        assert (ROOT / file).exists(), file
+
+
+def test_every_page_is_one_step_from_the_readme() -> None:
+    for page in (ROOT / "docs").glob("*.md"):
+        assert f"docs/{page.name}" in TEXT, page.name

@@ -1,0 +1,15 @@
+"""The reference pages are those of the code."""
+
+from pathlib import Path
+
+import pytest
+from support.script import load
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@pytest.mark.parametrize("page", ["options", "ports"])
+def test_pages_are_up_to_date(page: str) -> None:
+    """If this fails, run `make docs`."""
+    made = getattr(load("reference"), page)()
+    assert (DOCS / f"{page}.md").read_text(encoding="utf-8") == made
