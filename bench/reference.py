@@ -67,9 +67,9 @@ def ports() -> str:
                 if method not in has.setdefault(port.name, []):
                     has[port.name].append(method)
     rows = []
-    for name, (port, kind, width, meaning) in found.items():
+    for name, (code, kind, width, meaning) in found.items():
         only = "" if len(has[name]) == len(METHODS) else f" Methods: {', '.join(has[name])}."
-        rows.append([port, kind, width, meaning + only + ("" if name in always else " Only with its option.")])
+        rows.append([code, kind, width, meaning + only + ("" if name in always else " Only with its option.")])
     return "\n".join(
         [
             "# Ports\n",
