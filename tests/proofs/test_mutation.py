@@ -1,6 +1,5 @@
 """The short form of `make mutate`: some mutants of one core, and what it says when they are not noticed."""
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -32,7 +31,7 @@ def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
 
 
 @pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
+def small(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     monkeypatch.setattr(command, "CASES", [CASE])
     monkeypatch.setattr(proofs.mutation.score, "CLOCKS", CLOCKS)
     return monkeypatch
@@ -69,6 +68,6 @@ def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch
 
 def test_golden_model_is_held_against_the_core() -> None:
     played = stimulus(CASE.spec, 1000)
-    wrong = replace(played, traces=[replace(trace, a=trace.a ^ 1) for trace in played.traces])
+    wrong = replace(played, traces=[replace(trace, a=trace.a ^ np.uint8(1)) for trace in played.traces])
     with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match="mt, in clocks, from clock"):
         proofs.mutation.score.judge(CASE, pool, wrong)

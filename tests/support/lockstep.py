@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -19,6 +20,7 @@ from tachometry.spec import (
     METHODS,
     Encoder,
     MTachometer,
+    MTTachometer,
     RairanTachometer,
     Speed,
     STachometer,
@@ -105,6 +107,10 @@ EVENTS = {
 }
 
 
+def _count(found: NDArray[Any]) -> int:
+    return int(np.count_nonzero(found))
+
+
 def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding, PinTrace]:
     """A configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
     rng = np.random.default_rng(seed)
@@ -177,6 +183,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     if method == "mt" and rng.random() < 0.6:
         longest = int(rng.choice([2, max_ticks]))
         unit_cycles = spec.interval_unit_cycles
+        assert isinstance(spec, MTTachometer)
         spec = replace(spec, min_time=unit_cycles * int(rng.integers(1, longest * tick_cycles // unit_cycles + 1)))
     if isinstance(spec, RairanTachometer) and max_ticks >= 10 and not (spec.paper_exact or spec.lowpass):
         spec = replace(spec, adaptive=Fraction(1, 4))
@@ -238,16 +245,16 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         rows, stalled = len(updates.clock), updates.stalled
         shift = updates.get("dt_shift")
         return {
-            "low": np.count_nonzero(updates.interval > 1),
-            "high": np.count_nonzero(updates["n_ep1"] > 1),
-            "reversal": np.count_nonzero((updates["n_ep1"] == 0) & ~stalled),
-            "speed that fell": np.count_nonzero(updates.forced & ~stalled),
-            "rest": np.count_nonzero(stalled),
-            "count after rest": np.count_nonzero(stalled[:-1] & (updates["n_ep1"][1:] == 1)),
-            "dt longer than nominal": np.count_nonzero(np.diff(run.ticks.clock) > spec.timing.tick_cycles),
+            "low": _count(updates.interval > 1),
+            "high": _count(updates["n_ep1"] > 1),
+            "reversal": _count((updates["n_ep1"] == 0) & ~stalled),
+            "speed that fell": _count(updates.forced & ~stalled),
+            "rest": _count(stalled),
+            "count after rest": _count(stalled[:-1] & (updates["n_ep1"][1:] == 1)),
+            "dt longer than nominal": _count(np.diff(run.ticks.clock) > spec.timing.tick_cycles),
             "to the letter": rows * spec.paper_exact,
-            "dt longer": np.count_nonzero(shift),
-            "dt shorter again": np.count_nonzero(np.diff(shift) < 0),
+            "dt longer": _count(shift),
+            "dt shorter again": _count(np.diff(shift) < 0),
             spec.estimate: rows,
         }
     if isinstance(spec, TimedTachometer):
@@ -256,10 +263,10 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
     changed = np.diff(m_e, prepend=0) != 0
     by_count = ~updates.forced
     return {
-        "suppressed return": np.count_nonzero(changed & ~alterations(m_e)),
-        "alteration at max_ticks": np.count_nonzero(by_count & (updates.interval == spec.timing.max_ticks)),
-        "forced, then alteration": np.count_nonzero(updates.forced[:-1] & by_count[1:]),
-        "m_s = 1": np.count_nonzero(updates.interval == 1),
+        "suppressed return": _count(changed & ~alterations(m_e)),
+        "alteration at max_ticks": _count(by_count & (updates.interval == spec.timing.max_ticks)),
+        "forced, then alteration": _count(updates.forced[:-1] & by_count[1:]),
+        "m_s = 1": _count(updates.interval == 1),
         "reciprocal carried": spec.carried and len(updates.clock),
     }
 
@@ -274,20 +281,20 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
     return {
         "times in ticks" if spec.on_lattice else "times in clocks": n,
         "paper exact": n * spec.paper_exact,
-        "reversal": np.count_nonzero(~forced & (velocity == 0)),
-        "longer than the maximum time": np.count_nonzero(
+        "reversal": _count(~forced & (velocity == 0)),
+        "longer than the maximum time": _count(
             np.abs(velocity) * interval > spec.timer_periods << spec.native_frac_bits + 1
         ),
-        "count after a silence": np.count_nonzero(overdue[:-1] & ~forced[1:]),
-        "count at the maximum time": np.count_nonzero(~forced & (interval == spec.max_periods)),
-        "one after the other": np.count_nonzero(np.diff(updates.clock) == spec.update_spacing),
-        "forced after the maximum time": np.count_nonzero(overdue & ~updates.stalled),
-        "forced again": np.count_nonzero(updates.stalled),
-        "decay": np.count_nonzero(decay),
-        "decay backward": np.count_nonzero(decay & (velocity < 0)),
-        "decay again": np.count_nonzero(decay[1:] & decay[:-1]),
-        "out of range": np.count_nonzero(flagged) * spec.on_lattice,
-        "speed beyond the maximum": np.count_nonzero(flagged) * (not spec.on_lattice),
+        "count after a silence": _count(overdue[:-1] & ~forced[1:]),
+        "count at the maximum time": _count(~forced & (interval == spec.max_periods)),
+        "one after the other": _count(np.diff(updates.clock) == spec.update_spacing),
+        "forced after the maximum time": _count(overdue & ~updates.stalled),
+        "forced again": _count(updates.stalled),
+        "decay": _count(decay),
+        "decay backward": _count(decay & (velocity < 0)),
+        "decay again": _count(decay[1:] & decay[:-1]),
+        "out of range": _count(flagged) * spec.on_lattice,
+        "speed beyond the maximum": _count(flagged) * (not spec.on_lattice),
     }
 
 
@@ -298,23 +305,23 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
     found = Counter(
         covered_by_method(spec, run)
         | {
-            "m_e saturated": np.count_nonzero(run.ticks.overflow),
-            "sign change": np.count_nonzero(np.diff(sign[sign != 0])),
-            "stalled": np.count_nonzero(updates.stalled),
+            "m_e saturated": _count(run.ticks.overflow),
+            "sign change": _count(np.diff(sign[sign != 0])),
+            "stalled": _count(updates.stalled),
             "index captured": len(run.index.clock),
             "position reset": len(run.index.clock) * spec.index_reset,
             "external tick": len(run.ticks.clock) * (spec.max_tick_cycles is not None),
-            "external tick too early": np.count_nonzero(~np.isin(run.tick_errors, run.ticks.clock)),
-            "external tick missing": np.count_nonzero(np.isin(run.tick_errors, run.ticks.clock)),
-            "velocity saturated": np.count_nonzero(updates.get("velocity_overflow")),
+            "external tick too early": _count(~np.isin(run.tick_errors, run.ticks.clock)),
+            "external tick missing": _count(np.isin(run.tick_errors, run.ticks.clock)),
+            "velocity saturated": _count(updates.get("velocity_overflow")),
             "filtered": len(updates.clock) * (spec.lowpass is not None),
             "waited for the filter": spec.lowpass is not None
-            and np.count_nonzero(np.diff(updates.clock) == spec.low_pass.latency - 2),
-            "bounds": np.count_nonzero(updates.get("bounds_valid")),
-            "aged": np.count_nonzero(run.ticks.get("age")),
-            "update in every clock": np.count_nonzero(np.diff(updates.clock) == 1),
-            "glitch swallowed": run.ticks.get("swallowed_edges")[-1] // 2,
-            "position wrapped": np.count_nonzero(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
+            and _count(np.diff(updates.clock) == spec.low_pass.latency - 2),
+            "bounds": _count(updates.get("bounds_valid")),
+            "aged": _count(run.ticks.get("age")),
+            "update in every clock": _count(np.diff(updates.clock) == 1),
+            "glitch swallowed": int(run.ticks.get("swallowed_edges")[-1]) // 2,
+            "position wrapped": _count(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
         }
     )
     lines = [f"{a}{b}" for a, b in zip(trace.a, trace.b, strict=True)]

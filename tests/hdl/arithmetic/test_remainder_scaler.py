@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from support.mutant import caught, mutant
 from support.quotient import FlatQuotient, every_quotient
 from support.simulate import clock_by_clock
@@ -21,7 +22,8 @@ def long_spec(max_ticks: int, frac_bits: int, *, tick_cycles: int = 1, cancel: b
     return spec
 
 
-def wanted(spec: STachometer, base: np.ndarray, n: np.ndarray, m: np.ndarray, towards: int = 0) -> np.ndarray:
+def wanted(spec: STachometer, operands: list[NDArray[np.int64]], towards: int = 0) -> NDArray[np.int64]:
+    base, n, m = operands
     return (base << spec.frac_bits) + round_quotient(n, m << spec.reciprocal.halvings, spec.frac_bits, towards)
 
 
@@ -31,7 +33,7 @@ def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bit
     spec = long_spec(MAX_TICKS, frac_bits, cancel=cancel)
     numerators = range(-spec.max_numerator, spec.max_numerator + 1)
     *operands, got = every_quotient(spec, numerators, 1, tmp_path)
-    assert np.array_equal(got, wanted(spec, *operands))
+    assert np.array_equal(got, wanted(spec, operands))
 
 
 @pytest.mark.parametrize("tick_cycles", [2, 960])
@@ -43,7 +45,7 @@ def test_every_interval_and_the_extreme_numerators(tmp_path: Path, tick_cycles: 
     *operands, got = every_quotient(
         spec, [-extreme, extreme] if spec.serial else [-extreme, -1, 1, extreme], distance, tmp_path
     )
-    assert np.array_equal(got, wanted(spec, *operands))
+    assert np.array_equal(got, wanted(spec, operands))
 
 
 @pytest.mark.parametrize("tick_cycles", [2, 40])
@@ -54,7 +56,7 @@ def test_every_bound(tmp_path: Path, tick_cycles: int, towards: int) -> None:
     assert spec.serial == (tick_cycles == 40)
     distance = spec.tick_to_velocity if spec.serial else 1
     *operands, got = every_quotient(spec, range(-8, 9), distance, tmp_path, towards)
-    assert np.array_equal(got, wanted(spec, *operands, towards))
+    assert np.array_equal(got, wanted(spec, operands, towards))
 
 
 # With few fraction bits there are ties; with many the quotient is not yet 0 where the kept half begins.
@@ -76,7 +78,7 @@ def check_starts_over(*, serial: bool, frac_bits: int) -> None:
         rows += off * (distance - 1)
     seen = clock_by_clock(FlatQuotient(spec, serial=serial), rows + off * 40, ["done", "velocity", "m_out"])
     got = [(row["velocity"], row["m_out"]) for row in seen if row["done"]]
-    assert got == list(zip(wanted(spec, base, n, np.array(m)).tolist(), m, strict=True))
+    assert got == list(zip(wanted(spec, [base, n, np.array(m)]).tolist(), m, strict=True))
 
 
 @pytest.mark.parametrize("serial", [True, False])

@@ -1,5 +1,7 @@
 """What only the M/T method does."""
 
+from typing import Any
+
 import pytest
 from support.mutant import caught, mutant
 from support.timed import SILENCE, TICK, run, silence, spec_of, speed
@@ -88,7 +90,7 @@ def test_silence_in_a_window() -> None:
         ({"timer": "x"}, "timer must be clock or tick, not 'x'"),
     ],
 )
-def test_bad_options(options: dict, message: str) -> None:
+def test_bad_options(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=f"^{message}$"):
         spec_of("mt", **options)
 

@@ -1,6 +1,7 @@
 """The datapath of Rairán's method, with injected steps."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def steps(dt: int = 6, n: int = 4000) -> np.ndarray:
 
 @pytest.mark.parametrize("dt", [1, 2, 3, 6, 40])
 @pytest.mark.parametrize("options", [{}, {"paper_exact": True}, {"bound_decay": False}, {"bounds": True}])
-def test_every_update(dt: int, options: dict) -> None:
+def test_every_update(dt: int, options: dict[str, Any]) -> None:
     check(steps(dt), dt, **options)
 
 
@@ -84,7 +85,7 @@ def steady_steps(dt: int, n: int = 12_000) -> np.ndarray:
         {"max_speed": Speed.parse("20000rev/s"), "bounds": True},
     ],
 )
-def test_adaptive_dt(dt: int, max_ticks: int, target: int, options: dict) -> None:
+def test_adaptive_dt(dt: int, max_ticks: int, target: int, options: dict[str, Any]) -> None:
     check(steady_steps(dt), dt, max_ticks, adaptive=Fraction(1, target), **options)
 
 

@@ -1,6 +1,7 @@
 """What users complain of elsewhere: the methods that work on ticks at reversals, at rest and after it, by the gates."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pytest
 from support.mutant import caught, mutant
@@ -10,7 +11,8 @@ from tachometry.hdl.methods import DATAPATHS, interval
 from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
 
 T, MAX_TICKS = 6, 20
-SHARED = {"encoder": Encoder(100), "timing": Timing(1_000_000, T, MAX_TICKS), "frac_bits": 10, "bounds": True}
+TIMING = Timing(1_000_000, T, MAX_TICKS)
+SHARED: dict[str, Any] = {"encoder": Encoder(100), "timing": TIMING, "frac_bits": 10, "bounds": True}
 SPECS = {
     "eq. (21)": STachometer(**SHARED),
     "eq. (17)": STachometer(**SHARED, cancel=False),
@@ -42,8 +44,9 @@ def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
     found = []
     for clock, row in enumerate(seen):
         if row["velocity_valid"]:
-            shown = (row[name] / (1 << spec.frac_bits) for name in names[1:4])
-            found.append(Update((clock - spec.datapath_latency) // T, *shown, row["interval"], bool(row["stalled"])))
+            velocity, lower, upper = (row[name] / (1 << spec.frac_bits) for name in names[1:4])
+            tick, stalled = (clock - spec.datapath_latency) // T, bool(row["stalled"])
+            found.append(Update(tick, velocity, lower, upper, row["interval"], stalled))
     assert all(update.lower <= update.velocity <= update.upper for update in found)
     assert all(abs(update.velocity) <= spec.max_count for update in found)
     return found

@@ -63,8 +63,8 @@ def main(words: list[str]) -> bool:
         for wrong, future in zip(mutants, refuted, strict=True):
             result = future.result()
             fine &= result.verdict == "refuted"
-            right, changed = (" ".join(text.split()) for text in (wrong.right, wrong.wrong))
-            change = f"{wrong.box.__name__}: `{right}` → `{changed}`"
+            before, after = (" ".join(text.split()) for text in (wrong.right, wrong.wrong))
+            change = f"{wrong.box.__name__}: `{before}` → `{after}`"
             row(wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
     without = set() if words else proven - {wrong.refuted for wrong in mutants}
     if without:

@@ -64,7 +64,11 @@ CASES = [
     _case("m", "of 3", 3, 2, 2, average=3, bounds=True, age=True),
     _case(
         *("m", "of 4, rpm, low pass", 5, 2, 3),
-        **{"average": 4, "unit": "rpm", "frac_bits": 6, "max_tick_cycles": 9, "decoding": 2},
+        decoding=2,
+        average=4,
+        unit="rpm",
+        frac_bits=6,
+        max_tick_cycles=9,
         lowpass=Fraction(1, 2),
     ),
     _case("t", "in clocks", 7, 5, 3, bounds=True, age=True),

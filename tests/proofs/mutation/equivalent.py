@@ -87,6 +87,12 @@ _WATCHED = 20_000  # clocks in which mutants are watched
 _TOGETHER = 8  # mutants for one run of Yosys
 
 
+def _found(pattern: str, text: str) -> str:
+    match = re.search(pattern, text)
+    assert match is not None
+    return match[1]
+
+
 @dataclass(frozen=True)
 class Register:
     """A flip-flop; `init` has a character for each bit, the highest first, x where it is not known."""
@@ -129,10 +135,12 @@ def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
     known = _known(json.loads((folder / "mapped.json").read_text()))
     yosys(_MAP.format(mutants="\n".join([*selected(group), "setattr -unset init w:*"])), folder)
     text = (folder / "mapped.il").read_text()
-    registers, wires, connections = [], [], []
+    registers: list[Register] = []
+    wires: list[str] = []
+    connections: list[str] = []
 
     def cut(cell: re.Match[str]) -> str:
-        d, q, width = (re.search(pattern, cell[2])[1] for pattern in (r"\\D (.*)", r"\\Q (.*)", r"\\WIDTH (\d+)"))
+        d, q, width = (_found(pattern, cell[2]) for pattern in (r"\\D (.*)", r"\\Q (.*)", r"\\WIDTH (\d+)"))
         k = len(registers)
         registers.append(Register(int(width), *known.get(cell[1].removeprefix("\\"), ("x" * int(width), frozenset()))))
         wires.append(

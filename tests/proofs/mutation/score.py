@@ -66,7 +66,7 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
     return Score(case, len(found), sum(killed), sum(alike), len(unproven) - len(survivors), survivors)
 
 
-def _hold(case: Case, played: Stimulus, rows: NDArray) -> None:
+def _hold(case: Case, played: Stimulus, rows: NDArray[np.int64]) -> None:
     """Hold the core without a mutant against the golden model, from reset to reset."""
     for trace, start in zip(played.traces, played.starts, strict=True):
         own = rows[(rows[:, 0] >= start) & (rows[:, 0] < start + trace.n_clocks)]

@@ -52,8 +52,8 @@ def motion(n_cycles: int, seed: int) -> PinTrace:
                 clocks.append(now)
                 turns.append(int(np.sign(speed)))
         now += TICK_CYCLES * rng.uniform(MAX_TICKS + 2, MAX_TICKS + 8)
-    level = quadrature(np.cumsum(turns))
-    return PinTrace(np.round(clocks).astype(np.int64), level & 1, level >> 1, int(now))
+    level, one = quadrature(np.cumsum(turns)), np.uint8(1)
+    return PinTrace(np.round(clocks).astype(np.int64), level & one, level >> one, int(now))
 
 
 def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
@@ -101,7 +101,9 @@ class Campaign:
     @property
     def bound(self) -> int:
         """Clocks after which the outputs must be right."""
-        return self.spec.recovery_clocks
+        clocks = self.spec.recovery_clocks
+        assert clocks is not None
+        return clocks
 
     @property
     def fine(self) -> bool:
@@ -134,6 +136,7 @@ def upsets(method: str, n: int, seed: int = 1, n_cycles: int = 40) -> Campaign:
     spec, trace = spec_of(method), motion(n_cycles, seed)
     core = Upsettable(spec, trace)
     rng = np.random.default_rng(seed)
+    assert spec.recovery_clocks is not None
     length = spec.recovery_clocks + 3 * spec.timing.tick_cycles
     clock = np.sort(rng.integers(200 * TICK_CYCLES, trace.n_clocks - length, n))
     bit = rng.permutation(np.resize(rng.permutation(len(core.bits)), n))
