@@ -50,7 +50,10 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
     assert not command.main([])
     survivors = capsys.readouterr().out.partition("survivors of mt, in clocks:\n")[2].splitlines()
     assert len(survivors) > 10
-    assert all(line.startswith("  hdl/") or "amaranth/lib/cdc.py" in line for line in survivors), survivors
+    # Some multiplexers that Yosys makes have no line.
+    known = ("  hdl/", "  amaranth/lib/cdc.py", "  : ")
+    assert all(line.startswith(known) for line in survivors), survivors
+    assert sum(line.startswith("  hdl/") for line in survivors) > 10
 
 
 def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

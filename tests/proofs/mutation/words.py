@@ -24,6 +24,7 @@ IN_WORDS = {
     ("t, in ticks", "above.eq(value > Const(limit, value.shape())),", "B[2] inv"): (
         "the limit of the output is 127, or 123; velocities are 2^5·2π/m, and of these 201 and 100 are next to it"
     ),
+    ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
     ("mt, in clocks", "change = Signal(signed(max(len(shown), spec.native_width) + 1))", "change[6] const0"): (
         "read where the velocity decays, whether it does at all: from −48 at most to no more than 0, less than 64"
     ),
