@@ -4,27 +4,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.verilog import lint_exported
+from support.verilog import LintingVerilator
 
 from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.compiled import CompiledEngine, Design
 from tachometry.sim.engines.cxxrtl import Cxxrtl
-from tachometry.sim.engines.verilator import Verilator
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS
 
 CORES = [words for method in METHODS for words in configurations(method)]
 # A build takes seconds, a motion milliseconds: as many motions as these numbers allow are played on every core.
-MOTIONS, CLOCKS, EDGES = 50, 30_000_000, 100
+MOTIONS, CLOCKS, EDGES = 50, 20_000_000, 50
 
 
 @pytest.mark.parametrize("words", CORES, ids=" ".join)
 def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     spec = spec_of(words)
-    lint_exported(spec, tmp_path)
+    verilator = LintingVerilator(tmp_path)
+    engine: CompiledEngine = verilator
     trace = stress(spec, seed=1)
-    # The longest would take Verilator half a minute.
-    engine = Cxxrtl() if trace.n_clocks > 1e8 else Verilator()
+    if trace.n_clocks > 1e8:  # which would take Verilator half a minute
+        verilator.text(Design(spec, list(spec.pins)))
+        engine = Cxxrtl()
     found = lockstep(spec, trace, engine)
     assert found.n_mismatches == 0, found.first
     # All that the configuration can show has happened.

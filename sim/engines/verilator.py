@@ -66,13 +66,16 @@ class Verilator(CompiledEngine):
 
     name = "verilator"
 
+    def text(self, design: Design) -> str:
+        """The Verilog: what is exported, or, if signals are to be shown, a core with these as outputs."""
+        if not design.n_words:
+            return export(design.spec)["tachometer.v"]
+        with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+            return str(verilog.convert(design.component, name="tachometer", emit_src=False))
+
     def library(self, design: Design) -> Path:
         """See `CompiledEngine.library`."""
-        if design.n_words:
-            with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
-                text = verilog.convert(design.component, name="tachometer", emit_src=False)
-        else:
-            text = export(design.spec)["tachometer.v"]
+        text = self.text(design)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.FLAGS, version_of("verilator"))
         key = build.digest(self.name, text, tools, _OPTIONS, design.source(_MODEL), design.spec.ports)

@@ -7,6 +7,7 @@ import numpy as np
 
 from support.compiled import lint
 from tachometry.hdl import export
+from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.verilator import Verilator
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, observed
@@ -62,16 +63,23 @@ def _changes(pins: list[Port], trace: PinTrace) -> np.ndarray:
     return np.stack([trace.clock, *(trace.lines[pin.name] for pin in pins)], axis=1).astype(np.int64)
 
 
-def lint_exported(spec: TachometerSpec, folder: Path) -> None:
-    """Let Verilator read the exported Verilog with -Wall; any warning is an error."""
-    (folder / "tachometer.v").write_text(export(spec)["tachometer.v"])
-    lint(["tachometer.v"], "tachometer", folder)
+class LintingVerilator(Verilator):
+    """Verilator that also reads the exported Verilog with -Wall in a folder; any warning is an error."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self._folder = folder
+
+    def text(self, design: Design) -> str:
+        text = super().text(design)
+        (self._folder / "tachometer.v").write_text(text)
+        lint(["tachometer.v"], "tachometer", self._folder)
+        return text
 
 
 def run_in_verilator(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
     """Read the exported Verilog with -Wall, any warning an error, and play a trace on it."""
-    lint_exported(spec, folder)
-    return Verilator().run(spec, trace)
+    return LintingVerilator(folder).run(spec, trace)
 
 
 def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
