@@ -119,8 +119,8 @@ closest, where there is one.
 - *S*: use it if there is no timer faster than the tick, or if a divider is unwanted; at high speed with a real encoder;
   and around multiples of the unit velocity. Its tick can be as short as a clock. It is then as fine as T at low speeds.
 - *M/T*: use it if a fast timer and a divider are available. It has the least error of the cores on ramps and reversals.
-  A longer `--min-time` trades delay for less noise, as averaging does. On a lattice (`--timer tick`) it equals M at high
-  speeds.
+  A longer `--min-time` gives less noise and more delay, as averaging does. On a lattice (`--timer tick`) it equals M at
+  high speeds.
 - *T*: it equals M/T at slow speeds and sudden stops, with less logic. It suffers most from an uneven disc and from
   jitter.
 - *Rairán*: use it if bounds of the speed and a constant value at constant speed matter more than the error, which is up
