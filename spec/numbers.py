@@ -48,7 +48,7 @@ class Numbers(Parameters):
         if self.unit == NATIVE and self.velocity_bits is None:
             return None
         native = 1 << self.native_frac_bits
-        largest = self.bound_limit if self.bounds else self.max_count * native
+        largest = self.absent_bound if self.bounds else self.max_count * native
         return VelocityOutput(self._lsb_per_count / native, largest, self.velocity_bits, self.bounds)
 
     @property
@@ -62,14 +62,14 @@ class Numbers(Parameters):
         return signed_width(self.max_bound) + self.native_frac_bits
 
     @property
-    def bound_limit(self) -> int:
-        """Magnitude of a bound in counts per tick that there is none."""
+    def absent_bound(self) -> int:
+        """Magnitude that an absent bound has, in counts per tick: the greatest that fits."""
         return (1 << (self.bound_width - 1)) - 1
 
     @property
-    def shown_bound_limit(self) -> int:
-        """The same at the ports: `velocity_lower` of −limit and `velocity_upper` of limit are none."""
-        return self.bound_limit if self.output is None else self.output.limit
+    def shown_absent_bound(self) -> int:
+        """Magnitude of an absent bound at the ports: −limit for `velocity_lower`, limit for `velocity_upper`."""
+        return self.absent_bound if self.output is None else self.output.limit
 
     @property
     def update_spacing(self) -> int:

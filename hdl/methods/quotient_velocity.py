@@ -159,7 +159,7 @@ class QuotientVelocity(wiring.Component):
             ]
             with m.If(self.divider.start):
                 m.d.sync += none.eq(counted & end[-1] & (self.divisor == 1))
-            limit = -self._spec.bound_limit
+            limit = -self._spec.absent_bound
             lower = Signal.like(box.quotient, reset_less=True)
             with m.If(box.done):
                 m.d.sync += lower.eq(Mux(none, limit, box.quotient))

@@ -167,9 +167,9 @@ class RairanTachometer(TachometerSpec):
         dt = self.timing.tick_cycles
         up, down = (d * dt, (dt << shift) + more) if d >= 0 else (dt, (-d * dt << shift) + more)
         if down <= 0:
-            return self.bound_limit
+            return self.absent_bound
         raw = (up << self.native_frac_bits) // down if towards < 0 else -((-up << self.native_frac_bits) // down)
-        return min(raw, self.bound_limit)
+        return min(raw, self.absent_bound)
 
     def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
         """A bound's table, `one` being what it has for n, k and the regime.
@@ -201,7 +201,7 @@ class RairanTachometer(TachometerSpec):
         """Upper bounds; none for low 0. n1 of a dt, or of Ndt1 of them, that took a clock less."""
 
         def upper(n: int, shift: int, high: bool) -> int:
-            return self._bound(n + 1 if high else -n, shift, -1, 1) if n or high else self.bound_limit
+            return self._bound(n + 1 if high else -n, shift, -1, 1) if n or high else self.absent_bound
 
         return self._by_address(upper)
 

@@ -64,11 +64,11 @@ class STachometer(TachometerSpec):
     @property
     def max_numerator(self) -> int:
         """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
-        return (2 * self.max_count + self.bounds) * self.whole
+        return (2 * self.max_count + self.bounds) * self.numerator_per_count
 
     @property
-    def whole(self) -> int:
-        """What of N is one count."""
+    def numerator_per_count(self) -> int:
+        """What one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17)."""
         return 2 if self.cancel else 1
 
     @property

@@ -169,7 +169,7 @@ class Model:
         if not spec.bounds:
             return {}
         dt = one << events.shift
-        n, high, none = events.n, events.high, spec.bound_limit
+        n, high, none = events.n, events.high, spec.absent_bound
         bits = spec.native_frac_bits
         lower = round_quotient(np.where(high, n - 1, 1) * one, np.where(high, dt + 1, (n + 1) * dt + 1), bits, -1)
         lower[events.loose | (n == 0)] = 0

@@ -214,5 +214,5 @@ def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any
     for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
         distance, time = ends.T
         exact = round_quotient(distance * spec.timer_periods, np.maximum(time, 1), spec.native_frac_bits, towards)
-        found[name] = np.where(time > 0, exact, towards * spec.bound_limit)
+        found[name] = np.where(time > 0, exact, towards * spec.absent_bound)
     return found

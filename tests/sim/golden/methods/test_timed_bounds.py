@@ -85,7 +85,7 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     scale = INSTANTS * TICK << spec.native_frac_bits
     lasted = time[last] - time[first]
     lower, upper = updates["velocity_lower"][chosen], updates["velocity_upper"][chosen]
-    above, below = upper == spec.bound_limit, lower == -spec.bound_limit  # there is none
+    above, below = upper == spec.absent_bound, lower == -spec.absent_bound  # there is none
     assert (below | (lower * lasted <= way * scale)).all()
     assert (above | (upper * lasted >= way * scale)).all()
     if not spec.saturates:
