@@ -140,7 +140,7 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
         # The shaft is between the same two edges at both ends.
         least=np.stack([none - 1, time], axis=1),
         most=np.stack([none + 1, time], axis=1),
-        # Of the first period after reset not all was seen.
+        # The first period after reset was not seen completely.
         known=(np.arange(len(period)) > 0) | ~stalled,
     )
     return found.merged(silent)
