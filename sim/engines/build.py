@@ -49,7 +49,7 @@ def find_compiler() -> tuple[str, ...] | None:
 
 
 def compiler() -> tuple[str, ...]:
-    """The same.
+    """The compiler that `find_compiler` finds.
 
     Raises
     ------

@@ -110,7 +110,7 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
     ValueError
         At the end, if a point cannot be run.
     OSError
-        The same, if a worker lacks what it needs; at once, if one has another version, or the scheduler goes.
+        At the end, if a worker lacks what it needs; at once, if one has another version, or the scheduler goes.
     """
     from distributed import KilledWorker, as_completed
 

@@ -97,7 +97,8 @@ class _Columns(Mapping[str, tuple[str, str]]):
         return _RESULTS | own | _ENCODER
 
 
-# Every column of the results: its kind, and what is in it, with its unit. Empty is what is not there or cannot be told.
+# Every column of the results: its kind, and what is in it, with its unit. What does not exist or cannot be determined
+# is empty.
 COLUMNS = _Columns()
 
 

@@ -164,7 +164,7 @@ class RairanTachometer(TachometerSpec):
         return max(self.table).bit_length()
 
     def _bound(self, d: int, shift: int, more: int, towards: int) -> int:
-        """Bound for `d` counts in dt·2^shift, or one in −d of these, `more` clocks longer; rounded outward and clipped."""
+        """Bound for `d` counts in dt·2^shift, or one in −d of these, `more` clocks longer; outward, and clipped."""
         dt = self.timing.tick_cycles
         up, down = (d * dt, (dt << shift) + more) if d >= 0 else (dt, (-d * dt << shift) + more)
         if down <= 0:
