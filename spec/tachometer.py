@@ -71,7 +71,9 @@ class TachometerSpec(Numbers):
         if self.max_tick_cycles is None:
             return
         if self.own_ticks:
-            raise ParameterError("method", f"must be another than {self.method} for an external tick: it makes its own")
+            raise ParameterError(
+                "method", f"must be another than {self.method} for an external tick: it makes its own ticks"
+            )
         shortest = self.timing.tick_cycles
         if shortest < 2:
             raise ParameterError("tick_cycles", "must be at least 2 with an external tick, not 1")

@@ -139,7 +139,7 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
             raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
         if isinstance(error, KilledWorker):
             point = points[error.task[1]]
-            error = OSError(f"no worker outlives the point of {point.method} on {point.text}: {error}")
+            error = OSError(f"every worker died at the point of {point.method} on {point.text}: {error}")
         failed.append(error)
     if failed:
         first = failed[0]

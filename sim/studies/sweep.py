@@ -221,7 +221,7 @@ def run_packed(code: str, packed: bytes) -> Row:
         As `run_point`, with the point.
     """
     if code not in (code_digest(), code_digest(hardware=True)):
-        raise OtherCode(f"that of {platform.node()} is another")
+        raise OtherCode(f"{platform.node()} has another one")
     point = pickle.loads(packed)
     try:
         return run_point(point)

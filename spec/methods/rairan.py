@@ -68,7 +68,7 @@ class RairanTachometer(TachometerSpec):
         if self.estimate not in ESTIMATES:
             raise ParameterError("estimate", f"must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
         if self.bounds and self.paper_exact:
-            raise ParameterError("bounds", "must not be given with paper_exact, which leaves its own")
+            raise ParameterError("bounds", "must not be given with paper_exact, whose estimate leaves them")
         if self.timing.max_ticks >= MAX_TABLE:
             raise ParameterError(
                 "max_ticks", f"must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
@@ -83,10 +83,10 @@ class RairanTachometer(TachometerSpec):
 
     def _check_adaptive(self, target: Fraction) -> None:
         if self.paper_exact:
-            raise ParameterError("adaptive", "must not be given with paper_exact, which has one dt")
+            raise ParameterError("adaptive", "must not be given with paper_exact, whose dt is constant")
         if self.lowpass is not None:
             raise ParameterError(
-                "lowpass", "must not be given with adaptive, whose ticks differ: its time is counted in ticks"
+                "lowpass", "must not be given with adaptive: the filter counts ticks, which then differ in length"
             )
         if not 0 < target < Fraction(1, 3):
             raise ParameterError("adaptive", f"must be more than 0 and less than 1/3, not {float(target):.9g}")
