@@ -98,7 +98,7 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def remembered_clocks(self) -> int:
-        # And a division that has nothing to do with it.
+        # An unrelated division may have to end first.
         return self.remembered_periods * (self.longest_tick if self.on_lattice else 1) + self.division_clocks
 
     @property
