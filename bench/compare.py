@@ -37,97 +37,102 @@ class Situation:
 SITUATIONS = (
     Situation(
         "The paper's experiment",
-        """500 counts per revolution and a tick of 1 ms, which is also the unit of time of T and M/T: the setting
-that the S method was made for. It has half the error of M and of M/T in the same measurement time; T
-has no value above the unit velocity. The baselines are not bound to the lattice: LinuxCNC's timestamps of
-0.5 µs win by far.""",
+        """The encoder has 500 counts per revolution. The tick is 1 ms, and it is also the unit of time of T and
+M/T. This is the setting that the S method was made for. S has half the error of M and of M/T in the same
+measurement time. T has no value above the unit velocity. The baselines are not bound to the lattice, so
+LinuxCNC's timestamps of 0.5 µs are the best by far.""",
         "--methods s,m:average=4,t:timer=tick,mt:timer=tick:min-time=3ms,rairan,hostmot2,simplefoc,odrive "
         "--motion ramp:0:40rad/s:5s --from 100ms --vibration 1mrad:50Hz --seed 1",
         "--ppr 500 --decoding 1 --clock 50kHz --tick 1ms --max-time 10ms --max-speed 60rad/s",
     ),
     Situation(
         "Ramp",
-        """A clock of 0.1 µs as the timer beats a lattice of 100 µs: M/T (T_c is a tick) and T by a factor of 20
-and more, then LinuxCNC's timestamps, then the tracking loops, which lag by a constant 2 ms. Of what
-needs no divider, S is the best core.""",
+        """Times in clocks of 0.1 µs are better than a lattice of 100 µs. M/T (T_c is a tick) and T are the best by
+a factor of 20 and more. LinuxCNC's timestamps follow, and then the tracking loops, which lag by a
+constant 2 ms. Of the methods without a divider, S is the best core.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",
     ),
     Situation(
         "Ramp, real encoder",
-        """T measures one count, so every error of the disc and all jitter is in it, and in M/T while its windows
-are short. S, whose windows are longer, is the best core; a longer `--min-time` would give M/T the same.
-Methods that average over 1 ms or more keep their errors, and their delays.""",
+        """T measures one count, so its result contains every error of the disc and all jitter. The same is true of
+M/T while its windows are short. S has longer windows and is the best core; a longer `--min-time` would
+make M/T as good. Methods that average over 1 ms or more keep their errors and their delays.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),
     Situation(
         "Slow",
-        """0.04 counts per tick. All that measure the time between counts are alike; a filter of 5 ms takes the
-jitter out, at the price of its delay.""",
+        """The speed is 0.04 counts per tick. All methods that measure the time between counts are alike. A filter
+of 5 ms removes the jitter at the price of its delay.""",
         "--motion constant:1.3rad/s:4s --from 500ms --jitter 0.05 --seed 1",
     ),
     Situation(
         "Fast",
-        """7 counts per tick and 5 % jitter: whoever averages longest wins, and at constant speed delay costs
-nothing. S is the best core. Rairán's estimate is nearly constant, and off by up to eq. (13): 1/13 of
-the speed.""",
+        """The speed is 7 counts per tick, with 5 % jitter. The longest average has the least error, because at
+constant speed delay costs nothing. S is the best core. Rairán's estimate is nearly constant, and off by
+up to eq. (13), 1/13 of the speed.""",
         "--motion constant:217rad/s:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
         "Fast, ideal encoder",
-        """The same without jitter: M/T with a timer and a tenth of the time is as good as S within its eq. (18);
-what averages over 1 ms resolves more.""",
+        """This is the previous situation without jitter. M/T with a timer and a tenth of the time is as good as S,
+whose error is within eq. (18). Methods that average over 1 ms have a finer resolution.""",
         "--motion constant:217rad/s:1s --from 100ms",
     ),
     Situation(
         "At the unit velocity, with vibration",
-        """The case of Tsuji's Fig. 9(b): S cancels alternate alterations, and has the least error of the cores.
-Filters and tracking loops, which average the vibration out, have less.""",
+        """This is the case of Tsuji's Fig. 9(b). S cancels alternate alterations, and has the least error of the
+cores. Filters and tracking loops average the vibration out, and have less.""",
         "--motion ramp:31rad/s:32rad/s:1s --from 100ms --vibration 0.2mrad:170Hz --nonuniformity 0.1 --seed 1",
     ),
     Situation(
         "Reversals",
-        """Delay counts: filters of 5 ms are worst but for M. LinuxCNC's timestamps are best, then M/T; S and the
-tracking loops are alike.""",
+        """Here delay matters: filters of 5 ms are worse than all others but M. LinuxCNC's timestamps are best, and
+M/T is second. S and the tracking loops are alike.""",
         "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
         "At rest on an edge",
-        """The line dithers. T, M/T, Rairán (with what was added to it) and LinuxCNC know that both edges are one,
-and show 0: what is left is the vibration itself. S and the tracking loops show what they see of it.""",
+        """The line dithers. T, M/T, Rairán (with what this project added to it) and LinuxCNC recognise that both
+edges are the same one, and show 0. Their error is the vibration itself. S and the tracking loops show
+the part of the vibration that they see.""",
         "--motion stop:1s --vibration 0.3mrad:40Hz --from 100ms",
     ),
     Situation(
         "Stop",
-        """From 20 rad/s to rest at once. T, M/T and Rairán fall with the time since the last count; S holds its
-last value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms: a shorter
-`--max-time` mends that.""",
+        """The shaft goes from 20 rad/s to rest at once. T, M/T and Rairán decay with the time since the last count.
+S holds its last value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms. A
+shorter `--max-time` reduces this time.""",
         "--motion constant:20rad/s:200ms+stop:100ms --from 100ms",
     ),
 )
 
 HEAD = """# Methods beside each other
 
-Made by `python bench/compare.py`: each table is that of the command above it, by the golden models of the cores, which
-the hardware equals bit for bit, and float models of what others use, with the settings that their projects come with
-(they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs). Errors are those of the held velocity
-against the shaft's; the delay is the shift of the true speed that comes closest, where there is one.
+This page is made by `python bench/compare.py`. Each table is the output of the command above it. It shows the golden
+models of the cores, which the hardware equals bit for bit, and float models of what other projects use. The latter have
+the settings that their projects come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs.
+Errors are those of the held velocity against the shaft's speed. The delay is the shift of the true speed that comes
+closest, where there is one.
 
-**When to use what**, of the tables below:
+**When to use what**, according to the tables below:
 
-- *S*: no timer faster than the tick is at hand, or no divider is wanted; fast, with a real encoder; around multiples of
-  the unit velocity. Its tick can be as short as a clock, and then it is as fine as T at low speeds.
-- *M/T*: a fast timer and a divider are at hand: the least error of the cores on ramps and reversals. With `--min-time`
-  it trades delay for quiet, as averaging does; on a lattice (`--timer tick`) it is M at high speeds.
-- *T*: as M/T at slow speeds and sudden stops, with less logic. It suffers most from an uneven disc and from jitter.
-- *Rairán*: bounds of the speed and a constant value at constant speed matter more than its error, up to 1/3 at ω_lim.
-- *M*: nothing else fits, or its noise is filtered anyway.
-- *LinuxCNC's timestamps* (counts over the time between the latest counts, as M/T): nearly always good where 1 ms is
-  fast enough and software divides.
-- *Tracking loops* (ODrive, moteus): smooth, with a delay that is constant and known, 2 ms with their defaults.
-- *Filtered differences, SimpleFOC*: constant speed; 5 ms of delay everywhere else.
+- *S*: use it if there is no timer faster than the tick, or if a divider is unwanted; at high speed with a real encoder;
+  and around multiples of the unit velocity. Its tick can be as short as a clock. It is then as fine as T at low speeds.
+- *M/T*: use it if a fast timer and a divider are available. It has the least error of the cores on ramps and reversals.
+  A longer `--min-time` gives less noise and more delay, as averaging does. On a lattice (`--timer tick`) it equals M at
+  high speeds.
+- *T*: it equals M/T at slow speeds and sudden stops, with less logic. It suffers most from an uneven disc and from
+  jitter.
+- *Rairán*: use it if bounds of the speed and a constant value at constant speed matter more than the error, which is up
+  to 1/3 at ω_lim.
+- *M*: use it if nothing else fits, or if its noise is filtered anyway.
+- *LinuxCNC's timestamps* (counts over the time between the latest counts, as M/T): they are nearly always good where
+  1 ms is fast enough and software divides.
+- *Tracking loops* (ODrive, moteus): they are smooth, with a delay that is constant and known, 2 ms with their defaults.
+- *Filtered differences, SimpleFOC*: they are good at constant speed, and have 5 ms of delay everywhere else.
 
-Tsuji 2009, Fig. 8, says the same of M/T with a timer of 200 ns and S with ticks of 20 µs: M/T is better below about
-130 rad/s of an encoder of 81,000 counts, S above ([figures.md](figures.md)).
+Tsuji 2009, Fig. 8, agrees for M/T with a timer of 200 ns and S with ticks of 20 µs: M/T is better below about
+130 rad/s with an encoder of 81,000 counts, and S is better above ([figures.md](figures.md)).
 
 """
 

@@ -39,35 +39,37 @@ REPEATS = 2
 
 _HEADING = "## Engines"
 _PAGE = """
-The same motion through `--engine`: pysim has {slow:,} clocks of it, the compiled engines {fast:,}, the bare loop the
-same: a C++ loop around the same CXXRTL module, without debug information, that plays the same changes with `step()`
-on both levels of the clock, adds up the outputs at the strobes, and does nothing else.
-{repeats} runs, the fastest counts; a core that is new takes some seconds more, once. Every run is compared with the
-golden model, bit by bit. Clocks per second, in processor time:
+The same motion is run through `--engine`: {slow:,} clocks of it by pysim, and {fast:,} by the compiled engines and by
+the bare loop. The bare loop is a C++ loop around the same CXXRTL module, without debug information. It plays the same
+changes with `step()` on both levels of the clock, adds up the outputs at the strobes, and does nothing else.
+The table has the fastest of {repeats} runs. The first run of a new core takes some seconds more, for its compilation.
+Every run is compared with the golden model, bit by bit. Clocks per second, in processor time:
 
 {speeds}
-All ten seconds, {clocks:,} clocks, by cxxrtl, compared with the golden model in every bit of every update:
+The next table is of all ten seconds, {clocks:,} clocks, run by cxxrtl and compared with the golden model in every
+bit of every update:
 
 {whole}
-A golden model's time goes with edges, ticks and updates, not with clocks. It is a hundredth and less where updates are
-made of whole ticks; with T, M/T and Rairán's method every count is looked at, most of them make an update, and a chain
-of windows, each beginning where one before ended, has to be followed.
+A golden model's time depends on the numbers of edges, ticks and updates, not on clocks. It is a hundredth and less of
+the engine's time where updates are made of whole ticks. With T, M/T and Rairán's method every count is processed, and
+most counts make an update. Each window begins where the previous one ended, so the windows have to be followed in
+order.
 
-What makes it fast, each with what stands above it, on the S method:
+The next table shows what makes cxxrtl fast, on the S method. Each row includes the changes of the rows above it:
 
 {steps}
-- Debug information keeps every value of every clock in memory; without it the compiler keeps what it needs.
-- `step()` on both levels of the clock settles the core twice; all flip-flops take the rising edge, so that one
-  evaluation does, with the level and the reset as constants.
-- A commit asks of every flip-flop whether it has changed; here it is a copy, and of a model that is local to the loop
-  hardly that.
-- There are no black boxes. Values of more than 32 bits are pairs of words: they remain.
-- Room for rows is asked for between clocks, never within one: a clock that may be left half done keeps alive what it
-  has worked out, which cost a third.
-- The engine is slower than the fastest loop, whose model begins and ends with it: a call ends every 50 ms, for progress
-  and Ctrl-C, and the state outlives it; then there are the rows. The elaboration of the core and its look-up in the
-  cache, about a tenth of a second of each run, is half of the time of the short runs of the tables: compare with the
-  clocks/s of all ten seconds.
+- Debug information keeps every value of every clock in memory. Without it the compiler keeps only what it needs.
+- `step()` on both levels of the clock settles the core twice. All flip-flops take the rising edge, so one evaluation is
+  enough, with the level and the reset as constants.
+- A commit of CXXRTL asks of every flip-flop whether it has changed. Here a commit is a copy, and with a model that is
+  local to the loop there is hardly even a copy.
+- The core has no black boxes, so none has to be called. Values of more than 32 bits remain pairs of words.
+- Memory for rows is requested between clocks, never within one. If a clock could be left half done, the compiler would
+  have to keep its intermediate values, which cost a third of the speed.
+- The engine is slower than the fastest loop, whose model exists only within the loop. A call of the engine ends every
+  50 ms, for progress and Ctrl-C, so its state must outlive the call. The engine also stores rows. Each run needs about
+  a tenth of a second to elaborate the core and look it up in the cache. That is half of the time of the short runs in
+  the tables, so compare with the clocks/s of all ten seconds.
 """
 
 # The loops that are measured; each counts the clocks with a strobe.

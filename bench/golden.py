@@ -35,14 +35,15 @@ REPEATS = 3
 
 HEAD = """# Speed
 
-How fast the golden models are, which the hardware equals bit for bit, beside Amaranth's simulator (pysim), which runs
-the hardware clock by clock: `make bench` measures both in one run and writes this page. The golden models have the
+This page compares the speed of the golden models, which the hardware equals bit for bit, with that of Amaranth's
+simulator (pysim), which runs the hardware clock by clock. `make bench` measures both in one run and writes this page.
+The golden models run the
 {seconds:.0f} s of `--motion "{motion}"` (500 PPR x4, 48 MHz, 20 us: {clocks:.2g} clocks, {ticks:,} ticks,
-{edges:,} edges), the simulator {simulated:,} clocks of it, in which both agree on every bit.
+{edges:,} edges). The simulator runs {simulated:,} clocks of it, in which both agree on every bit.
 
 {table}
-Measured with {python} on {machine}, {cores} cores. A golden model takes time for edges, ticks and updates, none for
-clocks; the low-pass filter is a recursion, which it follows update by update. A tick is 960 clocks here.
+Measured with {python} on {machine}, {cores} cores. A golden model takes time for edges, ticks and updates, and none
+for clocks. The low-pass filter is a recursion, which the model follows update by update. A tick is 960 clocks here.
 """
 
 

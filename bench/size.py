@@ -205,15 +205,15 @@ PEERS = Table(
 PAGE_HEAD = """\
 # Size and speed
 
-Made by `make size` (`python bench/size.py`) with {used}.
+This page is made by `make size` (`python bench/size.py`) with {used}.
 
-- Area is that of the core alone, as nextpnr packs it: COMB, FF, DP16KD and MULT are the ECP5 cells TRELLIS_COMB,
-  TRELLIS_FF, DP16KD (block RAM) and MULT18X18D; LC, RAM and DSP the iCE40 cells ICESTORM_LC, ICESTORM_RAM and
+- Area is that of the core alone, as nextpnr packs it. COMB, FF, DP16KD and MULT are the ECP5 cells TRELLIS_COMB,
+  TRELLIS_FF, DP16KD (block RAM) and MULT18X18D. LC, RAM and DSP are the iCE40 cells ICESTORM_LC, ICESTORM_RAM and
   ICESTORM_DSP.
-- Fmax is that of the core in a wrapper, routed, the median over seeds 1, 2 and 3: the inputs come from a shift
-  register, the outputs are registered, then loaded into a shift register that ends in one pin.
+- Fmax is that of the core in a wrapper, routed. It is the median over seeds 1, 2 and 3. The inputs come from a shift
+  register. The outputs are registered, and then loaded into a shift register that ends in one pin.
 - Latency is from `tick` to `velocity_valid`.
-- What limits Fmax is the longest path of the median seed, from register to register, as `box.signal`.
+- The column "what limits Fmax" has the longest path of the median seed, from register to register, as `box.signal`.
 
 """
 

@@ -21,9 +21,9 @@ COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]
 
 _HEADING = "## Sweeps"
 _PAGE = """
-The points of [sweep.toml](sweep.toml), 200 ms each by the golden model: one after the other without Dask, then in
-processes of `tachometry sweep`. The start is until workers are there, each of which then imports numpy; it is not in
-points/s, but all is in processor time, that of the scheduler too.
+These are the points of [sweep.toml](sweep.toml), 200 ms each by the golden model. They run one after the other without
+Dask, and then in processes of `tachometry sweep`. The start lasts until the workers have connected; each of them then
+imports numpy. The start is not included in points/s. Processor time includes all of it, and that of the scheduler.
 
 {table}"""
 

@@ -43,7 +43,7 @@ class Outputs:
         return self._staging[target.parent] / "new" / target.name
 
     def get(self, what: str) -> Path | None:
-        """The same, or None if that output is not wanted."""
+        """Where to write the output `what` for now, or None if it is not wanted."""
         return self[what] if what in self._targets else None
 
     def __enter__(self) -> Self:

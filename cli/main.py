@@ -55,7 +55,7 @@ cli.add_command(verify)
 
 
 def main(args: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line and exit; what goes wrong is told in one line on stderr, never by a traceback."""
+    """Run the command line and exit; errors are reported in one line on stderr, never by a traceback."""
     if threading.current_thread() is threading.main_thread():
         # Ends as Ctrl-C does: what is done is kept, and nothing is left behind.
         signal.signal(signal.SIGTERM, signal.default_int_handler)

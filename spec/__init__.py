@@ -27,7 +27,7 @@ def common_options() -> tuple[Option, ...]:
 
 
 def own_options(method: str) -> tuple[Option, ...]:
-    """Options that a method has beside these."""
+    """Options of a method beyond those that every method has."""
     common = {about.name for about in common_options()}
     return tuple(about for about in options_of(METHODS[method]) if about.name not in common)
 

@@ -61,7 +61,7 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             "unit": spec.unit,
             "rad_per_s_per_lsb": spec.rad_per_s_per_lsb,
         },
-        **({"bounds": {"none": spec.shown_bound_limit}} if spec.bounds else {}),
+        **({"bounds": {"none": spec.shown_absent_bound}} if spec.bounds else {}),
         "interval_unit_cycles": spec.interval_unit_cycles,
         "latency_cycles": {
             "pin_to_count": spec.pin_to_count,

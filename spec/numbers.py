@@ -18,7 +18,7 @@ class Numbers(Parameters):
 
     @property
     def default_frac_bits(self) -> int:
-        """Fraction bits of the velocity if nothing is said of them."""
+        """Fraction bits of the velocity if they are not given."""
         coarsest, finest = self.frac_bits_range(self.unit)
         return 16 if self.unit == NATIVE else max(coarsest, min(10, finest))
 
@@ -32,7 +32,7 @@ class Numbers(Parameters):
 
     @property
     def native_frac_bits(self) -> int:
-        """Fraction bits of the velocity in counts per tick, of which one in another unit is made."""
+        """Fraction bits of the velocity in counts per tick, from which that in another unit is computed."""
         if self.unit == NATIVE:
             return self.frac_bits
         return max(4, ceil_log2(self._lsb_per_count) + 2)
@@ -44,11 +44,11 @@ class Numbers(Parameters):
 
     @property
     def output(self) -> VelocityOutput | None:
-        """How `velocity` is made of the native velocity; None if that is the output."""
+        """How `velocity` is computed from the native velocity; None if the native velocity is the output."""
         if self.unit == NATIVE and self.velocity_bits is None:
             return None
         native = 1 << self.native_frac_bits
-        largest = self.bound_limit if self.bounds else self.max_count * native
+        largest = self.absent_bound if self.bounds else self.max_count * native
         return VelocityOutput(self._lsb_per_count / native, largest, self.velocity_bits, self.bounds)
 
     @property
@@ -62,14 +62,14 @@ class Numbers(Parameters):
         return signed_width(self.max_bound) + self.native_frac_bits
 
     @property
-    def bound_limit(self) -> int:
-        """Magnitude of a bound in counts per tick that there is none."""
+    def absent_bound(self) -> int:
+        """Magnitude that an absent bound has, in counts per tick: the greatest that fits."""
         return (1 << (self.bound_width - 1)) - 1
 
     @property
-    def shown_bound_limit(self) -> int:
-        """The same at the ports: `velocity_lower` of −limit and `velocity_upper` of limit are none."""
-        return self.bound_limit if self.output is None else self.output.limit
+    def shown_absent_bound(self) -> int:
+        """Magnitude of an absent bound at the ports: −limit for `velocity_lower`, limit for `velocity_upper`."""
+        return self.absent_bound if self.output is None else self.output.limit
 
     @property
     def update_spacing(self) -> int:
@@ -83,15 +83,15 @@ class Numbers(Parameters):
 
     @property
     def low_pass(self) -> LowPass:
-        """The low-pass filter, of which there must be one."""
+        """The low-pass filter, for a core that has one."""
         assert self.lowpass is not None
-        # Those that wait for the filter add up, at most a tick in each of its clocks.
+        # The ticks of updates that wait for the filter add up, at most one in each clock of the filter.
         longest = max((1 << self.timing.max_ticks.bit_length()) - 1, 255)
         return LowPass(self.lowpass * self.timing.tick_seconds, longest, self.native_width)
 
     @property
     def low_pass_latency(self) -> int:
-        """Clocks from the velocity as measured to the filtered one, if they are no closer."""
+        """Clocks from the measured velocity to the filtered one, if updates are no closer."""
         return 0 if self.lowpass is None else self.low_pass.latency
 
     @property
@@ -112,7 +112,7 @@ class Numbers(Parameters):
 
     @property
     def min_tick_cycles(self) -> int:
-        """Fewest clocks between two external ticks: what works step by step must be done."""
+        """Fewest clocks between two external ticks: all work that is done step by step must be finished."""
         output = self.output_latency if self.output_serial else 0
         return max(2, self.datapath_latency if self.serial else 0, output)
 
@@ -145,7 +145,7 @@ class Numbers(Parameters):
 
     @property
     def max_pulse_count(self) -> int:
-        """Largest |m_e| of the longest tick that a method with its own makes, but for a wait for a count."""
+        """Largest |m_e| of the longest tick, less the time that a method with own ticks may wait for a count."""
         return self.max_count
 
     @property
@@ -180,7 +180,7 @@ class Numbers(Parameters):
 
     @property
     def output_serial(self) -> bool:
-        """Whether `velocity` is made of the native one bit by bit."""
+        """Whether `velocity` is computed from the native velocity bit by bit."""
         output = self.output
         return output is not None and len(output.digits) > 2 and self.has_room(output.serial_latency)
 

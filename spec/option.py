@@ -36,7 +36,7 @@ class ParameterError(ValueError):
 
     @staticmethod
     def longer(error: ValueError, more: str) -> ValueError:
-        """The same error with something behind its message."""
+        """This error with more text at the end of its message."""
         if isinstance(error, ParameterError):
             return ParameterError(error.parameter, error.rest + more)
         return ValueError(f"{error}{more}")
@@ -99,23 +99,23 @@ class Option:
     shown : str or None
         The default, as `--help` shows it.
     parse : callable
-        Makes the value of what the message calls the option, and of the text. A value that depends on other fields is
-        a `Derived`.
+        Makes the value from the name of the option in messages, and from the text. A value that depends on other fields
+        is a `Derived`.
     flag : bool
         Whether it stands alone, for yes.
     needs : str
         Name of the flag that must be given with it.
     fits : callable or None
-        Tells of a method's spec whether it has the option; None: it has.
+        Whether the spec of a method has the option; None: always.
     tests : tuple of str or None
         Values that pairwise tests use, the empty text for leaving it out; see `sim.studies.pairs` for those in words.
-        None: both of a flag, all choices, else none.
+        None: both values of a flag, all choices, else no values.
     few : int
-        How many of these, the first, are enough with a method that does little with the option.
+        For a method that hardly depends on the option, the first so many of these values are enough.
     field : str
-        Name of the field; known to `options_of`.
+        Name of the field; set by `options_of`.
     default : object
-        That of the field; known to `options_of`.
+        Default of the field; set by `options_of`.
     """
 
     help: str
@@ -136,7 +136,7 @@ class Option:
 
     @property
     def parameter(self) -> str:
-        """What messages call it."""
+        """The name of the option in messages."""
         return self.name.replace("-", "_")
 
     @property
@@ -202,7 +202,7 @@ def _of_field(about: Option, item: Field[Any]) -> Option:
 
 
 def read_options(spec: type[Any], texts: Mapping[str, str]) -> dict[str, Any]:
-    """Values of the fields of a class, of the texts that are given for its options.
+    """Values of the fields of a class, from the texts that are given for its options.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class Port:
 
     @property
     def is_strobe(self) -> bool:
-        """Whether it is high for one clock to tell that something is new."""
+        """Whether it is high for one clock when something is new."""
         return self.held_by == self.name
 
 

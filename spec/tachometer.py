@@ -19,7 +19,7 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 class TachometerSpec(Numbers):
     """From encoder pins to velocity, whatever the method; its parameters are those of `Parameters`.
 
-    A method is a subclass: what it says of itself is below, and all that tells methods apart is asked of it.
+    A method is a subclass: it declares the members below, and all code that depends on the method reads them.
 
     Raises
     ------
@@ -71,7 +71,9 @@ class TachometerSpec(Numbers):
         if self.max_tick_cycles is None:
             return
         if self.own_ticks:
-            raise ParameterError("method", f"must be another than {self.method} for an external tick: it makes its own")
+            raise ParameterError(
+                "method", f"must be another than {self.method} for an external tick: it makes its own ticks"
+            )
         shortest = self.timing.tick_cycles
         if shortest < 2:
             raise ParameterError("tick_cycles", "must be at least 2 with an external tick, not 1")
@@ -107,12 +109,12 @@ class TachometerSpec(Numbers):
 
     @property
     def remark(self) -> str:
-        """What to know of a plan of it; empty: nothing."""
+        """A remark below the plan of the method; empty: none."""
         return ""
 
     @property
     def memory(self) -> tuple[str, int, int] | None:
-        """What holds the reciprocal: what it is, entries, bits of an entry. None: nothing."""
+        """The memory of the reciprocal: its kind, entries, bits of an entry. None: there is no such memory."""
         return None
 
     @property
@@ -124,13 +126,13 @@ class TachometerSpec(Numbers):
     def recovery_clocks(self) -> int | None:
         """Clocks after which, from any state of the flip-flops, all outputs are right again; position aside.
 
-        Right is what docs/verification.md says. Counters that an upset has set beyond their ends go on to where they
-        wrap. None: a low-pass filter forgets by and by.
+        docs/verification.md defines when outputs are right. Counters that an upset has set beyond their ends continue
+        until they wrap. None: the core has a low-pass filter, which forgets only gradually.
         """
         if self.lowpass is not None:
             return None
         conditioned = 2 + (1 << max(self.filter_clocks - 1, 1).bit_length() if self.filter_clocks else 0)
-        # One to decode; then the first window that is whole begins with the end of another.
+        # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
         return conditioned + 1 + window + self.remembered_clocks + self.tick_latency + self.tick_to_velocity
 
@@ -146,7 +148,7 @@ class TachometerSpec(Numbers):
 
     @property
     def bound_ports(self) -> tuple[Port, ...]:
-        """What encloses the true speed."""
+        """Ports that enclose the true speed."""
         if not self.bounds:
             return ()
         width = self.bound_width if self.output is None else self.output.port_width

@@ -105,7 +105,7 @@ def read_nearest(what: str, text: str, units: Units, default: str = "") -> float
 
 
 def ratio(unit: str, other: str) -> Fraction | None:
-    """How many of `unit` one of `other` is, exactly; None if they cannot be turned into each other so."""
+    """How many of `unit` one of `other` is, exactly; None if there is no exact ratio."""
     for units in (TIME, FREQUENCY, SPEED, ANGLE):
         if unit in units and other in units and (units[unit].pi is None) == (units[other].pi is None):
             return units[other].exact / units[unit].exact

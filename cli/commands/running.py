@@ -50,7 +50,7 @@ def run_and_report(
 
 
 def _least(spec: TachometerSpec) -> int:
-    """Fewest clocks of which something can be told."""
+    """Fewest clocks after which there is something to report."""
     return spec.longest_tick + spec.tick_latency
 
 

@@ -33,7 +33,7 @@ METRICS = {
 
 
 class _Command(GroupedCommand):
-    """A command whose options may stand in a file, too, and may be varied: then the first value stands for all."""
+    """A command whose options may also stand in a file, and may vary; one that varies is read with its first value."""
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         own = super().get_params(ctx)

@@ -93,7 +93,7 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
     chosen = _listed("methods", methods, list(METHODS))
     used = present() if engines.strip() == "all" else _listed("engines", engines, list(ENGINES))
     for engine in used:
-        pick(engine)  # what is missing is told at once
+        pick(engine)  # what is missing is reported at once
     cores = [
         _Configuration(f"{method}{number}", method, words)
         for method in chosen
@@ -157,7 +157,7 @@ def _check(core: _Configuration, *, engines: list[str], clocks: int, seed: int, 
 
 
 def _heed_only_the_pool() -> None:
-    """In a process of the pool: Ctrl-C is heard by this one, which ends the others."""
+    """In a process of the pool: ignore Ctrl-C, which the main process handles by ending the others."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 

@@ -135,7 +135,7 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def core_and_make_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the same, and what makes a spec of another method as `make`, see `common_core_options`."""
+    """Decorator: as `core_options`, with what makes a spec of another method as `make`, see `common_core_options`."""
 
     @functools.wraps(command)
     def build(*, method: str, **given: Any) -> Any:

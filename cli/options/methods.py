@@ -17,7 +17,7 @@ class Methods:
     specs : dict of str to TachometerSpec or None
         By name, in order; None for what is no method of a core.
     left_out : dict of str to str
-        Methods of `all` that cannot be with these options, and why.
+        Methods of `all` that are impossible with these options, and why.
     """
 
     specs: dict[str, TachometerSpec | None]
@@ -44,7 +44,7 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
     if text.strip() == "all":
         specs: dict[str, TachometerSpec | None] = {}
         left_out = {}
-        make(next(iter(METHODS)), {})  # what is wrong for all is told at once
+        make(next(iter(METHODS)), {})  # what is wrong for all is reported at once
         for name in METHODS:
             try:
                 specs[name] = make(name, {})

@@ -138,12 +138,12 @@ def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def optional_motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the same, but without a motion `record` is None."""
+    """Decorator: as `motion_options`, but without a motion `record` is None."""
     return all_of([_motion(required=False), *_OPTIONS], _recording(command))
 
 
 def encoder_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the same, handed to the command as `motion`, a text, and `encoder`, a function of a spec."""
+    """Decorator: as `motion_options`, but handed over as `motion`, a text, and `encoder`, a function of a spec."""
     return all_of([_motion(required=True), *_OPTIONS], _encoding(command))
 
 

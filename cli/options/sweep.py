@@ -16,5 +16,5 @@ def by_name(command: click.Command) -> dict[str, click.Option]:
 
 
 def point_options() -> dict[str, click.Option]:
-    """All of them by their names."""
+    """All options that a sweep can vary, by their names."""
     return core_click_options() | by_name(ENCODER)

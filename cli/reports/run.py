@@ -1,4 +1,4 @@
-"""What a command says of a run: what came of it."""
+"""What a command prints about the results of a run."""
 
 import math
 import sys
@@ -16,7 +16,7 @@ from tachometry.spec.units import format_time
 
 
 def interrupted(n_clocks: int, wanted: int) -> int:
-    """Tell that a simulation has been ended early; the exit status."""
+    """Print that a simulation has been ended early; returns the exit status."""
     print(f"tachometry: interrupted after {n_clocks} of {wanted} clocks", file=sys.stderr)
     return INTERRUPTED
 
@@ -33,7 +33,7 @@ def print_summary(
 
 
 def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int) -> list[tuple[str, str]]:
-    """Rows of the table: what is told, and its value."""
+    """Rows of the table: a name and its value."""
     updates = run.updates
     n_overflows = int(np.count_nonzero(run.ticks.overflow))
     rows = [

@@ -44,7 +44,7 @@ def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[
 
 
 def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
-    """The same, of clocks that are simulated."""
+    """A progress bar of the clocks that are simulated."""
     return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), PerSecond("clocks"))
 
 

@@ -40,7 +40,7 @@ class Points:
     axes : dict of str to list of str
         All values of each axis.
     left_out : dict of str to str
-        Methods of `all` that cannot be everywhere, and why.
+        Methods of `all` that are impossible somewhere, and why.
     """
 
     points: dict[str, Point]

@@ -37,13 +37,13 @@ class Settings:
     vary: dict[str, list[Text]] = field(default_factory=dict)
 
     def over(self, other: "Settings") -> "Settings":
-        """These, and what they leave open of others; axes in the order of the others."""
+        """These settings, and from the others what these leave open; axes are in the order of the others."""
         fixed = {name: text for name, text in other.fixed.items() if name not in self.vary}
         vary = {name: values for name, values in other.vary.items() if name not in self.fixed}
         return Settings(fixed | self.fixed, vary | self.vary)
 
     def first(self) -> dict[str, Text]:
-        """Everything, of axes their first value."""
+        """All options, with the first value of every axis."""
         return self.fixed | {name: values[0] for name, values in self.vary.items()}
 
 
@@ -94,7 +94,7 @@ def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
 
 
 def arguments(texts: Mapping[str, Text], options: Mapping[str, click.Option]) -> list[str]:
-    """The same as words of a command line."""
+    """These settings as words of a command line."""
     words = []
     for name, text in texts.items():
         option = options[name]

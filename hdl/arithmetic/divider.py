@@ -11,10 +11,10 @@ class Divider(wiring.Component):
     In each step the divisor is taken from the doubled remainder, or added if that is negative; so it stays within
     −divisor … divisor − 1. The signs that it passes through, inverted but for the first, are the digits of the quotient
     in two's complement: Σ ±2^i is their weighted sum, and the last one is the correction to a remainder that is not
-    negative. A counter tells when the last has come: it ends from any state, unlike a mark among the digits.
+    negative. A counter shows when the last digit has come. It ends from any state, unlike a marker among the digits.
 
-    Latency: `done` is high as many clocks after `start` as the quotient has bits; a start before it, or together with
-    it, begins the next one.
+    Latency: `done` is high as many clocks after `start` as the quotient has bits; a `start` before `done`, or together
+    with it, begins the next division.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Divider(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        # Only what says that something is under way needs a reset; the rest is loaded before it is used.
+        # Only the flags of work in progress need a reset; all else is loaded before it is used.
         running = Signal()
         steps = Signal(signed((self._steps - 1).bit_length() + 1), reset_less=True)  # counts down to −1
         remainder = Signal(signed(len(self.by) + 1), reset_less=True)

@@ -28,7 +28,7 @@ class _Scaler(Protocol):
 
 @runtime_checkable
 class _TakesRemainder(Protocol):
-    """What a scaler for a carried reciprocal has as well."""
+    """What a scaler for a carried reciprocal has in addition."""
 
     r: Signal
 
@@ -66,13 +66,13 @@ class Quotient(wiring.Component):
     Members
     -------
     m : In(range(max_m + 1))
-        Only if it is not constant, as `enable`. A carried reciprocal restricts what may follow an m.
+        `m` and `enable` exist only if m is not constant. A carried reciprocal restricts what may follow an m.
     enable : In(1)
         `m` is new.
     load : In(1)
         `base`, `numerator`, `m` and `tag` are valid.
     start : In(1)
-        And they are to be used; only together with `load`.
+        The loaded values are to be used; only together with `load`.
     base, numerator : In(signed)
     tag : In(tag)
     results : Out(stream)

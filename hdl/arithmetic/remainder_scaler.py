@@ -3,7 +3,7 @@
 Both scalers form base·2^f + N·Q + ⌊N·R/m + ½⌋ exactly, or with the floor or the ceiling of N·R/m. The products grow by
 a bit of N at a time, the least significant first, its sign bit negative. N·R/m is a small number, of no more bits than
 N: it is found by as many subtractions of m, which leave a remainder of either sign (non-restoring), and one more rounds
-it. The one scaler does a step a clock on one pair of adders, the other all steps at once for any update rate.
+it. One scaler does a step per clock with one pair of adders. The other does all steps in parallel, for any update rate.
 """
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
@@ -46,7 +46,7 @@ class _RemainderScaler(wiring.Component):
     load : In(1)
         `base`, `numerator` and `tag` are valid.
     start : In(1)
-        And they are to be used; only together with `load`.
+        The loaded values are to be used; only together with `load`.
     base, numerator, tag : In
     q, r : In
         Quotient and remainder, valid in the clock after `start`.
@@ -81,7 +81,7 @@ class _RemainderScaler(wiring.Component):
         )
 
     def _up(self, doubled: Value, m: Value) -> Value:
-        """Whether ⌊N·R/m⌋ is to be one more, where twice what it leaves, less m, is `doubled`."""
+        """Whether ⌊N·R/m⌋ must be increased by one; `doubled` is twice its remainder, less m."""
         nearest = ~doubled[-1]
         return (nearest, doubled + m != 0, Const(0))[self._towards]
 
@@ -141,7 +141,7 @@ class SerialRemainderScaler(_RemainderScaler):
         m = Module()
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
-        # Only what says that something is under way needs a reset; the rest is loaded before it is used.
+        # Only the flags of work in progress need a reset; all else is loaded before it is used.
         running = Signal()
         step = Signal(range(2 * self._steps + 4), reset_less=True)
         tag = Signal.like(self.tag, reset_less=True)

@@ -2,8 +2,8 @@
 
 Both scalers form base·2^f + ⌊(N·q + E + 2^(k−1)) / 2^k⌋, which spec/formats/reciprocal.py shows to be correctly
 rounded, by adding q for every bit of N, the least significant first, and dropping a bit of the sum each time; the sign
-bit of N counts negative. The one takes a clock per bit and a single adder, the other an adder per bit and any update
-rate. Their latency is the same.
+bit of N counts negative. One scaler takes a clock per bit and a single adder. The other has an adder per bit, and
+accepts any update rate. Their latencies are the same.
 """
 
 from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
@@ -36,7 +36,7 @@ class _Scaler(wiring.Component):
     load : In(1)
         `base`, `numerator` and `tag` are valid.
     start : In(1)
-        And they are to be used; only together with `load`.
+        The loaded values are to be used; only together with `load`.
     base, numerator, tag : In
     q : In(reciprocal.width)
         Reciprocal, valid in the clock after `start`.
@@ -85,7 +85,7 @@ class SerialScaler(_Scaler):
         m = Module()
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
-        # Only what says that something is under way needs a reset; the rest is loaded before it is used.
+        # Only the flags of work in progress need a reset; all else is loaded before it is used.
         running = Signal()
         adding = Signal()
         last = Signal()

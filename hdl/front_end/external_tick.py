@@ -9,11 +9,12 @@ from amaranth.lib.wiring import In, Out
 class ExternalTick(wiring.Component):
     """Ends a window when `tick_in` rises, as a PWM carrier or a fieldbus sync does.
 
-    A rise that comes too early for the datapath is ignored: its window goes on. When none has come for `max_cycles`
-    clocks, the window ends all the same, so that nothing freezes and nothing overflows. Both are told.
+    A rise that comes too early for the datapath is ignored, and its window goes on. If no rise has come for
+    `max_cycles` clocks, the window ends without one, so that nothing freezes and nothing overflows. Both raise
+    `tick_error`.
 
     Latency: a rise that is sampled at clock edge c makes c + 2 the last clock of its window; `tick_error` is high two
-    clocks after the clock that it tells of, together with `tick` if it tells of a tick that did not come.
+    clocks after its cause. For a tick that did not come it is high together with `tick`.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ class GlitchFilter(wiring.Component):
         Take the level as it is: there is no past yet.
     filtered : Out(1)
     swallowed : Out(1)
-        One clock: a level went back before it had held long enough, so two edges are gone.
+        High for one clock when a level went back before it had held long enough; two edges are swallowed.
 
     Raises
     ------

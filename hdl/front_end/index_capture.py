@@ -8,8 +8,8 @@ from amaranth.lib.wiring import In, Out
 class IndexCapture(wiring.Component):
     """Captures the position when the index line Z rises.
 
-    Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + 2, and `index_position` is Σ s through
-    clock c: what `position` shows in that clock, or would, were it not set to 0.
+    Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + 2, and `index_position` is the sum of all
+    steps through clock c. `position` has this value in clock c + 2, unless the index sets it to 0.
 
     Parameters
     ----------

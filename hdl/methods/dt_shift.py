@@ -52,7 +52,7 @@ class DtShift(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         spec, rule = self._spec, self._spec.adaptive_dt
-        # 2^k − 1, of no state of its own: after an upset it could be that of another k.
+        # 2^k − 1 has no register of its own: after an upset that could belong to another k.
         mask = self._soon(m, Cat(self.shift > k for k in range(spec.max_shift)))
         passed = Signal(spec.max_shift)
         m.d.comb += self.last.eq(self.nominal & (passed == mask))
@@ -88,7 +88,7 @@ class DtShift(wiring.Component):
         return Array([constant(min(k, self._spec.max_shift)) for k in range(1 << len(self.shift))])[self.shift]
 
     def _soon(self, m: Module, value: Value, init: int = 0) -> Value:
-        """From a register what depends on k: but for a reversal, which does not ask, a window takes dt at least."""
+        """A constant that depends on k, from a register: a window lasts a dt at least, except at a reversal."""
         if self._spec.timing.tick_cycles == 1:
             return value
         held = Signal.like(value, init=init)

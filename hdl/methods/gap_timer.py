@@ -6,9 +6,9 @@ from amaranth.lib.wiring import In, Out
 
 
 class GapTimer(wiring.Component):
-    """Counts timer periods from count to count, and tells when there have been too many without one.
+    """Counts timer periods from count to count, and reports when too many periods have had no count.
 
-    Reset is taken for a count in the period before, which opens nothing. Without latency.
+    Reset is treated as a count in the period before the first one; this count opens no window. Without latency.
 
     Parameters
     ----------
@@ -20,9 +20,9 @@ class GapTimer(wiring.Component):
     period : In(1)
         A timer period ends.
     count : In(1)
-        With something counted in it.
+        Something was counted in this period.
     negative : In(1)
-        Its sign.
+        The sign of this count.
     age : Out(range(max_periods + 1), init=1)
         Periods since the last count, this one included; as the flags valid with `period`.
     opened : Out(1)
@@ -30,7 +30,7 @@ class GapTimer(wiring.Component):
     was_negative : Out(1)
         The sign of the last count.
     overdue : Out(1)
-        It was `max_periods` ago, and there is none now.
+        The last count was `max_periods` ago, and this period has none.
     """
 
     def __init__(self, max_periods: int) -> None:

@@ -37,7 +37,7 @@ class IntervalAccumulator(wiring.Component):
     update : Out(1)
         The window closes.
     forced : Out(1)
-        It does so without an alteration.
+        The window closes without an alteration.
     stalled : Out(1)
         Nothing was counted in any tick of the window, its opening tick included.
 

@@ -15,8 +15,9 @@ from tachometry.spec import MTachometer
 class MovingSum(wiring.Component):
     """Sum of the last n pulse numbers, the present one included.
 
-    It is a difference of what had been counted in all up to now and n ticks ago, modulo 2^sum_width: n ticks after an
-    upset, both have it. A sum from which the oldest number is taken when a new one is added would keep it for ever.
+    It is the difference of two totals modulo 2^sum_width: all counts up to now, and all counts up to n ticks ago. n
+    ticks after an upset, both totals contain its error, which cancels. A running sum, from which the oldest number is
+    subtracted when a new one is added, would keep the error for ever.
 
     Latency: none. What was counted before the first tick after reset is 0, whatever the memory still holds.
 
@@ -153,7 +154,7 @@ class MMethod(wiring.Component):
             self.updates.p.interval.eq(spec.average),
         ]
         if spec.bounds:
-            # Of the first tick not all was seen.
+            # The first tick was not seen completely.
             seen = Signal(range(spec.average + 1))
             with m.If(self.tick & (seen < spec.average)):
                 m.d.sync += seen.eq(seen + 1)
@@ -168,7 +169,7 @@ class MMethod(wiring.Component):
         total, shift = self.moving_sum.total, self._spec.shift
         if self.quotient is not None:
             m.submodules.quotient = quotient = self.quotient
-            # The sum has a clock of its own.
+            # The sum takes one clock.
             start, total, known = delay(m, self.tick, total, known)
             m.d.comb += [
                 quotient.load.eq(start),

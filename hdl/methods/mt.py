@@ -10,7 +10,7 @@ class MTMethod(TimedDatapath):
     """M/T-method datapath, eqs. (13) to (16) of Tsuji 2009: counts over the time that they take, longer than T_c.
 
     ½·s(opening) + counts between + ½·s(closing) is a sum over pairs of consecutive counts: a count of the same sign as
-    the one before is one, a count of the other sign, which meets the same edge again, is none.
+    the one before adds one, and a count of the other sign, which meets the same edge again, adds none.
     """
 
     def __init__(self, spec: MTTachometer) -> None:

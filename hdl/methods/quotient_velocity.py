@@ -42,7 +42,7 @@ class QuotientVelocity(wiring.Component):
     less, more : In(1)
         With `spec.bounds`: the distance may also have been a count less, or more.
     known, was_negative : In(1)
-        With `spec.bounds`: there are bounds; sign of the last count.
+        With `spec.bounds`. `known`: there are bounds. `was_negative`: the sign of the last count.
     updates : Out(stream)
         As those of the datapath.
     """
@@ -133,7 +133,7 @@ class QuotientVelocity(wiring.Component):
         return m
 
     def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
-        """Two more dividers, as long as the first, for the ends of what the velocity can have been."""
+        """Two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
         counted = Signal()
         greatest = self._spec.timer_periods
         m.d.comb += counted.eq(self.measure & ~self.forced_in)
@@ -154,12 +154,12 @@ class QuotientVelocity(wiring.Component):
                 end.eq(Mux(counted, distance, Mux(still, 0, -greatest))),
                 box.start.eq(self.divider.start),
                 box.dividend.eq(end),
-                # The edges lie within a period before what shows them.
+                # Each edge lies within one period before the count that reports it.
                 box.divisor.eq(self.divisor + Mux(counted, Mux(end[-1], -1, 1), 0)),
             ]
             with m.If(self.divider.start):
                 m.d.sync += none.eq(counted & end[-1] & (self.divisor == 1))
-            limit = -self._spec.bound_limit
+            limit = -self._spec.absent_bound
             lower = Signal.like(box.quotient, reset_less=True)
             with m.If(box.done):
                 m.d.sync += lower.eq(Mux(none, limit, box.quotient))

@@ -29,7 +29,7 @@ class RairanMethod(wiring.Component):
     last : Out(1)
         The present clock is the last of dt, and so of a tick.
     beyond : Out(1)
-        And Nep1 is saturated.
+        Nep1 is saturated; valid with `last`.
     tick, pulse_count : In
         Not used.
     updates : Out(stream)
@@ -80,7 +80,7 @@ class RairanMethod(wiring.Component):
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())
         new = registers(self.updates.p.shape(), "new", init={"n_dt1": 1})
         m.d.comb += self.updates.p.eq(new)
-        # At rest no update mends what an upset has done to the outputs.
+        # At rest no update corrects what an upset has done to the outputs.
         shown = update | stalled
         with m.If(shown):
             m.d.sync += [
@@ -99,7 +99,7 @@ class RairanMethod(wiring.Component):
         return m
 
     def _bounds(self, m: Module, new: data.View, *, shown: Value, backward: Signal) -> None:
-        """Both looked up; backwards, the negative of each is the other."""
+        """Both bounds from tables; backwards, they are negated and exchanged."""
         spec, counters = self._spec, self.counters
         width = spec.bound_width - 1
         low = ~counters.high & counters.unsynced

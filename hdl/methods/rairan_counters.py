@@ -33,14 +33,14 @@ class RairanCounters(wiring.Component):
     high, backward : Out(1)
         The regime, and the direction.
     forced, stalled : Out(1)
-        Of the last update: it came without a count; and it is that of the maximum time.
+        `forced`: the last update came without a count. `stalled`: it came at the maximum time.
     n_ep1, n_dt1 : Out
         Only with `paper_exact`: as in Table 1.
     shift : Out
         Only if dt is adaptive: n is of dt·2^shift.
     loose, unsynced, known : Out(1)
-        Only with bounds: n says nothing of the least speed; what it measures did not begin in step with dt; there has
-        been a count that dt was in step with.
+        Only with bounds. `loose`: n implies no least speed. `unsynced`: its measurement did not begin in step with dt.
+        `known`: there has been a count that dt was in step with.
     """
 
     def __init__(self, spec: RairanTachometer) -> None:
@@ -115,7 +115,7 @@ class RairanCounters(wiring.Component):
         return constant(0) if self.dt is None else self.dt.of(constant)
 
     def _clock(self, m: Module, opens: Signal) -> Value:
-        """Count dt from where a window opens, and on; whether it is over."""
+        """Count the clocks of dt, which each new window restarts; whether dt is over."""
         cycles = self._spec.timing.tick_cycles
         if cycles == 1:
             return Const(1)
@@ -128,7 +128,7 @@ class RairanCounters(wiring.Component):
         return left[-1]
 
     def _count(self, m: Module, pulse: Signal, opens: Signal) -> None:
-        """Cep, which a window that a count opens begins with that count, and Cdt since the last count."""
+        """Count Cep, which includes the count that opens a window, and Cdt since the last count."""
         c_more, c_dt, most = self.c_more, self.c_dt, self._spec.max_count
         full: Value = Const(0)
         if most < self._spec.timing.tick_cycles:
@@ -154,7 +154,7 @@ class RairanCounters(wiring.Component):
         return self.c_dt == self._of_dt(constant)
 
     def _is_longest(self) -> Value:
-        """With this end of dt Cdt is what the maximum time has dt, or has been so before."""
+        """Whether Cdt reaches the maximum time with this end of dt, or has reached it before."""
         return self._is(self._spec.max_dt) | self._is(lambda k: self._spec.max_dt(k) - 1)
 
     def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal) -> None:
@@ -209,7 +209,7 @@ class RairanCounters(wiring.Component):
         with m.Elif(opens & ((self.c_dt != 1) | ~self.high)):
             set_(self.c_dt, loose=self.rest, unsynced=~in_step)
         with m.Elif(waits & self._is_longest()):
-            # At rest no update would mend it after an upset.
+            # At rest no update would correct it after an upset.
             set_(0, update=~self.rest, forced=1, stalled=1)
         if spec.bound_decay:
             with m.Elif(waits & Mux(self.high, waited != 0, (waited > n) & self.n.any())):

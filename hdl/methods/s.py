@@ -48,7 +48,7 @@ class SMethod(wiring.Component):
             numerator_width=spec.numerator_width,
             tag=data.StructLayout({"forced": 1, "stalled": 1, **({"bounds_valid": 1} if spec.bounds else {})}),
             serial=spec.serial,
-            margin=spec.whole,
+            margin=spec.numerator_per_count,
         )
 
     @property

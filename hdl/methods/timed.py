@@ -27,8 +27,8 @@ class TimedDatapath(wiring.Component):
     step : In(signed(2))
         As late as `tick`; only if times are counted in clocks.
     updates : Out(stream)
-        `interval` is in timer periods. `forced`: silence alone caused the update. `stalled`: and there was no count in
-        the maximum time before it either. `out_of_range`, only if that can be: the velocity was too high to be
+        `interval` is in timer periods. `forced`: silence alone caused the update. `stalled`: in addition, there was no
+        count in the maximum time before it. `out_of_range`, only if that is possible: the velocity was too high to be
         measured, and is saturated.
     """
 
@@ -61,14 +61,17 @@ class TimedDatapath(wiring.Component):
 
     @property
     def _same(self) -> Value:
-        """Whether it is another edge than that of the last count."""
+        """Whether this count is from another edge than the last count."""
         if self._spec.paper_exact:
             return Value.cast(1)
         return self.gap_timer.was_negative == self.gap_timer.negative
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:
-        """Whether a measurement ends with this count, its distance in counts times the timer periods in a tick, and how
-        long it was; of anything else the last count's age."""
+        """Whether a measurement ends with this count, its distance, and its length.
+
+        The distance is in counts, times the timer periods in a tick. Where nothing ends, the length is the age of the
+        last count.
+        """
         raise NotImplementedError
 
     def elaborate(self, platform: object) -> Module:
@@ -91,7 +94,7 @@ class TimedDatapath(wiring.Component):
             quotient.stalled_in.eq(~timer.count & ~timer.opened),
         ]
         if spec.bounds:
-            # Of the first period after reset not all was seen.
+            # The first period after reset was not seen completely.
             begun = Signal()
             with m.If(timer.overdue):
                 m.d.sync += begun.eq(1)

@@ -12,9 +12,9 @@ from tachometry.spec.formats import low_pass
 
 
 class LowPass(wiring.Component):
-    """y ← u + E·(y − u), E = e^(−G·m·T): eq. (22) of Tsuji 2009, with E from a table, a bit of it a clock.
+    """y ← u + E·(y − u), E = e^(−G·m·T): eq. (22) of Tsuji 2009, with E from a table, multiplied by one bit per clock.
 
-    m is the number of ticks since the update before: what is measured over overlapping windows is not filtered twice.
+    m is the number of ticks since the update before, so that the overlap of two windows is not filtered twice.
     An update that comes while the filter works waits; one that comes while another waits takes its place and adds its
     ticks.
 
@@ -26,7 +26,7 @@ class LowPass(wiring.Component):
     layout : data.StructLayout
         Of an update; all of it but the velocity is handed on as it is.
     clears : bool
-        A `stalled` update is taken as it is, for whatever time.
+        A `stalled` update is taken as it is, whatever its time.
 
     Members
     -------
@@ -48,7 +48,7 @@ class LowPass(wiring.Component):
         m.d.comb += self.filtered.p.eq(filtered)
         extra, bits = spec.extra_bits, spec.factor_bits
 
-        # Ticks from the clock of the update before on.
+        # Ticks since the update before, including one in its clock.
         elapsed = UpdateAge(spec.max_interval)
         m.submodules.elapsed = elapsed
         m.d.comb += [elapsed.tick.eq(self.tick), elapsed.update.eq(self.updates.valid)]

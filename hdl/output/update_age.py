@@ -6,21 +6,21 @@ from amaranth.lib.wiring import In, Out
 
 
 class UpdateAge(wiring.Component):
-    """Counts the ticks since the update, or since reset: those of its clock and later, up to some number.
+    """Counts the ticks from the clock of the update, or from reset, on, up to `max_age`.
 
     Latency: none; in the clock of an update the age is 0, and a tick counts from the clock after it.
 
     Parameters
     ----------
     max_age : int
-        Where it stays.
+        The age at which the count stops.
 
     Members
     -------
     tick, update : In(1)
     age : Out(range(max_age + 1))
     before : Out(range(max_age + 1))
-        What it was before an update of this clock.
+        The age without an update in this clock.
     """
 
     def __init__(self, max_age: int) -> None:

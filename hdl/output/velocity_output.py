@@ -1,9 +1,9 @@
 """From the native velocity to the one that the user wants: its unit, its LSB, its width.
 
 Both boxes form ⌊(v·multiplier + 2^(shift−1)) / 2^shift⌋, which spec/formats/velocity_output.py shows to be within 0.7
-LSB, and hold it within bounds. The multiplier is a constant, taken from its lowest bit; what falls below the point is
-dropped on the way, which does not change the floor. The one adds v for a bit a clock, the other has an adder for each
-digit of the multiplier's canonical form and takes any update rate.
+LSB, and hold it within bounds. The multiplier is a constant, taken from its lowest bit; bits below the point are
+dropped after each addition, which does not change the floor. One box adds v for one bit per clock. The other has an
+adder for each digit of the multiplier's canonical form, and accepts any update rate.
 """
 
 from amaranth import Const, Module, Mux, Signal, Value, signed
@@ -32,7 +32,7 @@ class _VelocityOutput(wiring.Component):
     updates : In(stream)
         An update stays until the next.
     shown : Out(stream)
-        The same, and `velocity_overflow`; held until the next.
+        The update in the unit of the output, with `velocity_overflow`; held until the next.
     """
 
     def __init__(self, output: velocity_output.VelocityOutput, layout: data.StructLayout) -> None:

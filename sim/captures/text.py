@@ -83,7 +83,7 @@ def read_csv(
 def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
     """Write a recording as text with the header `time,a,b`, and `z` and `tick_in` if it has these lines.
 
-    `read_csv`, told of them, gives back the same changes and duration.
+    `read_csv`, given the names of these lines, returns the same changes and duration.
 
     Times are the shortest decimals that read as the same float64, equal on every machine. A last row without a change
     marks the end of the recording.

@@ -56,7 +56,7 @@ def _tokens(path: Path, file: BinaryIO) -> Iterator[Token]:
     try:
         yield from tokenize(file)
     except VCDParseError as error:
-        raise CaptureError(f"{path} must be a whole VCD file: {str(error).splitlines()[0]}") from error
+        raise CaptureError(f"{path} must be a complete VCD file: {str(error).splitlines()[0]}") from error
 
 
 def _declarations(path: Path, tokens: Iterator[Token]) -> tuple[dict[int, str], list[str], tuple[int, int]]:
@@ -80,7 +80,7 @@ def _declarations(path: Path, tokens: Iterator[Token]) -> tuple[dict[int, str], 
             if scale is None:
                 raise CaptureError(f"{path} must have a $timescale")
             return names, codes, scale
-    raise CaptureError(f"{path} must be a whole VCD file: its declarations do not end")
+    raise CaptureError(f"{path} must be a complete VCD file: its declarations do not end")
 
 
 def _default(names: dict[int, str], a: Channel | None, b: Channel | None) -> tuple[Channel | None, Channel | None]:
@@ -125,7 +125,7 @@ def _changes(path: Path, tokens: Iterator[Token], lines: dict[str, str], scale: 
                 level[change.id_code] = change.value.lower()
     note()
     if not times:
-        raise CaptureError(f"{path} must tell the levels of all lines, 0 or 1, at least once")
+        raise CaptureError(f"{path} must contain the levels of all lines, 0 or 1, at least once")
     numerator, denominator = scale
     seconds = np.array([(time - times[0]) * numerator / denominator for time in times])
     columns = dict(zip(lines, np.array(levels, dtype=np.uint8).T, strict=True))

@@ -14,7 +14,7 @@ IntArray = NDArray[np.int64]
 _CELLS_PER_PERIOD = 64
 _CHUNK = 1 << 16  # cells or edges handled at once
 _BISECT_AFTER = 40  # iterations of interpolation, of which ten are usual, before bisection makes an end of it
-_NO_TIME = 1e-15  # seconds, below which an instant need not be told more sharply than there
+_NO_TIME = 1e-15  # seconds; instants below this one need no finer resolution than those at it
 MAX_CELLS = 200_000_000
 
 
@@ -155,7 +155,7 @@ def _sign_change(
 def _interpolate(
     x1: FloatArray, x2: FloatArray, x3: FloatArray, f1: FloatArray, f2: FloatArray, f3: FloatArray
 ) -> FloatArray:
-    """Where the root is expected, as a fraction of the way from x1 to x2."""
+    """Where the root is expected, as a fraction of the distance from x1 to x2."""
     with np.errstate(divide="ignore", invalid="ignore"):  # of quotients that are not taken
         xi = (x1 - x2) / (x3 - x2)
         phi = (f1 - f2) / (f3 - f2)

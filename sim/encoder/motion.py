@@ -98,7 +98,7 @@ class Motion:
     Raises
     ------
     ValueError
-        If a segment is too short to be told from a moment, or a number is not finite.
+        If a segment is too short to be distinguished from a moment, or a number is not finite.
     """
 
     breakpoints: FloatArray
@@ -131,7 +131,7 @@ class Motion:
 
     @property
     def max_travel(self) -> float:
-        """Upper bound on the way travelled to and fro, rad."""
+        """Upper bound on the distance travelled to and fro, rad."""
         duration = np.diff(self.breakpoints)
         with np.errstate(over="ignore"):
             end_speed = self.start_speed + self.constant_acceleration * duration

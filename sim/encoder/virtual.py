@@ -37,7 +37,7 @@ class _VibratingShaft:
 
     @property
     def reach(self) -> float:
-        """Start angle and way travelled to and fro together, rad, or a little more."""
+        """Start angle and distance travelled to and fro together, rad, or a little more."""
         vibrated = 4 * self.vibration.amplitude_rad * self.vibration.frequency_hz if self.vibration else 0.0
         start = abs(self.motion.start_angle[0] + self.start_angle_rad)
         return float(start + self.motion.max_travel + vibrated * self.motion.duration)

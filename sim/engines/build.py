@@ -40,7 +40,7 @@ def find_compiler() -> tuple[str, ...] | None:
         except ValueError:  # an open quotation
             words = [given]
         if not shutil.which(words[0]):
-            raise NoCompiler(f"CXX must name a C++ compiler that is there, not {given!r}")
+            raise NoCompiler(f"CXX must name a C++ compiler that exists, not {given!r}")
         return tuple(words)
     for name in ("c++", "g++", "clang++"):
         if shutil.which(name):
@@ -49,7 +49,7 @@ def find_compiler() -> tuple[str, ...] | None:
 
 
 def compiler() -> tuple[str, ...]:
-    """The same.
+    """The compiler that `find_compiler` finds.
 
     Raises
     ------

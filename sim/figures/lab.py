@@ -66,7 +66,7 @@ class Lab:
         return golden.run(spec, PinTrace.of(encoding.recording, spec))
 
     def lockstep(self, spec: TachometerSpec, encoding: Encoding, begin: float = 0.0, end: float = 1.0) -> Run:
-        """The same, and the hardware in Amaranth's simulator held against it.
+        """What `golden` gives, compared with the hardware in Amaranth's simulator.
 
         It takes the figure from the share `begin` of its work to the share `end`.
         """

@@ -9,8 +9,8 @@ from tachometry.spec import TachometerSpec
 def filtered(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
     """Updates with the filtered velocity in counts per tick, as late as the filter shows them.
 
-    The filter takes an update when it is done with the one before; of those that come meanwhile it takes the last, for
-    the ticks of all. What is the last update of a shaft at rest it takes as it is.
+    The filter takes an update when it has finished the one before. Of the updates that come meanwhile it takes only the
+    last, with the ticks of all. It takes the last update of a shaft at rest as it is.
     """
     if spec.lowpass is None:
         return updates

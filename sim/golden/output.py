@@ -9,7 +9,7 @@ from tachometry.spec.tachometer import BOUNDS
 
 
 def in_unit(spec: TachometerSpec, updates: Table) -> Table:
-    """Updates whose velocity and bounds are native, with those of the output instead, as many clocks later.
+    """Updates with native velocity and bounds as the output shows them, later by the latency of the output.
 
     Where 64 bits do not hold the products, Python's integers do.
     """

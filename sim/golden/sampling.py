@@ -9,7 +9,7 @@ from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
 
 
 def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Last clocks of all windows whose `tick`, and clocks of all `tick_error`s that, fall within the trace."""
+    """Last clocks of all windows, and clocks of all `tick_error`s; each `tick` and `tick_error` is within the trace."""
     n_clocks = trace.n_clocks - spec.tick_latency
     if spec.max_tick_cycles is None:
         cycles = spec.timing.tick_cycles

@@ -28,7 +28,7 @@ def save_plan_plot(path: Path, spec: TachometerSpec, plan: Plan, unit: str) -> N
 
 
 def save_plans_plot(path: Path, spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> None:
-    """The same of several methods at the same speeds: Q_V, Q_V/V, T_m and Q_V·T_m, a line for each."""
+    """Draw the plans of several methods at the same speeds: Q_V, Q_V/V, T_m and Q_V·T_m, a line for each."""
     save_figure(path, lambda: _draw_all(spec, plans, unit))
 
 

@@ -34,7 +34,7 @@ def save_heat_maps(
 ) -> None:
     """Draw heat maps into a file whose kind its suffix tells: `.png` or `.pdf`; equal ones give equal files.
 
-    A field is the median over all points there. A method that has not an axis is the same all along it.
+    A field is the median over all points there. A method without one of the axes has the same value all along it.
 
     Parameters
     ----------

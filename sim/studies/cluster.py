@@ -110,7 +110,7 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
     ValueError
         At the end, if a point cannot be run.
     OSError
-        The same, if a worker lacks what it needs; at once, if one has another version, or the scheduler goes.
+        At the end, if a worker lacks what it needs; at once, if one has another version, or the scheduler goes.
     """
     from distributed import KilledWorker, as_completed
 
@@ -139,7 +139,7 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
             raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
         if isinstance(error, KilledWorker):
             point = points[error.task[1]]
-            error = OSError(f"no worker outlives the point of {point.method} on {point.text}: {error}")
+            error = OSError(f"every worker died at the point of {point.method} on {point.text}: {error}")
         failed.append(error)
     if failed:
         first = failed[0]

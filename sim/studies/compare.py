@@ -67,7 +67,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Score:
-    """A curve against the truth; None is what cannot be told.
+    """A curve against the truth; None is what cannot be determined.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
 
 
 def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
-    """The same of a run."""
+    """What a core shows in a run."""
     updates = run.updates
     clock_hz = spec.timing.clock_hz
     velocity = updates.velocity.astype(np.float64) * spec.rad_per_s_per_lsb

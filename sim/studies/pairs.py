@@ -1,7 +1,7 @@
 """Configurations of every method in which every two options meet, as words of the command line.
 
-The factors are the options that a method declares, with the values that these declare for tests. What two values cannot
-be together is found by trying.
+The factors are the options that a method declares, with the values that these declare for tests. Pairs of values that
+exclude each other are found by trying.
 """
 
 from fractions import Fraction

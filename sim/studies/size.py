@@ -114,7 +114,7 @@ endmodule
 
 
 def versions() -> dict[str, str]:
-    """Of every tool that has a part in the figures.
+    """Versions of every tool that has a part in the figures.
 
     Raises
     ------

@@ -97,7 +97,8 @@ class _Columns(Mapping[str, tuple[str, str]]):
         return _RESULTS | own | _ENCODER
 
 
-# Every column of the results: its kind, and what is in it, with its unit. Empty is what is not there or cannot be told.
+# Every column of the results: its kind, and what is in it, with its unit. What does not exist or cannot be determined
+# is empty.
 COLUMNS = _Columns()
 
 
@@ -220,7 +221,7 @@ def run_packed(code: str, packed: bytes) -> Row:
         As `run_point`, with the point.
     """
     if code not in (code_digest(), code_digest(hardware=True)):
-        raise OtherCode(f"that of {platform.node()} is another")
+        raise OtherCode(f"{platform.node()} has another one")
     point = pickle.loads(packed)
     try:
         return run_point(point)

@@ -161,12 +161,12 @@ class Results:
 
     def _close_journal(self) -> None:
         if self._journal is not None:
-            with suppress(OSError):  # of a line that could not be written, which has been told
+            with suppress(OSError):  # of a line that could not be written, which has been reported
                 self._journal.close()
 
     @contextmanager
     def _writing(self, path: Path) -> Iterator[None]:
-        """Tell which file could not be written, and what there is all the same."""
+        """Report which file could not be written, and what was saved nevertheless."""
         try:
             yield
         except OSError as error:

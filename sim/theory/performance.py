@@ -128,7 +128,7 @@ def _or_forced(
 
 
 def _of_s(spec: STachometer, speed: Floats) -> Performance:
-    """With eq. (17), too.
+    """S method, with eq. (17) as well.
 
     Nearer to a multiple of ω_u than ω_u/max_ticks updates are forced, and eq. (18) does not hold. With m_s ≥ kept + 1
     in the window after a forced one, in which eq. (21) weights the only alteration by one half and eq. (17) by one, the
@@ -157,7 +157,7 @@ def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
 
 
 def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:
-    """With an adaptive dt, too, that comes from shorter ones."""
+    """Rairán's method, also with an adaptive dt that has grown from shorter ones."""
     counts, tick_seconds, longest = spec.encoder.counts_per_rev, float(spec.timing.tick_seconds), spec.timing.max_ticks
     if spec.adaptive is None:
         return rairan_performance(speed, spec.estimate, counts, tick_seconds, longest)
@@ -178,7 +178,7 @@ def _steady_shift(spec: RairanTachometer, ratio: Floats) -> NDArray[np.int64]:
 
 
 def unknown(spec: TachometerSpec, speed: Floats) -> Performance:
-    """Of a method that has no equations here."""
+    """For a method that has no equations here."""
     nothing = np.full(len(speed), math.nan)
     return Performance(nothing, nothing, np.zeros(len(speed), dtype=np.bool_))
 

@@ -5,11 +5,11 @@ quotient and remainder, C = Q·m + R with 0 ≤ R < m, so there are no guard bit
 
     raw = b·2^f + N·Q + ⌊N·R/m + ½⌋
 
-which is ⌊2^f·x + ½⌋ for the exact x. From m to m + 1 they go by
+which is ⌊2^f·x + ½⌋ for the exact x. From m to m + 1, Q and R are updated by
 
     C = Q·(m+1) + (R − Q):   (Q, R) ← (Q, R−Q) if R ≥ Q, else (Q−1, R−Q+m+1)
 
-and that one correction is enough where Q ≤ m + 1, hence for all m ≥ √C. Below, a small table holds Q and R.
+One correction is enough where Q ≤ m + 1, hence for all m ≥ √C. For smaller m a table holds Q and R.
 """
 
 from dataclasses import dataclass

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
 
-# Up to this many intervals E is looked up in one table; beyond it is the product of two.
+# Up to this many intervals E is looked up in one table; beyond, it is the product of two.
 MAX_TABLE = 1024
 MAX_EXTRA_BITS = 26
 
@@ -31,7 +31,7 @@ class LowPass:
     exponent : Fraction
         G·T: what one tick adds to the exponent.
     max_interval : int
-        Most ticks that an update can stand for; more count as that.
+        Most ticks that an update can stand for; a greater number is treated as this one.
     native_width : int
         Bits of u, signed.
     """
@@ -42,7 +42,7 @@ class LowPass:
 
     @property
     def extra_bits(self) -> int:
-        """k: the least with 2^k ≥ 4/α for m = 1, in which steps that are less than an LSB are kept."""
+        """k: bits below the LSB in which the state is kept, the least with 2^k ≥ 4/α for m = 1."""
         least = 1 - self._decay(1)
         k = 2
         while k <= MAX_EXTRA_BITS and least * (1 << k) < 4:
@@ -62,7 +62,7 @@ class LowPass:
 
     @property
     def tables(self) -> tuple[tuple[int, ...], ...]:
-        """E of the low bits of m, and, where there is a second table, of those above: by address, in 2^−p."""
+        """E by address, in 2^−p: a table for the low bits of m and, if that is not enough, one for the bits above."""
         low = self._table(1, min(1 << self.low_bits, self.max_interval + 1))
         if self.max_interval < MAX_TABLE:
             return (low,)

@@ -53,7 +53,7 @@ class VelocityOutput:
 
     @property
     def _constant(self) -> tuple[int, int]:
-        """Multiplier, odd, and shift."""
+        """The odd multiplier, and the shift."""
         if self.ratio == 1:
             return 1, 0
         shift = self.max_native.bit_length() + 3
@@ -72,9 +72,9 @@ class VelocityOutput:
         return self._constant[1]
 
     def rounding(self, towards: int = 0) -> int:
-        """What is added before they are: to round to the nearest (0), down (−1) or up (1).
+        """What is added before these bits are dropped: to round to the nearest (0), down (−1) or up (1).
 
-        Down and up count in what the rounding of the multiplier may have changed: the result is a bound.
+        Down and up allow for the greatest error of the rounded multiplier, so that the result is a bound.
         """
         if not towards:
             return 1 << self.shift >> 1
@@ -104,12 +104,12 @@ class VelocityOutput:
 
     @property
     def serial_latency(self) -> int:
-        """Clocks with one adder: a bit of the multiplier each, and to clear, to round and to hold."""
+        """Clocks with one adder: one for each bit of the multiplier, and one each to clear, to round and to hold."""
         return self.multiplier.bit_length() + 3
 
     @property
     def pipelined_latency(self) -> int:
-        """Clocks with an adder for every digit but the first: one each, and to round and to hold."""
+        """Clocks with an adder for every digit but the first: one for each, one to round and one to hold."""
         return len(self.digits) - 1 + (self.shift > 0) + 1
 
 

@@ -41,14 +41,15 @@ class AdaptiveDt:
     def slow(self) -> int:
         """The least Ndt1 for which dt is as short as it can be, k = 0.
 
-        Within the target, 1/(2·Ndt1 + 1), or as good as what Nep1 = 2^K/Ndt1 would give, where no k reaches it.
+        Its error 1/(2·Ndt1 + 1) is within the target. Where no k reaches the target, the error is as small as that of
+        Nep1 = 2^K/Ndt1.
         """
         return min(self.fewest - 1, isqrt(1 << self.max_shift))
 
     def slow_from(self, shift: int) -> int:
-        """The least Ndt1 at which k is lessened or stays 0: the time of a count is `slow` dt, one more for k > 0."""
+        """The least Ndt1 at which k is reduced or stays 0: a count takes `slow` dt, or one more if k > 0."""
         return -(-(self.slow + (shift > 0)) >> shift)
 
     def rare_to(self, shift: int) -> int:
-        """The greatest Nep1 at which k is lessened because the counts are so far apart."""
+        """The greatest Nep1 at which k is reduced because the counts are so far apart."""
         return (1 << shift) // (self.slow + 1)

@@ -65,12 +65,12 @@ class MTachometer(TachometerSpec):
 
     @property
     def reciprocal(self) -> Reciprocal:
-        """What stands for 1/n where a shift does not do."""
+        """The reciprocal 1/n, where a shift is not enough."""
         return Reciprocal(self.average, self.max_sum + self.bounds, self.native_frac_bits, 0)
 
     @property
     def numerator_width(self) -> int:
-        """Bits of what is multiplied by it, signed."""
+        """Bits of the number that is multiplied by the reciprocal, signed."""
         return signed_width(self.max_sum + self.bounds)
 
     @property
@@ -79,7 +79,7 @@ class MTachometer(TachometerSpec):
 
     @property
     def remembered_clocks(self) -> int:
-        # The place in the memory may have to begin anew.
+        # After an upset the place in the memory may have to begin anew.
         return (self.average + 1) * self.longest_tick
 
     @property
@@ -88,5 +88,5 @@ class MTachometer(TachometerSpec):
 
     @property
     def datapath_latency(self) -> int:
-        # A clock for the sum, and what the scaler takes.
+        # One clock for the sum, and those of the scaler.
         return 1 if self.shift is not None else self.numerator_width + 4

@@ -16,8 +16,8 @@ def _clocks(what: str, text: str) -> Derived:
 class MTTachometer(TimedTachometer):
     """M/T-method tachometer: counts over the time from the first to the last of them, eq. (13) of Tsuji 2009.
 
-    A window opens at a count, and closes at the first one later than T_c after it, which opens the next. In counts per
-    tick, correctly rounded.
+    A window opens at a count, and closes at the first count later than T_c after that. The closing count opens the next
+    window. The velocity is in counts per tick, correctly rounded.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class MTTachometer(TimedTachometer):
 
     @property
     def remembered_periods(self) -> int:
-        # The window that is open, whose length may wrap, up to a count; and the next.
+        # The open window, whose length may wrap, ends with a count; then comes the next window.
         return (1 << self.interval_width) + self.max_periods + self.max_interval + 2
 
     @property

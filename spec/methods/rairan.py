@@ -16,7 +16,7 @@ ESTIMATES = ("n1", "n2", "n3")
 
 @dataclass(frozen=True, kw_only=True)
 class RairanTachometer(TachometerSpec):
-    """Tachometer of Rairán 2013: sampling periods dt that a count begins, one clock being his ts.
+    """Tachometer of Rairán 2013: sampling periods dt that a count begins; the paper's ts is a clock.
 
     A window begins with a count. It lasts dt, which has Nep1 counts (high speeds, n1 = Nep1), or until the next count,
     Ndt1 whole dt later (low speeds, n1 = 1/Ndt1). Velocity is n1, n2 or n3 in counts per tick, dt being the tick,
@@ -31,7 +31,8 @@ class RairanTachometer(TachometerSpec):
     bound_decay : bool
         Without a count the estimate falls with the time since the last one.
     adaptive : Fraction or None
-        dt is doubled up to K times, and no more than eq. (13) needs to be at most this; None: dt is always the tick.
+        Target for the error of eq. (13): dt is doubled up to K times, but no more than the target needs. None: dt is
+        always the tick.
 
     Raises
     ------
@@ -67,7 +68,7 @@ class RairanTachometer(TachometerSpec):
         if self.estimate not in ESTIMATES:
             raise ParameterError("estimate", f"must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
         if self.bounds and self.paper_exact:
-            raise ParameterError("bounds", "must not be given with paper_exact, which leaves its own")
+            raise ParameterError("bounds", "must not be given with paper_exact, whose estimate leaves them")
         if self.timing.max_ticks >= MAX_TABLE:
             raise ParameterError(
                 "max_ticks", f"must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
@@ -82,10 +83,10 @@ class RairanTachometer(TachometerSpec):
 
     def _check_adaptive(self, target: Fraction) -> None:
         if self.paper_exact:
-            raise ParameterError("adaptive", "must not be given with paper_exact, which has one dt")
+            raise ParameterError("adaptive", "must not be given with paper_exact, whose dt is constant")
         if self.lowpass is not None:
             raise ParameterError(
-                "lowpass", "must not be given with adaptive, whose ticks differ: its time is counted in ticks"
+                "lowpass", "must not be given with adaptive: the filter counts ticks, which then differ in length"
             )
         if not 0 < target < Fraction(1, 3):
             raise ParameterError("adaptive", f"must be more than 0 and less than 1/3, not {float(target):.9g}")
@@ -113,7 +114,7 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def max_shift(self) -> int:
-        """K: a tick, of two dt at most, ends within the maximum time, and the tables hold what it counts."""
+        """K: the greatest k for which a tick, of two dt at most, ends within the maximum time and fits the tables."""
         if self.adaptive is None:
             return 0
         longest = (self.timing.max_ticks // 2).bit_length() - 1
@@ -124,7 +125,7 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def adaptive_dt(self) -> AdaptiveDt:
-        """The rule of dt, of which there must be one."""
+        """The rule of dt, for a core that has an adaptive dt."""
         assert self.adaptive is not None
         return AdaptiveDt(self.adaptive, self.max_shift)
 
@@ -133,7 +134,7 @@ class RairanTachometer(TachometerSpec):
         return self.max_count << self.max_shift
 
     def max_dt(self, shift: int) -> int:
-        """Greatest Ndt1 for dt·2^shift: those that the maximum time has."""
+        """Greatest Ndt1 for dt·2^shift: how many of these the maximum time has."""
         return self.timing.max_ticks >> shift
 
     @property
@@ -163,20 +164,20 @@ class RairanTachometer(TachometerSpec):
         return max(self.table).bit_length()
 
     def _bound(self, d: int, shift: int, more: int, towards: int) -> int:
-        """`d` counts in dt·2^shift, or one in −d of them, that may be `more` clocks longer; outward, and clipped."""
+        """Bound for `d` counts in dt·2^shift, or one in −d of these, `more` clocks longer; outward, and clipped."""
         dt = self.timing.tick_cycles
         up, down = (d * dt, (dt << shift) + more) if d >= 0 else (dt, (-d * dt << shift) + more)
         if down <= 0:
-            return self.bound_limit
+            return self.absent_bound
         raw = (up << self.native_frac_bits) // down if towards < 0 else -((-up << self.native_frac_bits) // down)
-        return min(raw, self.bound_limit)
+        return min(raw, self.absent_bound)
 
     def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
-        """A bound's table, `one` being what it has for n, k and the regime.
+        """The table of a bound; `one` gives the entry for n, k and the regime.
 
-        By twice the address of the estimate, and one more if it is high. Where dt is adaptive, that of a low estimate
-        has a one in the place that `bound_depth` has, less k, and that of a high one in the place of `high_depth` and k
-        more: numbers below do not reach it.
+        An entry's address is twice that of the estimate, plus one if it is high. Where dt is adaptive, a leading one
+        tells the k of the address: for a low estimate k places below that of `low_depth`, for a high one k places above
+        that of `high_depth`. n is always less than this leading one.
         """
         if self.adaptive is None:
             return tuple(one(n, 0, high) for n in range(self.bound_depth) for high in (False, True))
@@ -189,7 +190,7 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def lower_table(self) -> tuple[int, ...]:
-        """Lower bounds; 0 for low 0. n2 of a dt, or of Ndt1 + 1 of them, that took a clock longer."""
+        """Lower bounds: n2 for a dt, or for Ndt1 + 1 of them, that took a clock longer; 0 for the estimate 0."""
 
         def lower(n: int, shift: int, high: bool) -> int:
             return self._bound(n if high else -n - 1, shift, 1, -1) if n or high else 0
@@ -198,10 +199,10 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def upper_table(self) -> tuple[int, ...]:
-        """Upper bounds; none for low 0. n1 of a dt, or of Ndt1 of them, that took a clock less."""
+        """Upper bounds: n1 for a dt, or for Ndt1 of them, that took a clock less; absent for the estimate 0."""
 
         def upper(n: int, shift: int, high: bool) -> int:
-            return self._bound(n + 1 if high else -n, shift, -1, 1) if n or high else self.bound_limit
+            return self._bound(n + 1 if high else -n, shift, -1, 1) if n or high else self.absent_bound
 
         return self._by_address(upper)
 
@@ -229,7 +230,7 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def memory(self) -> tuple[str, int, int]:
-        """What holds the reciprocal: what it is, entries, bits of an entry."""
+        """The memory of the reciprocal: its kind, entries, bits of an entry."""
         return "table", self.depth, self.table_width
 
     @property
@@ -267,7 +268,7 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def remembered_clocks(self) -> int:
-        # Cdt, which may wrap, up to a count; one up to the next, which opens a window, and that.
+        # Cdt may wrap before a count comes. The window up to the next count follows, and the one that this count opens.
         return ((1 << self.interval_width) + 2 * self.timing.max_ticks + 3) * self.timing.tick_cycles << self.max_shift
 
     @property

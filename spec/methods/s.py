@@ -53,7 +53,8 @@ class STachometer(TachometerSpec):
 
     @property
     def standstill_ticks(self) -> int:
-        # The count opens a window; the forced update at its end still weights it by one half, the next has it no more.
+        # The count opens a window; the forced update at its end still weights it by one half, the next no longer
+        # contains it.
         return 2 * self.timing.max_ticks - self.kept_ticks
 
     @property
@@ -64,11 +65,11 @@ class STachometer(TachometerSpec):
     @property
     def max_numerator(self) -> int:
         """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
-        return (2 * self.max_count + self.bounds) * self.whole
+        return (2 * self.max_count + self.bounds) * self.numerator_per_count
 
     @property
-    def whole(self) -> int:
-        """What of N is one count."""
+    def numerator_per_count(self) -> int:
+        """What one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17)."""
         return 2 if self.cancel else 1
 
     @property
@@ -85,17 +86,17 @@ class STachometer(TachometerSpec):
 
     @property
     def memory(self) -> tuple[str, int, int]:
-        """What holds the reciprocal: what it is, entries, bits of an entry."""
+        """The memory of the reciprocal: its kind, entries, bits of an entry."""
         return "table and carried on" if self.carried else "table", self.reciprocal.depth, self.reciprocal.width
 
     @property
     def numerator_width(self) -> int:
-        """Bits of N, signed: as many additions does its product take."""
+        """Bits of N, signed; a product with N takes as many additions."""
         return signed_width(self.max_numerator)
 
     @property
     def remembered_clocks(self) -> int:
-        # The window that is open, whose length may wrap, and the next.
+        # The open window, whose length may wrap, and the next one.
         return ((1 << self.interval_width) + self.timing.max_ticks + 1) * self.longest_tick
 
     @property
@@ -109,8 +110,8 @@ class STachometer(TachometerSpec):
 
     @property
     def _serial_latency(self) -> int:
-        # A clock for the table, one for its register, one a bit of N, one to add b; carried, again one for every digit
-        # of N·R/m, and one to round.
+        # One clock for the table, one for its register, one for each bit of N, one to add b. A carried reciprocal takes
+        # one more for every digit of N·R/m, and one to round.
         return 2 * self.numerator_width + 4 if self.carried else self.numerator_width + 3
 
     @property

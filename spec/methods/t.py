@@ -9,8 +9,8 @@ from tachometry.spec.methods.timed import TimedTachometer
 class TTachometer(TimedTachometer):
     """T-method tachometer: one count over the time since the count before, eq. (9) of Tsuji 2009.
 
-    In counts per tick, correctly rounded. Of two consecutive counts of opposite sign, which are the same edge of the
-    encoder, the velocity is 0.
+    The velocity is in counts per tick, correctly rounded. It is 0 for two consecutive counts of opposite sign, which
+    are from the same edge of the encoder.
     """
 
     method = "t"
@@ -23,7 +23,7 @@ class TTachometer(TimedTachometer):
 
     @property
     def remembered_periods(self) -> int:
-        # The time since the last count, which may wrap; and the next.
+        # The time since the last count, which may wrap, and the time to the next one.
         return (1 << self.max_periods.bit_length()) + self.max_periods + 1
 
     @property

@@ -83,7 +83,7 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def division_periods(self) -> int:
-        """Timer periods in which a division is done, however short they are."""
+        """Timer periods within which a division is finished, even if they are as short as possible."""
         return -(-self.division_clocks // self._shortest_period)
 
     @property
@@ -98,7 +98,7 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def remembered_clocks(self) -> int:
-        # And a division that has nothing to do with it.
+        # An unrelated division may have to end first.
         return self.remembered_periods * (self.longest_tick if self.on_lattice else 1) + self.division_clocks
 
     @property
@@ -123,7 +123,7 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def flags_range(self) -> bool:
-        """Whether there is something to flag by `out_of_range`."""
+        """Whether the core needs `out_of_range`."""
         return self.saturates
 
     @property
@@ -145,7 +145,7 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def min_tick_cycles(self) -> int:
-        # No tick comes too early: it asks the divider only when that is free; and updates are a division apart.
+        # No tick comes too early: it uses the divider only when that is free, and updates are a division apart.
         return 2
 
     @property
@@ -156,7 +156,7 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def datapath_latency(self) -> int:
-        # And one to hold.
+        # One more clock holds the result.
         return self.division_clocks + 1
 
     @property

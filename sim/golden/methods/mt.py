@@ -34,7 +34,8 @@ class Model:
         opening, ends = opening[~first[ends]], ends[~first[ends]]
         none = np.zeros(len(ends), dtype=np.bool_)
         distance, time = self._distance(counts.size, opening, ends), period[ends] - period[opening]
-        # On the lattice, whole ticks are summed: if they differ, the way from edge to edge is a count more or less.
+        # On the lattice, whole ticks are summed: if they differ, the distance from edge to edge is a count more or
+        # less.
         differ = (np.sign(counts.size[opening]) - np.sign(counts.size[ends])) // 2 * spec.on_lattice
         least, most = enclosure(distance, time, less=np.maximum(-differ, 0), more=np.maximum(differ, 0))
         found = Measurements(

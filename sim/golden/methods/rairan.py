@@ -31,7 +31,7 @@ class Windows:
     c_ep : int64 array, shape (n,)
         Counts in its first dt.
     in_step : bool array, shape (n,)
-        None but the count that opened it.
+        Its first dt has no count but the one that opened it.
     n_dt : int64 array, shape (n,)
         dt that end in it.
     shift : int64 array, shape (n,)
@@ -49,9 +49,9 @@ class Windows:
 
 
 def orbit(following: Ints, first: int) -> Ints:
-    """first, following[first], … until the last index, which follows itself; without that one.
+    """first, following[first], … without the last index, which follows itself.
 
-    Of a path and where its nodes lead in as many steps as it has nodes, follows one twice as long.
+    `jump` leads from a node as many nodes on as the path has, so that each step doubles the path.
     """
     path, jump = np.array([first]), following
     while path[-1] != len(following) - 1:
@@ -100,7 +100,7 @@ def windows(spec: RairanTachometer, steps: Steps, n_clocks: int) -> Windows:
 
 @dataclass(frozen=True)
 class Events:
-    """One row per update; as in an update, with the clock that causes it."""
+    """One row per update: its outputs, and the clock that causes it."""
 
     clock: Ints
     n: Ints
@@ -169,7 +169,7 @@ class Model:
         if not spec.bounds:
             return {}
         dt = one << events.shift
-        n, high, none = events.n, events.high, spec.bound_limit
+        n, high, none = events.n, events.high, spec.absent_bound
         bits = spec.native_frac_bits
         lower = round_quotient(np.where(high, n - 1, 1) * one, np.where(high, dt + 1, (n + 1) * dt + 1), bits, -1)
         lower[events.loose | (n == 0)] = 0

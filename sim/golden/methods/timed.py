@@ -40,7 +40,7 @@ class Counts:
     size : int64 array, shape (n,)
         Counts of the step or of the tick; never 0.
     clock_of : int64 array, shape (m,), or None
-        Clock in which each period is seen; None: they are the same.
+        Clock in which each period is seen; None: a period is a clock.
     n_periods : int
     """
 
@@ -88,9 +88,9 @@ class Measurements:
     forced, stalled, beyond : bool arrays, shape (n,)
         `beyond`: out of range before any division.
     least, most : int64 arrays, shape (n, 2)
-        The same, distance and time, with the least and the greatest speed that can have been; time 0: there is none.
+        Distance and time for the least and for the greatest possible speed; time 0: that bound is absent.
     known : bool array, shape (n,)
-        There are such.
+        Whether `least` and `most` are valid.
     """
 
     clock: Ints
@@ -107,16 +107,16 @@ class Measurements:
         return Measurements(*(column[rows] for column in vars(self).values()))
 
     def merged(self, other: "Measurements") -> "Measurements":
-        """Both, in order of their clocks."""
+        """The rows of both, in order of their clocks."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         both = Measurements(*(np.concatenate(pair) for pair in pairs))
         return both[np.argsort(both.clock, kind="stable")]
 
 
 def enclosure(distance: Ints, time: Ints, less: Ints | int = 0, more: Ints | int = 0) -> tuple[Ints, Ints]:
-    """`least` and `most` of distances from edge to edge, which lie within a period before what shows them.
+    """`least` and `most` of distances between edges; each edge lies within a period before its count.
 
-    The distance may also have been `less` or `more` than said.
+    The true distance may also be shorter by `less` counts, or longer by `more`.
     """
     low, high = distance - less, distance + more
     return (
@@ -126,7 +126,7 @@ def enclosure(distance: Ints, time: Ints, less: Ints | int = 0, more: Ints | int
 
 
 def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) -> Measurements:
-    """And a 0 for every silence."""
+    """The measurements, and a forced 0 for every silence."""
     period, stalled = counts.silences(spec.max_periods)
     none = np.zeros(len(period), dtype=np.int64)
     time = np.full(len(period), spec.max_periods)
@@ -140,7 +140,7 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
         # The shaft is between the same two edges at both ends.
         least=np.stack([none - 1, time], axis=1),
         most=np.stack([none + 1, time], axis=1),
-        # Of the first period after reset not all was seen.
+        # The first period after reset was not seen completely.
         known=(np.arange(len(period)) > 0) | ~stalled,
     )
     return found.merged(silent)
@@ -158,10 +158,10 @@ def _among(values: Ints, ordered: Ints) -> NDArray[np.bool_]:
     return np.append(ordered, -1)[np.searchsorted(ordered, values)] == values
 
 
-def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> Measurements:
-    """Ticks at which the velocity sinks; `held` is the velocity after each measurement.
+def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> Measurements:
+    """Ticks at which the velocity decays; `held` is the velocity after each measurement.
 
-    A tick without a count asks, if nothing is being divided; a measurement that begins meanwhile takes the divider.
+    A tick without a count compares, if nothing is being divided. A measurement that begins meanwhile takes the divider.
     """
     ask = ticks.clock[~(_among(ticks.clock, taken.clock) | _among(ticks.clock, counts.clock(counts.period)))]
     clock = np.append(taken.clock, ask)
@@ -187,7 +187,7 @@ def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: I
     nearer = (greatest < np.abs(velocity)) & (first | (rank < np.roll(least, 1)))
     none = np.zeros(len(clock), dtype=np.bool_)
     last_size = np.append(0, counts.size)[np.searchsorted(counts.period, period)]
-    # No farther back than its last edge.
+    # The shaft is no farther back than its last edge.
     least = np.stack([np.where((sign > 0) & (last_size > 0), 0, -1), age], axis=1)
     most = np.stack([np.where((sign < 0) & (last_size < 0), 0, 1), age], axis=1)
     return Measurements(clock, sign, age, ~none, none, none, least, most, ~none)[nearer]
@@ -196,7 +196,7 @@ def _sinking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: I
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
     """All updates with the velocity in counts per tick, as the datapath shows it."""
     if spec.decays:
-        taken = taken.merged(_sinking(spec, counts, taken, rounded(spec, taken.distance, taken.time)[0], ticks))
+        taken = taken.merged(_decaying(spec, counts, taken, rounded(spec, taken.distance, taken.time)[0], ticks))
     velocity, saturated = rounded(spec, taken.distance, taken.time)
     columns = {
         "velocity": velocity,
@@ -214,5 +214,5 @@ def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any
     for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
         distance, time = ends.T
         exact = round_quotient(distance * spec.timer_periods, np.maximum(time, 1), spec.native_frac_bits, towards)
-        found[name] = np.where(time > 0, exact, towards * spec.bound_limit)
+        found[name] = np.where(time > 0, exact, towards * spec.absent_bound)
     return found

@@ -181,6 +181,6 @@ def test_a_point_that_no_worker_outlives(tmp_path: Path) -> None:
     words = [*COMMAND, *SWEEP[:-2], "--methods", "m", "--vary", "speed=5", "--jobs", "1"]
     done = subprocess.run(words, env=os.environ | more, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("tachometry: error: no worker outlives the point of m on constant:5:50ms: ")
+    assert done.stderr.startswith("tachometry: error: every worker died at the point of m on constant:5:50ms: ")
     assert done.stderr.endswith("; 1 of 1 point could not be run\n")
     assert done.stderr.count("\n") == 1

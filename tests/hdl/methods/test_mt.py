@@ -25,7 +25,7 @@ def test_windows() -> None:
 
 
 def check_reversals() -> None:
-    """Half of the ends and all between: where an edge is met twice, the way is that of the shaft."""
+    """Half of the ends and all between: where an edge is met twice, the distance is that of the shaft."""
     steps = {5: 1, 15: 1, 25: -1, 35: -1, 45: -1, 60: 1, 70: -1, 80: -1, 115: -1, 125: 1, 170: 1}
     got = run(spec_of("mt", min_time=50, bound_decay=False), steps, 171)
     # +½ +1 −1 −1 −1 +½, then +½ −1 −1 −½, then −½ +1 +½; to the letter the counts after the opening one.

@@ -27,7 +27,7 @@ def test_steady_speed(method: str, sign: int) -> None:
 
 
 def check_reversal(method: str) -> None:
-    """The edge that is met twice is no way."""
+    """An edge that is met twice adds no distance."""
     steps = {5: 1, 45: 1, 95: -1, 125: -1, 175: -1}
     got = run(timed(method, bound_decay=False), steps, 180)
     ways = [(45, 1, 40), (95, 0, 50), (125, -1, 30), (175, -1, 50)]

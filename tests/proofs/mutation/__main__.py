@@ -22,7 +22,7 @@ def main(words: list[str]) -> bool:
     methods = chosen("method", words, METHODS)
     scores: list[Score] = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        row("core", "mutants", "killed", "equivalent", "in words", "survivors", "seconds")
+        row("core", "mutants", "killed", "equivalent", "argued by hand", "survivors", "seconds")
         row("---", *["---:"] * 6)
         for case in CASES:
             if case.method in methods:
@@ -32,22 +32,22 @@ def main(words: list[str]) -> bool:
                 seconds = f"{time.monotonic() - start:.0f}"
                 row(
                     *(case.name, score.mutants, score.killed, score.equivalent),
-                    *(score.in_words, len(score.survivors), seconds),
+                    *(score.argued, len(score.survivors), seconds),
                 )
     print()
-    row("method", "mutants", "killed", "equivalent", "in words", "survivors", "score")
+    row("method", "mutants", "killed", "equivalent", "argued by hand", "survivors", "score")
     row("---", *["---:"] * 6)
     fine = True
     for method in METHODS:
         of_method = [score for score in scores if score.case.method == method]
         if not of_method:
             continue
-        mutants, killed, equivalent, words = (
-            sum(getattr(score, name) for score in of_method) for name in ("mutants", "killed", "equivalent", "in_words")
+        mutants, killed, equivalent, argued = (
+            sum(getattr(score, name) for score in of_method) for name in ("mutants", "killed", "equivalent", "argued")
         )
-        wrong = mutants - equivalent - words
+        wrong = mutants - equivalent - argued
         fine &= killed >= LEAST * wrong
-        row(method, mutants, killed, equivalent, words, wrong - killed, f"{100 * killed / wrong:.1f} %")
+        row(method, mutants, killed, equivalent, argued, wrong - killed, f"{100 * killed / wrong:.1f} %")
     for score in scores:
         if score.survivors:
             print(f"\nsurvivors of {score.case.name}:")

@@ -8,12 +8,12 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
+from proofs.mutation.argued import argued
 from proofs.mutation.cases import Case
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.netlist import GROUP, Mutant, exported, mutants
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus, stimulus
-from proofs.mutation.words import in_words
 
 from tachometry.sim import golden
 from tachometry.sim.signals.run import compare, observed
@@ -23,13 +23,13 @@ CLOCKS = 400_000  # of the stimulus
 
 @dataclass(frozen=True)
 class Score:
-    """Of a core: numbers of mutants, of equivalent ones as proven and as words say, and the others that live."""
+    """What became of the mutants of a core: numbers of them, and the survivors that nothing shows to be equivalent."""
 
     case: Case
     mutants: int
     killed: int
     equivalent: int
-    in_words: int
+    argued: int
     survivors: list[Mutant]
 
 
@@ -62,7 +62,7 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
         with tempfile.TemporaryDirectory() as folder:
             alike += equivalent(case, flat, left[first : first + GROUP], played.pins, Path(folder), pool)
     unproven = [mutant for mutant, same in zip(left, alike, strict=True) if not same]
-    survivors = [mutant for mutant in unproven if not in_words(case.name, mutant)]
+    survivors = [mutant for mutant in unproven if not argued(case.name, mutant)]
     return Score(case, len(found), sum(killed), sum(alike), len(unproven) - len(survivors), survivors)
 
 

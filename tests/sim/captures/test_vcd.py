@@ -66,11 +66,11 @@ def test_the_waveform_of_a_simulation_replays_as_the_same_pins(tmp_path: Path, c
         (HEAD + BODY, ("top.a", "top.a"), "channels a and b of {path} must be two of "),
         (HEAD + BODY, ("top.bus", "top.a"), "channel a of {path} must be one of "),
         (HEAD.replace("$timescale 10 ns $end", ""), ("0", "1"), "{path} must have a $timescale"),
-        (HEAD[:60], ("0", "1"), "{path} must be a whole VCD file: "),
-        ("", ("0", "1"), "{path} must be a whole VCD file: its declarations do not end"),
+        (HEAD[:60], ("0", "1"), "{path} must be a complete VCD file: "),
+        ("", ("0", "1"), "{path} must be a complete VCD file: its declarations do not end"),
         (HEAD + BODY + "#40\nz!\n", ("0", "1"), "levels of {path} must be 0 or 1, not z1 at time 40"),
-        (HEAD + "#0\n1!\n", ("0", "1"), "{path} must tell the levels of all lines, 0 or 1, at least once"),
-        ("no waveform", ("0", "1"), "{path} must be a whole VCD file: "),
+        (HEAD + "#0\n1!\n", ("0", "1"), "{path} must contain the levels of all lines, 0 or 1, at least once"),
+        ("no waveform", ("0", "1"), "{path} must be a complete VCD file: "),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(tmp_path: Path, text: str, channels: tuple[str, str], message: str) -> None:

@@ -78,8 +78,8 @@ def test_without_a_cache_that_can_be_written(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize(
     ("compiler", "message"),
     [
-        ("/nonexistent", r"CXX must name a C\+\+ compiler that is there, not '/nonexistent'"),
-        ("c++ 'x", 'CXX must name a C\\+\\+ compiler that is there, not "c\\+\\+ \'x"'),
+        ("/nonexistent", r"CXX must name a C\+\+ compiler that exists, not '/nonexistent'"),
+        ("c++ 'x", 'CXX must name a C\\+\\+ compiler that exists, not "c\\+\\+ \'x"'),
         ("true -x", "true -x made no library"),
         ("c++ -bogus", r"c\+\+ -bogus cannot compile the core: .*bogus"),
     ],

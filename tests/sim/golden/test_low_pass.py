@@ -131,7 +131,7 @@ def test_time_is_what_has_passed_and_not_what_was_measured() -> None:
 
 
 def test_a_method_without_updates_at_rest_ends_at_0() -> None:
-    """Its last update is `stalled`: nothing would come to let the velocity sink."""
+    """Its last update is `stalled`: no later update would let the velocity decay."""
     rairan = RairanTachometer(
         encoder=Encoder(100), timing=Timing(1_000_000, 100, 50), lowpass=Fraction(100), max_speed=Speed(Fraction(200))
     )

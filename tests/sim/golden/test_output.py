@@ -47,8 +47,8 @@ def test_bounds_stay_bounds(unit: str, ppr: int) -> None:
     """Of a native bound comes one that is no narrower, and wider by less than an LSB and an eighth."""
     spec = STachometer(encoder=Encoder(ppr), timing=Timing(48_000_000, 960, 500), bounds=True)
     spec = replace(spec, unit=unit, frac_bits=spec.frac_bits_range(unit)[1])
-    native = np.random.default_rng(ppr).integers(-spec.bound_limit, spec.bound_limit + 1, 1000)
-    native[:2] = spec.bound_limit, -spec.bound_limit
+    native = np.random.default_rng(ppr).integers(-spec.absent_bound, spec.absent_bound + 1, 1000)
+    native[:2] = spec.absent_bound, -spec.absent_bound
     bounds = {"velocity_lower": native, "velocity_upper": native, "bounds_valid": native > 0}
     done = in_unit(spec, updates_of(native).having(**bounds))
     per_tick = 1 / (spec.encoder.counts_per_rev * spec.timing.tick_seconds * REV_PER_UNIT[unit])
@@ -57,7 +57,7 @@ def test_bounds_stay_bounds(unit: str, ppr: int) -> None:
     for raw, lower, upper in rows:
         assert 0 <= raw * scale - lower < Fraction(9, 8)
         assert 0 <= upper - raw * scale < Fraction(9, 8)
-    assert done["velocity_upper"][0] == -done["velocity_lower"][1] == spec.shown_bound_limit
+    assert done["velocity_upper"][0] == -done["velocity_lower"][1] == spec.shown_absent_bound
 
 
 def test_what_does_not_fit_saturates_and_is_flagged() -> None:

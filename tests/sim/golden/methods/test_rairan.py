@@ -263,13 +263,13 @@ def test_a_burst_after_standstill() -> None:
         ),
         (
             {"paper_exact": True, "bounds": True},
-            "bounds must not be given with paper_exact, which leaves its own",
+            "bounds must not be given with paper_exact, whose estimate leaves them",
         ),
         ({"adaptive": Fraction(1, 3)}, "adaptive must be more than 0 and less than 1/3, not 0.333333333"),
         ({"adaptive": Fraction(0)}, "adaptive must be more than 0 and less than 1/3, not 0"),
         (
             {"adaptive": Fraction(1, 10), "paper_exact": True},
-            "adaptive must not be given with paper_exact, which has one dt",
+            "adaptive must not be given with paper_exact, whose dt is constant",
         ),
         (
             {"adaptive": Fraction(1, 10), "max_ticks": 3},
@@ -284,7 +284,7 @@ def test_a_burst_after_standstill() -> None:
             "adaptive must be at least 0.03226 with this speed and time, not 0.001",
         ),
         ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
-        ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own"),
+        ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own ticks"),
     ],
 )
 def test_bad_parameters(parameters: dict[str, Any], message: str) -> None:

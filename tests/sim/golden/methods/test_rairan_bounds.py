@@ -47,7 +47,7 @@ def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float,
     # travelled/time in counts per dt is (whole·gap + part)·dt·FINE / (gap·time)
     whole, time = last - opening, end - true[opening]
     travelled = sign[last] * (whole * gap + part) * dt * FINE << FRAC_BITS
-    none = spec.bound_limit
+    none = spec.absent_bound
     assert ((lower * gap * time <= travelled) | (lower == -none)).all()
     assert ((travelled <= upper * gap * time) | (upper == none)).all()
 

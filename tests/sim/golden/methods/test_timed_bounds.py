@@ -47,7 +47,7 @@ def check_silence(spec: TimedTachometer, updates: Table) -> None:
     assert ((lower <= -one) & (lower > -one - lasted))[velocity <= 0].all()
     if spec.bound_decay:
         assert (velocity != 0).sum() > 5
-    # What sinks has passed an edge last, and has not come back over it; after a reversal it may go on either way.
+    # While the velocity decays, the shaft has not come back over its last edge; after a reversal it may go either way.
     assert ((lower == 0) | (lower <= -one))[velocity > 0].all()
     assert ((upper == 0) | (upper >= one))[velocity < 0].all()
 
@@ -85,7 +85,7 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     scale = INSTANTS * TICK << spec.native_frac_bits
     lasted = time[last] - time[first]
     lower, upper = updates["velocity_lower"][chosen], updates["velocity_upper"][chosen]
-    above, below = upper == spec.bound_limit, lower == -spec.bound_limit  # there is none
+    above, below = upper == spec.absent_bound, lower == -spec.absent_bound  # there is none
     assert (below | (lower * lasted <= way * scale)).all()
     assert (above | (upper * lasted >= way * scale)).all()
     if not spec.saturates:

@@ -1,0 +1,43 @@
+"""Survivors that are equivalent to the core by an argument made by hand, where the proof does not reach.
+
+The keys are the core, the line of the HDL, and what the mutant changes in the cell that Yosys made of that line. B is
+the value that a reset gives, and S is whether there is a reset.
+"""
+
+from pathlib import Path
+
+from proofs.mutation.netlist import Mutant
+
+ROOT = Path(__file__).parents[3]
+_NO_COUNT = (
+    "it is read as the sign of a distance, after a count has set it, and where the velocity decays: until then the "
+    "velocity is 0, and the speed that the time allows is no less"
+)
+
+ARGUED = {
+    ("t, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
+    ("t, in clocks", '"was_negative": Out(1),', "B[0] inv"): _NO_COUNT,
+    ("t, in clocks", "quotient.decay.eq(self.tick & ~timer.count),", "Y[0] const1"): (
+        "every count measures, with two exceptions: while a measurement is divided, nothing decays; if none came in "
+        "the maximum time, the velocity is 0, the time allows no less, and a measurement takes the divider anyway"
+    ),
+    ("t, in ticks", "above.eq(value > Const(limit, value.shape())),", "B[2] inv"): (
+        "the limit of the output is 123 instead of 127; velocities are 2^5·2π/m, and the nearest ones are 100 and 201"
+    ),
+    ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
+    ("mt, in clocks", "change = Signal(signed(max(len(shown), spec.native_width) + 1))", "change[6] const0"): (
+        "it is read to decide whether the velocity decays: the change is at most 48, from −48 to 0, and less than 64"
+    ),
+}
+
+
+def argued(core: str, mutant: Mutant) -> bool:
+    """Whether an argument covers a mutant of a core."""
+    change = mutant.place.rpartition(".")[2]
+    for place in mutant.lines:
+        file, _, number = place.partition(":")
+        if file.startswith("hdl/"):
+            line = (ROOT / file).read_text(encoding="utf-8").splitlines()[int(number.split(".")[0]) - 1]
+            if (core, line.strip(), change) in ARGUED:
+                return True
+    return False
