@@ -42,7 +42,8 @@ def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     assert bool(len(actual.tick_errors)) == (spec.max_tick_cycles is not None)
     assert updates.get("velocity_overflow").any() <= ("--velocity-width" in words)
     left = CLOCKS
-    for seed in range(2, MOTIONS + 1):
+    # The golden low-pass filter goes from update to update.
+    for seed in range(2, 2 + (MOTIONS if spec.lowpass is None else MOTIONS // 10)):
         trace = stress(spec, seed, EDGES)
         left -= trace.n_clocks
         if left < 0:

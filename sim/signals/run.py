@@ -38,7 +38,7 @@ class Table:
         return len(self.clock)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        return self.columns[name]
+        return self.clock if name == "clock" else self.columns[name]
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         if name.startswith("_") or name not in self.columns:

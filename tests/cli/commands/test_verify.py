@@ -41,8 +41,10 @@ def test_all_engines_and_methods(few: None, tmp_path: Path, capsys: pytest.Captu
 
 
 def test_a_difference_is_saved_with_the_command_that_replays_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    averaging = [words for words in configurations("m") if "--average" in words][:3]
+    monkeypatch.setattr(command, "configurations", lambda method: averaging)
     wrong = mutant(MovingSum, "(quiet >= last)", "(quiet >= last - 1)")
     options = ["--methods", "m", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out"]
     with wrong:
