@@ -15,7 +15,7 @@ from tachometry.spec import METHODS
 
 CORES = [words for method in METHODS for words in configurations(method)]
 # A build takes seconds, a motion milliseconds: as many motions as these numbers allow are played on every core.
-MOTIONS, CLOCKS, EDGES = 50, 20_000_000, 50
+MOTIONS, CLOCKS, EDGES = 50, 4_000_000, 50
 
 
 @pytest.mark.parametrize("words", CORES, ids=" ".join)

@@ -65,6 +65,7 @@ class Verilator(CompiledEngine):
     """The engine that runs the exported Verilog."""
 
     name = "verilator"
+    more: tuple[str, ...] = ()  # options of the compiler
 
     def text(self, design: Design) -> str:
         """The Verilog: what is exported, or, if signals are to be shown, a core with these as outputs."""
@@ -77,7 +78,7 @@ class Verilator(CompiledEngine):
         """See `CompiledEngine.library`."""
         text = self.text(design)
         compiler = build.compiler()
-        tools = (compiler, build.version(compiler), build.FLAGS, version_of("verilator"))
+        tools = (compiler, build.version(compiler), build.FLAGS, self.more, version_of("verilator"))
         key = build.digest(self.name, text, tools, _OPTIONS, design.source(_MODEL), design.spec.ports)
 
         def make(folder: Path) -> Path:
@@ -89,7 +90,7 @@ class Verilator(CompiledEngine):
             model = _model(design, "\n".join(f'#include "{name}"' for name in made))
             objects = [_runtime(source, tools) for source in _RUNTIME]
             return build.compile_library(
-                design.source(model), folder, f"-I{home() / 'include'}", f"-I{folder / 'made'}", *objects
+                design.source(model), folder, f"-I{home() / 'include'}", f"-I{folder / 'made'}", *objects, *self.more
             )
 
         return build.cached(key, ".so", make)

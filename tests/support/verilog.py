@@ -66,6 +66,8 @@ def _changes(pins: list[Port], trace: PinTrace) -> np.ndarray:
 class LintingVerilator(Verilator):
     """Verilator that also reads the exported Verilog with -Wall in a folder; any warning is an error."""
 
+    more = ("-O1",)  # is compiled in less time, and runs long enough for a test in less than a second
+
     def __init__(self, folder: Path) -> None:
         super().__init__()
         self._folder = folder
