@@ -19,6 +19,10 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "compare.md"
 CORE = "--ppr 500 --clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/s"
 
 
+# All, and M/T with windows of 1 ms, as long as those of S at high speed and of what reads the encoder every 1 ms.
+WITH_LONG_MT = "s,m,t,mt,mt:min-time=1ms,rairan,difference,hostmot2,simplefoc,odrive,moteus"
+
+
 @dataclass(frozen=True)
 class Situation:
     """What is compared: a title, what is seen in the table, the options of the command, those of the core first."""
@@ -55,8 +59,9 @@ constant 2 ms. Of the methods without a divider, S is the best core.""",
     Situation(
         "Ramp, real encoder",
         """T measures one count, so its result contains every error of the disc and all jitter. The same is true of
-M/T while its windows are short. S has longer windows and is the best core; a longer `--min-time` would
-make M/T as good. Methods that average over 1 ms or more keep their errors and their delays.""",
+M/T while its windows are short. With windows of 1 ms it is as good as LinuxCNC's timestamps, and the best
+core. Methods that average over more keep their errors and their delays.""",
+        f"--methods {WITH_LONG_MT} "
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),
     Situation(
@@ -68,9 +73,9 @@ of 5 ms removes the jitter at the price of its delay.""",
     Situation(
         "Fast",
         """The speed is 7 counts per tick, with 5 % jitter. The longest average has the least error, because at
-constant speed delay costs nothing. S is the best core. Rairán's estimate is nearly constant, and off by
-up to eq. (13), 1/13 of the speed.""",
-        "--motion constant:217rad/s:1s --from 100ms --jitter 0.05 --seed 1",
+constant speed delay costs nothing. In the same time of 1 ms, M/T has half the error of S. Rairán's
+estimate is nearly constant, and off by up to eq. (13), 1/13 of the speed.""",
+        f"--methods {WITH_LONG_MT} --motion constant:217rad/s:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
         "Fast, ideal encoder",
@@ -116,11 +121,11 @@ closest, where there is one.
 
 **When to use what**, according to the tables below:
 
-- *S*: use it if there is no timer faster than the tick, or if a divider is unwanted; at high speed with a real encoder;
-  and around multiples of the unit velocity. Its tick can be as short as a clock. It is then as fine as T at low speeds.
-- *M/T*: use it if a fast timer and a divider are available. It has the least error of the cores on ramps and reversals.
-  A longer `--min-time` gives less noise and more delay, as averaging does. On a lattice (`--timer tick`) it equals M at
-  high speeds.
+- *S*: use it if there is no timer faster than the tick, or if a divider is unwanted; and around multiples of the unit
+  velocity. Its tick can be as short as a clock. It is then as fine as T at low speeds.
+- *M/T*: use it if a fast timer and a divider are available. It has the least error of the cores on ramps and reversals,
+  and with `--min-time 1ms` also with a real disc at speed. A longer `--min-time` gives less noise and more delay, as
+  averaging does. On a lattice (`--timer tick`) it equals M at high speeds.
 - *T*: it equals M/T at slow speeds and sudden stops, with less logic. It suffers most from an uneven disc and from
   jitter.
 - *Rairán*: use it if bounds of the speed and a constant value at constant speed matter more than the error, which is up

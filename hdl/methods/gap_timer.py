@@ -14,11 +14,14 @@ class GapTimer(wiring.Component):
     ----------
     max_periods : int
         Periods without a count after which `overdue` is high, and the time begins anew.
+    on_lattice : bool
+        Timer periods are ticks.
 
     Members
     -------
+    tick : In(1)
     period : In(1)
-        A timer period ends.
+        A timer period ends; one does with every tick.
     count : In(1)
         Something was counted in this period.
     negative : In(1)
@@ -31,12 +34,16 @@ class GapTimer(wiring.Component):
         The sign of the last count.
     overdue : Out(1)
         The last count was `max_periods` ago, and this period has none.
+    silent : Out(1)
+        A tick ends in which there was no count.
     """
 
-    def __init__(self, max_periods: int) -> None:
+    def __init__(self, max_periods: int, *, on_lattice: bool) -> None:
         self._max_periods = max_periods
+        self._on_lattice = on_lattice
         super().__init__(
             {
+                "tick": In(1),
                 "period": In(1),
                 "count": In(1),
                 "negative": In(1),
@@ -44,6 +51,7 @@ class GapTimer(wiring.Component):
                 "opened": Out(1),
                 "was_negative": Out(1),
                 "overdue": Out(1),
+                "silent": Out(1),
             }
         )
 
@@ -51,6 +59,10 @@ class GapTimer(wiring.Component):
         m = Module()
         longest = Signal()
         m.d.comb += self.overdue.eq(self.period & longest & ~self.count)
+        earlier = Signal()  # a count in an earlier period of this tick
+        m.d.comb += self.silent.eq(self.tick & ~self.count & ~earlier)
+        if not self._on_lattice:
+            m.d.sync += earlier.eq(~self.tick & (self.count | earlier))
         with m.If(self.period):
             m.d.sync += [self.age.eq(self.age + 1), longest.eq(self.age == self._max_periods - 1)]
             with m.If(longest | self.count):

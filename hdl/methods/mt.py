@@ -26,7 +26,7 @@ class MTMethod(TimedDatapath):
         ends = Signal()
         opens = Signal()
         m.d.comb += [
-            ends.eq(timer.count & timer.opened & late),
+            ends.eq(timer.count & timer.opened & late & (self.quotient_velocity.free if spec.may_be_late else 1)),
             opens.eq(ends | ~timer.opened),
             total.eq(travelled + (self._size if spec.on_lattice else Mux(self._same, self._one, 0))),
         ]

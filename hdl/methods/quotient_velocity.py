@@ -15,9 +15,9 @@ from tachometry.spec.tachometer import BOUNDS
 class QuotientVelocity(wiring.Component):
     """Divides distance by time, rounds, and holds the result; between measurements the velocity may decay.
 
-    A measurement may begin when `free` is high. When `decay` is high and the divider is idle, it finds the greatest
-    speed that the time since the last count allows. If that, rounded, is nearer to 0 than the velocity, it becomes the
-    velocity. A measurement that begins meanwhile takes the divider, and the velocity does not decay.
+    A measurement may begin when `free` is high. When `decay` is high and the divider is idle, it finds 1½ counts over
+    the time since the last count: an edge may lie half a count off. If that, rounded, is nearer to 0 than the velocity,
+    it becomes the velocity. A measurement that begins meanwhile takes the divider, and the velocity does not decay.
 
     Latency: an update comes `spec.datapath_latency` clocks after `measure` or `decay`.
 
@@ -51,8 +51,9 @@ class QuotientVelocity(wiring.Component):
         self._spec = spec
         self.divider = Divider(
             divisor_width=spec.interval_width,
-            integer_bits=spec.max_quotient.bit_length(),
-            scale_bits=spec.native_frac_bits + 1,
+            # Distances are divided in half counts.
+            integer_bits=spec.max_quotient.bit_length() + 1,
+            scale_bits=spec.native_frac_bits,
         )
         self.bound_dividers = {
             name: Divider(
@@ -66,7 +67,7 @@ class QuotientVelocity(wiring.Component):
             {
                 "measure": In(1),
                 "decay": In(1),
-                "dividend": In(self.divider.dividend.shape()),
+                "dividend": In(signed(len(self.divider.dividend) - 1)),
                 "divisor": In(spec.interval_width),
                 "forced_in": In(1),
                 "stalled_in": In(1),
@@ -89,13 +90,14 @@ class QuotientVelocity(wiring.Component):
         if spec.decays:
             m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.busy & ~rounds & ~compared)
         backward = new.velocity[-1]
-        greatest = Mux(backward, -spec.timer_periods, spec.timer_periods)
+        halves = self.dividend << 1
+        greatest = Mux(backward, -3 * spec.timer_periods, 3 * spec.timer_periods)
         m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(rounds & ~self.measure)]
         m.d.comb += [
             self.free.eq(~(measuring & (divider.busy | rounds))),
             divider.start.eq(self.measure | decays),
             divider.divisor.eq(self.divisor),
-            divider.dividend.eq(Mux(self.measure, self.dividend, greatest) if spec.decays else self.dividend),
+            divider.dividend.eq(Mux(self.measure, halves, greatest) if spec.decays else halves),
         ]
         forced, stalled, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "stalled", "beyond"))
         with m.If(divider.start):

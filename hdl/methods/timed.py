@@ -34,7 +34,7 @@ class TimedDatapath(wiring.Component):
 
     def __init__(self, spec: TimedTachometer) -> None:
         self._spec = spec
-        self.gap_timer = GapTimer(spec.max_periods)
+        self.gap_timer = GapTimer(spec.max_periods, on_lattice=spec.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
         super().__init__(
             {
@@ -83,11 +83,12 @@ class TimedDatapath(wiring.Component):
         ends, distance, time = self._window(m)
         wiring.connect(m, quotient.updates, wiring.flipped(self.updates))
         m.d.comb += [
+            timer.tick.eq(self.tick),
             timer.period.eq(self.tick if spec.on_lattice else 1),
             timer.count.eq(timer.period & size.any()),
             timer.negative.eq(size[-1]),
             quotient.measure.eq(timer.overdue | ends),
-            quotient.decay.eq(self.tick & ~timer.count),
+            quotient.decay.eq(timer.silent),
             quotient.dividend.eq(Mux(timer.count, distance, 0)),
             quotient.divisor.eq(time),
             quotient.forced_in.eq(~timer.count),

@@ -78,8 +78,8 @@ class Verilator(CompiledEngine):
         """See `CompiledEngine.library`."""
         text = self.text(design)
         compiler = build.compiler()
-        tools = (compiler, build.version(compiler), build.FLAGS, self.more, version_of("verilator"))
-        key = build.digest(self.name, text, tools, _OPTIONS, design.source(_MODEL), design.spec.ports)
+        tools = (compiler, build.version(compiler), build.FLAGS, version_of("verilator"))
+        key = build.digest(self.name, text, tools, self.more, _OPTIONS, design.source(_MODEL), design.spec.ports)
 
         def make(folder: Path) -> Path:
             (folder / "core.v").write_text(text, encoding="utf-8")

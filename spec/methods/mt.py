@@ -68,7 +68,9 @@ class MTTachometer(TimedTachometer):
 
     @property
     def max_interval(self) -> int:
-        return self.min_periods + self.max_periods
+        # A window stays open while the one before is divided.
+        late = -(-self.division_clocks // self.min_tick_cycles) if self.may_be_late else 0
+        return max(self.min_periods, late) + self.max_periods
 
     @property
     def remembered_periods(self) -> int:

@@ -19,7 +19,7 @@ class TimedTachometer(TachometerSpec):
     timer : str
         What times are counted in: `clock`, or `tick`, the lattice of the paper, where all counts of a tick are one.
     bound_decay : bool
-        At ticks, a speed that the silence since the last count excludes becomes the greatest that it allows.
+        At ticks without a count, a speed beyond 1½ counts over the time since the last count becomes that.
     paper_exact : bool
         The published algorithm and nothing else: no decay, and a reversal is no special case.
 
@@ -31,7 +31,7 @@ class TimedTachometer(TachometerSpec):
 
     timer: str = option("clock", "What times are counted in: clocks, or ticks as in the paper.", choices=_TIMERS)
     bound_decay: bool = option(
-        True, "While no count comes, let the velocity decay as the greatest speed that the silence allows."
+        True, "While no count comes, let the velocity decay as 1½ counts over the time since the last one."
     )
     paper_exact: bool = option(
         False, "The published algorithm and nothing else: no decay, and a reversal is no special case."
@@ -75,16 +75,14 @@ class TimedTachometer(TachometerSpec):
         return self.timing.tick_cycles // self.timer_cycles
 
     @property
-    def _shortest_period(self) -> int:
-        """Fewest clocks in a timer period."""
-        if not self.on_lattice:
-            return 1
-        return self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
+    def division_periods(self) -> int:
+        """Timer periods within which a division is finished, if no tick is shorter than nominal."""
+        return -(-self.division_clocks // self.timer_cycles)
 
     @property
-    def division_periods(self) -> int:
-        """Timer periods within which a division is finished, even if they are as short as possible."""
-        return -(-self.division_clocks // self._shortest_period)
+    def may_be_late(self) -> bool:
+        """Whether ticks from outside may end a measurement before a division is finished."""
+        return self.on_lattice and self.max_tick_cycles is not None
 
     @property
     def max_periods(self) -> int:

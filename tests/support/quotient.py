@@ -53,13 +53,16 @@ _MAIN = """
 int main(int, char **argv) {{
   cxxrtl_design::p_top top;
   std::vector<int64_t> answers;
+  // All flip-flops take the rising edge: one evaluation a clock, whose outputs are those before it.
   auto clock = [&] {{
-    top.p_clk.set<bool>(false); top.step();
+    top.prev_p_clk.set<bool>(false);
+    top.p_clk.set<bool>(true);
+    top.eval();
     if (top.p_done.get<bool>()) {{
       uint64_t raw = top.p_velocity.get<uint64_t>();
       answers.push_back(int64_t(raw << (64 - {width})) >> (64 - {width}));
     }}
-    top.p_clk.set<bool>(true); top.step();
+    top.commit();
   }};
   const int numerators[] = {{{numerators}}};
   for (int m = 1; m <= {max_m}; m++) {{

@@ -55,11 +55,11 @@ def speed(counts: int, clocks: int) -> int:
 
 
 def decay(last_count: int, velocity: int, until: int) -> list[Row]:
-    """The updates with which a velocity decays: at the tick, 1 count over the time since the last count."""
+    """The updates with which a velocity decays: at ticks without a count, 1½ counts over the time since the last."""
     rows = []
-    for clock in range(last_count + 1, until):
+    for clock in range(last_count + TICK, until):
         if clock % TICK == TICK - 1:
-            most = speed(1 if velocity > 0 else -1, clock - last_count)
+            most = speed(3 if velocity > 0 else -3, 2 * (clock - last_count))
             if abs(most) < abs(velocity):
                 velocity = most
                 rows.append((clock, most, clock - last_count, True, False))

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from support.compiled import lint
+from support.compiled import lint, precompiled
 from tachometry.hdl import export
 from tachometry.sim.engines.compiled import Design
-from tachometry.sim.engines.verilator import Verilator
+from tachometry.sim.engines.verilator import Verilator, home
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import Port, TachometerSpec
@@ -64,24 +64,22 @@ def _changes(pins: list[Port], trace: PinTrace) -> np.ndarray:
 
 
 class LintingVerilator(Verilator):
-    """Verilator that also reads the exported Verilog with -Wall in a folder; any warning is an error."""
+    """Verilator that also reads the exported Verilog with -Wall in a folder; any warning is an error.
 
-    more = ("-O1",)  # is compiled in less time, and runs long enough for a test in less than a second
+    `few` clocks are to be run: the compiler is to be fast rather than its code.
+    """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, few: bool) -> None:
         super().__init__()
         self._folder = folder
+        level = "-O0" if few else "-Og"
+        self.more = (level, *precompiled(home() / "include", "verilated.h", level))
 
     def text(self, design: Design) -> str:
         text = super().text(design)
         (self._folder / "tachometer.v").write_text(text)
         lint(["tachometer.v"], "tachometer", self._folder)
         return text
-
-
-def run_in_verilator(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
-    """Read the exported Verilog with -Wall, any warning an error, and play a trace on it."""
-    return LintingVerilator(folder).run(spec, trace)
 
 
 def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:

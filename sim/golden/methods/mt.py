@@ -1,6 +1,7 @@
 """Golden M/T method: eqs. (13) to (16) of Tsuji 2009, window by window."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, chain, enclosure, updates, with_silences
@@ -29,6 +30,8 @@ class Model:
         firsts = np.append(np.flatnonzero(first), n)
         next_first = firsts[np.searchsorted(firsts, np.arange(n), side="right")]
         closing = np.searchsorted(period, period + spec.min_periods, side="right")
+        if spec.may_be_late:
+            closing = np.maximum(closing, self._free(counts, first))
         ends = np.flatnonzero(chain(np.minimum(closing, next_first)))
         opening, ends = ends[:-1], ends[1:]
         opening, ends = opening[~first[ends]], ends[~first[ends]]
@@ -40,7 +43,7 @@ class Model:
         least, most = enclosure(distance, time, less=np.maximum(-differ, 0), more=np.maximum(differ, 0))
         found = Measurements(
             clock=counts.clock(period[ends]),
-            distance=distance,
+            distance=2 * distance,
             time=time,
             forced=none,
             stalled=none,
@@ -50,6 +53,17 @@ class Model:
             known=~none,
         )
         return updates(spec, counts, with_silences(spec, counts, found), ticks)
+
+    def _free(self, counts: Counts, first: NDArray[np.bool_]) -> Ints:
+        """The first count after each opening one with which a division can begin.
+
+        What is being divided is the window that ended with the opening count, or the 0 forced before it.
+        """
+        clock = counts.clock(counts.period)
+        zeros = counts.clock(counts.silences(self._spec.max_periods)[0])
+        forced = np.append(zeros, -self._spec.division_clocks)[np.searchsorted(zeros, clock) - 1]
+        begun = np.where(first, forced, clock)
+        return np.searchsorted(clock, begun + self._spec.division_clocks)
 
     def _distance(self, size: Ints, opening: Ints, closing: Ints) -> Ints:
         """Counts from an opening to a closing one."""

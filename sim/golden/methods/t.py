@@ -31,7 +31,7 @@ class Model:
         least, most = enclosure(distance, time)
         found = Measurements(
             clock=counts.clock(counts.period),
-            distance=distance,
+            distance=2 * distance,
             time=time,
             forced=none,
             stalled=none,
@@ -42,6 +42,9 @@ class Model:
         )
         opened = (gap <= spec.max_periods) & (np.arange(len(gap)) > 0)
         asked = with_silences(spec, counts, found[opened | many])
-        # What comes while the divider is at work is not measured.
-        taken = asked[chain(np.searchsorted(asked.clock, asked.clock + spec.division_clocks))]
+        # What comes while the divider is at work is not measured; but a 0 is always forced.
+        following = np.searchsorted(asked.clock, asked.clock + spec.division_clocks)
+        zeros = np.append(np.flatnonzero(asked.forced), len(following))
+        next_zero = zeros[np.searchsorted(zeros, np.arange(len(following)), side="right")]
+        taken = asked[chain(np.minimum(following, next_zero))]
         return updates(spec, counts, taken, ticks)

@@ -83,7 +83,7 @@ class Measurements:
     Parameters
     ----------
     clock : int64 array, shape (n,)
-    distance : int64 array, shape (n,), counts
+    distance : int64 array, shape (n,), half counts
     time : int64 array, shape (n,), timer periods
     forced, stalled, beyond : bool arrays, shape (n,)
         `beyond`: out of range before any division.
@@ -147,8 +147,8 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
 
 
 def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, NDArray[np.bool_]]:
-    """Velocity in counts per tick, saturated, and whether that changed it."""
-    exact = round_quotient(distance * spec.timer_periods, time, spec.native_frac_bits)
+    """Velocity in counts per tick of a distance in half counts, saturated, and whether that changed it."""
+    exact = round_quotient(distance * spec.timer_periods, time, spec.native_frac_bits - 1)
     limit = spec.max_count << spec.native_frac_bits
     return np.clip(exact, -limit, limit), np.abs(exact) > limit
 
@@ -161,9 +161,11 @@ def _among(values: Ints, ordered: Ints) -> NDArray[np.bool_]:
 def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> Measurements:
     """Ticks at which the velocity decays; `held` is the velocity after each measurement.
 
-    A tick without a count compares, if nothing is being divided. A measurement that begins meanwhile takes the divider.
+    A tick in whose window no count came compares, if nothing is being divided. A measurement that begins meanwhile
+    takes the divider.
     """
-    ask = ticks.clock[~(_among(ticks.clock, taken.clock) | _among(ticks.clock, counts.clock(counts.period)))]
+    through = np.searchsorted(counts.clock(counts.period), ticks.clock, side="right")
+    ask = ticks.clock[(np.diff(through, prepend=0) == 0) & ~_among(ticks.clock, taken.clock)]
     clock = np.append(taken.clock, ask)
     order = np.argsort(clock)
     clock, measured = clock[order], order < len(taken.clock)
@@ -178,8 +180,9 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
 
     period = np.searchsorted(ticks.clock, clock) if spec.on_lattice else clock
     age = period - np.append(-1, counts.period)[np.searchsorted(counts.period, period)]
+    # An edge may lie half a count off: the silence allows 1½ counts.
     sign = np.where(velocity < 0, -1, 1)
-    greatest = np.abs(rounded(spec, sign, age)[0])
+    greatest = np.abs(rounded(spec, 3 * sign, age)[0])
     # Least magnitude that the velocity had since the measurement, before each: of ranks, which later measurements beat.
     _, rank = np.unique(greatest, return_inverse=True)
     least = np.minimum.accumulate(rank - last * (len(rank) + 1)) + last * (len(rank) + 1)
@@ -190,22 +193,26 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     # The shaft is no farther back than its last edge.
     least = np.stack([np.where((sign > 0) & (last_size > 0), 0, -1), age], axis=1)
     most = np.stack([np.where((sign < 0) & (last_size < 0), 0, 1), age], axis=1)
-    return Measurements(clock, sign, age, ~none, none, none, least, most, ~none)[nearer]
+    return Measurements(clock, 3 * sign, age, ~none, none, none, least, most, ~none)[nearer]
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
     """All updates with the velocity in counts per tick, as the datapath shows it."""
+    # A forced 0 takes the divider, if ticks are so short that it is still at work.
+    finished = np.diff(taken.clock, append=np.iinfo(np.int64).max) >= spec.division_clocks
+    shown = taken[finished]
     if spec.decays:
-        taken = taken.merged(_decaying(spec, counts, taken, rounded(spec, taken.distance, taken.time)[0], ticks))
-    velocity, saturated = rounded(spec, taken.distance, taken.time)
+        held = rounded(spec, taken.distance, taken.time)[0]
+        shown = shown.merged(_decaying(spec, counts, taken, held, ticks))
+    velocity, saturated = rounded(spec, shown.distance, shown.time)
     columns = {
         "velocity": velocity,
-        "interval": taken.time,
-        "forced": taken.forced,
-        "stalled": taken.stalled,
-        "out_of_range": saturated | taken.beyond,
+        "interval": shown.time,
+        "forced": shown.forced,
+        "stalled": shown.stalled,
+        "out_of_range": saturated | shown.beyond,
     }
-    return Table(taken.clock + spec.datapath_latency, columns | (_bounds(spec, taken) if spec.bounds else {}))
+    return Table(shown.clock + spec.datapath_latency, columns | (_bounds(spec, shown) if spec.bounds else {}))
 
 
 def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any]]:

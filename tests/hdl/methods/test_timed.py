@@ -7,6 +7,7 @@ from support.mutant import caught, mutant
 from support.timed import SILENCE, TICK, decay, run, silence, spec_of, speed
 
 from tachometry.hdl.methods import gap_timer, quotient_velocity
+from tachometry.spec import Timing
 from tachometry.spec.methods.timed import TimedTachometer
 
 METHODS = ["t", "mt"]
@@ -40,7 +41,7 @@ def test_reversal(method: str) -> None:
 
 
 def check_standstill(method: str, sign: int = 1) -> None:
-    """The speed decays tick by tick as 1 count over the silence, and is 0 when the maximum time is over."""
+    """The speed decays tick by tick as 1½ counts over the silence, and is 0 when the maximum time is over."""
     steps = {5: sign, 25: sign, 45: sign}
     n = 45 + 3 * SILENCE
     v = sign * speed(1, 20)
@@ -93,7 +94,7 @@ def test_burst_after_standstill(method: str) -> None:
     moving = [row for row in got if row[1]]
     assert [row[1] for row in moving if not row[3]] == [speed(1, 1)] * sum(not row[3] for row in moving)
     assert all(
-        last < clock < last + SILENCE and 0 < v <= speed(1, age) for clock, v, age, forced, _ in moving if forced
+        last < clock < last + SILENCE and 0 < v <= speed(3, 2 * age) for clock, v, age, forced, _ in moving if forced
     )
     assert len(moving) > 5
 
@@ -121,20 +122,34 @@ def test_a_measurement_takes_the_divider_from_a_decay(method: str) -> None:
     for clock in range(tick + 1, tick + 20):
         got = run(spec, {5: 1, 25: 1, 45: 1, clock: 1}, clock + 1)
         assert got[-1] == (clock, speed(1, clock - 45), clock - 45, False, False)
-        assert ((tick, speed(1, tick - 45), tick - 45, True, False) in got) == (clock >= tick + spec.division_clocks)
+        decayed = (tick, speed(3, 2 * (tick - 45)), tick - 45, True, False)
+        assert (decayed in got) == (clock >= tick + spec.division_clocks)
 
 
 def check_turning_tail(method: str) -> None:
-    """A decay looks at the sign of the velocity, not of that before it."""
+    """A decay looks at the sign of the velocity, not of that before it; ticks here are shorter than a division."""
     for late in range(20):
         steps = {5: 1, 45: 1, 65: -1, 72 + late: -1}
-        got = run(timed(method), steps, 72 + late + 100)
+        got = run(timed(method, timing=Timing(800, 8, 50)), steps, 72 + late + 100)
         assert all(velocity <= 0 for clock, velocity, *_ in got if clock > 65)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_turning_tail(method: str) -> None:
     check_turning_tail(method)
+
+
+def check_only_silence_decays(method: str) -> None:
+    """Counts come late, 19 clocks after 10 that lay 10 apart, but the tick is not empty: nothing decays."""
+    steps = {clock: 1 for clock in (*range(100, 201, 10), 201 + 19 + 18)}
+    got = run(timed(method), steps, 220)
+    assert len(got) > 3
+    assert not any(forced and velocity for _, velocity, _, forced, _ in got)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_only_silence_decays(method: str) -> None:
+    check_only_silence_decays(method)
 
 
 MUTANTS = {
@@ -167,6 +182,7 @@ MUTANTS = {
         "forced.eq(forced)",
         check_standstill,
     ),
+    "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
     "decaying too early": (quotient_velocity.QuotientVelocity, " & ~rounds & ~compared", "", check_turning_tail),
 }
 

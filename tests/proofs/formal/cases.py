@@ -261,12 +261,13 @@ def timed(
         "MAX_QUOTIENT": spec.max_quotient,
         "SATURATES": int(spec.saturates),
         "FLAGS": int(spec.flags_range),
-        "INTEGER_BITS": spec.max_quotient.bit_length(),
+        "INTEGER_BITS": spec.max_quotient.bit_length() + 1,
         "INTERVAL_WIDTH": spec.interval_width,
         "FRAC_BITS": spec.frac_bits,
         "DIVISION_CLOCKS": spec.division_clocks,
     }
     probes = _TIMED_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
+    probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
     probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
@@ -289,8 +290,8 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
 
 # What can be said of M/T without what is divided; the last one takes as long as all the others.
 _MT_GIVEN = (
-    "lemma_idle lemma_age lemma_timer lemma_since lemma_free lemma_running lemma_silent lemma_many lemma_left "
-    "lemma_steps lemma_rest lemma_rested lemma_length lemma_unopened lemma_core_length lemma_window_free "
+    "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
+    "lemma_left lemma_steps lemma_rest lemma_rested lemma_length lemma_unopened lemma_core_length lemma_window_free "
     "pt_update pt_held pt_spacing pt_rest",
     "lemma_travelled",
 )

@@ -22,7 +22,7 @@ module timed #(
 ) (
     input clk, input rst, input a, input b
 );
-  localparam V = COUNT_WIDTH + FRAC_BITS, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS + 1, W = 8;
+  localparam V = COUNT_WIDTH + FRAC_BITS, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS, W = 8;
   localparam P = LATTICE ? 1 : T, B = DIVISION_CLOCKS, LONG = MAX_PERIODS * (LATTICE ? T : 1), PHASES = LATTICE ? T : 1;
   wire tick, velocity_valid, forced, stalled;
   wire signed [COUNT_WIDTH-1:0] pulse_count;
@@ -78,6 +78,11 @@ module timed #(
       was_negative <= count ? negative : last_negative;
     end
 
+  // Whether a count came since the last tick. On the lattice only ticks have counts.
+  reg came = 0;
+  wire shown_came, seen = LATTICE ? 0 : UPSET ? shown_came : came;
+  always @(posedge clk) came <= !rst && !tick && (count || seen);
+
   // The window of M/T: its length, and what it has travelled so far, in counts.
   reg signed [W-1:0] travelled = 0;
   wire signed [W-1:0] pair = MT && LATTICE ? size : negative != last_negative ? 0 : negative ? -1 : 1;
@@ -91,7 +96,7 @@ module timed #(
       if (count) travelled <= closes || !opened ? 0 : travelled + pair;
     end
 
-  // The division under way: clocks since it began, whether it is of a measurement, its distance and time.
+  // The division under way: clocks since it began, whether it is of a measurement, its distance in half counts, its time.
   reg [4:0] since = 0;
   reg measuring = 0, silent = 0, still = 0, many_now = 0;
   reg signed [I+Q:0] distance = 0;
@@ -99,7 +104,7 @@ module timed #(
   wire free = UPSET ? !core_measuring || !(core_running || core_rounds) : since == 0 || since == B || !measuring;
   wire idles = UPSET ? !(core_running || core_rounds || core_compared) : since == 0;
   wire measured = MT ? closes : count && free && (opened || many);
-  wire decays = tick && !count && !overdue && idles;
+  wire decays = tick && !count && !seen && !overdue && idles;
   wire signed [W-1:0] pairs = MT ? travelled + pair : many ? (negative ? -1 : 1) : pair;
   always @(posedge clk)
     if (rst) since <= 0;
@@ -110,7 +115,7 @@ module timed #(
         silent <= !count;
         still <= !count && !opened;
         many_now <= many;
-        distance <= overdue ? 0 : measured ? P * pairs : velocity < 0 ? -P : P;
+        distance <= overdue ? 0 : measured ? 2 * P * pairs : velocity < 0 ? -3 * P : 3 * P;
         times <= measured ? (MT ? length : many ? 1 : age) : age;
       end
     end
@@ -167,8 +172,8 @@ module timed #(
     end
   end
 
-  // 2^f x + 1/2 = (2^(f+1) distance + times) / (2 times), rounded down, and the largest that can be shown.
-  wire signed [N+I+2:0] wanted = (shown_distance <<< (FRAC_BITS + 1)) + $signed({1'b0, shown_times});
+  // 2^f x + 1/2 = (2^f distance + times) / (2 times), rounded down, and the largest that can be shown.
+  wire signed [N+I+2:0] wanted = (shown_distance <<< FRAC_BITS) + $signed({1'b0, shown_times});
   wire signed [N+I+2:0] divisor = $signed({1'b0, shown_times, 1'b0}), have = divisor * velocity;
   localparam signed [V-1:0] LIMIT = MAX_COUNT << FRAC_BITS;
   wire fits = !SATURATES || (wanted < divisor * (LIMIT + 1) && wanted >= -divisor * LIMIT);
@@ -178,14 +183,14 @@ module timed #(
   // Lemmas: what the induction needs to know of the state. Of a division: its distance, shifted, is the remainder and
   // the divisor times the digits so far, 1 or -1 each.
   wire [4:0] j = since - 1;
-  wire signed [N+I+1:0] all = distance <<< (FRAC_BITS + 1);
+  wire signed [N+I+1:0] all = distance <<< FRAC_BITS;
   wire signed [N+I+1:0] taken = all >>> (N - j);
   wire [N-1:0] found_digits = core_digits & ((1 << j) - 1);
   wire signed [N+1:0] digits = $signed({1'b0, found_digits, 1'b0}) - (1 <<< j) + 1;
   wire signed [N+I+1:0] passed = $signed({1'b0, times}) * digits;
   wire signed [N+I+2:0] asked = all + $signed({1'b0, times}), twice = $signed({1'b0, times, 1'b0});
   wire signed [N+I+2:0] found = twice * core_rounded;
-  wire signed [W+3:0] most = MAX_QUOTIENT * times, farthest = (LATTICE ? MAX_COUNT : 1) * (length - 1);
+  wire signed [W+3:0] most = measuring ? 2 * MAX_QUOTIENT * times : (times << Q) - 1, farthest = (LATTICE ? MAX_COUNT : 1) * (length - 1);
   reg [$clog2(T):0] phase = PHASES;  // of the timer period, 1 to PHASES; waits for the first tick
   always @(posedge clk) phase <= rst ? PHASES : period ? 1 : phase < PHASES ? phase + 1 : PHASES;
   always @* begin
@@ -209,8 +214,10 @@ module timed #(
         && core_remainder >= -$signed({1'b0, times})));
     lemma_quotient: assert (!fresh_division || !core_running || taken == core_remainder + passed);
     lemma_rounded: assert (!fresh_division || since < N + 2 || (found <= asked && asked < found + twice));
-    lemma_decays: assert (!fresh_division || since == 0 || measuring || (distance == (velocity < 0 ? -P : P) && silent));
-    lemma_sunk: assert (!fresh_due || !due || due_measuring || (due_distance == (past < 0 ? -P : P) && due_silent));
+    lemma_decays: assert (!fresh_division || since == 0 || measuring
+        || (distance == (velocity < 0 ? -3 * P : 3 * P) && silent));
+    lemma_decayed: assert (!fresh_due || !due || due_measuring
+        || (due_distance == (past < 0 ? -3 * P : 3 * P) && due_silent));
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
     lemma_still: assert (!fresh_past || since == 0 || measuring || !still || velocity == 0);
@@ -223,6 +230,11 @@ module timed #(
       wire core_beyond;
       always @* lemma_beyond: assert (since == 0 || core_beyond == many_now);
     end
+    if (!LATTICE) begin : clocked
+      wire core_came;
+      assign shown_came = core_came;
+      always @* lemma_came: assert (came == core_came);
+    end else assign shown_came = 0;
     if (LATTICE) begin : lattice
       wire signed [$clog2(T-1):0] core_window;
       reg [$clog2(T):0] clock = 0;
@@ -243,7 +255,7 @@ module timed #(
     if (MT) begin : mt
       wire [I-1:0] core_length;
       wire core_late;
-      wire signed [I+Q:0] core_travelled;
+      wire signed [I+Q-1:0] core_travelled;
       assign lasted = UPSET ? core_length : length;
       always @* begin
         lemma_length: assert (length >= 1 && (!opened || (length <= MIN_PERIODS + age && core_length == length

@@ -17,10 +17,6 @@ _NO_COUNT = (
 ARGUED = {
     ("t, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
     ("t, in clocks", '"was_negative": Out(1),', "B[0] inv"): _NO_COUNT,
-    ("t, in clocks", "quotient.decay.eq(self.tick & ~timer.count),", "Y[0] const1"): (
-        "every count measures, with two exceptions: while a measurement is divided, nothing decays; if none came in "
-        "the maximum time, the velocity is 0, the time allows no less, and a measurement takes the divider anyway"
-    ),
     ("t, in ticks", "above.eq(value > Const(limit, value.shape())),", "B[2] inv"): (
         "the limit of the output is 123 instead of 127; velocities are 2^5·2π/m, and the nearest ones are 100 and 201"
     ),

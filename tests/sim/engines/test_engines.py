@@ -31,8 +31,13 @@ def turning(n_clocks: int, spacing: int = 7) -> PinTrace:
     return PinTrace(clock, a, b, n_clocks)
 
 
-@pytest.mark.parametrize("name", COMPILED)
-@pytest.mark.parametrize(("method", "seed"), [("s", 9), ("m", 4), ("mt", 2), ("t", 0), ("rairan", 1)])
+@pytest.mark.parametrize(
+    ("name", "method", "seed"),
+    [
+        *(("cxxrtl", method, seed) for method, seed in [("s", 9), ("m", 4), ("mt", 2), ("t", 0), ("rairan", 1)]),
+        ("verilator", "mt", 2),  # which plays on many more cores in test_matrix.py
+    ],
+)
 def test_random_cases(name: str, method: str, seed: int) -> None:
     spec, _, trace = random_case(seed, method)
     run = pick(name).run(spec, trace)
