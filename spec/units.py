@@ -16,6 +16,8 @@ PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/%]*)"
 _QUANTITY = re.compile(QUANTITY, re.ASCII)
 _LONGEST = 400  # characters of a number
+# Sizes of a number: products of several still are floats.
+_LEAST, _GREATEST = Fraction(1, 10**30), Fraction(10**30)
 
 
 class Unit(NamedTuple):
@@ -75,7 +77,7 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
     Raises
     ------
     ParameterError
-        If the text is not of this form.
+        If the text is not of this form, or the number absurdly large or small.
     """
     number = text.strip()
     match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
@@ -83,7 +85,10 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
         names = ", ".join(filter(None, units))
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
         raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
-    return Fraction(match[1]), match[2] or default
+    value = Fraction(match[1])
+    if value and not _LEAST <= abs(value) <= _GREATEST:
+        raise ParameterError(what, f"must be 0 or of a size from 1e-30 to 1e30, not {text!r}")
+    return value, match[2] or default
 
 
 def read_exactly(what: str, text: str, units: Units, default: str = "") -> Fraction:
@@ -93,15 +98,9 @@ def read_exactly(what: str, text: str, units: Units, default: str = "") -> Fract
 
 
 def read_nearest(what: str, text: str, units: Units, default: str = "") -> float:
-    """The quantity in the first of the units as a float, which must be finite; else as `read_quantity`."""
+    """The quantity in the first of the units as a float; arguments and errors as of `read_quantity`."""
     value, unit = read_quantity(what, text, units, default)
-    try:
-        nearest = units[unit].nearest(value)
-    except OverflowError:
-        nearest = math.inf
-    if not math.isfinite(nearest):
-        raise ParameterError(what, f"must be finite, not {text!r}")
-    return nearest
+    return units[unit].nearest(value)
 
 
 def ratio(unit: str, other: str) -> Fraction | None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.option import all_of, option, refuse_without
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import parse_frequency
 
@@ -58,6 +58,8 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
             tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
             return read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), index, tick)
 
+        if others.get("capture") is None:
+            refuse_without("--replay", _OPTIONS)
         return command(read=read, **others)
 
     return all_of(_OPTIONS, build)

@@ -9,12 +9,13 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, writing
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading, writing
 from tachometry.sim.signals import files
 from tachometry.sim.signals.recording import Recording
 
 BLOCK = 4 << 20  # bytes of text parsed at once
 LONGEST_HEADER = 1 << 16  # bytes
+_LATEST = 1e30  # seconds
 
 
 def read_csv(
@@ -74,6 +75,7 @@ def read_csv(
             changed = np.diff(block_level, prepend=np.uint8(last_level)) != 0
             time.append(block_time[changed] - start)
             level.append(block_level[changed])
+            check_edges(path, sum(map(len, level)))
             last_time, last_level = float(block_time[-1]), int(block_level[-1])
     if not level:
         raise CaptureError(f"{path} must have at least one row after its header, not 0")
@@ -145,6 +147,7 @@ def _parse(path: Path, line: int, block: bytes, names: list[str], columns: tuple
         _name_the_bad_cell(path, line, lines, names, columns)
     time = values[:, 0]
     _refuse(path, line, ~np.isfinite(time), "time must be a finite number of seconds", time)
+    _refuse(path, line, np.abs(time) > _LATEST, f"time must be at most {_LATEST:g} s", time)
     for column, value in zip(columns[1:], values.T[1:], strict=True):
         _refuse(path, line, (value != 0) & (value != 1), f"level of {names[column]} must be 0 or 1", value)
     return values
