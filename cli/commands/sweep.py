@@ -112,7 +112,8 @@ Examples:
     "Machines",
     "--scheduler",
     metavar="ADDRESS",
-    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry.",
+    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
+    "Whoever can connect to it can run code there and here, see docs/sweep.md.",
 )
 @output(
     "--results",
