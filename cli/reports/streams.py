@@ -3,6 +3,7 @@
 import io
 import os
 import sys
+from typing import TextIO
 
 INTERNAL = 70  # exit status: a fault of the program, as sysexits.h has it
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
@@ -28,11 +29,11 @@ def prepare_streams() -> None:
             stream.reconfigure(encoding="utf-8", errors="backslashreplace")
 
 
-def silence(stream: io.TextIOBase | None) -> None:
+def silence(stream: TextIO) -> None:
     """Send what is still written to a stream nowhere: its reader is gone."""
     try:
         nothing = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nothing, stream.fileno() if stream else 1)
+        os.dup2(nothing, stream.fileno())
         os.close(nothing)
     except (OSError, ValueError):  # not a file
         pass
