@@ -14,7 +14,7 @@ from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import Make, common_core_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import FORMS, optional_motion_options
-from tachometry.cli.options.option import GroupedCommand, option, output
+from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.spec import Encoder, TachometerSpec
 from tachometry.spec.units import format_time, parse_time
 
@@ -54,7 +54,7 @@ Examples:
     "--replay",
     "capture",
     metavar="CAPTURE",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     help="Captured lines instead of a --motion: .sr, .csv or .vcd, as `tachometry replay` takes them.",
 )
 @capture_options

@@ -11,7 +11,7 @@ import click
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.motion import FORMS, optional_motion_options
-from tachometry.cli.options.option import GroupedCommand, option
+from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
 
@@ -39,7 +39,7 @@ Examples:
     "--output",
     "-o",
     "directory",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     required=True,
     metavar="DIR",
     help="Directory to write to; it is made if it does not exist, and files in it are overwritten.",

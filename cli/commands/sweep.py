@@ -10,8 +10,9 @@ import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, tables_of
-from tachometry.cli.options.option import INTERRUPTED, GroupedCommand, option, output
+from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.options.sweep import by_name, point_options
+from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
 from tachometry.spec.units import parse_time, plural
 
@@ -69,7 +70,7 @@ Examples:
   tachometry sweep docs/sweep.toml --vary seed=1..10:10 \\
       --scheduler tcp://host:8786""",
 )
-@click.argument("file", required=False, type=click.Path(path_type=Path))
+@click.argument("file", required=False, type=FilePath())
 @option(
     "Sweep",
     "--vary",

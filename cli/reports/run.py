@@ -6,7 +6,7 @@ import sys
 import numpy as np
 from rich.text import Text
 
-from tachometry.cli.options.option import INTERRUPTED
+from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.signals.run import Mismatch, Run
