@@ -60,6 +60,8 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             "frac_bits": spec.frac_bits,
             "unit": spec.unit,
             "rad_per_s_per_lsb": spec.rad_per_s_per_lsb,
+            "full_scale": spec.full_scale * 2.0**-spec.frac_bits,
+            "full_scale_rad_per_s": spec.full_scale * spec.rad_per_s_per_lsb,
         },
         **({"bounds": {"none": spec.shown_absent_bound}} if spec.bounds else {}),
         "interval_unit_cycles": spec.interval_unit_cycles,

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from tachometry.spec.formats.low_pass import LowPass
 from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput, per_count
+from tachometry.spec.option import is_derived
 from tachometry.spec.parameters import Parameters
 from tachometry.spec.units import ceil_log2, signed_width
 
@@ -20,7 +21,16 @@ class Numbers(Parameters):
     def default_frac_bits(self) -> int:
         """Fraction bits of the velocity if they are not given."""
         coarsest, finest = self.frac_bits_range(self.unit)
-        return 16 if self.unit == NATIVE else max(coarsest, min(10, finest))
+        most = 16 if self.unit == NATIVE else min(10, finest)
+        if self.max_speed is not None and not is_derived(self.velocity_width):
+            # With them no velocity saturates.
+            most = min(most, self.fitting_frac_bits(self.max_count))
+        return max(coarsest, most)
+
+    def fitting_frac_bits(self, counts: Fraction | int) -> int:
+        """The most fraction bits with which so many counts per tick fit `velocity_width`."""
+        lsb = counts * self._per_count / ((1 << (self.velocity_width - 1)) - 1)
+        return -ceil_log2(lsb)
 
     def frac_bits_range(self, unit: str) -> tuple[int, int]:
         """Fewest and most fraction bits of the velocity in `unit`."""
@@ -45,11 +55,25 @@ class Numbers(Parameters):
     @property
     def output(self) -> VelocityOutput | None:
         """How `velocity` is computed from the native velocity; None if the native velocity is the output."""
-        if self.unit == NATIVE and self.velocity_bits is None:
+        if self.unit == NATIVE and self.velocity_width == self.native_width:
             return None
+        return self._output(self.velocity_width)
+
+    def _output(self, width: int) -> VelocityOutput:
         native = 1 << self.native_frac_bits
         largest = self.absent_bound if self.bounds else self.max_count * native
-        return VelocityOutput(self._lsb_per_count / native, largest, self.velocity_bits, self.bounds)
+        return VelocityOutput(self._lsb_per_count / native, largest, width, self.bounds)
+
+    @property
+    def needed_velocity_width(self) -> int:
+        """Bits with which `velocity` never saturates."""
+        return self.native_width if self.unit == NATIVE else signed_width(self._output(0).greatest)
+
+    @property
+    def full_scale(self) -> int:
+        """The greatest |velocity|, in its LSB: there it saturates."""
+        greatest = self.max_count << self.native_frac_bits
+        return greatest if self.output is None else min(self.output.scaled(greatest), self.output.limit)
 
     @property
     def max_bound(self) -> int:
@@ -77,9 +101,13 @@ class Numbers(Parameters):
         return self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
 
     @property
+    def _per_count(self) -> Fraction:
+        """One count per tick in the unit."""
+        return per_count(self.unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
+
+    @property
     def _lsb_per_count(self) -> Fraction:
-        count = per_count(self.unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
-        return count * Fraction(2) ** self.frac_bits
+        return self._per_count * Fraction(2) ** self.frac_bits
 
     @property
     def low_pass(self) -> LowPass:
@@ -152,11 +180,6 @@ class Numbers(Parameters):
     def count_width(self) -> int:
         """Bits of `pulse_count`."""
         return signed_width(self.max_pulse_count)
-
-    @property
-    def velocity_width(self) -> int:
-        """Bits of `velocity`."""
-        return self.native_width if self.output is None else self.output.port_width
 
     @property
     def interval_width(self) -> int:

@@ -190,11 +190,15 @@ class Speed:
         """The speed in rad/s."""
         return float(self.value * SPEED[self.unit].exact)
 
-    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
-        """⌈speed / ω_u⌉: the most counts that one tick can hold at this speed, ω_u = 2π/(P·T_s)."""
+    def counts(self, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
+        """Speed / ω_u, counts per tick, with ω_u = 2π/(P·T_s)."""
         size, pi = SPEED[self.unit]
         turns = size / (2 * PI) if pi is None else size * pi / 2
-        return math.ceil(self.value * turns * counts_per_rev * tick_seconds)
+        return self.value * turns * counts_per_rev * tick_seconds
+
+    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
+        """The most counts that one tick can hold at this speed."""
+        return math.ceil(self.counts(counts_per_rev, tick_seconds))
 
     def __str__(self) -> str:
         number = self.value.numerator if self.value.denominator == 1 else float(self.value)

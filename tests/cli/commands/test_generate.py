@@ -45,7 +45,7 @@ def test_defaults(tmp_path: Path) -> None:
         "max_ticks": 500,
         "unit": "count/tick",
         "frac_bits": 16,
-        "velocity_bits": None,
+        "velocity_width": 27,
         "max_speed": None,
         "position_width": 32,
         "filter_clocks": 0,
@@ -66,7 +66,7 @@ def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
     expected = {
         "unit": "rpm",
         "frac_bits": 3,
-        "velocity_bits": 12,
+        "velocity_width": 12,
         "index": True,
         "index_reset": True,
         "filter_clocks": 4,
