@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tachometry.spec.option import ParameterError
 
@@ -158,6 +158,32 @@ def ceil_log2(number: Fraction) -> int:
 def signed_width(limit: int) -> int:
     """Bits of a two's complement number that holds -limit … +limit."""
     return limit.bit_length() + 1
+
+
+class SpeedUnit(NamedTuple):
+    """The unit in which commands show speeds; everything else has them in rad/s.
+
+    Parameters
+    ----------
+    name : str
+        `rad/s`, `rev/s` or `rpm`.
+    """
+
+    name: str
+
+    @property
+    def rad_per_s(self) -> float:
+        """One of this unit in rad/s."""
+        return float(SPEED[self.name].exact)
+
+    def of(self, rad_per_s: Any) -> Any:
+        """A number or an array in rad/s, in this unit."""
+        return rad_per_s / self.rad_per_s
+
+    @property
+    def suffix(self) -> str:
+        """What the names of columns end with."""
+        return self.name.replace("/", "_")
 
 
 @dataclass(frozen=True)
