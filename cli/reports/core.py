@@ -53,7 +53,8 @@ def _full_scale(spec: TachometerSpec) -> str:
     if not spec.narrow:
         return value
     counted = spec.shown_unit.of(spec.max_velocity * spec.unit_velocity)
-    return f"{value}; that is what {spec.velocity_width} bits hold, counted is up to {counted:.6g} {spec.shown_unit.name}"
+    held = f"{value}; that is what {spec.velocity_width} bits hold"
+    return f"{held}, counted is up to {counted:.6g} {spec.shown_unit.name}"
 
 
 def _resolution(spec: TachometerSpec) -> list[tuple[str, str]]:
