@@ -1,14 +1,17 @@
 """What every method shares: checks, ports and what a method says of itself."""
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, ClassVar
 
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
 from tachometry.spec.numbers import Numbers
-from tachometry.spec.option import ParameterError, options_of, settle
+from tachometry.spec.option import ParameterError, is_derived, options_of, settle
 from tachometry.spec.port import UPDATE, Port, held, ports_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
+from tachometry.spec.units import SpeedUnit, plural, signed_width
 
 TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
 # The ends of what encloses the true speed, and which way each is rounded: outward.
@@ -52,6 +55,8 @@ class TachometerSpec(Numbers):
         if self.unit not in UNITS:
             raise ParameterError("unit", f"must be one of {', '.join(UNITS)}, not {self.unit!r}")
         self._check_ticks()
+        if not is_derived(self.velocity_width) and not 8 <= self.velocity_width <= 64:
+            raise ParameterError("velocity_width", f"must be from 8 to 64, not {self.velocity_width}")
         settle(self)
         self._check_velocity()
         if not 8 <= self.position_width <= 48:
@@ -84,10 +89,9 @@ class TachometerSpec(Numbers):
             )
 
     def _check_velocity(self) -> None:
-        if self.velocity_bits is not None and not 8 <= self.velocity_bits <= 64:
-            raise ParameterError("velocity_bits", f"must be from 8 to 64, not {self.velocity_bits}")
         coarsest, finest = self.frac_bits_range(self.unit)
         if coarsest <= self.frac_bits <= finest:
+            self._check_full_scale(coarsest)
             return
         if self.unit == NATIVE:
             raise ParameterError("frac_bits", f"must be from {coarsest} to {finest}, not {self.frac_bits}")
@@ -96,6 +100,23 @@ class TachometerSpec(Numbers):
             f"must be from 2^{-finest} to 2^{-coarsest} {self.unit} with this encoder and tick, "
             f"not 2^{-self.frac_bits}",
         )
+
+    def _check_full_scale(self, coarsest: int) -> None:
+        """See that a velocity of so many bits shows the greatest speed."""
+        if self.max_speed is None or is_derived(self.velocity_width):
+            return
+        counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
+        counts = min(counts, Fraction(self.max_velocity))
+        fitting = self.fitting_frac_bits(counts)
+        if self.frac_bits <= fitting:
+            return
+        needs = f"to show {self.max_speed} in {self.velocity_width} bits"
+        if fitting < coarsest:
+            width = signed_width(math.ceil(counts * self.per_count * Fraction(2) ** coarsest))
+            raise ParameterError("velocity_width", f"must be at least {width} to show {self.max_speed} in {self.unit}")
+        if self.unit == NATIVE:
+            raise ParameterError("frac_bits", f"must be at most {fitting} {needs}, not {self.frac_bits}")
+        raise ParameterError("lsb", f"must be at least 2^{-fitting} {self.unit} {needs}, not 2^{-self.frac_bits}")
 
     @property
     def description(self) -> str:
@@ -111,6 +132,28 @@ class TachometerSpec(Numbers):
     def remark(self) -> str:
         """A remark below the plan of the method; empty: none."""
         return ""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the core is not as its options say."""
+        if self.max_speed is None:
+            return ()
+        counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
+        if counts <= self.max_velocity:
+            return ()
+        unit, most = SpeedUnit(self.max_speed.unit), plural(self.max_velocity, "count")
+        greatest = unit.of(self.max_velocity * self.unit_velocity)
+        return (f"greatest speed cut from {self.max_speed} to {greatest:.6g}{unit.name}: {most} per tick is the most",)
+
+    @property
+    def min_time_cycles(self) -> int | None:
+        """Clocks that every measurement lasts longer than; None: there is no such time."""
+        return None
+
+    @property
+    def max_time_cycles(self) -> int:
+        """Clocks after which an update is forced, with ticks as long as nominal."""
+        return self.timing.max_ticks * self.timing.tick_cycles
 
     @property
     def memory(self) -> tuple[str, int, int] | None:
@@ -151,7 +194,7 @@ class TachometerSpec(Numbers):
         """Ports that enclose the true speed."""
         if not self.bounds:
             return ()
-        width = self.bound_width if self.output is None else self.output.port_width
+        width = self.bound_width if self.output is None else self.velocity_width
         return (
             *(
                 held(

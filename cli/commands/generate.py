@@ -68,6 +68,8 @@ def generate(
     DIR/NAME.core  FuseSoC core file (CAPI2)
     with --testbench cocotb also DIR/test_NAME.py and DIR/NAME_vectors.json
 
+    What was built is printed: full scale, LSB, resolution, widths and latencies.
+
     Equal options give equal files, byte for byte, on every machine.
     """
     check_module_name(name)
@@ -88,4 +90,8 @@ def generate(
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:
         click.echo(click.format_filename(directory / file))
+    from tachometry.cli.reports.core import print_core
+
+    click.echo()
+    print_core(spec)
     return 0

@@ -239,12 +239,14 @@ class RairanTachometer(TachometerSpec):
             held(
                 *(UPDATE, "n_ep1", self.max_pulse_count.bit_length()),
                 unit="counts",
-                help="Nep1 of the velocity: counts in a sampling period dt.",
+                help="Nep1 of the velocity: counts in a sampling period dt. With --paper-exact: the register Nep1 of "
+                "Table 1 as it is, whichever of Nep1 and Ndt1 the velocity comes from.",
             ),
             held(
                 *(UPDATE, "n_dt1", self.interval_width),
                 unit="dt",
-                help="Ndt1 of the velocity: sampling periods dt from one count to the next.",
+                help="Ndt1 of the velocity: sampling periods dt from one count to the next. With --paper-exact: the "
+                "register Ndt1 of Table 1 as it is.",
             ),
             *(
                 [

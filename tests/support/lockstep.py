@@ -2,6 +2,7 @@
 
 import itertools
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -21,6 +22,7 @@ from tachometry.spec import (
     Encoder,
     MTachometer,
     MTTachometer,
+    ParameterError,
     RairanTachometer,
     Speed,
     STachometer,
@@ -221,7 +223,9 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
         spec = replace(spec, unit=unit, frac_bits=int(rng.integers(max(coarsest, finest - 12), finest + 1)))
     if rng.random() < 0.3:
         narrower = 10 if isinstance(spec, TimedTachometer) else 4
-        spec = replace(spec, velocity_bits=max(8, spec.velocity_width - int(rng.integers(-2, narrower))))
+        width = max(8, spec.velocity_width - int(rng.integers(-2, narrower)))
+        with suppress(ParameterError):  # too narrow for the greatest speed
+            spec = replace(spec, velocity_width=width)
     return spec
 
 
