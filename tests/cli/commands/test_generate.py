@@ -30,7 +30,8 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
     written = {path.name: path.read_bytes().decode() for path in (tmp_path / "new" / "rtl").iterdir()}
     assert written == export(spec, "spindle")
     assert capsys.readouterr().out.split() == [
-        str(tmp_path / "new" / "rtl" / f"spindle.{suffix}") for suffix in ("v", "json", "core")
+        str(tmp_path / "new" / "rtl" / f"spindle{suffix}")
+        for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")
     ]
 
 
