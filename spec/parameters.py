@@ -80,7 +80,7 @@ class Parameters:
         tests=("most - 20", "most - 0", "16"),
         also=(
             Option(
-                "LSB of the velocity as a power of two of its unit, e.g. 2^-10 (instead of --frac-bits).",
+                "LSB of the velocity as a power of two of its unit: 2^-4 or 0.0625 (instead of --frac-bits).",
                 name="lsb",
                 metavar="2^-N",
                 parse=parse_lsb,

@@ -13,7 +13,8 @@ from tachometry.spec.option import ParameterError
 PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 
 # A decimal number and its unit. Exponents beyond three digits would make numbers that fill the memory.
-QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/%]*)"
+# µ is the sign of either code point, U+00B5 or U+03BC.
+QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-zµμ/%]*)"
 _QUANTITY = re.compile(QUANTITY, re.ASCII)
 _LONGEST = 400  # characters of a number
 
@@ -79,11 +80,18 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
     """
     number = text.strip()
     match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
-    if match is None or (match[2] or default) not in units:
+    unit = plain_unit(match[2]) or default if match else ""
+    if match is None or unit not in units:
         names = ", ".join(filter(None, units))
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
+        allowed = f"or one in {names}" if "" in units else allowed
         raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
-    return Fraction(match[1]), match[2] or default
+    return Fraction(match[1]), unit
+
+
+def plain_unit(unit: str) -> str:
+    """The name of a unit in the tables, such as `us` for `µs`."""
+    return re.sub("^[µμ]", "u", unit)
 
 
 def read_exactly(what: str, text: str, units: Units, default: str = "") -> Fraction:

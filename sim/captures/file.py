@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tachometry.sim.signals.files import replacing
+from tachometry.spec.option import ParameterError
 
 Channel = str | int
 NONE: Mapping[str, Channel] = {}
@@ -13,6 +14,10 @@ NONE: Mapping[str, Channel] = {}
 
 class CaptureError(ValueError):
     """A capture cannot be read or written; the message is one line, with what is wrong and what is allowed."""
+
+
+class OptionError(CaptureError, ParameterError):
+    """An option does not go with a capture; the command line names it as it was given."""
 
 
 @contextmanager

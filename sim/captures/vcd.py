@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 from vcd.reader import ScopeDecl, Token, TokenKind, VarDecl, VCDParseError, tokenize
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, choose_channels, reading
 from tachometry.sim.signals.recording import Recording
 
 _UNITS = {"s": 0, "ms": 3, "us": 6, "ns": 9, "ps": 12, "fs": 15}
@@ -44,7 +44,7 @@ def read_vcd(
     """
     path = Path(path)
     if samplerate_hz is not None:
-        raise CaptureError(f"samplerate must not be given for {path}: a waveform has its times")
+        raise OptionError("samplerate", f"must not be given for {path}: a waveform has its times")
     with reading(path), path.open("rb") as file:
         tokens = _tokens(path, file)
         names, codes, scale = _declarations(path, tokens)

@@ -15,11 +15,14 @@ UNITS = (NATIVE, *_PER_REV_PER_SECOND)
 
 
 def parse_lsb(what: str, text: str) -> int:
-    """Fraction bits N of an LSB such as `2^-10`, 2^−N; ParameterError if it is no power of two."""
-    match = re.fullmatch(r"2\^([+-]?[0-9]{1,3})", text.strip())
-    if match is None:
-        raise ParameterError(what, f"must be a power of two such as 2^-10, not {text!r}")
-    return -int(match[1])
+    """Fraction bits N of an LSB, 2^−N, such as `2^-4` or `0.0625`; ParameterError if it is no power of two."""
+    if match := re.fullmatch(r"2\^([+-]?[0-9]{1,3})", text.strip()):
+        return -int(match[1])
+    if re.fullmatch(r"\+?([0-9]{1,30}(\.[0-9]{0,100})?|\.[0-9]{1,100})", text.strip(), re.ASCII):
+        lsb = Fraction(text.strip())
+        if lsb.numerator.bit_count() == lsb.denominator.bit_count() == 1:
+            return lsb.denominator.bit_length() - lsb.numerator.bit_length()
+    raise ParameterError(what, f"must be a power of two such as 2^-10 or 0.0625, not {text!r}")
 
 
 def per_count(unit: str, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:

@@ -20,6 +20,7 @@ from tachometry.hdl.methods import mt as mt_method
 from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.sim.testbench.vectors import usual_motion
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.provenance import notice
 
 SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us"
 CASES = {
@@ -154,7 +155,9 @@ def test_stands_on_its_own_and_is_the_same_again(tmp_path: Path) -> None:
         assert generate(tmp_path / folder, *SMALL.split(), *CASES["s"].split()) == 0
     for name in ("test_spindle.py", "spindle_vectors.json"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
-    assert "tachometry" not in (tmp_path / "1" / "test_spindle.py").read_text()
+    bench = (tmp_path / "1" / "test_spindle.py").read_text()
+    assert bench.startswith(notice("#"))
+    assert "tachometry" not in bench.removeprefix(notice("#"))
 
 
 def test_usual_motion_stays_short_for_every_timing() -> None:
