@@ -35,7 +35,7 @@ class QuotientVelocity(wiring.Component):
         Distance in counts, times the timer periods in a tick.
     divisor : In(spec.interval_width)
         Time in timer periods.
-    forced_in, stalled_in, beyond_in : In(1)
+    forced_in, beyond_in : In(1)
         Valid with `measure` and `decay`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
@@ -70,7 +70,6 @@ class QuotientVelocity(wiring.Component):
                 "dividend": In(signed(len(self.divider.dividend) - 1)),
                 "divisor": In(spec.interval_width),
                 "forced_in": In(1),
-                "stalled_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
                 **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
@@ -99,12 +98,11 @@ class QuotientVelocity(wiring.Component):
             divider.divisor.eq(self.divisor),
             divider.dividend.eq(Mux(self.measure, halves, greatest) if spec.decays else halves),
         ]
-        forced, stalled, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "stalled", "beyond"))
+        forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
         with m.If(divider.start):
             m.d.sync += [
                 measuring.eq(self.measure),
                 forced.eq(self.forced_in),
-                stalled.eq(self.stalled_in),
                 beyond.eq(self.beyond_in),
             ]
 
@@ -126,7 +124,6 @@ class QuotientVelocity(wiring.Component):
                 new.velocity.eq(shown),
                 new.interval.eq(divider.by),
                 new.forced.eq(forced),
-                new.stalled.eq(stalled),
             ]
             if spec.flags_range:
                 m.d.sync += new.out_of_range.eq(beyond | saturated)

@@ -32,8 +32,8 @@ class RairanCounters(wiring.Component):
         Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. This and all below are held until the next update.
     high, backward : Out(1)
         The regime, and the direction.
-    forced, stalled : Out(1)
-        `forced`: the last update came without a count. `stalled`: it came at the maximum time.
+    forced, at_rest : Out(1)
+        `forced`: the last update came without a count. `at_rest`: it came at the maximum time.
     n_ep1, n_dt1 : Out
         Only with `paper_exact`: as in Table 1.
     shift : Out
@@ -56,7 +56,7 @@ class RairanCounters(wiring.Component):
                 "high": Out(1),
                 "backward": Out(1),
                 "forced": Out(1),
-                "stalled": Out(1),
+                "at_rest": Out(1),
                 # Nep1 and Ndt1 as they are before anything has come.
                 **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
                 **({"shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
@@ -182,7 +182,7 @@ class RairanCounters(wiring.Component):
             update: Value | int = 1,
             high: int = 0,
             forced: int = 0,
-            stalled: int = 0,
+            at_rest: int = 0,
             loose: Value | int = 0,
             unsynced: Value | int = 0,
         ) -> None:
@@ -195,7 +195,7 @@ class RairanCounters(wiring.Component):
                 self.n.eq(n),
                 self.high.eq(high),
                 self.forced.eq(forced),
-                self.stalled.eq(stalled),
+                self.at_rest.eq(at_rest),
             ]
 
         m.d.sync += self.update.eq(0)
@@ -210,7 +210,7 @@ class RairanCounters(wiring.Component):
             set_(self.c_dt, loose=self.rest, unsynced=~in_step)
         with m.Elif(waits & self._is_longest()):
             # At rest no update would correct it after an upset.
-            set_(0, update=~self.rest, forced=1, stalled=1)
+            set_(0, update=~self.rest, forced=1, at_rest=1)
         if spec.bound_decay:
             with m.Elif(waits & Mux(self.high, waited != 0, (waited > n) & self.n.any())):
                 set_(waited, forced=1, loose=1)

@@ -46,7 +46,6 @@ class Model:
             distance=2 * distance,
             time=time,
             forced=none,
-            stalled=none,
             beyond=none,
             least=least,
             most=most,
@@ -60,7 +59,7 @@ class Model:
         What is being divided is the window that ended with the opening count, or the 0 forced before it.
         """
         clock = counts.clock(counts.period)
-        zeros = counts.clock(counts.silences(self._spec.max_periods)[0])
+        zeros = counts.clock(counts.silences(self._spec.max_periods))
         forced = np.append(zeros, -self._spec.division_clocks)[np.searchsorted(zeros, clock) - 1]
         begun = np.where(first, forced, clock)
         return np.searchsorted(clock, begun + self._spec.division_clocks)

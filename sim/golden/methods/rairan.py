@@ -139,12 +139,13 @@ class Model:
     def __init__(self, spec: RairanTachometer) -> None:
         self._spec = spec
 
-    def windows(self, steps: Steps, n_clocks: int) -> tuple[Ints, Bools]:
-        """Last clocks of all ticks, and whether Nep1 is saturated in them."""
+    def windows(self, steps: Steps, n_clocks: int) -> tuple[Ints, Bools, Ints]:
+        """Last clocks of all ticks, whether Nep1 is saturated in them, and nominal ticks that they are long."""
         found, dt = windows(self._spec, steps, n_clocks), self._spec.timing.tick_cycles
         nth = counting(found.n_dt)
         last = np.repeat(found.start, found.n_dt) + (nth + 1) * np.repeat(dt << found.shift, found.n_dt)
-        return last, (nth == 0) & np.repeat(found.c_ep > self._spec.max_count << found.shift, found.n_dt)
+        beyond = (nth == 0) & np.repeat(found.c_ep > self._spec.max_count << found.shift, found.n_dt)
+        return last, beyond, np.repeat(1 << found.shift, found.n_dt)
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
         """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
@@ -156,7 +157,7 @@ class Model:
             "velocity": self._velocity(events),
             "interval": np.where(events.high | (events.n == 0), 1, events.n) << events.shift,
             "forced": events.forced,
-            "stalled": events.stalled,
+            "rests": events.stalled,
             "n_ep1": events.n_ep1,
             "n_dt1": events.n_dt1,
             "dt_shift": events.shift,

@@ -17,7 +17,7 @@ def check_windows() -> None:
     at = [5, 30, 55, 60, 80, 110, 111, 161, 162]
     got = run(spec, dict.fromkeys(at, 1), 163)
     windows = [(60, 3, 55), (111, 3, 51), (162, 2, 51)]
-    assert got == [(clock, speed(way, time), time, False, False) for clock, way, time in windows]
+    assert got == [(clock, speed(way, time), time, False) for clock, way, time in windows]
 
 
 def test_windows() -> None:
@@ -29,7 +29,7 @@ def check_reversals() -> None:
     steps = {5: 1, 15: 1, 25: -1, 35: -1, 45: -1, 60: 1, 70: -1, 80: -1, 115: -1, 125: 1, 170: 1}
     got = run(spec_of("mt", min_time=50, bound_decay=False), steps, 171)
     # +½ +1 −1 −1 −1 +½, then +½ −1 −1 −½, then −½ +1 +½; to the letter the counts after the opening one.
-    assert got == [(clock, speed(way, 55), 55, False, False) for clock, way in ((60, -1), (115, -2), (170, 1))]
+    assert got == [(clock, speed(way, 55), 55, False) for clock, way in ((60, -1), (115, -2), (170, 1))]
     got = run(spec_of("mt", min_time=50, paper_exact=True), steps, 171)
     assert [row[1:3] for row in got] == [(speed(way, 55), 55) for way in (-1, -3, 2)]
 
@@ -55,7 +55,7 @@ def test_a_count_while_the_divider_runs_goes_on() -> None:
     busy = spec.division_clocks
     steps = dict.fromkeys([5, 45, 45 + busy - 1, 45 + busy], 1)
     got = run(spec, steps, 46 + busy)
-    assert got == [(45, speed(1, 40), 40, False, False), (45 + busy, speed(2, busy), busy, False, False)]
+    assert got == [(45, speed(1, 40), 40, False), (45 + busy, speed(2, busy), busy, False)]
 
 
 def check_silence_in_a_window() -> None:
@@ -65,13 +65,13 @@ def check_silence_in_a_window() -> None:
     steps = dict.fromkeys([5, 55, last], 1) | dict.fromkeys([last + SILENCE + 60, last + SILENCE + 261], -1)
     got = run(spec, steps, last + SILENCE + 262)
     assert got[:1] == silence(last, last + SILENCE + 1)
-    assert got[1:] == [(last + SILENCE + 261, speed(-1, 201), 201, False, False)]
+    assert got[1:] == [(last + SILENCE + 261, speed(-1, 201), 201, False)]
     # Also in the clock after it.
     got = run(spec, {5: 1, last: 1, last + SILENCE + 1: 1}, last + SILENCE + 50)
     assert got == silence(last, last + SILENCE + 1)
     # A window may be longer than the maximum time, as long as no silence is.
     got = run(spec, {5: 1, 200: 1, 200 + SILENCE: 1}, 201 + SILENCE)
-    assert got == [(200 + SILENCE, speed(2, 195 + SILENCE), 195 + SILENCE, False, False)]
+    assert got == [(200 + SILENCE, speed(2, 195 + SILENCE), 195 + SILENCE, False)]
 
 
 def test_silence_in_a_window() -> None:

@@ -15,7 +15,7 @@ from tachometry.sim.golden.methods.rairan import Model
 from tachometry.spec import Speed
 from tachometry.spec.tachometer import BOUNDS
 
-NAMES = ["velocity", "interval", "forced", "stalled", "n_ep1", "n_dt1"]
+NAMES = ["velocity", "interval", "forced", "n_ep1", "n_dt1"]
 
 
 def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) -> None:
@@ -23,14 +23,17 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
     spec = make_spec(dt, max_ticks, **options)
     names = NAMES + [*BOUNDS, "bounds_valid"] * spec.bounds + ["dt_shift"] * (spec.adaptive is not None)
     rows = [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
-    seen = clock_by_clock(rairan.RairanMethod(spec), rows, ["velocity_valid", "last", "beyond", *names])
+    lengths = ["tick_shift"] * (spec.adaptive is not None)
+    seen = clock_by_clock(rairan.RairanMethod(spec), rows, ["velocity_valid", "last", "beyond", *lengths, *names])
     got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
     updates = golden_updates(spec, step)
     columns = [updates[name].astype(int).tolist() for name in names]
     assert got == list(zip((updates.clock + DELAY).tolist(), *columns, strict=True))
-    ends, beyond = Model(spec).windows(steps_of(step), len(step))
+    ends, beyond, nominal = Model(spec).windows(steps_of(step), len(step))
     assert [clock for clock, row in enumerate(seen[: len(step)]) if row["last"]] == ends.tolist()
     assert [row["beyond"] for row in seen[: len(step)] if row["last"]] == beyond.astype(int).tolist()
+    for name in lengths:
+        assert [1 << seen[end + spec.tick_latency][name] for end in ends] == nominal.tolist()
 
 
 def steps(dt: int = 6, n: int = 2500) -> np.ndarray:
