@@ -39,8 +39,6 @@ class QuotientVelocity(wiring.Component):
         Valid with `measure` and `decay`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
-    less, more : In(1)
-        With `spec.bounds`: the distance may also have been a count less, or more.
     known, was_negative : In(1)
         With `spec.bounds`. `known`: there are bounds. `was_negative`: the sign of the last count.
     updates : Out(stream)
@@ -72,7 +70,7 @@ class QuotientVelocity(wiring.Component):
                 "forced_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
-                **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
+                **({"known": In(1), "was_negative": In(1)} if spec.bounds else {}),
                 "updates": Out(update_stream(update_layout(spec))),
             }
         )
@@ -143,7 +141,7 @@ class QuotientVelocity(wiring.Component):
             m.submodules[f"divider_{name}"] = box
             upper = name == "velocity_upper"
             # The upper bound is rounded up: as the negative of what is rounded down.
-            distance = -(self.dividend + self.more) if upper else self.dividend - self.less
+            distance = -self.dividend if upper else self.dividend
             # While the velocity decays, the shaft is no farther back than its last edge.
             signs = new.velocity[-1], self.was_negative
             still = decays & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))

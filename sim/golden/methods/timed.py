@@ -112,15 +112,11 @@ class Measurements:
         return both[np.argsort(both.clock, kind="stable")]
 
 
-def enclosure(distance: Ints, time: Ints, less: Ints | int = 0, more: Ints | int = 0) -> tuple[Ints, Ints]:
-    """`least` and `most` of distances between edges; each edge lies within a period before its count.
-
-    The true distance may also be shorter by `less` counts, or longer by `more`.
-    """
-    low, high = distance - less, distance + more
+def enclosure(distance: Ints, time: Ints) -> tuple[Ints, Ints]:
+    """`least` and `most` of distances between edges; each edge lies within a period before its count."""
     return (
-        np.stack([low, np.where(low < 0, time - 1, time + 1)], axis=1),
-        np.stack([high, np.where(high > 0, time - 1, time + 1)], axis=1),
+        np.stack([distance, np.where(distance < 0, time - 1, time + 1)], axis=1),
+        np.stack([distance, np.where(distance > 0, time - 1, time + 1)], axis=1),
     )
 
 

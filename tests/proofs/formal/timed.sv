@@ -92,7 +92,8 @@ module timed #(
 
   // The window of M/T: its length, and what it has travelled so far, in counts.
   reg signed [W-1:0] travelled = 0;
-  wire signed [W-1:0] pair = MT && LATTICE ? size : negative != last_negative ? 0 : negative ? -1 : 1;
+  wire signed [W-1:0] turned = negative == last_negative ? 0 : negative ? 1 : -1;
+  wire signed [W-1:0] pair = MT && LATTICE ? size + turned : negative != last_negative ? 0 : negative ? -1 : 1;
   wire closes = MT && count && opened && lasted > MIN_PERIODS;
   always @(posedge clk)
     if (rst) begin
