@@ -123,7 +123,7 @@ class RairanMethod(wiring.Component):
             m.d.comb += read.addr.eq(place[: len(read.addr)])
             m.d.sync += entry.eq(read.data)
         valid = Signal()
-        m.d.comb += valid.eq(counters.known & (counters.high | counters.n.any()))
+        m.d.comb += valid.eq(counters.high | counters.n.any())
         (valid,) = delay(m, valid, clocks=2)
         with m.If(shown):
             m.d.sync += [

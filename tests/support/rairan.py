@@ -91,14 +91,17 @@ def clock_by_clock(
         clock += 1
         new: tuple[int, int] | None = None
         forced = rests = False
-        then, measured = k, None
+        then, measured, anew = k, None, False
         if s and sign and s != sign:  # against the last direction: a new window, and no estimate
             sign, clock, c_ep, c_dt, in_step, new = s, 0, 1, 0, True, (0, 1)
             then = 0
-        elif s and c_dt:  # the first count after dt opens the next window
-            if c_dt >= 2 or n_ep <= 1:
-                new = (1, c_dt)
-            measured = new or (n_ep, n_dt)
+        elif s and (c_dt or not sign):  # the first count, and the first after dt, opens the next window
+            if not sign or c_dt == max_ticks >> k:  # after reset or rest nothing is known of the time before it
+                then, anew = 0, True
+            else:
+                if c_dt >= 2 or n_ep <= 1:
+                    new = (1, c_dt)
+                measured = new or (n_ep, n_dt)
             sign, clock, c_ep, c_dt, in_step = s, 0, 1, 0, True
         elif clock == dt << k:
             ends.append(now)
@@ -128,7 +131,7 @@ def clock_by_clock(
         if adaptive is not None:
             if measured is not None:
                 k, falls = next_k(k, falls, *measured, *adaptive)
-            elif then != k or (new == (0, 1) and not forced):
+            elif anew or then != k or (new == (0, 1) and not forced):
                 k, falls = 0, False
     return rows, ends
 

@@ -41,7 +41,7 @@ module rairan #(
   wire signed [W:0] shown_clock = T - 2 - core_left;
   wire [W-1:0] elapsing = UPSET ? $unsigned(shown_clock) : clock;
   wire turns = count && has_moved && backward != was_back;
-  wire late = count && !turns && c_dt != 0;
+  wire late = count && !turns && (c_dt != 0 || !has_moved), fresh = !has_moved || c_dt == MAX_TICKS;
   wire ends = !turns && !late && elapsing == T - 1;
   wire [W-1:0] held = c_ep > MAX_COUNT ? MAX_COUNT : c_ep;
   wire [W-1:0] waited = in_step ? c_dt + 1 : c_dt;
@@ -53,7 +53,7 @@ module rairan #(
     dt = n_dt;
     if (turns) {update, alone, rests, ep, dt} = {3'b100, {W{1'b0}}, {{W-1{1'b0}}, 1'b1}};
     else if (late) begin
-      if (c_dt >= 2 || n_ep < 2) begin
+      if (!fresh && (c_dt >= 2 || n_ep < 2)) begin
         {update, alone, rests} = 3'b100;
         ep = 1;
         dt = c_dt;
@@ -114,7 +114,7 @@ module rairan #(
     lemma_left: assert (core_left == T - 2 - elapsed);
     lemma_clock: assert (clock < T && c_ep <= clock + 1);
     lemma_count: assert (core_any == (c_ep != 0) && core_more == (held == 0 ? 0 : held - 1));
-    lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0) && core_rest == (c_dt == MAX_TICKS));
+    lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0 || !moved) && core_rest == (c_dt == MAX_TICKS));
     lemma_in_dt: assert (c_dt == 0 || c_ep == 0);
     lemma_flags: assert (core_moved == moved && core_backward == back
         && (c_dt == MAX_TICKS || core_in_step == in_step));
