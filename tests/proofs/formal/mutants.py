@@ -116,6 +116,7 @@ MUTANTS = [
     Mutant("Rairán", "pr_tick", RairanCounters, "start = cycles - 2", "start = cycles - 1"),
     Mutant("Rairán", "pr_update", RairanCounters, "pulse & (late | due) | turns", "pulse & late | turns"),
     Mutant("Rairán", "pr_estimate", RairanCounters, "in_step.eq(opens)", "in_step.eq(0)", 32),
+    Mutant("Rairán", "pr_update", RairanCounters, "(~moved | self.rest)", "~moved", 32),
     Mutant("Rairán", "pr_velocity", RairanMethod, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
     Mutant("Rairán", "pr_rest", RairanCounters, "set_(0, update=~self.rest", "set_(1, update=~self.rest", 32),
     Mutant("Rairán", "pr_stalled", Standstill, "left.eq(self._max_ticks)", "left.eq(self._max_ticks - 1)", 32),

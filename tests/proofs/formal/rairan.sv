@@ -115,6 +115,7 @@ module rairan #(
     lemma_clock: assert (clock < T && c_ep <= clock + 1);
     lemma_count: assert (core_any == (c_ep != 0) && core_more == (held == 0 ? 0 : held - 1));
     lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0 || !moved) && core_rest == (c_dt == MAX_TICKS));
+    lemma_moved: assert (moved || (c_ep == 0 && n_ep == 0));
     lemma_in_dt: assert (c_dt == 0 || c_ep == 0);
     lemma_flags: assert (core_moved == moved && core_backward == back
         && (c_dt == MAX_TICKS || core_in_step == in_step));
