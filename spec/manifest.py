@@ -53,6 +53,7 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
         "clock_hz": spec.timing.clock_hz,
         "tick_cycles": spec.timing.tick_cycles,
         "max_ticks": spec.timing.max_ticks,
+        "stalled_after_ticks": spec.stalled_after_ticks,
         "counts_per_rev": spec.encoder.counts_per_rev,
         "decoding": spec.encoder.decoding,
         "velocity": {

@@ -38,8 +38,8 @@ class TachometerSpec(Numbers):
     update_by: ClassVar[str] = "tick"
     # Whether the method ends the ticks itself, by what it counts.
     own_ticks: ClassVar[bool] = False
-    # Whether there are no more updates once one is `stalled`.
-    last_when_stalled: ClassVar[bool] = False
+    # Whether the 0 that the maximum time forces is the last update before the next count.
+    last_at_rest: ClassVar[bool] = False
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
     # Whether pairwise tests give all options all of their values.
@@ -166,6 +166,16 @@ class TachometerSpec(Numbers):
         return self.timing.max_ticks
 
     @property
+    def max_tick_shift(self) -> int:
+        """Greatest k where a tick may last 2^k nominal ones."""
+        return 0
+
+    @property
+    def stalled_after_ticks(self) -> int:
+        """Nominal ticks that ticks in a row without a count must last for `stalled` to rise."""
+        return self.timing.max_ticks + 1
+
+    @property
     def recovery_clocks(self) -> int | None:
         """Clocks after which, from any state of the flip-flops, all outputs are right again; position aside.
 
@@ -177,7 +187,10 @@ class TachometerSpec(Numbers):
         conditioned = 2 + (1 << max(self.filter_clocks - 1, 1).bit_length() if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
-        return conditioned + 1 + window + self.remembered_clocks + self.tick_latency + self.tick_to_velocity
+        # What counts the ticks of a silence may have to begin anew.
+        silence = ((1 << self.timing.max_ticks.bit_length()) + 1) * self.longest_tick
+        method = self.remembered_clocks + self.tick_to_velocity
+        return conditioned + 1 + window + max(method, silence) + self.tick_latency
 
     @property
     def remembered_clocks(self) -> int:
