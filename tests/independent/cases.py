@@ -54,7 +54,11 @@ CASES = [
     _case("m_rpm", f"tick=21 max-time=420 max-speed=40rad/s average=3 velocity-width=12 {_ALL}", 4000, least=4),
     _case("m_rad", "tick=160 max-time=1600 decoding=1 unit=rad/s lowpass=300Hz external-tick=yes average=2", 15000),
     _case("m_rev", "tick=1 max-time=2 unit=rev/s frac-bits=2 average=256", 1500),
-    _case("m_wide", "tick=2 max-time=6 frac-bits=24 external-tick=yes max-tick-period=300 bounds=yes average=8", 4000),
+    _case(
+        "m_wide",
+        "tick=2 max-time=6 frac-bits=24 external-tick=yes max-tick-period=300 max-speed=50rev/s bounds=yes average=8",
+        4000,
+    ),
     _case("t_native", "tick=40 max-time=800 bounds=yes", 9000),
     _case("t_rpm", f"tick=300 max-time=1500 max-speed=5rev/s velocity-width=14 {_ALL}", 20000, 4, True, 150),
     _case("t_rad", "tick=400 max-time=2000 decoding=1 unit=rad/s lowpass=1kHz external-tick=yes", 24000, 1, True, 150),
@@ -81,8 +85,19 @@ CASES = [
         seed="rairan_rad6",  # with updates so far apart that the filter takes them all
     ),
     _case("rairan_rev", "tick=20 max-time=1280 unit=rev/s lsb=2^-6 adaptive=10% bounds=yes", 14000),
-    _case("rairan_one", "dt=1 max-time=2047 decoding=2 max-speed=1rev/s", 3000),
+    _case("rairan_one", "dt=1 max-time=2047 decoding=2 unit=rpm max-speed=1rev/s", 3000),
     _case("rairan_exact", "tick=17 max-time=340 paper-exact=yes estimate=n1 frac-bits=24", 9000),
+]
+# Cores of which only the manifest is of interest.
+DESCRIBED = [
+    # The greatest speed is less than 2^-10 of its unit.
+    _case("s_slow", "ppr=4194304 tick=1048576 max-time=2097152 unit=rpm max-speed=0.0001rpm"),
+    _case(
+        "t_fast",
+        "ppr=1 tick=2 max-time=4096 unit=rad/s timer=tick external-tick=yes max-tick-period=9 max-speed=1e5rpm",
+    ),
+    _case("mt_default", "tick=50 max-time=1000 external-tick=yes filter=129 bounds=yes unit=rpm"),
+    _case("mt_lattice_bounds", "tick=50 max-time=1000 external-tick=yes max-tick-period=60 bounds=yes timer=tick"),
 ]
 # What takes millions of clocks.
 LONG = [

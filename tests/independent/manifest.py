@@ -77,10 +77,10 @@ def _canonical_quantity(settings: Settings, name: str, shown: object) -> object:
     wanted = {"max_speed": settings.max_speed, "lowpass": settings.lowpass, "adaptive": settings.target}[name]
     if wanted is None or shown is None:
         return None if wanted is None else wanted
-    if name == "max_speed":
-        return settings.words["max-speed"]
+    if isinstance(wanted, tuple):
+        value, unit = wanted
+        return shown if Fraction(str(shown).removesuffix(unit)) == value else settings.words["max-speed"]
     given = float(Fraction(str(shown).removesuffix("rad/s")))
-    assert isinstance(wanted, Fraction)
     return shown if given == pytest.approx(float(wanted), rel=1e-12) else wanted
 
 
