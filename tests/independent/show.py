@@ -57,8 +57,8 @@ def check_updates(
     rows: Sequence[Row],
     ticks: Sequence[Tick],
     slack: Fraction = Fraction(0),
-) -> None:
-    """Every update, its clock and all that comes with it; `stalled` is another test's."""
+) -> set[str]:
+    """Every update, its clock and all that comes with it, but `stalled`; which bounds have been absent."""
     latency = manifest["latency_cycles"]
     late = latency["tick_latency"] + latency["tick_to_velocity"]
     assert [update.cause + late for update in updates[: len(rows)]] == [row["clock"] for row in rows]
@@ -86,3 +86,15 @@ def check_updates(
                 assert not value
         if settings.flag("bounds"):
             check_bounds(settings, update, row, manifest["bounds"]["none"], seen)
+    return seen
+
+
+def check_age(settings: Settings, rows: Sequence[Row]) -> None:
+    """`age` is the number of ticks since the update, this one perhaps not counted yet; it stays at the maximum."""
+    ticks = 0
+    for row in rows:
+        if row["tick"]:
+            ticks += 1
+            assert row["age"] in {min(ticks - 1, settings.max_ticks), min(ticks, settings.max_ticks)}, row
+        if row["velocity_valid"]:
+            ticks = 0

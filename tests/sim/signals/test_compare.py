@@ -15,7 +15,7 @@ N_ROWS = 4
 def spec_of(method: str) -> TachometerSpec:
     """A core with as many outputs as the method can have."""
     options: dict[str, object] = {"bounds": True, "age": True, "index": True, "filter_clocks": 2, "unit": "rpm"}
-    own: dict[str, object] = {"rairan": {"adaptive": Fraction(1, 10)}}.get(method, {"max_tick_cycles": 40})
+    own: dict[str, object] = {"adaptive": Fraction(1, 10)} if method == "rairan" else {"max_tick_cycles": 40}
     return METHODS[method](encoder=Encoder(500), timing=TIMING, **options, **own)  # type: ignore[arg-type]
 
 
