@@ -11,7 +11,7 @@ from tachometry.spec.numbers import Numbers
 from tachometry.spec.option import ParameterError, is_derived, options_of, settle
 from tachometry.spec.port import UPDATE, Port, held, ports_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
-from tachometry.spec.units import SpeedUnit, plural, signed_width
+from tachometry.spec.units import PI, SpeedUnit, plural, signed_width
 
 TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
 # The ends of what encloses the true speed, and which way each is rounded: outward.
@@ -65,10 +65,16 @@ class TachometerSpec(Numbers):
             raise ParameterError("filter_clocks", f"must be from 0 to 255, not {self.filter_clocks}")
         if self.index_reset and not self.index:
             raise ParameterError("index_reset", "must be given together with an index")
-        if self.lowpass is not None and (self.lowpass <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS):
-            least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))
+        if self.lowpass is not None:
+            self._check_lowpass(self.lowpass)
+
+    def _check_lowpass(self, bandwidth: Fraction) -> None:
+        least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))
+        greatest = 2 * PI * self.timing.clock_hz  # nothing is faster than the clock
+        if bandwidth <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS or bandwidth > greatest:
             raise ParameterError(
-                "lowpass", f"must be at least {least:.4g} rad/s here, not {float(self.lowpass):.9g} rad/s"
+                "lowpass",
+                f"must be from {least:.4g} to {float(greatest):.4g} rad/s here, not {float(bandwidth):.9g} rad/s",
             )
 
     def _check_ticks(self) -> None:
