@@ -33,8 +33,11 @@ def _draw(
     heights = {"velocity": 3.2} | ({curve.name: 0.8 for curve in curves} if true_speed else {})
     figure, panels = place_panels(spec, heights, "Comparison")
     truth = true_speed(instants) if true_speed else None
+    values = [curve.estimate.at(instants) for curve in curves]
+    # What goes up and down most is drawn behind, as it would bury the others.
+    calmest = sorted(range(len(curves)), key=lambda place: float(np.sum(np.abs(np.diff(values[place])))))
     for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
-        held = curve.estimate.at(instants)
+        held = values[place]
         kept = columns(instants, held)
         panels["velocity"].plot(
             instants[kept],
@@ -43,7 +46,7 @@ def _draw(
             linewidth=0.7,
             drawstyle="steps-post",
             label=curve.name,
-            zorder=2 - result.rms / 1e6 if result.rms is not None else 2 - place / 100,  # the noisiest behind
+            zorder=2 - calmest.index(place) / 100,
         )
         if truth is None:
             continue
@@ -51,7 +54,8 @@ def _draw(
         kept = columns(instants, error)
         axes.axhline(0, color="0.6", linewidth=0.7)
         axes.plot(instants[kept], error[kept], color=colour, linewidth=0.6)
-        axes.text(0.005, 0.86, curve.name, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
+        words = f"{curve.name}: {curve.what}"
+        axes.text(0.005, 0.86, words, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
         axes.text(0.995, 0.86, f"RMS {result.rms:.3g} rad/s", transform=axes.transAxes, ha="right", fontsize=7)
     if truth is not None:
         kept = columns(instants, truth)

@@ -101,9 +101,9 @@ def _title(spec: TachometerSpec, what: str | None) -> str:
     timing = spec.timing
     return (
         f"{what or spec.heading}: "
-        f"{spec.encoder.pulses_per_rev} PPR ×{spec.encoder.decoding}, "
-        f"$T_s$ = {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
-        f"clock {_frequency(timing.clock_hz)}, $ω_u$ = {spec.unit_velocity:.5g} rad/s"
+        f"{spec.encoder.pulses_per_rev} lines ×{spec.encoder.decoding}, "
+        f"tick {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
+        f"clock {_frequency(timing.clock_hz)}, one count per tick = {spec.unit_velocity:.5g} rad/s"
     )
 
 

@@ -148,7 +148,7 @@ BAD = [
     (["--vary", "speed=none"], "{speed} must be a number in"),
     (["--vary", "tick=33us"], "--max-time must be a whole number of ticks, not 20ms"),
     (["--vary", "tick=33us"], "(method s, speed=5rad/s, tick=33us)"),
-    (["--vary", "jitter=x"], "'x' is not a valid float"),
+    (["--vary", "jitter=x"], "must be a number or one in %, not 'x'"),
     (["--vary", "jitter=0,0.7"], "--jitter must be "),
     (["--vary", "average=1,2", "--methods", "s"], "--average must be given with a method that has it: m"),
     (["--average", "2", "--methods", "s,t"], "--average must be given with a method that has it: m"),
