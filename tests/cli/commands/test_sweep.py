@@ -251,5 +251,6 @@ def test_the_extra_is_needed(name: str, capsys: pytest.CaptureFixture[str], monk
     monkeypatch.setitem(sys.modules, name, None)
     assert run(*CORE, *MOTION, *AXES) == 2
     assert capsys.readouterr().err == (
-        f"tachometry: error: a sweep needs the extra `sweep`: {name} is not installed: pip install '.[sweep]'\n"
+        f"tachometry: error: a sweep needs the extra `sweep`: {name} is not installed: "
+        "pip install 'tachometry[sweep]'\n"
     )
