@@ -20,7 +20,7 @@ $(VENV)/.run: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install -q --disable-pip-version-check -e .
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
-	mkdir -p $$site/tachometry && for layer in $(LAYERS); do ln -sfn "$(CURDIR)/$$layer" $$site/tachometry/$$layer; done
+	mkdir -p $$site/tachometry && for item in $(LAYERS) package/*.*; do ln -sfn "$(CURDIR)/$$item" $$site/tachometry/$${item#package/}; done
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.run
@@ -93,7 +93,7 @@ api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks and tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy $(addprefix -p tachometry.,$(LAYERS))
+	$(BIN)/mypy -p tachometry
 	$(BIN)/mypy bench tests
 
 clean: ## remove what was built, and the environment

@@ -117,7 +117,8 @@ This page is made by `python bench/compare.py`. Each table is the output of the 
 models of the cores, which the hardware equals bit for bit, and float models of what other projects use. The latter have
 the settings that their projects come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs.
 Errors are those of the held velocity against the shaft's speed. The delay is the shift of the true speed that comes
-closest, where there is one.
+closest. It is left out where it says nothing: where the true speed is constant, and where noise or an offset looks like
+a delay.
 
 **When to use what**, according to the tables below:
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from tachometry.spec.docstrings import with_inherited
 from tachometry.spec.encoder import Encoder
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
 from tachometry.spec.option import Derived, Option, option, parse_flag, parse_whole
@@ -153,3 +154,6 @@ class Parameters:
         parse=parse_bandwidth,
         tests=("", "20kHz"),
     )
+
+    def __init_subclass__(cls) -> None:
+        cls.__doc__ = with_inherited(cls.__doc__, cls.__base__.__doc__ if cls.__base__ else None)

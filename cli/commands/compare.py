@@ -90,8 +90,9 @@ def compare(
 
     Cores are run by their golden models, which the hardware equals bit for bit; the others are float models with the
     settings that their projects come with. Errors are those of the held velocity against the shaft's, from when every
-    method has given its first value; the delay is the shift of the true speed that comes closest. A capture does not
-    tell the true speed, so there are no errors.
+    method has given its first value; the delay is the shift of the true speed that comes closest. It is left out
+    where it says nothing: at constant speed, and where noise hides it. A capture does not tell the true speed, so there
+    are no errors.
     """
     from tachometry.sim.studies.compare import BASELINES, common_instants, score
 

@@ -65,7 +65,7 @@ def generate(
     \b
     DIR/NAME.v       Verilog-2001 for any tool
     DIR/NAME.json    manifest: ports, widths, units, latencies, every option
-    DIR/NAME.core    FuseSoC core file (CAPI2), with the targets default, lint and sim
+    DIR/NAME.core    FuseSoC core file (CAPI2): targets default, lint and sim
     DIR/NAME_inst.v  instantiation template
     DIR/NAME_tb.sv   smoke test, for the target sim
     DIR/NAME.xdc     constraints for Vivado

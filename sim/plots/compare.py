@@ -34,8 +34,11 @@ def _draw(
     figure, panels = place_panels(spec, heights, "Comparison")
     unit = spec.shown_unit
     truth = unit.of(true_speed(instants)) if true_speed else None
+    values = [unit.of(curve.estimate.at(instants)) for curve in curves]
+    # What goes up and down most is drawn behind, as it would bury the others.
+    calmest = sorted(range(len(curves)), key=lambda place: float(np.sum(np.abs(np.diff(values[place])))))
     for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
-        held = unit.of(curve.estimate.at(instants))
+        held = values[place]
         kept = columns(instants, held)
         panels["velocity"].plot(
             instants[kept],
@@ -44,7 +47,7 @@ def _draw(
             linewidth=0.7,
             drawstyle="steps-post",
             label=curve.name,
-            zorder=2 - result.rms / 1e6 if result.rms is not None else 2 - place / 100,  # the noisiest behind
+            zorder=2 - calmest.index(place) / 100,
         )
         if truth is None:
             continue
@@ -52,7 +55,8 @@ def _draw(
         kept = columns(instants, error)
         axes.axhline(0, color="0.6", linewidth=0.7)
         axes.plot(instants[kept], error[kept], color=colour, linewidth=0.6)
-        axes.text(0.005, 0.86, curve.name, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
+        words = f"{curve.name}: {curve.what}"
+        axes.text(0.005, 0.86, words, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
         axes.text(
             0.995, 0.86, f"RMS {unit.of(result.rms):.3g} {unit.name}", transform=axes.transAxes, ha="right", fontsize=7
         )

@@ -71,7 +71,7 @@ def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
     clock, velocity = _held_to_end(updates.clock, velocity, run.n_clocks)
     kept = columns(clock, velocity)
     time = clock[kept] / clock_hz * scale
-    axes.plot(time, velocity[kept], color=ESTIMATE, drawstyle="steps-post", label="estimate (held)")
+    axes.plot(time, velocity[kept], color=ESTIMATE, drawstyle="steps-post", label="measured (held)")
     if true_speed:
         instants = np.linspace(0, run.n_clocks / clock_hz, max(_TRUE_POINTS, 2 * len(run.ticks.clock)))
         speed = unit.of(true_speed(instants))
@@ -109,7 +109,7 @@ def _multiples(axes: Axes, unit_velocity: float) -> None:
         return count * unit_velocity
 
     right = axes.secondary_yaxis("right", functions=(counts, speed))
-    right.set_ylabel("$ω/ω_u$ (counts per tick)")
+    right.set_ylabel("counts per tick")
     right.spines["right"].set_visible(True)
     low, high = (v / unit_velocity for v in axes.get_ylim())
     if high - low <= _MOST_MULTIPLES:
@@ -141,13 +141,13 @@ def _count(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     kept = columns(clock, m_e)
     axes.plot(clock[kept] / spec.timing.clock_hz * scale, m_e[kept], color=COUNT, drawstyle="steps-post")
     axes.set_ylim(m_e.min() - 0.5, m_e.max() + 0.5)
-    axes.set_ylabel("$m_e$ (counts)")
+    axes.set_ylabel("counts in a tick")
     axes.yaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True, nbins=5, min_n_ticks=1))
 
 
 def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     updates = run.updates
-    for forced, colour, label in ((False, ESTIMATE, "alteration"), (True, FORCED, "forced")):
+    for forced, colour, label in ((False, ESTIMATE, spec.update_by), (True, FORCED, "forced")):
         chosen = updates.forced == forced
         time = updates.clock[chosen] / spec.timing.clock_hz
         m_s = updates.interval[chosen] * (spec.interval_unit_cycles / spec.timing.tick_cycles)
@@ -156,5 +156,5 @@ def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     axes.set_yscale("log")
     axes.set_ylim(0.8 * spec.interval_unit_cycles / spec.timing.tick_cycles, spec.timing.max_ticks * 1.25)
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_ylabel("$m_s$ (ticks)")
+    axes.set_ylabel("measurement (ticks)")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=2)

@@ -55,7 +55,11 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
             [*"FILE --vary --methods --engine --jobs --scheduler --results --axes --metric --seed".split(), *FAULTS],
             ["Sweep", "Machines", "Motion", "Encoder faults", "Outputs"],
         ),
-        ("replay", ["CAPTURE", "--a", "--b", "--z", "--tick-in", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),
+        (
+            "replay",
+            ["CAPTURE", "--a", "--b", "--z", "--tick-in", "--time", "--samplerate", *OUTPUTS],
+            ["Capture", "Outputs"],
+        ),
     ],
 )
 def test_every_option_is_explained(

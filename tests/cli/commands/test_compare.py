@@ -116,7 +116,8 @@ def test_sizes_need_their_tools(capsys: pytest.CaptureFixture[str], monkeypatch:
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err == (
-        "tachometry: error: --size needs the extra `size`: yowasp-nothing is not installed: pip install '.[size]'\n"
+        "tachometry: error: --size needs the extra `size`: yowasp-nothing is not installed: "
+        "pip install 'tachometry[size]'\n"
     )
 
 
