@@ -133,7 +133,7 @@ class MMethod(wiring.Component):
                 numerator_width=spec.numerator_width,
                 tag=self._tag,
                 serial=spec.serial,
-                margin=1,
+                margin=spec.margin,
                 constant=spec.average,
             )
 
@@ -174,16 +174,19 @@ class MMethod(wiring.Component):
             m.d.comb += [
                 quotient.load.eq(start),
                 quotient.start.eq(start),
-                quotient.numerator.eq(total),
+                quotient.numerator.eq(total << self._spec.error_bits),
                 quotient.tag.eq(known),
             ]
             return quotient.results.valid, quotient.results.p
-        velocities = quotients(self._spec)
+        velocities, finer = quotients(self._spec), self._spec.error_bits
         valid = Signal()
         layout = {name: signed(width) for name, (width, _) in velocities.items()} | self._tag.members
         new = registers(data.StructLayout(layout), "new")
         m.d.sync += valid.eq(self.tick)
         with m.If(self.tick):
-            m.d.sync += [new[name].eq((total + count) << shift) for name, (_, count) in velocities.items()]
+            m.d.sync += [
+                new[name].eq(((total << finer) + count * self._spec.margin) << (shift - finer))
+                for name, (_, count) in velocities.items()
+            ]
             m.d.sync += [new[name].eq(known[name]) for name in self._tag.members]
         return valid, new

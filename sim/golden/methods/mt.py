@@ -40,7 +40,7 @@ class Model:
         # On the lattice, whole ticks are summed: if they differ, the distance from edge to edge is a count more or
         # less.
         differ = (np.sign(counts.size[opening]) - np.sign(counts.size[ends])) // 2 * spec.on_lattice
-        least, most = enclosure(distance, time, less=np.maximum(-differ, 0), more=np.maximum(differ, 0))
+        least, most = enclosure(spec, distance, time, less=np.maximum(-differ, 0), more=np.maximum(differ, 0))
         found = Measurements(
             clock=counts.clock(period[ends]),
             distance=2 * distance,
