@@ -46,10 +46,6 @@ class TachometerSpec(Numbers):
     pairs_all: ClassVar[bool] = False
     # Tenths of the maximum time after which it shows that the shaft stands, counted from the last count but one.
     rest_tenths: ClassVar[int] = 17
-    # Options that all methods have and that matter to this one: pairwise tests give them some of their values.
-    pairs_with: ClassVar[frozenset[str]] = frozenset(
-        ("tick", "max-time", "unit", "frac-bits", "velocity-width", "max-speed", "bounds")
-    )
 
     def __post_init__(self) -> None:
         if self.unit not in UNITS:
@@ -65,6 +61,11 @@ class TachometerSpec(Numbers):
             raise ParameterError("filter_clocks", f"must be from 0 to 255, not {self.filter_clocks}")
         if self.index_reset and not self.index:
             raise ParameterError("index_reset", "must be given together with an index")
+        if not 0 <= self.edge_error <= 1:
+            raise ParameterError("edge_error", f"must be from 0 to 1, not {float(self.edge_error):.9g}")
+        if self.edge_error and not self.bounds:
+            raise ParameterError("edge_error", "must be given together with bounds")
+        object.__setattr__(self, "edge_error", Fraction(math.ceil(8 * self.edge_error), 8))
         if self.lowpass is not None:
             self._check_lowpass(self.lowpass)
 
@@ -220,8 +221,9 @@ class TachometerSpec(Numbers):
                     *(UPDATE, name, width),
                     signed=True,
                     unit=f"2^{-self.frac_bits} {self.unit}",
-                    help=f"{side} end of what the true mean speed over the measured window was; {sign} bounds.none of "
-                    "the manifest means that there is none.",
+                    help=f"{side} end of what the true mean speed over the measured window was, for edges within "
+                    "--edge-error (0: an ideal disc and ideal lines) while no count is lost or added; "
+                    f"{sign} bounds.none of the manifest means that there is none.",
                 )
                 for name, side, sign in zip(BOUNDS, ("Lower", "Upper"), ("minus", "plus"), strict=True)
             ),

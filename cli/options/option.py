@@ -123,7 +123,9 @@ def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:
         If one is.
     """
     context = click.get_current_context()
-    names = {parameter.name for parameter in all_of(options, click.command()(lambda: None)).params}
+    command = click.command()(lambda: None)
+    all_of(options, command)
+    names = {parameter.name for parameter in command.params}
     for parameter in context.command.get_params(context):
         source = context.get_parameter_source(parameter.name or "")
         if parameter.name in names and source is ParameterSource.COMMANDLINE:

@@ -55,6 +55,7 @@ def test_defaults(tmp_path: Path) -> None:
         "max_tick_cycles": None,
         "age": False,
         "bounds": False,
+        "edge_error": 0.0,
         "lowpass": None,
         "cancel": True,
     }
