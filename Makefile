@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test verify formal mutate upset bench size docs api lint clean
+.PHONY: help venv demo figures compare icarus test pytest verify formal mutate upset bench size docs api lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -20,7 +20,7 @@ $(VENV)/.run: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install -q --disable-pip-version-check -e .
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
-	mkdir -p $$site/tachometry && for layer in $(LAYERS); do ln -sfn "$(CURDIR)/$$layer" $$site/tachometry/$$layer; done
+	mkdir -p $$site/tachometry && for item in $(LAYERS) package/*.*; do ln -sfn "$(CURDIR)/$$item" $$site/tachometry/$${item#package/}; done
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.run
@@ -54,7 +54,10 @@ icarus: ## Icarus Verilog, installed with apt-get if it is missing
 	  $$sudo apt-get install -qq -y iverilog >/dev/null || { $$sudo apt-get update -qq && $$sudo apt-get install -qq -y iverilog >/dev/null; }; \
 	} || { echo "make: Icarus Verilog is needed and could not be installed: see https://github.com/steveicarus/iverilog" >&2; exit 1; }
 
-test: $(VENV)/.test lint icarus ## lint, types and all tests
+test: $(VENV)/.test icarus ## lint, types and all tests
+	@$(MAKE) --no-print-directory -j2 lint pytest
+
+pytest: $(VENV)/.test icarus
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
@@ -90,7 +93,7 @@ api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks and tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy $(addprefix -p tachometry.,$(LAYERS))
+	$(BIN)/mypy -p tachometry
 	$(BIN)/mypy bench tests
 
 clean: ## remove what was built, and the environment

@@ -117,7 +117,8 @@ This page is made by `python bench/compare.py`. Each table is the output of the 
 models of the cores, which the hardware equals bit for bit, and float models of what other projects use. The latter have
 the settings that their projects come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs.
 Errors are those of the held velocity against the shaft's speed. The delay is the shift of the true speed that comes
-closest, where there is one.
+closest. It is left out where it says nothing: where the true speed is constant, and where noise or an offset looks like
+a delay.
 
 **When to use what**, according to the tables below:
 
@@ -162,7 +163,7 @@ def table(found: list[dict[str, str]]) -> str:
         return f"{scale * float(row[name]):.3g}" if row[name] else ""
 
     heads = ("method", "updates/s", "longest T_m (ms)", "RMS error (rad/s)", "greatest (rad/s)", "delay (ms)")
-    numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms", 1), ("max", 1), ("delay", 1e3))
+    numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms_rad_s", 1), ("max_rad_s", 1), ("delay", 1e3))
     return markdown(heads, [(row["name"], *(cell(row, name, scale) for name, scale in numbers)) for row in found])
 
 

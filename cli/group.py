@@ -36,10 +36,10 @@ Examples:
 @click.version_option(package_name="tachometry", message="%(prog)s %(version)s")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """Encoder pins in, exact velocity out.
+    """Encoder pins in, velocity out: the speed measurement of a servo drive for FPGAs.
 
-    Generates tachometer cores as Verilog, and runs them bit for bit against a golden model, on the signals of a virtual
-    encoder or on those that a logic analyser has captured.
+    Generates tachometer cores as Verilog, and compares every bit of them with a golden model, on the signals of a
+    virtual encoder or on those that a logic analyser has captured.
 
     Exit status: 0 success, 1 hardware and golden model differ, 2 error, 70 a fault of tachometry itself, 130
     interrupted, 141 nobody reads the output.

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from tachometry.spec.docstrings import with_inherited
 from tachometry.spec.encoder import Encoder
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
 from tachometry.spec.option import Derived, Option, option, parse_flag, parse_whole
 from tachometry.spec.timing import MAX_TICK_CYCLES, Timing, whole_clocks
-from tachometry.spec.units import Speed, parse_bandwidth
+from tachometry.spec.units import FRACTION, Speed, parse_bandwidth, read_exactly
 
 # The longest external tick, if nothing else is said.
 TWO_TICKS: Any = Derived(lambda spec: min(2 * spec.timing.tick_cycles, MAX_TICK_CYCLES))
@@ -29,10 +30,11 @@ class Parameters:
     unit : str
         Of `velocity`: `count/tick`, `rad/s`, `rev/s` or `rpm`.
     frac_bits : int
-        One LSB of `velocity` is 2^−frac_bits of its unit. If it is not given: 16 in counts per tick, else 10 or as many
-        as there can be.
-    velocity_bits : int or None
-        Bits of `velocity`, which saturates and raises `velocity_overflow`; None: as many as it can need.
+        One LSB of `velocity` is 2^−frac_bits of its unit. If it is not given: 16 in counts per tick, else 10; fewer if
+        there cannot be as many, or if with `max_speed` the velocity would not fit `velocity_width`.
+    velocity_width : int
+        Bits of `velocity`. With fewer than it can need, it saturates and raises `velocity_overflow`; `max_speed` must
+        fit. If it is not given: as many as it can need.
     max_speed : Speed or None
         Greatest speed to be measured. It narrows every number that depends on it; pulses beyond it saturate m_e and
         raise `overflow`. None: as wide as the tick has clocks.
@@ -51,7 +53,9 @@ class Parameters:
         Output `age`: ticks since the update.
     bounds : bool
         Outputs `velocity_lower` and `velocity_upper`, which enclose the true mean speed over the measured window, and
-        `bounds_valid`.
+        `bounds_valid`; for a disc and lines whose edges are within `edge_error`, while no count is lost or added.
+    edge_error : Fraction
+        The distance of any two edges is off by at most so many counts, 0 to 1; it is rounded up to eighths.
     lowpass : Fraction or None
         G of the low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, in rad/s; None: no filter.
 
@@ -73,13 +77,13 @@ class Parameters:
     frac_bits: int = option(
         Derived(lambda spec: spec.default_frac_bits),
         "Fraction bits of the velocity: its LSB is 2^-N of the unit. In count/tick 4 to 24.",
-        shown="16 in count/tick, else 10 or as many as there can be",
+        shown="16 in count/tick, else 10; fewer if --max-speed would not fit --velocity-width",
         metavar="N",
         parse=parse_whole,
         tests=("most - 20", "most - 0", "16"),
         also=(
             Option(
-                "LSB of the velocity as a power of two of its unit, e.g. 2^-10 (instead of --frac-bits).",
+                "LSB of the velocity as a power of two of its unit: 2^-4 or 0.0625 (instead of --frac-bits).",
                 name="lsb",
                 metavar="2^-N",
                 parse=parse_lsb,
@@ -87,11 +91,11 @@ class Parameters:
             ),
         ),
     )
-    velocity_bits: int | None = option(
-        None,
-        "Bits of the velocity, 8 to 64; a velocity that does not fit saturates and raises velocity_overflow.",
+    velocity_width: int = option(
+        Derived(lambda spec: spec.needed_velocity_width),
+        "Bits of the velocity, 8 to 64; a velocity that does not fit saturates and raises velocity_overflow. "
+        "--max-speed must fit.",
         shown="as many as it can need",
-        name="velocity-width",
         metavar="N",
         parse=parse_whole,
         tests=("", "needed - 2", "needed - 0"),
@@ -142,13 +146,27 @@ class Parameters:
     bounds: bool = option(
         False,
         "Outputs velocity_lower and velocity_upper, which enclose the true mean speed over the measured window, and "
-        "bounds_valid.",
+        "bounds_valid. They hold for an ideal disc and ideal lines, or within --edge-error, while no count is lost.",
+    )
+    edge_error: Fraction = option(  # noqa: RUF009
+        Fraction(0),
+        "The distance of any two edges is off by at most E counts, 0 to 1, because of the disc and the lines, so "
+        "--bounds are wider. It is rounded up to eighths.",
+        shown="0",
+        metavar="E",
+        parse=lambda what, text: read_exactly(what, text, FRACTION),
+        needs="bounds",
+        tests=("0.3",),
     )
     lowpass: Fraction | None = option(  # noqa: RUF009
         None,
-        "Low-pass filter of the velocity for measurements of different length, eq. (22), in rad/s, Hz or kHz.",
+        "Low-pass filter of the velocity for measurements of different length, eq. (22), in rad/s, Hz or kHz. The "
+        "length is the time since the last update.",
         metavar="BANDWIDTH",
         unit="rad/s",
         parse=parse_bandwidth,
         tests=("", "20kHz"),
     )
+
+    def __init_subclass__(cls) -> None:
+        cls.__doc__ = with_inherited(cls.__doc__, cls.__base__.__doc__ if cls.__base__ else None)

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tachometry.spec.option import ParameterError
 
@@ -13,7 +13,8 @@ from tachometry.spec.option import ParameterError
 PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 
 # A decimal number and its unit. Exponents beyond three digits would make numbers that fill the memory.
-QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-z/%]*)"
+# µ is the sign of either code point, U+00B5 or U+03BC.
+QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-zµμ/%]*)"
 _QUANTITY = re.compile(QUANTITY, re.ASCII)
 _LONGEST = 400  # characters of a number
 # Sizes of a number: products of several still are floats.
@@ -81,14 +82,21 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
     """
     number = text.strip()
     match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
-    if match is None or (match[2] or default) not in units:
+    unit = plain_unit(match[2]) or default if match else ""
+    if match is None or unit not in units:
         names = ", ".join(filter(None, units))
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
+        allowed = f"or one in {names}" if "" in units else allowed
         raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
     value = Fraction(match[1])
     if value and not _LEAST <= abs(value) <= _GREATEST:
         raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")
-    return value, match[2] or default
+    return value, unit
+
+
+def plain_unit(unit: str) -> str:
+    """The name of a unit in the tables, such as `us` for `µs`."""
+    return re.sub("^[µμ]", "u", unit)
 
 
 def read_exactly(what: str, text: str, units: Units, default: str = "") -> Fraction:
@@ -159,6 +167,32 @@ def signed_width(limit: int) -> int:
     return limit.bit_length() + 1
 
 
+class SpeedUnit(NamedTuple):
+    """The unit in which commands show speeds; everything else has them in rad/s.
+
+    Parameters
+    ----------
+    name : str
+        `rad/s`, `rev/s` or `rpm`.
+    """
+
+    name: str
+
+    @property
+    def rad_per_s(self) -> float:
+        """One of this unit in rad/s."""
+        return float(SPEED[self.name].exact)
+
+    def of(self, rad_per_s: Any) -> Any:
+        """A number or an array in rad/s, in this unit."""
+        return rad_per_s / self.rad_per_s
+
+    @property
+    def suffix(self) -> str:
+        """What the names of columns end with."""
+        return self.name.replace("/", "_")
+
+
 @dataclass(frozen=True)
 class Speed:
     """An angular speed with its unit, kept exactly as it was given.
@@ -189,11 +223,15 @@ class Speed:
         """The speed in rad/s."""
         return float(self.value * SPEED[self.unit].exact)
 
-    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
-        """⌈speed / ω_u⌉: the most counts that one tick can hold at this speed, ω_u = 2π/(P·T_s)."""
+    def counts(self, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
+        """Speed / ω_u, counts per tick, with ω_u = 2π/(P·T_s)."""
         size, pi = SPEED[self.unit]
         turns = size / (2 * PI) if pi is None else size * pi / 2
-        return math.ceil(self.value * turns * counts_per_rev * tick_seconds)
+        return self.value * turns * counts_per_rev * tick_seconds
+
+    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
+        """The most counts that one tick can hold at this speed."""
+        return math.ceil(self.counts(counts_per_rev, tick_seconds))
 
     def __str__(self) -> str:
         number = self.value.numerator if self.value.denominator == 1 else float(self.value)

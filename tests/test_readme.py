@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tachometry.spec import METHODS, of_texts
+
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
 
@@ -34,8 +36,10 @@ def test_every_shell_command(tmp_path: Path) -> None:
             continue
         if command == "make demo":
             command = "sh docs/demo.sh"
-        command = command.replace(".venv/bin", shlex.quote(str(Path(sys.executable).parent)))
-        environment = os.environ | {"BIN": str(Path(sys.executable).parent), "OUT": "build/demo"}
+        bin_ = str(Path(sys.executable).parent)
+        command = command.replace(".venv/bin", shlex.quote(bin_))
+        path = f"{bin_}{os.pathsep}{os.environ['PATH']}"  # as the line that activates the environment sets it
+        environment = os.environ | {"BIN": bin_, "OUT": "build/demo", "PATH": path}
         done = subprocess.run(command, shell=True, cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
     for name in re.findall(r"^\| `([\w.]+)`(?:, `([\w.]+)`)? \|", TEXT, re.MULTILINE):
@@ -74,6 +78,36 @@ def test_python_examples(capsys: pytest.CaptureFixture[str]) -> None:
     speed = re.search(r"the alarm came at ([\d.]+) rad/s", capsys.readouterr().out)
     assert speed is not None
     assert 100 <= float(speed[1]) < 105
+
+
+def cells(page: str, heading: str, row: str) -> list[str]:
+    """A row of a table of a page of the documentation, under a heading."""
+    _, part = (ROOT / "docs" / page).read_text(encoding="utf-8").split(f"\n## {heading}\n")
+    line = next(line for line in part.split("\n## ")[0].splitlines() if line.startswith(f"| {row} | "))
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def alike(shown: str, measured: str) -> bool:
+    """Whether a number is another to two digits, or none where there is none."""
+    return float(f"{float(measured):.2g}") == float(shown) if measured else shown == "-"
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_numbers_of_the_table_of_methods_are_those_of_the_pages(method: str) -> None:
+    line = re.search(rf"^\| \[?`{method}`.*$", TEXT, re.MULTILINE)
+    assert line is not None
+    _, _, _, noise, delay, standstill, comb, when = (cell.strip() for cell in line[0].strip("|").split("|"))
+    ideal, real = noise.removesuffix(" rad/s").split(" / ")
+    assert alike(ideal, cells("compare.md", "Ramp", method)[3])
+    assert alike(real, cells("compare.md", "Ramp, real encoder", method)[3])
+    assert alike(delay.removesuffix(" ms"), cells("compare.md", "Reversals", method)[5])
+    assert comb == cells("size.md", "ECP5 (LFE5U-25F, CABGA256)", "default" if method == "s" else method)[2]
+    texts = {"ppr": "500", "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
+    spec = of_texts(method, texts)
+    rest = float(1000 * spec.standstill_ticks * spec.timing.tick_seconds)
+    assert standstill.split(",")[0] == f"{rest:g} ms"
+    if "--min-time 1ms" in when:
+        assert f"{float(cells('compare.md', 'Ramp, real encoder', 'mt:min-time=1ms')[3]):.2g} rad/s" in when
 
 
 def test_pictures_are_there() -> None:

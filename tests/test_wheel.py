@@ -34,7 +34,7 @@ def files(*folders: str) -> set[str]:
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Built from what git has alone, so nothing that lies in the checkout gets in."""
     source, made = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    for name in files(*LAYERS, "pyproject.toml", "README.md", "LICENSE"):
+    for name in files(*LAYERS, "package", "pyproject.toml", "README.md", "LICENSE"):
         (source / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, source / name)
     run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", made, source, cwd=made)
@@ -45,7 +45,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_holds_every_file_of_the_layers(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         packed = {name for name in archive.namelist() if ".dist-info/" not in name}
-    assert packed == {f"tachometry/{name}" for name in files(*LAYERS)}
+    assert packed == {f"tachometry/{name.removeprefix('package/')}" for name in files(*LAYERS, "package")}
 
 
 def test_it_runs_in_an_empty_environment(wheel: Path, tmp_path: Path) -> None:
@@ -56,5 +56,7 @@ def test_it_runs_in_an_empty_environment(wheel: Path, tmp_path: Path) -> None:
     run(*pip, "check", cwd=tmp_path)
     run(scripts / "tachometry", "generate", *CORE, "--testbench", "cocotb", "-o", "core", cwd=tmp_path)
     assert {"tachometer.v", "tachometer.json", "test_tachometer.py"} <= set(os.listdir(tmp_path / "core"))
-    told = run(scripts / "tachometry", "simulate", *CORE, "--motion", "constant:20rad/s:100ms", cwd=tmp_path)
+    told = run(
+        scripts / "python", "-m", "tachometry", "simulate", *CORE, "--motion", "constant:20rad/s:100ms", cwd=tmp_path
+    )
     assert "PASS" in told

@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Write a core as Verilog, with its manifest and FuseSoC file.",
+    short_help="Write a core as Verilog, with its manifest, constraints and FuseSoC file.",
     epilog=f"""{FORMS}
 
 \b
@@ -60,20 +60,26 @@ def generate(
     record: Callable[[TachometerSpec], Encoding] | None,
     tables: list[Path],
 ) -> int:
-    """Write a core as Verilog, with its manifest and FuseSoC file.
+    """Write a core as Verilog, with its manifest and all that it takes to build it into a design.
 
     \b
-    DIR/NAME.v     Verilog-2001 for any tool
-    DIR/NAME.json  manifest: ports, widths, units, latencies, every option
-    DIR/NAME.core  FuseSoC core file (CAPI2)
+    DIR/NAME.v       Verilog-2001 for any tool
+    DIR/NAME.json    manifest: ports, widths, units, latencies, every option
+    DIR/NAME.core    FuseSoC core file (CAPI2): targets default, lint and sim
+    DIR/NAME_inst.v  instantiation template
+    DIR/NAME_tb.sv   smoke test, for the target sim
+    DIR/NAME.xdc     constraints for Vivado
+    DIR/NAME.sdc     constraints for Quartus and others
     with --testbench cocotb also DIR/test_NAME.py and DIR/NAME_vectors.json
+
+    What was built is printed: full scale, LSB, resolution, widths and latencies.
 
     Equal options give equal files, byte for byte, on every machine.
     """
     check_module_name(name)
     if record is not None and testbench is None:
         raise ValueError("--motion must be given together with --testbench")
-    files = [f"{name}.{suffix}" for suffix in ("v", "json", "core")]
+    files = [name + suffix for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")]
     if testbench:
         files += [f"test_{name}.py", f"{name}_vectors.json"]
     with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
@@ -89,4 +95,8 @@ def generate(
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:
         click.echo(click.format_filename(directory / file))
+    from tachometry.cli.reports.core import print_core
+
+    click.echo()
+    print_core(spec)
     return 0

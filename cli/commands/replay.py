@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs nei
     epilog="""\b
 Examples:
   tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv
-  tachometry replay scope.csv --a CH1 --b CH2 --ppr 1024 \\
+  tachometry replay scope.csv --time "t [us]" --a CH1 --b CH2 --ppr 1024 \\
       --clock 500kHz --tick 100us --plot run.png
 
 Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
@@ -48,8 +48,9 @@ def replay(
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
-    CAPTURE is a sigrok session (.sr), a text (.csv) with the header time,a,b, times in seconds and levels 0 or 1, or a
-    waveform (.vcd), whose one-bit variables are named with their scopes: --a top.a --b top.b.
+    CAPTURE is a sigrok session (.sr), a text (.csv) with a line of names such as time,a,b and levels 0 or 1, as Saleae
+    Logic and sigrok-cli export it, or a waveform (.vcd), whose one-bit variables are named with their scopes:
+    --a top.a --b top.b.
     Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
 
     Ctrl-C ends the simulation, and what was simulated so far is reported and written. Equal options and captures give

@@ -35,9 +35,16 @@ _OPTIONS = [
     ),
     option(
         _CAPTURE,
+        "--time",
+        metavar="COLUMN",
+        help="Column of the times in a .csv file: its name, or its number from 0. [default: the column named time]",
+    ),
+    option(
+        _CAPTURE,
         "--samplerate",
         metavar="FREQUENCY",
-        help="Samplerate of a .sr file that does not contain it, in Hz (plain number), kHz, MHz or GHz.",
+        help="Samplerate of a .sr or .csv file that contains neither it nor times, in Hz (plain number), kHz, MHz or "
+        "GHz.",
     ),
 ]
 
@@ -47,23 +54,25 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def build(
-        *, a: str | None, b: str | None, z: str | None, tick_in: str | None, samplerate: str | None, **others: Any
+        *,
+        a: str | None,
+        b: str | None,
+        z: str | None,
+        tick_in: str | None,
+        time: str | None,
+        samplerate: str | None,
+        **others: Any,
     ) -> Any:
         def read(capture: Path, spec: TachometerSpec) -> Recording:
             from tachometry.sim.captures.read import read_capture
 
-            if samplerate is not None and capture.suffix.lower() in (".csv", ".vcd"):
-                raise ValueError(f"--samplerate must not be given for {capture}: it has its times")
             index = "z" if z is None and spec.index else z
             tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
-            return read_capture(capture, a, b, None if samplerate is None else _samplerate(samplerate), index, tick)
+            rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
+            return read_capture(capture, a, b, rate, index, tick, time)
 
         if others.get("capture") is None:
             refuse_without("--replay", _OPTIONS)
         return command(read=read, **others)
 
     return all_of(_OPTIONS, build)
-
-
-def _samplerate(text: str) -> float:
-    return float(parse_frequency("samplerate", text))

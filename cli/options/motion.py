@@ -11,7 +11,7 @@ import click
 
 from tachometry.cli.options.option import all_of, option, refuse_without
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import DEGREES, read_nearest
+from tachometry.spec.units import DEGREES, FRACTION, Units, read_nearest
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -30,14 +30,20 @@ Units: rad/s (default), rev/s, rpm; s (default), ms, us, ns;
   Hz (default), kHz, MHz, GHz."""
 
 
-class Degrees(click.types.FloatParamType):
-    """A number of degrees, plain or with its unit."""
+class Quantity(click.types.FloatParamType):
+    """A number, plain or with one of some units."""
+
+    def __init__(self, units: Units, default: str = "") -> None:
+        self._units, self._default = units, default
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         try:
             return float(value)
         except ValueError:
-            return read_nearest(param.name if param and param.name else "angle", value, DEGREES, "deg")
+            return read_nearest(param.name if param and param.name else "number", value, self._units, self._default)
+
+
+_DEGREES, _FRACTION = Quantity(DEGREES, "deg"), Quantity(FRACTION)
 
 
 def _motion(required: bool) -> Callable[[Any], Any]:
@@ -61,16 +67,16 @@ _OPTIONS = [
     option(
         _FAULTS,
         "--jitter",
-        type=float,
+        type=_FRACTION,
         default=0,
         metavar="FRACTION",
-        help="Gaussian jitter of each edge in time: its standard deviation over the gap to the nearer neighbour, below "
-        "0.5.",
+        help="Gaussian jitter of each edge in time: its standard deviation over the gap to the nearer neighbour, such "
+        "as 0.05 or 5%, below 0.5.",
     ),
     option(
         _FAULTS,
         "--nonuniformity",
-        type=float,
+        type=_FRACTION,
         default=0,
         metavar="FRACTION",
         help="Edges of the disc are displaced by up to this many edge pitches, below 0.5, the same in every turn.",
@@ -79,7 +85,7 @@ _OPTIONS = [
         _FAULTS,
         "--phase-error",
         "phase_error_deg",
-        type=Degrees(),
+        type=_DEGREES,
         default=0,
         metavar="DEGREES",
         help="B's pulse comes this many electrical degrees later than 90 after A's, such as 5 or 5deg; between -90 and "
@@ -89,7 +95,7 @@ _OPTIONS = [
         _FAULTS,
         "--duty-error",
         "duty_error_deg",
-        type=Degrees(),
+        type=_DEGREES,
         default=0,
         metavar="DEGREES",
         help="Pulses of A and B are this many electrical degrees wider than 180, such as 5 or 5deg; between -90 and "
@@ -105,7 +111,7 @@ _OPTIONS = [
     option(
         _FAULTS,
         "--lost",
-        type=float,
+        type=_FRACTION,
         default=0,
         metavar="PROBABILITY",
         help="Probability that a line misses a pulse: it stays low, and two edges are lost.",
@@ -113,7 +119,7 @@ _OPTIONS = [
     option(
         _FAULTS,
         "--illegal",
-        type=float,
+        type=_FRACTION,
         default=0,
         metavar="PROBABILITY",
         help="Probability that an edge comes together with the next one: both lines change at once.",

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 
+from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
@@ -14,7 +15,8 @@ from rich.text import Text
 from tachometry.cli.reports.streams import printable
 
 _PATIENCE = 2.0  # seconds of work without a bar
-_PLAIN_WIDTH = 100  # columns where there is no terminal
+_PLAIN_WIDTH = 1 << 16  # columns where there is no terminal: no line is broken
+_GAP = 2  # columns between two of a table
 
 
 @contextmanager
@@ -74,7 +76,7 @@ class _Console(Console):
 
 
 def stdout_console() -> Console:
-    """Where to print: as wide as the terminal, or the same everywhere if there is none."""
+    """Where to print: as wide as the terminal, or without breaking a line if there is none."""
     return _Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
 
 
@@ -89,10 +91,38 @@ def print_rows(rows: list[tuple[str, str]]) -> None:
 
 
 def print_table(heads: Sequence[str], rows: Iterable[Sequence[str]], left: Collection[int] = (0,)) -> None:
-    """Print a table on stdout: numbers to the right, and the columns that are `left`, which are words, to the left."""
-    table = Table(box=None, pad_edge=False, header_style="")
-    for column, head in enumerate(heads):
-        table.add_column(head, justify="left" if column in left else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    stdout_console().print(table)
+    """Print a table on stdout: numbers to the right, and the columns that are `left`, which are words, to the left.
+
+    No cell is broken or cut. If the terminal is too narrow, heads have several lines; if it still is, the table is
+    printed in parts, each with the first column.
+    """
+    console, body = stdout_console(), [*rows]
+
+    def widths(names: Sequence[str]) -> list[int]:
+        lines = ([*name.split("\n"), *(row[column] for row in body)] for column, name in enumerate(names))
+        return [max(map(cell_len, texts)) for texts in lines]
+
+    if sum(widths(heads)) + _GAP * (len(heads) - 1) > console.width:
+        heads = [head.replace(" ", "\n") for head in heads]
+    for number, part in enumerate(_parts(widths(heads), console.width)):
+        console.width = max(console.width, sum(widths(heads)[column] + _GAP for column in part))
+        table = Table(box=None, pad_edge=False, header_style="")
+        for column in part:
+            table.add_column(heads[column], justify="left" if column in left else "right", no_wrap=True)
+        for row in body:
+            table.add_row(*(Text(row[column]) for column in part))
+        if number:
+            console.print()
+        console.print(table)
+
+
+def _parts(widths: Sequence[int], room: int) -> list[list[int]]:
+    """Columns that fit beside each other, the first in every part."""
+    parts, used = [[0]], widths[0]
+    for column, width in enumerate(widths[1:], 1):
+        if used + _GAP + width > room and len(parts[-1]) > 1:
+            parts.append([0])
+            used = widths[0]
+        parts[-1].append(column)
+        used += _GAP + width
+    return parts

@@ -2,10 +2,10 @@
 
 from amaranth import Cat, Module, Signal
 from amaranth.lib import wiring
-from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
+from tachometry.hdl.front_end.synchronizer import Synchronizer
 
 
 class InputConditioner(wiring.Component):
@@ -50,7 +50,7 @@ class InputConditioner(wiring.Component):
         swallowed = []
         for name in self._lines:
             level = Signal(name=f"synchronised_{name}") if self._filter_clocks else getattr(self, f"level_{name}")
-            m.submodules[f"sync_{name}"] = FFSynchronizer(getattr(self, name), level)
+            m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), level)
             if self._filter_clocks:
                 m.submodules[f"filter_{name}"] = line = GlitchFilter(self._filter_clocks)
                 m.d.comb += [

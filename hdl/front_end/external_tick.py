@@ -2,8 +2,9 @@
 
 from amaranth import Const, Module, Signal, signed
 from amaranth.lib import wiring
-from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.front_end.synchronizer import Synchronizer
 
 
 class ExternalTick(wiring.Component):
@@ -47,7 +48,7 @@ class ExternalTick(wiring.Component):
         m = Module()
         level = Signal()
         past = Signal()
-        m.submodules.sync = FFSynchronizer(self.tick_in, level)
+        m.submodules.sync_tick_in = Synchronizer(self.tick_in, level)
         # Two clocks for the synchroniser, which has no reset, one for the level before.
         clocks_since_reset = Signal(3)
         m.d.sync += [past.eq(level), clocks_since_reset.eq((clocks_since_reset << 1) | 1)]

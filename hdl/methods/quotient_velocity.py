@@ -35,12 +35,10 @@ class QuotientVelocity(wiring.Component):
         Distance in counts, times the timer periods in a tick.
     divisor : In(spec.interval_width)
         Time in timer periods.
-    forced_in, stalled_in, beyond_in : In(1)
+    forced_in, beyond_in : In(1)
         Valid with `measure` and `decay`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
-    less, more : In(1)
-        With `spec.bounds`: the distance may also have been a count less, or more.
     known, was_negative : In(1)
         With `spec.bounds`. `known`: there are bounds. `was_negative`: the sign of the last count.
     updates : Out(stream)
@@ -58,8 +56,8 @@ class QuotientVelocity(wiring.Component):
         self.bound_dividers = {
             name: Divider(
                 divisor_width=(spec.max_interval + 1).bit_length(),
-                integer_bits=spec.max_bound.bit_length(),
-                scale_bits=spec.native_frac_bits,
+                integer_bits=spec.max_bound.bit_length() + spec.error_bits,
+                scale_bits=spec.native_frac_bits - spec.error_bits,
             )
             for name in (BOUNDS if spec.bounds else ())
         }
@@ -70,10 +68,9 @@ class QuotientVelocity(wiring.Component):
                 "dividend": In(signed(len(self.divider.dividend) - 1)),
                 "divisor": In(spec.interval_width),
                 "forced_in": In(1),
-                "stalled_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
-                **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
+                **({"known": In(1), "was_negative": In(1)} if spec.bounds else {}),
                 "updates": Out(update_stream(update_layout(spec))),
             }
         )
@@ -99,12 +96,11 @@ class QuotientVelocity(wiring.Component):
             divider.divisor.eq(self.divisor),
             divider.dividend.eq(Mux(self.measure, halves, greatest) if spec.decays else halves),
         ]
-        forced, stalled, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "stalled", "beyond"))
+        forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
         with m.If(divider.start):
             m.d.sync += [
                 measuring.eq(self.measure),
                 forced.eq(self.forced_in),
-                stalled.eq(self.stalled_in),
                 beyond.eq(self.beyond_in),
             ]
 
@@ -126,7 +122,6 @@ class QuotientVelocity(wiring.Component):
                 new.velocity.eq(shown),
                 new.interval.eq(divider.by),
                 new.forced.eq(forced),
-                new.stalled.eq(stalled),
             ]
             if spec.flags_range:
                 m.d.sync += new.out_of_range.eq(beyond | saturated)
@@ -137,7 +132,12 @@ class QuotientVelocity(wiring.Component):
     def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
         """Two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
         counted = Signal()
-        greatest = self._spec.timer_periods
+        # Distances in 2^−finer counts, and by how much edges may be off.
+        finer, off = (
+            self._spec.error_bits,
+            int(self._spec.edge_error * (self._spec.timer_periods << self._spec.error_bits)),
+        )
+        greatest = (self._spec.timer_periods << finer) + off
         m.d.comb += counted.eq(self.measure & ~self.forced_in)
         known = Signal(reset_less=True)
         with m.If(self.divider.start):
@@ -146,14 +146,14 @@ class QuotientVelocity(wiring.Component):
             m.submodules[f"divider_{name}"] = box
             upper = name == "velocity_upper"
             # The upper bound is rounded up: as the negative of what is rounded down.
-            distance = -(self.dividend + self.more) if upper else self.dividend - self.less
+            distance = -self.dividend if upper else self.dividend
             # While the velocity decays, the shaft is no farther back than its last edge.
             signs = new.velocity[-1], self.was_negative
             still = decays & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
             end = Signal.like(box.dividend)
             none = Signal(reset_less=True)
             m.d.comb += [
-                end.eq(Mux(counted, distance, Mux(still, 0, -greatest))),
+                end.eq(Mux(counted, (distance << finer) - off, Mux(still, -off, -greatest))),
                 box.start.eq(self.divider.start),
                 box.dividend.eq(end),
                 # Each edge lies within one period before the count that reports it.

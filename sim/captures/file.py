@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tachometry.sim.signals.files import replacing
 from tachometry.sim.signals.recording import MAX_EDGES
+from tachometry.spec.option import ParameterError
 
 Channel = str | int
 NONE: Mapping[str, Channel] = {}
@@ -14,6 +15,10 @@ NONE: Mapping[str, Channel] = {}
 
 class CaptureError(ValueError):
     """A capture cannot be read or written; the message is one line, with what is wrong and what is allowed."""
+
+
+class OptionError(CaptureError, ParameterError):
+    """An option does not go with a capture; the command line names it as it was given."""
 
 
 @contextmanager

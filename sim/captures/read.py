@@ -1,11 +1,12 @@
 """Captures of any kind: sigrok sessions (`.sr`), text (`.csv`), waveforms (`.vcd`)."""
 
+import functools
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
-from tachometry.sim.captures.file import CaptureError, Channel
+from tachometry.sim.captures.file import CaptureError, Channel, OptionError
 from tachometry.sim.captures.sigrok import read_sr
 from tachometry.sim.captures.text import read_csv
 from tachometry.sim.captures.vcd import read_vcd
@@ -36,6 +37,7 @@ def read_capture(
     samplerate_hz: float | None = None,
     z: Channel | None = None,
     tick_in: Channel | None = None,
+    time: Channel | None = None,
 ) -> Recording:
     """Read the encoder lines from a capture; the suffix tells its kind.
 
@@ -47,9 +49,11 @@ def read_capture(
         Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named A and B
         (in any case) if there are both, else the first two.
     samplerate_hz : float or None, Hz
-        Only for a `.sr` that has no samplerate.
+        Only for a `.sr` or `.csv` that has neither a samplerate nor times.
     z, tick_in : str, int or None
         Channels of the index line and of the external tick, likewise; what is not given, the recording has not.
+    time : str, int or None
+        Only for a `.csv`: column of the times, see `read_csv`.
 
     Raises
     ------
@@ -60,5 +64,9 @@ def read_capture(
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise CaptureError(f"a capture must be a .sr, .csv or .vcd file, not {path}")
+    if time is not None:
+        if reader is not read_csv:
+            raise OptionError("time", f"must not be given for {path}: it has its times")
+        reader = functools.partial(read_csv, time=time)
     others = {name: channel for name, channel in (("z", z), ("tick_in", tick_in)) if channel is not None}
     return reader(path, a, b, samplerate_hz, others)

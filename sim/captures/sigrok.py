@@ -72,13 +72,13 @@ def read_sr(
         raise CaptureError(f"samplerate must be above 0 Hz and finite, not {samplerate_hz} Hz")
     with reading(path), _damage_named(path), _Bounded(path) as file, zipfile.ZipFile(file) as archive:
         session = _read_session(path, archive)
-        rate = _agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
+        rate = agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
         bits = choose_channels(path, session.channels, a, b, others)
         sample, level, n_samples = _changes(session, bits, _pieces(path, archive, session, _piece))
     if n_samples == 0:
         raise CaptureError(f"{path} must have at least one sample, not 0")
-    duration = float(_divide(np.array([n_samples]), rate, up=True)[0])
-    return Recording.of_level(_divide(sample, rate, up=False), level, duration, ("a", "b", *others))
+    duration = float(divide(np.array([n_samples]), rate, up=True)[0])
+    return Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *others))
 
 
 def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
@@ -210,7 +210,7 @@ def _read_session(path: Path, archive: zipfile.ZipFile) -> _Session:
             raise CaptureError(f"probes of {path} must be 1 to {8 * int(unitsize)} (unitsize {unitsize}), not {number}")
     channels = {number - 1: name.strip() or f"D{number - 1}" for number, name in probes}
     members = _members(path, archive, device["capturefile"].strip())
-    return _Session(path, channels, int(unitsize), _parse_samplerate(path, device.get("samplerate")), members)
+    return _Session(path, channels, int(unitsize), parse_samplerate(path, device.get("samplerate")), members)
 
 
 def _members(path: Path, archive: zipfile.ZipFile, capturefile: str) -> list[zipfile.ZipInfo]:
@@ -236,7 +236,7 @@ def _members(path: Path, archive: zipfile.ZipFile, capturefile: str) -> list[zip
     return members
 
 
-def _parse_samplerate(path: Path, text: str | None) -> float | None:
+def parse_samplerate(path: Path, text: str | None) -> float | None:
     """Parse `24 MHz`, `12.5kHz`, `1000000`; 0 is what sigrok writes when it knows none."""
     if text is None or not text.strip():
         return None
@@ -246,7 +246,7 @@ def _parse_samplerate(path: Path, text: str | None) -> float | None:
     return float(Fraction(match[1]) * UNIT_HZ[match[2]]) or None
 
 
-def _agreed_samplerate(path: Path, in_file: float | None, given: float | None) -> float:
+def agreed_samplerate(path: Path, in_file: float | None, given: float | None) -> float:
     if in_file is not None and given is not None and in_file != given:
         raise CaptureError(f"samplerate of {path} must be {in_file:.15g} Hz as the file has it, not {given:.15g} Hz")
     rate = in_file if in_file is not None else given
@@ -293,7 +293,7 @@ def _changes(
     return np.concatenate(sample).astype(np.int64), np.concatenate(level), n_samples
 
 
-def _divide(k: NDArray[np.int64], rate: float, *, up: bool) -> NDArray[np.float64]:
+def divide(k: NDArray[np.int64], rate: float, *, up: bool) -> NDArray[np.float64]:
     """Give k / rate as float64, rounded down or up, never to nearest.
 
     To nearest, one quotient in twelve lies so far above that `ceil(k / rate * rate)` is k + 1. Rounded down, the

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO, NoReturn
@@ -10,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading, writing
+from tachometry.sim.captures.header import COMMENTS, Header, read_header
 from tachometry.sim.signals import files
 from tachometry.sim.signals.recording import Recording
 
 BLOCK = 4 << 20  # bytes of text parsed at once
-LONGEST_HEADER = 1 << 16  # bytes
-_LATEST = 1e30  # seconds
+_COMMENT = re.compile(rb"^[#;].*\n", re.MULTILINE)
+# Beyond it a time or the number of a sample is a mistake.
+_LATEST, _LAST_SAMPLE = 1e30, 1e15
 
 
 def read_csv(
@@ -25,61 +28,73 @@ def read_csv(
     samplerate_hz: float | None = None,
     others: Mapping[str, Channel] = NONE,
     *,
+    time: Channel | None = None,
     _block: int = BLOCK,
 ) -> Recording:
-    """Read two to four channels of a text with the header `time,a,b`, times in seconds and levels 0 or 1.
+    """Read two to four channels of a text with a line of names, such as `time,a,b`, and levels 0 or 1.
 
     Rows are change points or samples; rows that change nothing are dropped. Times count from the first row, and the
-    last row ends the recording. There may be more columns after `time`, or others: each is a channel, and only
-    those chosen are parsed. Fields are plain numbers, without quotes; lines end in LF or CR LF.
+    last row ends the recording. Each column but that of the time is a channel, in any order, and only those chosen are
+    parsed. The time is in seconds, or in the unit that stands in brackets behind its name, as in `Time [us]`. Columns
+    are separated by commas, by semicolons (then numbers may have decimal commas) or by tabs. Lines that begin with `;`
+    or `#` are comments. Fields are plain numbers, without quotes; lines end in LF or CR LF.
+
+    Without a column of times, a row is a sample, and the last row lasts for its sample, too. What sigrok writes in
+    comments is used: the samplerate, and the names of the channels.
 
     Parameters
     ----------
     path : path
     a, b : str, int or None
-        Name of the column, else its number, from 0 for the first after `time`. When not given: the columns named A and
-        B (in any case) if there are both, else the first two.
-    samplerate_hz : None
-        Not allowed: a row has its time.
+        Name of the column, else its number, from 0, the time left out. When not given: the columns named A and B (in
+        any case) if there are both, else the first two.
+    samplerate_hz : float or None, Hz
+        Only for a file that has neither times nor a samplerate.
     others : mapping of str to str or int
         Columns of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
+    time : str, int or None
+        Column of the times: its name, else its number among all columns, from 0. When not given: the column named
+        `time` (in any case, whatever unit is behind it), if there is one.
 
     Raises
     ------
     CaptureError
-        If the file is missing, empty, or has another header; for an unknown channel; for a row with too few or too
-        many fields, a time that is not a finite number or decreases, or a level that is not 0 or 1.
+        If the file is missing, empty, or has no line of names; for an unknown channel; if its rows cannot be dated; for
+        a row with too few or too many fields, a time that is not a finite number or decreases, or a level that is not
+        0 or 1.
     """
     path = Path(path)
-    if samplerate_hz is not None:
-        raise CaptureError(f"samplerate must not be given for {path}: its rows have their times")
-    time: list[NDArray[np.float64]] = []
+    times: list[NDArray[np.float64]] = []
     level: list[NDArray[np.uint8]] = []
     start = last_time = float("nan")
-    last_level = 255
+    last_level, n_rows = 255, 0
     with reading(path), path.open("rb") as file:
-        names = _read_header(path, file)
-        columns = (0, *(number + 1 for number in choose_channels(path, dict(enumerate(names[1:])), a, b, others)))
-        for line, block in _blocks(file, _block):
-            values = _parse(path, line, block, names, columns)
-            block_time = values[:, 0]
+        header = read_header(path, file, time, samplerate_hz)
+        columns = tuple(header.column(number) for number in choose_channels(path, header.channels, a, b, others))
+        for line, block in _blocks(file, header.lines + 1, _block):
+            block_time, block_lines = _parse(path, line, block, header, columns, n_rows)
+            n_rows += len(block_time)
             if not level:
                 start = last_time = float(block_time[0])
             before = np.append(last_time, block_time[:-1])
             if (back := np.flatnonzero(block_time < before)).size:
                 late, early = before[back[0]], block_time[back[0]]
                 raise CaptureError(
-                    f"{path} line {line + back[0]}: time must be at least {late} s as before, not {early} s"
+                    f"{path} line {line[back[0]]}: time must be at least {late} {header.unit} as before, not {early} "
+                    f"{header.unit}"
                 )
-            block_level = (values[:, 1:] @ 2.0 ** np.arange(len(columns) - 1)).astype(np.uint8)
+            block_level = (block_lines @ 2.0 ** np.arange(len(columns))).astype(np.uint8)
             changed = np.diff(block_level, prepend=np.uint8(last_level)) != 0
-            time.append(block_time[changed] - start)
+            times.append(block_time[changed] - start)
             level.append(block_level[changed])
             check_edges(path, sum(map(len, level)))
             last_time, last_level = float(block_time[-1]), int(block_level[-1])
     if not level:
         raise CaptureError(f"{path} must have at least one row after its header, not 0")
-    return Recording.of_level(np.concatenate(time), np.concatenate(level), last_time - start, ("a", "b", *others))
+    duration = header.duration(last_time - start)
+    return Recording.of_level(
+        header.seconds(np.concatenate(times)), np.concatenate(level), duration, ("a", "b", *others)
+    )
 
 
 def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
@@ -109,64 +124,76 @@ def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
         files.write_csv(beside, ("time", *recording.lines), files.rows_of(columns))
 
 
-def _read_header(path: Path, file: BinaryIO) -> list[str]:
-    text = file.readline(LONGEST_HEADER).decode("utf-8-sig", errors="replace").rstrip("\r\n")
-    names = [name.strip() for name in text.split(",")]
-    if names[0] != "time" or len(names) < 3 or "" in names or len(set(names)) < len(names):
-        shown = text if len(text) <= 60 else text[:60] + "..."
-        raise CaptureError(f"header of {path} must be time,a,b (or other channels, each name once), not {shown!r}")
-    return names
-
-
-def _blocks(file: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
-    """Give blocks of whole lines, each with the number of its first line; blank lines at the end of the file go."""
-    line, pending = 2, b""
+def _blocks(file: BinaryIO, line: int, size: int) -> Iterator[tuple[NDArray[np.int64], bytes]]:
+    """Give blocks of whole rows, and the line of each; comments, and blank lines at the end of the file, go."""
+    pending = b""
     while data := file.read(size):
         pending = (pending + data).replace(b"\r\n", b"\n")
         full = pending[: pending.rfind(b"\n") + 1].rstrip(b"\n")
         if full:
-            yield line, full + b"\n"
+            yield from _rows(line, full + b"\n")
             line += full.count(b"\n") + 1
             pending = pending[len(full) + 1 :]
     if last := pending.rstrip(b"\r\n"):
-        yield line, last + b"\n"
+        yield from _rows(line, last + b"\n")
 
 
-def _parse(path: Path, line: int, block: bytes, names: list[str], columns: tuple[int, ...]) -> NDArray[np.float64]:
-    """Give time and levels of a block as an array of a column each, all finite, levels 0 or 1."""
+def _rows(line: int, block: bytes) -> Iterator[tuple[NDArray[np.int64], bytes]]:
     text = np.frombuffer(block, np.uint8)
-    commas_before = np.searchsorted(np.flatnonzero(text == ord(",")), np.flatnonzero(text == ord("\n")))
-    n_fields = np.diff(commas_before, prepend=0) + 1
+    first = text[np.append(0, np.flatnonzero(text == ord("\n"))[:-1] + 1)]
+    is_row = ~np.isin(first, [ord(sign) for sign in COMMENTS])
+    if is_row.any():
+        yield line + np.flatnonzero(is_row), block if is_row.all() else _COMMENT.sub(b"", block)
+
+
+def _parse(
+    path: Path, line: NDArray[np.int64], block: bytes, header: Header, columns: tuple[int, ...], n_before: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the times of a block, finite, or the numbers of its rows; and its levels, 0 or 1, a column for each line."""
+    names = header.names
+    text = np.frombuffer(block, np.uint8)
+    newlines = np.flatnonzero(text == ord("\n"))
+    n_fields = np.diff(np.searchsorted(np.flatnonzero(text == ord(header.separator)), newlines), prepend=0) + 1
     _refuse(path, line, n_fields != len(names), f"a row must have {len(names)} fields ({','.join(names)})", n_fields)
     if b"\r" in block:
         raise CaptureError(f"lines of {path} must end in LF or CR LF, not CR")
+    if header.separator == ";":
+        block = block.replace(b",", b".")
     lines = block.decode("utf-8", errors="replace")
+    wanted = columns if header.time is None else (header.time, *columns)
     try:
-        values = np.loadtxt(io.StringIO(lines), delimiter=",", usecols=columns, comments=None, ndmin=2)
+        values = np.loadtxt(io.StringIO(lines), delimiter=header.separator, usecols=wanted, comments=None, ndmin=2)
     except ValueError:
-        _name_the_bad_cell(path, line, lines, names, columns)
-    time = values[:, 0]
-    _refuse(path, line, ~np.isfinite(time), "time must be a finite number of seconds", time)
-    _refuse(path, line, np.abs(time) > _LATEST, f"time must be at most {_LATEST:g} s", time)
-    for column, value in zip(columns[1:], values.T[1:], strict=True):
+        _name_the_bad_cell(path, line, lines, header, wanted)
+    for column, value in zip(columns, values.T[-len(columns) :], strict=True):
         _refuse(path, line, (value != 0) & (value != 1), f"level of {names[column]} must be 0 or 1", value)
-    return values
+    if header.time is None:
+        return n_before + np.arange(len(values), dtype=np.float64), values
+    time = values[:, 0]
+    _refuse(path, line, ~np.isfinite(time), f"time must be a finite number of {header.unit_name}", time)
+    latest = _LATEST if header.samplerate_hz is None else _LAST_SAMPLE
+    _refuse(path, line, np.abs(time) > latest, f"time must be at most {latest:g} {header.unit}", time)
+    return time, values[:, 1:]
 
 
-def _refuse(path: Path, line: int, wrong: NDArray[np.bool_], rule: str, values: NDArray[np.generic]) -> None:
+def _refuse(
+    path: Path, line: NDArray[np.int64], wrong: NDArray[np.bool_], rule: str, values: NDArray[np.generic]
+) -> None:
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise CaptureError(f"{path} line {line + row}: {rule}, not {values[row]:.15g}")
+        raise CaptureError(f"{path} line {line[row]}: {rule}, not {values[row]:.15g}")
 
 
-def _name_the_bad_cell(path: Path, line: int, lines: str, names: list[str], columns: tuple[int, ...]) -> NoReturn:
-    for number, row in enumerate(lines.split("\n")[:-1], line):
-        fields = row.split(",")
+def _name_the_bad_cell(
+    path: Path, line: NDArray[np.int64], lines: str, header: Header, columns: tuple[int, ...]
+) -> NoReturn:
+    for number, row in zip(line, lines.split("\n"), strict=False):
+        fields = row.split(header.separator)
         for column in columns:
             try:
                 np.loadtxt([fields[column] or "?"], comments=None)
             except ValueError:
                 raise CaptureError(
-                    f"{path} line {number}: {names[column]} must be a number, not {fields[column]!r}"
+                    f"{path} line {number}: {header.names[column]} must be a number, not {fields[column]!r}"
                 ) from None
-    raise CaptureError(f"{path} from line {line} on: all fields must be numbers")
+    raise CaptureError(f"{path} from line {line[0]} on: all fields must be numbers")

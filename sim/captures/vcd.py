@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 from vcd.reader import ScopeDecl, Token, TokenKind, VarDecl, VCDParseError, tokenize
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_edges, choose_channels, reading
 from tachometry.sim.signals.recording import Recording
 
 _LONGEST_NAME = 4096
@@ -45,7 +45,7 @@ def read_vcd(
     """
     path = Path(path)
     if samplerate_hz is not None:
-        raise CaptureError(f"samplerate must not be given for {path}: a waveform has its times")
+        raise OptionError("samplerate", f"must not be given for {path}: a waveform has its times")
     with reading(path), path.open("rb") as file:
         _check_end(path, file)
         tokens = _tokens(path, file)

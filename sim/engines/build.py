@@ -92,6 +92,25 @@ def digest(*parts: object) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
+def precompiled(folder: Path, name: str, *flags: str) -> list[str]:
+    """Options with which g++, and only that, takes a header that it has compiled before: half the time of a small core.
+
+    `folder` is one of include files; what is compiled with these options needs the same `flags`.
+    """
+    header = folder / name
+    command = compiler()
+    if "Free Software Foundation" not in version(command):
+        return []
+
+    def make(building: Path) -> Path:
+        made = building / "header.gch"
+        run([*command, *FLAGS, *flags, "-x", "c++-header", f"-I{folder}", "-o", made, header], "compiler")
+        return made
+
+    made = cached(digest(header.read_text(), version(command), command, FLAGS, flags), ".gch", make)
+    return ["-include", str(made.with_suffix(""))]
+
+
 def compile_library(source: str, folder: Path, *more: str | Path) -> Path:
     """A shared library of a C++ text, in `folder`; `more` are options, and files to be compiled or linked with it."""
     (folder / "model.cc").write_text(source, encoding="utf-8")

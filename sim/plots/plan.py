@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from tachometry.sim.plots.style import COLOURS, ESTIMATE, FORCED, place_panels, save_figure
 from tachometry.sim.studies.plan import Plan
-from tachometry.spec import Speed, TachometerSpec
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import SpeedUnit
 
 _HEIGHTS = {"resolution": 3.4, "time": 2.4}  # inches
 
@@ -34,12 +35,12 @@ def save_plans_plot(path: Path, spec: TachometerSpec, plans: Mapping[str, Plan],
 
 def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Figure:
     figure, panels = place_panels(spec, dict.fromkeys(("resolution", "relative", "time", "product"), 2.2), "Methods")
-    per_unit = Speed.parse(f"1{unit}").rad_per_s
+    per_unit = SpeedUnit(unit).rad_per_s
     for (name, plan), colour in zip(plans.items(), COLOURS * len(plans), strict=False):
         values = (plan.resolution / per_unit, 100 * plan.relative, plan.measurement_time, plan.product)
         for axes, value in zip(panels.values(), values, strict=True):
             axes.loglog(plan.speed / per_unit, value, color=colour, label=name)
-    labels = (f"$Q_V$ ({unit})", "$Q_V/V$ (%)", "$T_m$ (s)", "$Q_V T_m$ (rad)")
+    labels = (f"resolution ({unit})", "resolution/speed (%)", "measurement time (s)", "resolution × time (rad)")
     for axes, label in zip(panels.values(), labels, strict=True):
         axes.axvline(spec.unit_velocity / per_unit, color="0.4", linestyle=":")
         axes.set_ylabel(label)
@@ -52,24 +53,26 @@ def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Fig
 def _draw(spec: TachometerSpec, plan: Plan, unit: str) -> Figure:
     figure, panels = place_panels(spec, _HEIGHTS)
     resolution, time = panels["resolution"], panels["time"]
-    per_unit = Speed.parse(f"1{unit}").rad_per_s
+    per_unit = SpeedUnit(unit).rad_per_s
     speed, forced = plan.speed / per_unit, plan.forced
     left, right = speed[0] / 1.05, speed[-1] * 1.05
-    marks = [("$ω_u$", spec.unit_velocity / per_unit, ":")]
+    marks = [("one count per tick", spec.unit_velocity / per_unit, ":")]
     if spec.max_speed is not None:
-        marks.append(("max_speed", spec.max_speed.rad_per_s / per_unit, "--"))
+        marks.append(("greatest speed", spec.max_speed.rad_per_s / per_unit, "--"))
     for axes, values in ((resolution, 100 * plan.resolution / plan.speed), (time, plan.measurement_time)):
-        axes.loglog(speed, values, color=ESTIMATE, label="alteration")
+        axes.loglog(speed, values, color=ESTIMATE, label=f"update by {spec.update_by}")
         if forced.any():
-            axes.loglog(speed[forced], values[forced], ".", color=FORCED, markersize=2.5, label="forced")
+            axes.loglog(
+                speed[forced], values[forced], ".", color=FORCED, markersize=2.5, label="update by the maximum time"
+            )
         for label, mark, style in marks:
             if left <= mark <= right:
                 axes.axvline(mark, color="0.4", linestyle=style, label=label)
     rounding = 100 * spec.rounding_lsb * spec.rad_per_s_per_lsb / plan.speed
-    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"{spec.rounding_lsb} LSB")
-    resolution.set_ylabel("$Q_V/V$ (%)")
+    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"rounding, {spec.rounding_lsb} LSB")
+    resolution.set_ylabel("resolution/speed (%)")
     resolution.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=5)
-    time.set_ylabel("$T_m$ (s)")
+    time.set_ylabel("measurement time (s)")
     time.set_xlabel(f"speed ({unit})")
     time.set_xlim(left, right)
     return figure

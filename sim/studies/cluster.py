@@ -38,7 +38,9 @@ def require() -> None:
         try:
             __import__(name)
         except ImportError:
-            raise OSError(f"a sweep needs the extra `sweep`: {name} is not installed: pip install '.[sweep]'") from None
+            raise OSError(
+                f"a sweep needs the extra `sweep`: {name} is not installed: pip install 'tachometry[sweep]'"
+            ) from None
 
 
 @contextmanager

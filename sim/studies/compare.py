@@ -21,6 +21,8 @@ TrueSpeed = Callable[[FloatArray], FloatArray]
 _MOST_INSTANTS = 200_000
 _LONGEST_DELAY = 0.02  # seconds, that is looked for
 _ALIKE = 1e-9  # of a speed; a constant one has no delay
+# Shares of the mean square error that go with a delay: enough in any case, and at least.
+_MUCH, _LITTLE = 0.25, 0.01
 
 
 def _simplefoc(steps: baselines.Steps) -> baselines.Estimate:
@@ -78,7 +80,8 @@ class Score:
     rms, max : float or None, rad/s
         Error of the held velocity.
     delay : float or None, seconds
-        Shift of the true speed that comes closest.
+        Shift of the true speed that comes closest. None where it says nothing: the true speed is constant, or the curve
+        would be early, or hardly any of the error goes with the shift, or an offset might be its cause as well.
     """
 
     name: str
@@ -146,6 +149,8 @@ def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueS
         if np.ptp(truth) > _ALIKE * np.max(np.abs(truth)):
             with suppress(ValueError):  # a motion that looks alike at several shifts
                 delay = baselines.delay_seconds(instants, held, truth, reach)
+                if not _says_something(error, held - true_speed(np.maximum(instants - delay, 0)), delay):
+                    delay = None
     return Score(
         curve.name,
         curve.what,
@@ -156,3 +161,15 @@ def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueS
         worst,
         delay,
     )
+
+
+def _says_something(error: FloatArray, left: FloatArray, delay: float) -> bool:
+    """Whether a delay is more than noise or an offset, which look like one while the speed rises.
+
+    It is if a quarter of the mean square error goes with it; or less, but more than twice what goes with an offset.
+    """
+    square = float(np.mean(error * error))
+    if delay < 0 or square == 0:
+        return delay >= 0
+    explained, offset = 1 - float(np.mean(left * left)) / square, float(np.mean(error)) ** 2 / square
+    return explained >= _MUCH or explained >= max(_LITTLE, 2 * offset)

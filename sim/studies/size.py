@@ -124,7 +124,7 @@ def versions() -> dict[str, str]:
     try:
         return {package: importlib.metadata.version(package) for package in PACKAGES}
     except importlib.metadata.PackageNotFoundError as error:
-        raise RuntimeError(f"{error.name} is not installed: pip install '.[size]'") from error
+        raise RuntimeError(f"{error.name} is not installed: pip install 'tachometry[size]'") from error
 
 
 def made(

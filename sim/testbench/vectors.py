@@ -15,6 +15,7 @@ from tachometry.sim.signals.recording import Recording, check_ticks
 from tachometry.sim.signals.run import Run
 from tachometry.spec import TachometerSpec
 from tachometry.spec.option import ParameterError
+from tachometry.spec.provenance import LICENSE, generator, notice
 
 # Clocks of the motion, and of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING, _STANDING = 160_000, 800_000
@@ -47,6 +48,8 @@ def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = 
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {trace.n_clocks} clocks")
     vectors = {
+        "generator": generator(),
+        "license": LICENSE,
         "clocks": trace.n_clocks,
         "pins": list(trace.lines),
         "changes": _rows(trace.clock, *trace.lines.values()),
@@ -54,7 +57,7 @@ def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = 
     }
     text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
     bench = Path(__file__).with_name("cocotb_bench.py").read_text(encoding="utf-8")
-    return {f"test_{name}.py": bench, f"{name}_vectors.json": text}
+    return {f"test_{name}.py": notice("#") + bench, f"{name}_vectors.json": text}
 
 
 def usual_motion(spec: TachometerSpec) -> Recording:

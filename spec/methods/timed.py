@@ -1,11 +1,13 @@
 """What the methods that measure the time between counts share (Tsuji 2009, Sec. IV-B and C)."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from tachometry.spec.option import ParameterError, option
 from tachometry.spec.port import UPDATE, Port, held
 from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.units import plural
 
 _TIMERS = ("clock", "tick")
 
@@ -41,7 +43,6 @@ class TimedTachometer(TachometerSpec):
     equation: ClassVar[int]
     update_by = "count"
     rest_tenths = 22
-    pairs_with = TachometerSpec.pairs_with | {"external-tick", "lowpass"}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -90,6 +91,25 @@ class TimedTachometer(TachometerSpec):
         return max(self.timing.max_ticks * self.timer_periods, self.division_periods)
 
     @property
+    def max_time_cycles(self) -> int:
+        return self.max_periods * self.timer_cycles
+
+    @property
+    def standstill_ticks(self) -> int:
+        return -(-self.max_time_cycles // self.timing.tick_cycles)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        given = self.timing.max_ticks * self.timing.tick_cycles
+        return (*super().notes, *self._raised("maximum time", given, self.max_time_cycles))
+
+    def _raised(self, what: str, given: int, built: int) -> tuple[str, ...]:
+        """A note if a time is longer than it was asked for."""
+        if built == given:
+            return ()
+        return (f"{what} raised from {plural(given, 'clock')} to {built}: a division takes {self.division_clocks}",)
+
+    @property
     def remembered_periods(self) -> int:
         """Timer periods up to the end of a measurement that began after an upset, or of a silence."""
         raise NotImplementedError
@@ -111,8 +131,9 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def max_bound(self) -> int:
-        # Distance/(time − 1) is at most twice distance/time; on the lattice reversals may add a count.
-        return 2 * self.max_quotient + 1
+        # Distance/(time − 1) is at most twice distance/time; on the lattice reversals may add a count. An edge error is
+        # divided by a period at least.
+        return 2 * self.max_quotient + 1 + math.ceil(self.edge_error * self.timer_periods)
 
     @property
     def saturates(self) -> bool:

@@ -35,7 +35,7 @@ CORE = """
     --ppr --decoding --clock --tick --max-time --external-tick --max-tick-period --unit --frac-bits --lsb
     --velocity-width --cancel --no-cancel --max-speed --position-width --filter --index --index-reset
 """.split()
-DEFAULTS = ("48MHz", "20us", "10ms", "count/tick", "16 in count/tick, else 10 or as many as there can be", "4")
+DEFAULTS = ("48MHz", "20us", "10ms", "count/tick", "4", "as many as it can need")
 FAULTS = "--jitter --nonuniformity --phase-error --duty-error --bounce --lost --illegal".split()
 OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
 
@@ -55,7 +55,11 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
             [*"FILE --vary --methods --engine --jobs --scheduler --results --axes --metric --seed".split(), *FAULTS],
             ["Sweep", "Machines", "Motion", "Encoder faults", "Outputs"],
         ),
-        ("replay", ["CAPTURE", "--a", "--b", "--z", "--tick-in", "--samplerate", *OUTPUTS], ["Capture", "Outputs"]),
+        (
+            "replay",
+            ["CAPTURE", "--a", "--b", "--z", "--tick-in", "--time", "--samplerate", *OUTPUTS],
+            ["Capture", "Outputs"],
+        ),
     ],
 )
 def test_every_option_is_explained(

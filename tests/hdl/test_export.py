@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -20,7 +21,8 @@ def make_spec(tick: str = "20us", **options: object) -> STachometer:
 @pytest.mark.parametrize("spec", [make_spec(), make_spec("5us", max_speed=Speed.parse("400rad/s"), cancel=False)])
 def test_files(spec: STachometer) -> None:
     files = export(spec, "speed_meter")
-    assert list(files) == ["speed_meter.v", "speed_meter.json", "speed_meter.core"]
+    kit = ["speed_meter.core", "speed_meter_inst.v", "speed_meter_tb.sv", "speed_meter.xdc", "speed_meter.sdc"]
+    assert list(files) == ["speed_meter.v", "speed_meter.json", *kit]
     described = json.loads(files["speed_meter.json"])
     assert described["module"] == "speed_meter"
     # The ports of the module are those of the manifest, in width and direction.
@@ -30,10 +32,37 @@ def test_files(spec: STachometer) -> None:
     assert {(name, direction, int(high or 0) + 1) for direction, high, name in found} == {
         (port["name"], port["direction"], port["width"]) for port in described["ports"]
     }
-    assert files["speed_meter.core"].startswith(f"CAPI=2:\nname: ::speed_meter:{VERSION}\n")
     assert described["generator"] == f"tachometry {VERSION}"
-    assert f"// Made by tachometry {VERSION}.\n" in files["speed_meter.v"]
-    assert "toplevel: speed_meter" in files["speed_meter.core"]
+    assert described["license"] == "BSD-2-Clause"
+
+
+def test_a_reset_that_is_high_from_the_beginning_works_in_systemverilog(tmp_path: Path) -> None:
+    """`reg rst = 1` is no change there, so nothing would wake `always @*`, and all outputs would be x for ever."""
+    text = export(STachometer(encoder=Encoder(8), timing=Timing(10**6, 8, 10)), "core")["core.v"]
+    assert "reg \\$auto" in text
+    (tmp_path / "core.v").write_text(text)
+    (tmp_path / "bench.v").write_text(
+        """module bench;
+          reg clk = 0, rst = 1, a = 0, b = 0;
+          wire tick, velocity_valid;
+          wire [31:0] position, velocity;
+          core core (.clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .position(position), .velocity(velocity),
+            .velocity_valid(velocity_valid));
+          always #5 clk = ~clk;
+          initial begin
+            #52 rst = 0;
+            @(posedge velocity_valid) #1 $display("%b%b", position, velocity);
+            $finish;
+          end
+          initial #9999 $finish;
+        endmodule
+        """
+    )
+    for standard in ("2001", "2012"):
+        command = ["iverilog", f"-g{standard}", "-o", "core.vvp", "core.v", "bench.v"]
+        subprocess.run(command, cwd=tmp_path, check=True, stderr=subprocess.DEVNULL)
+        said = subprocess.run(["vvp", "-n", "core.vvp"], cwd=tmp_path, check=True, capture_output=True, text=True)
+        assert re.fullmatch(r"[0z]+\n", said.stdout), (standard, said.stdout)
 
 
 @pytest.mark.parametrize("tick_cycles", [2, 16, 960])

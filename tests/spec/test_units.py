@@ -8,9 +8,20 @@ from support.command import run
 
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import Vibration, parse_motion
-from tachometry.spec import Speed, Timing
+from tachometry.spec import ParameterError, Speed, Timing
+from tachometry.spec.formats.velocity_output import parse_lsb
 from tachometry.spec.methods.adaptive import parse_target
-from tachometry.spec.units import BANDWIDTH, FREQUENCY, PI, SPEED, TIME, parse_bandwidth, ratio, read_exactly
+from tachometry.spec.units import (
+    BANDWIDTH,
+    FREQUENCY,
+    PI,
+    SPEED,
+    TIME,
+    parse_bandwidth,
+    parse_time,
+    ratio,
+    read_exactly,
+)
 
 
 def test_times_frequencies_speeds_and_angles_are_read_alike() -> None:
@@ -47,12 +58,33 @@ def test_fractions(text: str, target: str) -> None:
     assert parse_target("adaptive", text) == Fraction(target)
 
 
+@pytest.mark.parametrize("text", ["20us", "20µs", "20μs", "20 µs"])
+def test_micro_may_be_written_with_its_sign(text: str) -> None:
+    assert parse_time("tick", text) == Fraction(20, 10**6)
+    assert str(Timing.parse("1MHz", text, "1ms")) == str(Timing.parse("1MHz", "20us", "1ms"))
+
+
+@pytest.mark.parametrize(
+    ("text", "bits"), [("2^-4", 4), ("0.0625", 4), (".5", 1), ("1", 0), ("1.0", 0), ("4", -2), ("2^3", -3)]
+)
+def test_an_lsb_is_a_power_of_two(text: str, bits: int) -> None:
+    assert parse_lsb("lsb", text) == bits
+
+
+@pytest.mark.parametrize("text", ["0", "0.0", "0.06", "0.2", "3", "-0.5", "1/16", "1e-1", "", "2^x", "0." + "0" * 200])
+def test_what_is_no_lsb(text: str) -> None:
+    with pytest.raises(ParameterError, match=r"^lsb must be a power of two such as 2\^-10 or 0.0625, not "):
+        parse_lsb("lsb", text)
+
+
 @pytest.mark.parametrize(
     ("words", "status"),
     [
         ("--clock 100MHz --tick 50ns --max-time 1us --motion constant:10rad/s:500ns", 0),
         ("--clock 0.1GHz --tick 50ns --max-time 1us --motion sine:5rpm:1MHz:1us --vibration 1deg:1MHz", 0),
         ("--clock 0.1GHz --tick 50ns --max-time 1us --motion stop:1us --phase-error 5deg --bounce 2:50ns", 0),
+        ("--clock 1MHz --tick 20µs --motion ramp:0:20rad/s:2000µs --jitter 5% --lost 0.1%", 0),
+        ("--clock 1MHz --tick 20us --motion ramp:0:20rad/s:2ms --jitter 5us", 2),
         ("--clock 1e9999Hz --motion stop:1us", 2),
         ("--clock 1MHz --lowpass 1e9999Hz --motion stop:1us", 2),
         ("--method rairan --adaptive 1e999999999 --motion stop:1us", 2),

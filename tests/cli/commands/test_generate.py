@@ -29,8 +29,9 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
     )
     written = {path.name: path.read_bytes().decode() for path in (tmp_path / "new" / "rtl").iterdir()}
     assert written == export(spec, "spindle")
-    assert capsys.readouterr().out.split() == [
-        str(tmp_path / "new" / "rtl" / f"spindle.{suffix}") for suffix in ("v", "json", "core")
+    assert capsys.readouterr().out.split("\n\n")[0].split() == [
+        str(tmp_path / "new" / "rtl" / f"spindle{suffix}")
+        for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")
     ]
 
 
@@ -45,7 +46,7 @@ def test_defaults(tmp_path: Path) -> None:
         "max_ticks": 500,
         "unit": "count/tick",
         "frac_bits": 16,
-        "velocity_bits": None,
+        "velocity_width": 27,
         "max_speed": None,
         "position_width": 32,
         "filter_clocks": 0,
@@ -54,6 +55,7 @@ def test_defaults(tmp_path: Path) -> None:
         "max_tick_cycles": None,
         "age": False,
         "bounds": False,
+        "edge_error": 0.0,
         "lowpass": None,
         "cancel": True,
     }
@@ -66,7 +68,7 @@ def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
     expected = {
         "unit": "rpm",
         "frac_bits": 3,
-        "velocity_bits": 12,
+        "velocity_width": 12,
         "index": True,
         "index_reset": True,
         "filter_clocks": 4,
@@ -129,7 +131,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr 9 --name 9lives", "--name must be a letter or _ and up to 63 letters, digits or _, not '9lives'"),
         ("--ppr 9 --name ../x", "--name must be a letter or _"),
         ("--ppr 9 --unit m/s", "--unit must be one of count/tick, rad/s, rev/s, rpm, not 'm/s'"),
-        ("--ppr 9 --lsb 0.5", "--lsb must be a power of two such as 2^-10, not '0.5'"),
+        ("--ppr 9 --lsb 0.3", "--lsb must be a power of two such as 2^-10 or 0.0625, not '0.3'"),
         ("--ppr 9 --lsb 2^-10 --frac-bits 10", "--lsb must not be given together with --frac-bits"),
         (
             "--ppr 500 --unit rpm --lsb 2^-30",

@@ -53,6 +53,25 @@ def test_channels_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "counts out -62" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
 
 
+@pytest.mark.parametrize(
+    ("header", "row", "options"),
+    [
+        ("Time [s],Channel 0,Channel 1", "{0:.9f},{1},{2}", ""),
+        ("left,when (µs),right", "{1},{3},{2}", "--time when --a left --b right"),
+        ("; by hand\nleft;right;t [us]", "{1};{2};{3}", "--time 2 --a 0 --b 1"),
+    ],
+)
+def test_csv_of_others(header: str, row: str, options: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = recorded()
+    rows = zip(*(column.tolist() for column in (recording.time, recording.a, recording.b)), strict=True)
+    lines = [row.format(*one, one[0] * 1e6) for one in [*rows, (recording.duration, recording.a[-1], recording.b[-1])]]
+    if ";" in row:
+        lines = [line.replace(".", ",") for line in lines]
+    (tmp_path / "c.csv").write_text("\n".join([header, *lines]), encoding="utf-8")
+    assert run("replay", tmp_path / "c.csv", *CORE, *options.split()) == 0
+    assert "counts out 62" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+
+
 def test_samplerate(tmp_path: Path) -> None:
     write_sr(tmp_path / "c.sr", recorded().place(20_000), 20_000)
     assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
@@ -77,6 +96,8 @@ def test_samplerate(tmp_path: Path) -> None:
         ("c.csv", "--samplerate 1MHz", "--samplerate must not be given for"),
         ("short.csv", "", "short.csv must last at least 22 clocks of --clock (1.1ms), a tick and its latency, not 1"),
         ("c.sr", "--trace {folder}/c.sr", "--trace must be another file than the input"),
+        ("c.sr", "--time A", "--time must not be given for"),
+        ("c.csv", "--time when", "--time of"),
         ("c.sr", "--index", "c.sr must be one of A (0), B (1), not 'z'"),
         ("c.sr", "--external-tick", "c.sr must be one of A (0), B (1), not 'tick_in'"),
         ("c.sr", "--external-tick --tick-in X", "must be one of A (0), B (1), not 'X'"),

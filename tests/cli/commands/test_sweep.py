@@ -148,7 +148,7 @@ BAD = [
     (["--vary", "speed=none"], "{speed} must be a number in"),
     (["--vary", "tick=33us"], "--max-time must be a whole number of ticks, not 20ms"),
     (["--vary", "tick=33us"], "(method s, speed=5rad/s, tick=33us)"),
-    (["--vary", "jitter=x"], "'x' is not a valid float"),
+    (["--vary", "jitter=x"], "must be a number or one in %, not 'x'"),
     (["--vary", "jitter=0,0.7"], "--jitter must be "),
     (["--vary", "average=1,2", "--methods", "s"], "--average must be given with a method that has it: m"),
     (["--average", "2", "--methods", "s,t"], "--average must be given with a method that has it: m"),
@@ -251,5 +251,6 @@ def test_the_extra_is_needed(name: str, capsys: pytest.CaptureFixture[str], monk
     monkeypatch.setitem(sys.modules, name, None)
     assert run(*CORE, *MOTION, *AXES) == 2
     assert capsys.readouterr().err == (
-        f"tachometry: error: a sweep needs the extra `sweep`: {name} is not installed: pip install '.[sweep]'\n"
+        f"tachometry: error: a sweep needs the extra `sweep`: {name} is not installed: "
+        "pip install 'tachometry[sweep]'\n"
     )

@@ -157,11 +157,62 @@ def test_wrong_channels(tmp_path: Path, name: str) -> None:
     assert_error(path, "channels a and b of PATH must be two of A (0), B (1), Z (2), not both B", a="B")
 
 
-@pytest.mark.parametrize("header", ["", "a,b,time", "Time,a,b", "time,a", "time;a;b", "time,a,a", "time,a,", "0,0,1"])
+@pytest.mark.parametrize("header", ["", "time,a", "time;a", "time,a,a", "time,a,", "0,0,1", "0,1,2", "time a b"])
 def test_csv_header(tmp_path: Path, header: str) -> None:
     make_csv(tmp_path / "x.csv", f"{header}\n0,0,1\n")
-    wanted = f"header of PATH must be time,a,b (or other channels, each name once), not {header!r}"
-    assert_error(tmp_path / "x.csv", wanted)
+    wanted = "must name the columns, as time,a,b does: two channels at least, each name once"
+    shown = header or "0,0,1"  # a blank line is none
+    assert_error(tmp_path / "x.csv", f"header of PATH {wanted}, not {shown!r}")
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        (
+            "a,b,c\n0,0,1\n",
+            {},
+            "header of PATH must have a column named time, or --time or --samplerate must be given, not 'a,b,c'",
+        ),
+        ("a,b,c\n0,0,1\n", {"time": "d"}, "time of PATH must be one of the columns a (0), b (1), c (2), not 'd'"),
+        ("a,b,c\n0,0,1\n", {"time": "3"}, "time of PATH must be one of the columns a (0), b (1), c (2), not '3'"),
+        (
+            "a,b\n0,0\n",
+            {"time": "a"},
+            "header of PATH must name the columns, as time,a,b does: two channels at least, each name once, not 'a,b'",
+        ),
+        (
+            "Time [samples],a,b\n0,0,1\n",
+            {},
+            "unit of column Time [samples] of PATH must be one of s, ms, us, ns, not 'samples'",
+        ),
+        ("Time [us],a,b\n2,0,1\n1,0,1\n", {}, "PATH line 3: time must be at least 2.0 us as before, not 1.0 us"),
+        ("Time [us],a,b\ninf,0,1\n", {}, "PATH line 2: time must be a finite number of us, not inf"),
+        ("#\n;\ntime,a,b\n#,\n0,0,1\n;x\n\n1,0,2\n", {}, "PATH line 7: a row must have 3 fields (time,a,b), not 1"),
+        ("#\n;\ntime,a,b\n#,\n0,0,1\n;x\n1,0,2\n", {}, "PATH line 7: level of b must be 0 or 1, not 2"),
+        ("#\n;\ntime,a,b\n#,\n0,0,1\n;x\n1,0,X\n", {}, "PATH line 7: b must be a number, not 'X'"),
+        ("time,a,b\n#0,0,1\n", {}, "PATH must have at least one row after its header, not 0"),
+        (
+            "; Samplerate: fast\na,b\n0,0\n",
+            {},
+            "samplerate of PATH must be a number and Hz, kHz, MHz or GHz, not 'fast'",
+        ),
+        (
+            "; Samplerate: 1 MHz\na,b\n0,0\n",
+            {"samplerate_hz": 2e6},
+            "samplerate of PATH must be 1000000 Hz as the file has it, not 2000000 Hz",
+        ),
+        ("a,b\n0,2\n", {"samplerate_hz": 2e6}, "PATH line 2: level of b must be 0 or 1, not 2"),
+    ],
+)
+def test_csv_of_others(tmp_path: Path, text: str, options: dict[str, str | float], message: str) -> None:
+    make_csv(tmp_path / "x.csv", text)
+    assert_error(tmp_path / "x.csv", message, **options)
+
+
+@pytest.mark.parametrize("name", ["x.sr", "x.vcd"])
+def test_time_is_of_csv_only(tmp_path: Path, name: str) -> None:
+    make_sr(tmp_path / name, [bytes(4)])
+    assert_error(tmp_path / name, "time must not be given for PATH: it has its times", time="A")
 
 
 def test_csv_header_of_a_binary_file(tmp_path: Path) -> None:

@@ -35,6 +35,24 @@ def test_what_cannot_be_told_is_not() -> None:
     assert score(steady, 1.0, np.arange(0.1, 0.9, 1e-3), None).rms is None
 
 
+def test_there_is_no_delay_where_it_says_nothing() -> None:
+    """On a ramp an offset looks like a delay, or like its opposite, and so does noise."""
+    time = np.arange(0, 0.4, 1e-4)
+    instants = time[100:-100]
+
+    def ramp(t: np.ndarray) -> np.ndarray:
+        return 250 * t
+
+    def delay(velocity: np.ndarray) -> float | None:
+        return score(curve(time, velocity), 0.4, instants, ramp).delay
+
+    noise = np.random.default_rng(1).normal(0, 9, len(time))
+    assert delay(ramp(time - 2e-3)) == pytest.approx(2e-3, abs=1e-4)
+    assert delay(ramp(time - 2e-3) + noise / 30) == pytest.approx(2e-3, abs=2e-4)
+    assert delay(ramp(time - 2e-3) + noise) is None
+    assert delay(ramp(time + 2e-3)) is None  # early
+
+
 def test_curves_are_compared_from_when_all_have_begun() -> None:
     curves = [curve(np.array([0.1, 0.2]), np.zeros(2)), curve(np.array([0.3]), np.zeros(1))]
     instants = common_instants(curves, 1.0, 0.01)

@@ -1,0 +1,213 @@
+"""What lies beside the Verilog to build it into a design: template, constraints, FuseSoC core file, smoke test."""
+
+import textwrap
+
+from tachometry.spec import TachometerSpec
+from tachometry.spec.port import Port
+from tachometry.spec.provenance import notice, version
+
+_CORE = """\
+CAPI=2:
+# FuseSoC core file: fusesoc --cores-root . run --target lint NAME, or --target sim.
+@NOTICE_HASH@
+name: ::NAME:@VERSION@
+description: @METHOD@-method tachometer for incremental encoders
+
+filesets:
+  rtl:
+    files:
+      - NAME.v
+    file_type: verilogSource
+  vivado:
+    files:
+      - NAME.xdc
+    file_type: xdc
+  quartus:
+    files:
+      - NAME.sdc
+    file_type: SDC
+  bench:
+    files:
+      - NAME_inst.v:
+          is_include_file: true
+      - NAME_tb.sv
+    file_type: systemVerilogSource
+
+targets:
+  default:
+    filesets:
+      - rtl
+      - tool_vivado ? (vivado)
+      - tool_quartus ? (quartus)
+    toplevel: NAME
+    flow: lint
+    flow_options:
+      tool: verilator
+
+  lint:
+    filesets: [rtl]
+    toplevel: NAME
+    flow: lint
+    flow_options:
+      tool: verilator
+      verilator_options: [-Wall]
+
+  sim:
+    filesets: [rtl, bench]
+    toplevel: NAME_tb
+    flow: sim
+    flow_options:
+      tool: icarus
+      iverilog_options: [-g2012, -Wall]
+"""
+
+_XDC = """\
+# Vivado constraints of NAME: read_xdc NAME.xdc, or add it to the project. They find the core wherever it is.
+@NOTICE_HASH@
+# The pins are asynchronous: their paths to the first flip-flop have no timing, and both flip-flops stay together.
+"""
+_XDC_PIN = """
+# @PIN@
+set_false_path -to [get_pins -hierarchical -filter {NAME =~ *@PATH_SLASH@/stage0_reg/D}]
+set_property ASYNC_REG TRUE [get_cells -hierarchical -filter {NAME =~ *@PATH_SLASH@/stage*_reg}]
+"""
+
+_SDC = """\
+# SDC constraints of NAME, for Quartus and others that read SDC. They find the core wherever it is.
+@NOTICE_HASH@
+# The pins are asynchronous: their paths to the first flip-flop have no timing. Quartus calls it a register, others a
+# cell.
+"""
+_SDC_PIN = """
+# @PIN@
+if {[llength [info commands get_registers]]} {
+    set_false_path -to [get_registers {*@PATH_STAR@|stage0}]
+} else {
+    set_false_path -to [get_cells -hierarchical {*@PATH_STAR@*stage0*}]
+}
+"""
+
+_BENCH = """\
+// Smoke test of NAME: turns the encoder 40 quarter periods forward and 16 back, and checks the position.
+// For every tick and every update against the golden model: tachometry generate --testbench cocotb.
+@NOTICE_SLASHES@
+module NAME_tb;
+  localparam HOLD = @HOLD@;  // clocks of a quarter period
+
+  reg clk = 1'b0;
+  reg rst = 1'b1;
+  reg @PINS@;
+
+`include "NAME_inst.v"
+
+  integer updates = 0;
+  integer errors = 0;
+  reg [1:0] quarter = 2'd0;
+
+  always #5 clk = ~clk;
+@TICKS@
+  always @(posedge clk) if (!rst) begin
+    if (velocity_valid) begin
+      updates <= updates + 1;
+      if (^velocity === 1'bx) errors <= errors + 1;
+    end
+    if (decode_error !== 1'b0) errors <= errors + 1;
+  end
+
+  task turn(input integer steps, input forward);
+    repeat (steps) begin
+      quarter = forward ? quarter + 2'd1 : quarter - 2'd1;
+      a = quarter[1] ^ quarter[0];
+      b = quarter[1];
+      repeat (HOLD) @(negedge clk);
+    end
+  endtask
+
+  initial begin
+    repeat (4) @(negedge clk);
+    rst = 1'b0;
+    repeat (HOLD) @(negedge clk);
+    turn(40, 1'b1);
+    turn(16, 1'b0);
+    if (errors != 0 || position !== @EXPECTED@)
+      $fatal(1, "FAIL: position %0d instead of @EXPECTED@, %0d errors", position, errors);
+    $display("PASS: position %0d, %0d updates, velocity %0d", position, updates, velocity);
+    $finish;
+  end
+endmodule
+"""
+_TICKS = """
+  integer clocks = 0;
+  always @(negedge clk) begin
+    clocks <= clocks == @TICK_CYCLES@ - 1 ? 0 : clocks + 1;
+    tick_in <= clocks < (@TICK_CYCLES@ + 1) / 2;
+  end
+"""
+_STEPS_PER_TICK, _LONGEST_HOLD = 4, 5000
+# Where the synchroniser of a pin is in the core.
+_BOX = {"tick_in": "sampling_clock"}
+
+
+def kit(spec: TachometerSpec, name: str) -> dict[str, str]:
+    """Texts by file name: `NAME.core`, `NAME_inst.v`, `NAME_tb.sv`, `NAME.xdc`, `NAME.sdc`.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    name : str
+        Of the module.
+    """
+
+    def filled(text: str, **parts: object) -> str:
+        marks = {"HASH": "#", "SLASHES": "//"}
+        parts |= {f"NOTICE_{kind}": notice(mark).rstrip("\n") for kind, mark in marks.items()}
+        parts |= {"VERSION": version(), "METHOD": spec.method}
+        for key, part in parts.items():
+            text = text.replace(f"@{key}@", str(part))
+        return text.replace("NAME", name)
+
+    def constraints(head: str, each: str) -> str:
+        paths = [(pin, [_BOX.get(pin, "conditioner"), f"sync_{pin}"]) for pin in asynchronous]
+        parts = [filled(each, PIN=pin, PATH_SLASH="/".join(path), PATH_STAR="*".join(path)) for pin, path in paths]
+        # In a filter NAME is a property of Vivado.
+        return filled(head) + "".join(part.replace(f"{{{name} =~", "{NAME =~") for part in parts)
+
+    asynchronous = [pin.name for pin in spec.pins]
+    cycles = spec.timing.tick_cycles
+    hold = max(min(-(-cycles // _STEPS_PER_TICK), _LONGEST_HOLD), 2 * (spec.filter_clocks + 8))
+    bench = filled(
+        _BENCH,
+        HOLD=hold,
+        PINS=", ".join(f"{pin} = 1'b0" for pin in asynchronous),
+        TICKS=_TICKS.replace("@TICK_CYCLES@", str(cycles)) if spec.max_tick_cycles else "",
+        EXPECTED=(40 - 16) * spec.encoder.decoding // 4,
+    )
+    return {
+        f"{name}.core": filled(_CORE),
+        f"{name}_inst.v": _instance(spec, name),
+        f"{name}_tb.sv": bench,
+        f"{name}.xdc": constraints(_XDC, _XDC_PIN),
+        f"{name}.sdc": constraints(_SDC, _SDC_PIN),
+    }
+
+
+def _instance(spec: TachometerSpec, name: str) -> str:
+    inputs = [port for port in spec.ports if port.direction == "input"]
+    lines = [f'// Instantiation template of {name}: copy it, or `include "{name}_inst.v" into a module that has']
+    lines += [f"// {', '.join(port.name for port in inputs)}.", *notice("//").splitlines()]
+    for port in spec.outputs:
+        lines += ["", *_comment(port), f"wire {_kind(port)}{port.name};"]
+    lines += ["", f"{name} {name}_inst ("]
+    for port in inputs:
+        lines += [*(f"  {line}" for line in _comment(port)), f"  .{port.name}({port.name}),"]
+    lines += [f"  .{port.name}({port.name})," for port in spec.outputs]
+    return "\n".join(lines)[:-1] + "\n);\n"
+
+
+def _comment(port: Port) -> list[str]:
+    told = port.help if not port.unit else f"{port.help.rstrip('.')}; in {port.unit}."
+    return [f"// {line}" for line in textwrap.wrap(told, 110)]
+
+
+def _kind(port: Port) -> str:
+    return "signed " * port.signed + f"[{port.width - 1}:0] " * (port.width > 1)

@@ -1,0 +1,19 @@
+"""Docstrings of classes that have parameters of their bases."""
+
+import inspect
+import re
+
+_SECTION = re.compile(r"\n\nParameters\n-{10}\n(.*?)(?=\n\n\w+\n-{3,}|\Z)", re.DOTALL)
+
+
+def with_inherited(own: str | None, base: str | None) -> str | None:
+    """A docstring, with the parameters of another behind its own."""
+    text, above = inspect.cleandoc(own or ""), _SECTION.search(inspect.cleandoc(base or ""))
+    if not text or above is None:
+        return own
+    here = _SECTION.search(text)
+    if here is not None:
+        return text[: here.end()] + "\n" + above[1] + text[here.end() :]
+    end = re.search(r"\n\n\w+\n-{3,}|\Z", text)
+    assert end is not None
+    return text[: end.start()] + above[0] + text[end.start() :]

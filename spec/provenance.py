@@ -1,0 +1,25 @@
+"""What every generated file says of itself: what made it, whose it is, and how it may be used."""
+
+import importlib.metadata
+
+LICENSE = "BSD-2-Clause"
+
+
+def version() -> str:
+    """The version of tachometry."""
+    return importlib.metadata.version("tachometry")
+
+
+def generator() -> str:
+    """What makes the files."""
+    return f"tachometry {version()}"
+
+
+def notice(mark: str) -> str:
+    """Lines of a comment that begin with `mark`."""
+    lines = (
+        f"Made by {generator()}.",
+        "SPDX-FileCopyrightText: 2026, the Tachometry contributors",
+        f"SPDX-License-Identifier: {LICENSE}",
+    )
+    return "".join(f"{mark} {line}\n" for line in lines)

@@ -1,0 +1,75 @@
+"""Tables on terminals of any width, and in pipes."""
+
+import itertools
+
+import pytest
+from support.command import run
+
+from tachometry.cli.reports import terminal
+
+HEADS = ("method", "updates/s", "RMS (rad/s)", "what it is")
+ROWS = [("s", "2450", "0.123456789", "a method of words"), ("rairan:estimate=n3", "1.58e+04", "12345.6789", "-")]
+
+
+def shown(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, width: int | None) -> list[str]:
+    if width is not None:
+        monkeypatch.setattr(terminal, "_PLAIN_WIDTH", width)
+    terminal.print_table(HEADS, ROWS, left=(0, 3))
+    return capsys.readouterr().out.splitlines()
+
+
+@pytest.mark.parametrize("width", [30, 40, 50, 60, 80, 100])
+def test_no_cell_is_cut_or_broken(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = shown(capsys, monkeypatch, width)
+    text = "\n".join(lines)
+    assert "…" not in text
+    for row in ROWS:
+        for cell in row[1:]:
+            assert any(f"  {cell}" in line for line in lines), cell
+    assert max(map(len, lines)) <= width or width < len("rairan:estimate=n3  a method of words")
+
+
+def test_a_narrow_table_has_the_first_column_in_every_part(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts = [
+        [*group]
+        for empty, group in itertools.groupby(shown(capsys, monkeypatch, 45), lambda line: not line.strip())
+        if not empty
+    ]
+    assert len(parts) == 2
+    for part in parts:
+        assert [line.split()[0] for line in part][-2:] == ["s", "rairan:estimate=n3"]
+
+
+def test_a_pipe_gets_whole_lines(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = shown(capsys, monkeypatch, None)
+    assert len(lines) == 3
+    assert lines[0].split() == " ".join(HEADS).split()
+    terminal.print_rows([("name", "word " * 200)])
+    assert capsys.readouterr().out.count("\n") == 1
+
+
+@pytest.mark.parametrize("width", [60, 80])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "plan --ppr 500 --max-speed 400rad/s",
+        "plan --ppr 500 --max-speed 400rad/s --methods all",
+        "compare --ppr 50 --clock 100kHz --tick 1ms --max-time 10ms --motion ramp:0:100rad/s:100ms",
+        "simulate --engine pysim --ppr 50 --clock 20kHz --tick 1ms --motion constant:20rad/s:50ms",
+    ],
+)
+def test_commands_never_truncate(
+    command: str, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run(*command.split()) == 0
+    numbers = capsys.readouterr().out.split()
+    monkeypatch.setattr(terminal, "_PLAIN_WIDTH", width)
+    assert run(*command.split()) == 0
+    narrow = capsys.readouterr().out
+    assert "…" not in narrow
+    for word in numbers:
+        assert word in narrow

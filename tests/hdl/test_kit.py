@@ -1,0 +1,168 @@
+"""What lies beside the Verilog: it names what is there, and it runs."""
+
+import fnmatch
+import json
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from tachometry.hdl import export
+from tachometry.sim.engines.verilator import home
+from tachometry.spec import METHODS, common_options, of_texts, own_options
+from tachometry.spec.provenance import LICENSE, generator, version
+
+BIN = Path(sys.executable).parent
+PAGE = (Path(__file__).parents[2] / "docs" / "integration.md").read_text(encoding="utf-8")
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
+CASES = {
+    "s": {"external-tick": "yes", "index": "yes", "filter": "4", "unit": "rpm", "bounds": "yes", "age": "yes"},
+    "m": {"decoding": "1", "lowpass": "20Hz"},
+    "t": {"decoding": "2", "index": "yes", "index-reset": "yes"},
+    "mt": {"external-tick": "yes", "bounds": "yes"},
+    "rairan": {"filter": "100", "bounds": "yes"},
+}
+
+
+@cache
+def made(method: str) -> dict[str, str]:
+    return export(of_texts(method, BASE | CASES[method]), "spindle")
+
+
+def run(folder: Path, *command: str | Path, **environment: str) -> str:
+    done = subprocess.run(
+        list(map(str, command)), cwd=folder, env=os.environ | environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def test_every_file_names_version_and_licence() -> None:
+    for file, text in made("s").items():
+        assert generator() in text, file
+        assert LICENSE in text, file
+    assert f"name: ::spindle:{version()}\n" in made("s")["spindle.core"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_smoke_test_includes_the_template_and_passes(method: str, tmp_path: Path) -> None:
+    files = made(method)
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    said = run(tmp_path, "iverilog", "-g2012", "-Wall", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
+    assert said == ""
+    counts = 24 * int(CASES[method].get("decoding", "4")) // 4
+    assert re.match(
+        rf"PASS: position {counts}, [1-9]\d* updates, velocity -?\d+\n", run(tmp_path, "vvp", "-n", "x.vvp")
+    )
+    ports = [port["name"] for port in json.loads(files["spindle.json"])["ports"]]
+    assert re.findall(r"^  \.(\w+)\(\1\)", files["spindle_inst.v"], re.MULTILINE) == ports
+
+
+def test_the_smoke_test_fails_on_a_wrong_core(tmp_path: Path) -> None:
+    files = made("m")
+    wrong = files["spindle_inst.v"].replace(".a(a)", ".a(b)").replace(".b(b)", ".b(a)")
+    for file, text in {**files, "spindle_inst.v": wrong}.items():
+        (tmp_path / file).write_text(text)
+    run(tmp_path, "iverilog", "-g2012", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
+    done = subprocess.run(["vvp", "-n", "x.vvp"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "FAIL: position -6 instead of 6, 0 errors" in done.stdout + done.stderr
+
+
+def flip_flops(verilog: str) -> dict[str, str]:
+    """Paths of the synchronisers' flip-flops from the top, with a slash, and their attributes."""
+    modules = dict(re.findall(r"^module (\S+?) ?\(.*?$(.*?)^endmodule", verilog, re.MULTILINE | re.DOTALL))
+
+    def below(module: str, path: str) -> dict[str, str]:
+        text = modules[module]
+        found: dict[str, str] = {}
+        for attributes, name in re.findall(r"((?:^  \(\*.*\*\)\n)*)^  (?:output|reg) (stage\d)\b", text, re.MULTILINE):
+            found[path + name] = found.get(path + name, "") + attributes
+        for inner, name in re.findall(r"^  (\\\S+|\w+) +(\w+) \(", text, re.MULTILINE):
+            found |= below(inner, f"{path}{name}/") if inner in modules else {}
+        return found
+
+    return below("spindle", "spindle_inst/")
+
+
+@pytest.mark.parametrize("method", ["s", "mt", "rairan"])
+def test_constraints_meet_every_synchroniser_once(method: str) -> None:
+    files = made(method)
+    found = flip_flops(files["spindle.v"])
+    pins = [pin.name for pin in of_texts(method, BASE | CASES[method]).pins]
+    assert len(found) == 2 * len(pins)
+    first = [path for path in found if path.endswith("stage0")]
+    # As Vivado, Quartus Standard, and others name them.
+    vivado = [f"{path}_reg/D" for path in first]
+    quartus = [re.sub(r"(\w+)/", r"e.\1:\1|", path) for path in first]
+    kinds = {
+        r"get_pins -hierarchical -filter \{NAME =~ (.*)\}": ("xdc", vivado),
+        r"get_registers \{(.*)\}": ("sdc", quartus),
+        r"get_cells -hierarchical \{(.*)\}": ("sdc", vivado),
+    }
+    for pattern, (suffix, names) in kinds.items():
+        wanted = re.findall(pattern, files[f"spindle.{suffix}"])
+        assert len(wanted) == len(pins)
+        for name in names:
+            assert [bool(fnmatch.fnmatchcase(name, one)) for one in wanted].count(True) == 1, (name, wanted)
+    cells = re.findall(r"get_cells -hierarchical -filter \{NAME =~ (.*)\}", files["spindle.xdc"])
+    for path, attributes in found.items():
+        assert sum(fnmatch.fnmatchcase(f"{path}_reg", one) for one in cells) == 1
+        assert '(* ASYNC_REG = "TRUE" *)' in attributes, path
+
+
+@pytest.mark.parametrize("quartus", [False, True])
+def test_constraints_are_tcl(quartus: bool) -> None:
+    tcl = pytest.importorskip("tkinter").Tcl()
+    tcl.eval("set said {}")
+    known = ["get_pins", "get_cells", *(["get_registers"] if quartus else [])]
+    for name in known:
+        tcl.eval(f"proc {name} args {{return [list {name} {{*}}$args]}}")
+    for name in ("set_false_path", "set_property"):
+        tcl.eval(f"proc {name} args {{lappend ::said [list {name} {{*}}$args]}}")
+    files = made("s")
+    tcl.eval(files["spindle.sdc"])
+    said = tcl.splitlist(tcl.eval("set said"))
+    assert len(said) == 4
+    assert all(("get_registers" if quartus else "get_cells") in line for line in said)
+    tcl.eval("set said {}")
+    tcl.eval(files["spindle.xdc"])
+    assert len(tcl.splitlist(tcl.eval("set said"))) == 8
+
+
+def test_fusesoc_runs_every_target(tmp_path: Path) -> None:
+    for file, text in made("s").items():
+        (tmp_path / file).write_text(text)
+    path = f"{home() / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    targets = re.findall(r"^  (\w+):\n    filesets:", made("s")["spindle.core"], re.MULTILINE)
+    assert targets == ["default", "lint", "sim"]
+    for target in targets:
+        command = (BIN / "fusesoc", "--cores-root", ".", "run", "--target", target, "spindle")
+        home_ = {"VERILATOR_ROOT": str(home()), "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
+        said = run(tmp_path, *command, PATH=path, **home_)
+        assert "Warning" not in said, said
+        assert ("PASS: position 24" in said) == (target == "sim")
+
+
+def keys(item: object, path: str = "") -> set[str]:
+    """Paths of all keys: `velocity.width`, `ports[].name`."""
+    if isinstance(item, dict):
+        below = [keys(value, f"{path}.{key}" if path else key) for key, value in item.items()]
+        return {f"{path}.{key}" if path else key for key in item}.union(*below)
+    if isinstance(item, list):
+        return set().union(*(keys(value, f"{path}[]") for value in item))
+    return set()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_key_of_the_manifest_is_documented(method: str) -> None:
+    found = keys(json.loads(made(method)["spindle.json"]))
+    told = set(re.findall(r"^\| `([\w.\[\]]+)` \|", PAGE, re.MULTILINE))
+    assert {key for key in found if not key.startswith("parameters.")} <= told
+    options = {f"parameters.{about.parameter}" for about in (*common_options(), *own_options(method))}
+    assert {key for key in found if key.startswith("parameters.")} - options - {"parameters.method"} <= told
