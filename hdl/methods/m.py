@@ -178,6 +178,7 @@ class MMethod(wiring.Component):
                 quotient.tag.eq(known),
             ]
             return quotient.results.valid, quotient.results.p
+        assert shift is not None
         velocities, finer = quotients(self._spec), self._spec.error_bits
         valid = Signal()
         layout = {name: signed(width) for name, (width, _) in velocities.items()} | self._tag.members
