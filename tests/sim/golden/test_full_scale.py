@@ -28,7 +28,7 @@ def spec_of(**options: str) -> TachometerSpec:
 def fastest(sign: int) -> PinTrace:
     """A count in every clock."""
     level = quadrature(sign * np.arange(600))
-    return PinTrace(np.arange(600), (level & 1).astype(np.uint8), (level >> 1).astype(np.uint8), 600)
+    return PinTrace(np.arange(600), level & np.uint8(1), level >> np.uint8(1), 600)
 
 
 @pytest.mark.parametrize("options", OUTPUTS, ids=str)
