@@ -191,7 +191,9 @@ class TachometerSpec(Numbers):
         """
         if self.lowpass is not None:
             return None
-        conditioned = 2 + (1 << max(self.filter_clocks - 1, 1).bit_length() if self.filter_clocks else 0)
+        # A line that must be known anew has to hold still once more.
+        held = 1 << max(self.filter_clocks - 1, 1).bit_length()
+        conditioned = 2 + (held + self.filter_clocks if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
         # What counts the ticks of a silence may have to begin anew.
