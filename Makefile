@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test verify formal mutate upset bench size docs api lint clean
+.PHONY: help venv demo figures compare icarus test pytest verify formal mutate upset bench size docs api lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -54,7 +54,10 @@ icarus: ## Icarus Verilog, installed with apt-get if it is missing
 	  $$sudo apt-get install -qq -y iverilog >/dev/null || { $$sudo apt-get update -qq && $$sudo apt-get install -qq -y iverilog >/dev/null; }; \
 	} || { echo "make: Icarus Verilog is needed and could not be installed: see https://github.com/steveicarus/iverilog" >&2; exit 1; }
 
-test: $(VENV)/.test lint icarus ## lint, types and all tests
+test: $(VENV)/.test icarus ## lint, types and all tests
+	@$(MAKE) --no-print-directory -j2 lint pytest
+
+pytest: $(VENV)/.test icarus
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md

@@ -163,7 +163,7 @@ def table(found: list[dict[str, str]]) -> str:
         return f"{scale * float(row[name]):.3g}" if row[name] else ""
 
     heads = ("method", "updates/s", "longest T_m (ms)", "RMS error (rad/s)", "greatest (rad/s)", "delay (ms)")
-    numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms", 1), ("max", 1), ("delay", 1e3))
+    numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms_rad_s", 1), ("max_rad_s", 1), ("delay", 1e3))
     return markdown(heads, [(row["name"], *(cell(row, name, scale) for name, scale in numbers)) for row in found])
 
 

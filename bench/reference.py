@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 from pages import markdown, write
 
-from tachometry.cli.main import cli
+from tachometry.cli.group import cli
 from tachometry.cli.options.option import Option
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing, of_texts
 

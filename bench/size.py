@@ -103,7 +103,7 @@ CONFIGURATIONS = (
     Configuration("external-tick", "external tick, up to 40 us", replace(REFERENCE, max_tick_cycles=1920)),
     Configuration("rad-per-s", "velocity in 2^-10 rad/s", replace(REFERENCE, unit="rad/s", frac_bits=10)),
     Configuration("rpm", "velocity in 2^-6 rpm", replace(REFERENCE, unit="rpm", frac_bits=6)),
-    Configuration("velocity-16", "16-bit velocity, saturating", replace(REFERENCE, velocity_bits=16)),
+    Configuration("velocity-16", "16-bit velocity, saturating", replace(REFERENCE, max_speed=None, velocity_width=16)),
     Configuration("age", "ticks since the update", replace(REFERENCE, age=True)),
     Configuration("bounds", "bounds of the true speed", replace(REFERENCE, bounds=True)),
     Configuration("lowpass", "low-pass filter, 200 rad/s", replace(REFERENCE, lowpass=Fraction(200))),

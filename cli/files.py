@@ -2,11 +2,20 @@
 
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+
+from tachometry.cli.environment import DISK
+
+if sys.platform != "win32":
+    import fcntl
+
+_PREFIX = ".tachometry-"
+_NEW, _OLD = "new", "old"
 
 
 class Outputs:
@@ -14,7 +23,8 @@ class Outputs:
 
     Every file is written under its own name into a temporary directory beside its target. When the block has
     succeeded all are renamed onto their targets, existing files included; after an error or Ctrl-C nothing is left:
-    no temporary, no directory that was made for a target, and every target is as it was before.
+    no temporary, no directory that was made for a target, and every target is as it was before. What a process that
+    was killed has left is removed by the next one that writes to the same place.
 
     Parameters
     ----------
@@ -28,19 +38,21 @@ class Outputs:
     ValueError
         If two targets are one file, or one is an input or no regular file.
     OSError
-        On entering and leaving, if a target cannot be written.
+        On entering and leaving, if a target cannot be written; also for a full disk in the block, with the target.
     """
 
     def __init__(self, targets: Mapping[str, Path], inputs: Iterable[Path] = ()) -> None:
         self._targets = {what: _real(path) for what, path in targets.items()}
         self._made: list[Path] = []
         self._staging: dict[Path, Path] = {}
+        self._locks: list[int] = []
+        self._current: Path | None = None
         self._check({_real(path) for path in inputs})
 
     def __getitem__(self, what: str) -> Path:
         """Where to write the output `what` for now."""
-        target = self._targets[what]
-        return self._staging[target.parent] / "new" / target.name
+        self._current = target = self._targets[what]
+        return self._staging[target.parent] / _NEW / target.name
 
     def get(self, what: str) -> Path | None:
         """Where to write the output `what` for now, or None if it is not wanted."""
@@ -60,6 +72,7 @@ class Outputs:
     ) -> None:
         if error is not None:
             self._discard()
+            self._name_the_target(error)
             return
         try:
             self._commit()
@@ -88,9 +101,12 @@ class Outputs:
             for directory in reversed(missing):
                 self._made.append(directory)
                 directory.mkdir()
-            staging = self._staging[parent] = Path(tempfile.mkdtemp(prefix=".tachometry-", dir=parent))
-            (staging / "new").mkdir()
-            (staging / "old").mkdir()
+            _clear_stale(parent)
+            staging, lock = _new_staging(parent)
+            self._staging[parent] = staging
+            self._locks += [] if lock is None else [lock]
+            (staging / _NEW).mkdir()
+            (staging / _OLD).mkdir()
         except OSError as error:
             raise _unwritable(target, error) from error
 
@@ -99,7 +115,7 @@ class Outputs:
         begun: list[tuple[Path, Path | None]] = []
         try:
             for what, target in self._targets.items():
-                old = self._staging[target.parent] / "old" / target.name if target.exists() else None
+                old = self._staging[target.parent] / _OLD / target.name if target.exists() else None
                 begun.append((target, old))
                 try:
                     if old is not None:
@@ -124,6 +140,61 @@ class Outputs:
     def _remove_staging(self) -> None:
         for directory in self._staging.values():
             shutil.rmtree(directory, ignore_errors=True)
+        while self._locks:
+            os.close(self._locks.pop())
+
+    def _name_the_target(self, error: BaseException) -> None:
+        """Raise what the system says of a file here with the name of its target."""
+        of_system = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(of_system, OSError):
+            return
+        staged = Path(os.fsdecode(of_system.filename or ""))
+        for parent, staging in self._staging.items():
+            if staged.is_relative_to(staging):
+                raise _unwritable(parent / staged.name, of_system) from error
+        # A write knows no name: it is of the output that was asked for last.
+        if of_system.filename is None and of_system.errno in DISK and self._current is not None:
+            raise _unwritable(self._current, of_system) from error
+
+
+def _new_staging(parent: Path) -> tuple[Path, int | None]:
+    """A new temporary directory, and what locks it for as long as this process lives; None where there are no locks."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
+        lock = _lock(folder, wait=True)
+        if folder.exists():
+            return folder, lock
+        if lock is not None:  # another process has just cleared it away
+            os.close(lock)
+
+
+def _clear_stale(parent: Path) -> None:
+    """Remove what killed processes have left in a directory; files that they had put aside go back to their places."""
+    for folder in parent.glob(f"{_PREFIX}*"):
+        try:
+            lock = _lock(folder, wait=False)
+        except OSError:
+            continue
+        if lock is None:
+            continue
+        for old in (folder / _OLD).glob("*"):
+            if not (parent / old.name).exists():
+                old.replace(parent / old.name)
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(lock)
+
+
+def _lock(folder: Path, *, wait: bool) -> int | None:
+    """A descriptor that locks a directory; None if it is locked, or cannot be."""
+    if sys.platform == "win32":
+        return None
+    descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
 
 
 def _real(path: Path) -> Path:

@@ -13,12 +13,14 @@ from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods import DATAPATHS
-from tachometry.hdl.methods.datapath import OwnTicks, TickSource
+from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
 from tachometry.hdl.output.low_pass import LowPass
+from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.spec import TachometerSpec
+from tachometry.spec.port import UPDATE
 
 
 class Tachometer(wiring.Component):
@@ -64,7 +66,10 @@ class Tachometer(wiring.Component):
         else:
             self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
         layout = update_layout(spec)
-        self.low_pass = None if spec.lowpass is None else LowPass(spec.low_pass, layout, clears=spec.last_when_stalled)
+        self.low_pass = None if spec.lowpass is None else LowPass(spec.low_pass, layout, clears=spec.last_at_rest)
+        self.standstill: Standstill | None = None
+        if not isinstance(self.datapath, OwnStandstill):
+            self.standstill = Standstill(spec.timing.max_ticks, spec.count_width, max_shift=spec.max_tick_shift)
         self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
         if spec.output is not None:
             box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
@@ -108,6 +113,7 @@ class Tachometer(wiring.Component):
         m.d.comb += [getattr(datapath, name).eq(value) for name, value in taken.items() if name in inputs]
         if isinstance(datapath, OwnTicks):
             m.d.comb += pulse_counter.beyond.eq(datapath.beyond)
+        self._rest(m)
         self._output(m)
         if self._spec.age:
             m.submodules.age = age = UpdateAge(self._spec.timing.max_ticks)
@@ -129,6 +135,20 @@ class Tachometer(wiring.Component):
             m.d.comb += self.swallowed_edges.eq(conditioner.swallowed_edges)
         return m
 
+    def _rest(self, m: Module) -> None:
+        """Whether the shaft rests."""
+        if isinstance(self.datapath, OwnStandstill):
+            m.d.comb += self.stalled.eq(self.datapath.stalled)
+        if self.standstill is not None:
+            m.submodules.standstill = standstill = self.standstill
+            m.d.comb += [
+                standstill.tick.eq(self.tick),
+                standstill.m_e.eq(self.pulse_count),
+                self.stalled.eq(standstill.stalled),
+            ]
+            if isinstance(self.datapath, LongTicks):
+                m.d.comb += standstill.shift.eq(self.datapath.tick_shift)
+
     def _output(self, m: Module) -> None:
         """From the datapath to the ports, by way of the low-pass filter and of the unit if they are there."""
         updates = self.datapath.updates
@@ -142,4 +162,4 @@ class Tachometer(wiring.Component):
             wiring.connect(m, updates, output.updates)
             updates = output.shown
         m.d.comb += self.velocity_valid.eq(updates.valid)
-        m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in updates.p.shape().members]
+        m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in self._spec.strobes[UPDATE]]

@@ -53,6 +53,7 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
         "clock_hz": spec.timing.clock_hz,
         "tick_cycles": spec.timing.tick_cycles,
         "max_ticks": spec.timing.max_ticks,
+        "stalled_after_ticks": spec.stalled_after_ticks,
         "counts_per_rev": spec.encoder.counts_per_rev,
         "decoding": spec.encoder.decoding,
         "velocity": {
@@ -60,7 +61,11 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             "frac_bits": spec.frac_bits,
             "unit": spec.unit,
             "rad_per_s_per_lsb": spec.rad_per_s_per_lsb,
+            "full_scale": spec.full_scale * 2.0**-spec.frac_bits,
+            "full_scale_rad_per_s": spec.full_scale * spec.rad_per_s_per_lsb,
         },
+        "max_time_cycles": spec.max_time_cycles,
+        **({} if spec.min_time_cycles is None else {"min_time_cycles": spec.min_time_cycles}),
         **({"bounds": {"none": spec.shown_absent_bound}} if spec.bounds else {}),
         "interval_unit_cycles": spec.interval_unit_cycles,
         "latency_cycles": {

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tachometry.spec.formats.low_pass import LowPass
-from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput, per_count
+from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput
+from tachometry.spec.formats.velocity_output import per_count as of_a_count
+from tachometry.spec.option import is_derived
 from tachometry.spec.parameters import Parameters
-from tachometry.spec.units import ceil_log2, signed_width
+from tachometry.spec.units import SpeedUnit, ceil_log2, signed_width
 
 MAX_NATIVE_FRAC_BITS = 24
 
@@ -20,15 +22,24 @@ class Numbers(Parameters):
     def default_frac_bits(self) -> int:
         """Fraction bits of the velocity if they are not given."""
         coarsest, finest = self.frac_bits_range(self.unit)
-        return 16 if self.unit == NATIVE else max(coarsest, min(10, finest))
+        most = 16 if self.unit == NATIVE else min(10, finest)
+        if self.max_speed is not None and not is_derived(self.velocity_width):
+            # With them no velocity saturates.
+            most = min(most, self.fitting_frac_bits(self.max_velocity))
+        return max(coarsest, most)
+
+    def fitting_frac_bits(self, counts: Fraction | int) -> int:
+        """The most fraction bits with which so many counts per tick fit `velocity_width`."""
+        lsb = counts * self.per_count / ((1 << (self.velocity_width - 1)) - 1)
+        return -ceil_log2(lsb)
 
     def frac_bits_range(self, unit: str) -> tuple[int, int]:
         """Fewest and most fraction bits of the velocity in `unit`."""
         if unit == NATIVE:
             return 4, MAX_NATIVE_FRAC_BITS
         # The greatest speed must be at least one LSB, and one count per tick at most 2^22.
-        count = per_count(unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
-        return 1 - ceil_log2(count * self.max_count), MAX_NATIVE_FRAC_BITS - 2 - ceil_log2(count)
+        count = of_a_count(unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
+        return 1 - ceil_log2(count * self.max_velocity), MAX_NATIVE_FRAC_BITS - 2 - ceil_log2(count)
 
     @property
     def native_frac_bits(self) -> int:
@@ -38,18 +49,48 @@ class Numbers(Parameters):
         return max(4, ceil_log2(self._lsb_per_count) + 2)
 
     @property
+    def max_velocity(self) -> int:
+        """Greatest velocity in counts per tick: a mean of pulse numbers never exceeds the largest of them."""
+        return self.max_count
+
+    @property
     def native_width(self) -> int:
-        """Bits of the velocity in counts per tick: a mean of pulse numbers never exceeds the largest of them."""
-        return signed_width(self.max_count) + self.native_frac_bits
+        """Bits of the velocity in counts per tick."""
+        return signed_width(self.max_velocity) + self.native_frac_bits
 
     @property
     def output(self) -> VelocityOutput | None:
         """How `velocity` is computed from the native velocity; None if the native velocity is the output."""
-        if self.unit == NATIVE and self.velocity_bits is None:
+        if self.unit == NATIVE and self.velocity_width == self.native_width:
             return None
+        return self._output(self.velocity_width)
+
+    def _output(self, width: int) -> VelocityOutput:
         native = 1 << self.native_frac_bits
-        largest = self.absent_bound if self.bounds else self.max_count * native
-        return VelocityOutput(self._lsb_per_count / native, largest, self.velocity_bits, self.bounds)
+        largest = self.absent_bound if self.bounds else self.max_velocity * native
+        return VelocityOutput(self._lsb_per_count / native, largest, width, self.bounds)
+
+    @property
+    def needed_velocity_width(self) -> int:
+        """Bits with which `velocity` never saturates."""
+        return self.native_width if self.unit == NATIVE else signed_width(self._output(0).greatest)
+
+    @property
+    def full_scale(self) -> int:
+        """The greatest |velocity|, in its LSB: there it saturates."""
+        greatest = self.max_velocity << self.native_frac_bits
+        return greatest if self.output is None else min(self.output.scaled(greatest), self.output.limit)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether a measured velocity can exceed what `velocity_width` bits hold."""
+        output = self.output
+        return output is not None and output.scaled(self.max_velocity << self.native_frac_bits) > output.limit
+
+    @property
+    def shown_unit(self) -> SpeedUnit:
+        """The unit in which commands show speeds; rad/s for counts per tick, which depend on the tick."""
+        return SpeedUnit("rad/s" if self.unit == NATIVE else self.unit)
 
     @property
     def max_bound(self) -> int:
@@ -77,9 +118,13 @@ class Numbers(Parameters):
         return self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
 
     @property
+    def per_count(self) -> Fraction:
+        """One count per tick in the unit."""
+        return of_a_count(self.unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
+
+    @property
     def _lsb_per_count(self) -> Fraction:
-        count = per_count(self.unit, self.encoder.counts_per_rev, self.timing.tick_seconds)
-        return count * Fraction(2) ** self.frac_bits
+        return self.per_count * Fraction(2) ** self.frac_bits
 
     @property
     def low_pass(self) -> LowPass:
@@ -97,7 +142,7 @@ class Numbers(Parameters):
     @property
     def greatest_speed(self) -> float:
         """Greatest speed, in rad/s, that `velocity` can show; ticks are as long as nominal."""
-        counted = self.max_count * self.unit_velocity
+        counted = self.max_velocity * self.unit_velocity
         return counted if self.output is None else min(counted, self.output.limit * self.rad_per_s_per_lsb)
 
     @property
@@ -152,11 +197,6 @@ class Numbers(Parameters):
     def count_width(self) -> int:
         """Bits of `pulse_count`."""
         return signed_width(self.max_pulse_count)
-
-    @property
-    def velocity_width(self) -> int:
-        """Bits of `velocity`."""
-        return self.native_width if self.output is None else self.output.port_width
 
     @property
     def interval_width(self) -> int:

@@ -49,12 +49,31 @@ class Derived:
     of: Callable[[Any], Any]
 
 
+class Settled(int):
+    """A whole number that `settle` has derived. In `dataclasses.replace` it is derived anew."""
+
+    derived: Derived
+
+    def __reduce__(self) -> tuple[type[int], tuple[int]]:
+        return int, (int(self),)
+
+
 def settle(item: Any, *names: str) -> None:
     """Replace derived values of a frozen dataclass by what they are: those of some fields, or of all in order."""
     for name in names or (other.name for other in fields(item)):
         value = getattr(item, name)
-        if isinstance(value, Derived):
-            object.__setattr__(item, name, value.of(item))
+        derived = value.derived if isinstance(value, Settled) else value
+        if isinstance(derived, Derived):
+            value = derived.of(item)
+            if type(value) is int:
+                value = Settled(value)
+                value.derived = derived
+            object.__setattr__(item, name, value)
+
+
+def is_derived(value: object) -> bool:
+    """Whether the value of a field was not given, but follows from other fields."""
+    return isinstance(value, Derived | Settled)
 
 
 def parse_flag(what: str, text: str) -> bool:
@@ -157,6 +176,8 @@ class Option:
         """A value of the field for a manifest."""
         if isinstance(value, Fraction):
             return f"{float(value)!r}{self.unit}" if self.unit else float(value)
+        if isinstance(value, Settled):
+            return int(value)
         return value if isinstance(value, bool | int | str | None) else str(value)
 
 

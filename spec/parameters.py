@@ -30,10 +30,11 @@ class Parameters:
     unit : str
         Of `velocity`: `count/tick`, `rad/s`, `rev/s` or `rpm`.
     frac_bits : int
-        One LSB of `velocity` is 2^−frac_bits of its unit. If it is not given: 16 in counts per tick, else 10 or as many
-        as there can be.
-    velocity_bits : int or None
-        Bits of `velocity`, which saturates and raises `velocity_overflow`; None: as many as it can need.
+        One LSB of `velocity` is 2^−frac_bits of its unit. If it is not given: 16 in counts per tick, else 10; fewer if
+        there cannot be as many, or if with `max_speed` the velocity would not fit `velocity_width`.
+    velocity_width : int
+        Bits of `velocity`. With fewer than it can need, it saturates and raises `velocity_overflow`; `max_speed` must
+        fit. If it is not given: as many as it can need.
     max_speed : Speed or None
         Greatest speed to be measured. It narrows every number that depends on it; pulses beyond it saturate m_e and
         raise `overflow`. None: as wide as the tick has clocks.
@@ -74,7 +75,7 @@ class Parameters:
     frac_bits: int = option(
         Derived(lambda spec: spec.default_frac_bits),
         "Fraction bits of the velocity: its LSB is 2^-N of the unit. In count/tick 4 to 24.",
-        shown="16 in count/tick, else 10 or as many as there can be",
+        shown="16 in count/tick, else 10; fewer if --max-speed would not fit --velocity-width",
         metavar="N",
         parse=parse_whole,
         tests=("most - 20", "most - 0", "16"),
@@ -88,11 +89,11 @@ class Parameters:
             ),
         ),
     )
-    velocity_bits: int | None = option(
-        None,
-        "Bits of the velocity, 8 to 64; a velocity that does not fit saturates and raises velocity_overflow.",
+    velocity_width: int = option(
+        Derived(lambda spec: spec.needed_velocity_width),
+        "Bits of the velocity, 8 to 64; a velocity that does not fit saturates and raises velocity_overflow. "
+        "--max-speed must fit.",
         shown="as many as it can need",
-        name="velocity-width",
         metavar="N",
         parse=parse_whole,
         tests=("", "needed - 2", "needed - 0"),

@@ -108,7 +108,12 @@ def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:
             "One clock: both lines changed at once, so the direction is unknown and nothing was counted.",
         ),
         held(TICK, "overflow", help="pulse_count was saturated at the maximum speed; position is exact all the same."),
-        held(UPDATE, "stalled", help="Nothing was counted over a whole forced measurement: the shaft rests."),
+        held(
+            TICK,
+            "stalled",
+            help="The shaft rests: pulse_count was 0 in this period and in those before it for longer than the maximum "
+            "time, see stalled_after_ticks of the manifest. It falls with the next count.",
+        ),
         *_if(
             spec.output, held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
         ),

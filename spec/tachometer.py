@@ -1,14 +1,17 @@
 """What every method shares: checks, ports and what a method says of itself."""
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, ClassVar
 
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
 from tachometry.spec.numbers import Numbers
-from tachometry.spec.option import ParameterError, options_of, settle
+from tachometry.spec.option import ParameterError, is_derived, options_of, settle
 from tachometry.spec.port import UPDATE, Port, held, ports_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
+from tachometry.spec.units import SpeedUnit, plural, signed_width
 
 TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
 # The ends of what encloses the true speed, and which way each is rounded: outward.
@@ -35,8 +38,8 @@ class TachometerSpec(Numbers):
     update_by: ClassVar[str] = "tick"
     # Whether the method ends the ticks itself, by what it counts.
     own_ticks: ClassVar[bool] = False
-    # Whether there are no more updates once one is `stalled`.
-    last_when_stalled: ClassVar[bool] = False
+    # Whether the 0 that the maximum time forces is the last update before the next count.
+    last_at_rest: ClassVar[bool] = False
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
     # Whether pairwise tests give all options all of their values.
@@ -52,6 +55,8 @@ class TachometerSpec(Numbers):
         if self.unit not in UNITS:
             raise ParameterError("unit", f"must be one of {', '.join(UNITS)}, not {self.unit!r}")
         self._check_ticks()
+        if not is_derived(self.velocity_width) and not 8 <= self.velocity_width <= 64:
+            raise ParameterError("velocity_width", f"must be from 8 to 64, not {self.velocity_width}")
         settle(self)
         self._check_velocity()
         if not 8 <= self.position_width <= 48:
@@ -84,10 +89,9 @@ class TachometerSpec(Numbers):
             )
 
     def _check_velocity(self) -> None:
-        if self.velocity_bits is not None and not 8 <= self.velocity_bits <= 64:
-            raise ParameterError("velocity_bits", f"must be from 8 to 64, not {self.velocity_bits}")
         coarsest, finest = self.frac_bits_range(self.unit)
         if coarsest <= self.frac_bits <= finest:
+            self._check_full_scale(coarsest)
             return
         if self.unit == NATIVE:
             raise ParameterError("frac_bits", f"must be from {coarsest} to {finest}, not {self.frac_bits}")
@@ -96,6 +100,23 @@ class TachometerSpec(Numbers):
             f"must be from 2^{-finest} to 2^{-coarsest} {self.unit} with this encoder and tick, "
             f"not 2^{-self.frac_bits}",
         )
+
+    def _check_full_scale(self, coarsest: int) -> None:
+        """See that a velocity of so many bits shows the greatest speed."""
+        if self.max_speed is None or is_derived(self.velocity_width):
+            return
+        counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
+        counts = min(counts, Fraction(self.max_velocity))
+        fitting = self.fitting_frac_bits(counts)
+        if self.frac_bits <= fitting:
+            return
+        needs = f"to show {self.max_speed} in {self.velocity_width} bits"
+        if fitting < coarsest:
+            width = signed_width(math.ceil(counts * self.per_count * Fraction(2) ** coarsest))
+            raise ParameterError("velocity_width", f"must be at least {width} to show {self.max_speed} in {self.unit}")
+        if self.unit == NATIVE:
+            raise ParameterError("frac_bits", f"must be at most {fitting} {needs}, not {self.frac_bits}")
+        raise ParameterError("lsb", f"must be at least 2^{-fitting} {self.unit} {needs}, not 2^{-self.frac_bits}")
 
     @property
     def description(self) -> str:
@@ -113,6 +134,28 @@ class TachometerSpec(Numbers):
         return ""
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the core is not as its options say."""
+        if self.max_speed is None:
+            return ()
+        counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
+        if counts <= self.max_velocity:
+            return ()
+        unit, most = SpeedUnit(self.max_speed.unit), plural(self.max_velocity, "count")
+        greatest = unit.of(self.max_velocity * self.unit_velocity)
+        return (f"greatest speed cut from {self.max_speed} to {greatest:.6g}{unit.name}: {most} per tick is the most",)
+
+    @property
+    def min_time_cycles(self) -> int | None:
+        """Clocks that every measurement lasts longer than; None: there is no such time."""
+        return None
+
+    @property
+    def max_time_cycles(self) -> int:
+        """Clocks after which an update is forced, with ticks as long as nominal."""
+        return self.timing.max_ticks * self.timing.tick_cycles
+
+    @property
     def memory(self) -> tuple[str, int, int] | None:
         """The memory of the reciprocal: its kind, entries, bits of an entry. None: there is no such memory."""
         return None
@@ -121,6 +164,16 @@ class TachometerSpec(Numbers):
     def standstill_ticks(self) -> int:
         """Ticks from that of the last count to the update that reads 0, at most."""
         return self.timing.max_ticks
+
+    @property
+    def max_tick_shift(self) -> int:
+        """Greatest k where a tick may last 2^k nominal ones."""
+        return 0
+
+    @property
+    def stalled_after_ticks(self) -> int:
+        """Nominal ticks that ticks in a row without a count must last for `stalled` to rise."""
+        return self.timing.max_ticks + 1
 
     @property
     def recovery_clocks(self) -> int | None:
@@ -134,7 +187,10 @@ class TachometerSpec(Numbers):
         conditioned = 2 + (1 << max(self.filter_clocks - 1, 1).bit_length() if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
-        return conditioned + 1 + window + self.remembered_clocks + self.tick_latency + self.tick_to_velocity
+        # What counts the ticks of a silence may have to begin anew.
+        silence = ((1 << self.timing.max_ticks.bit_length()) + 1) * self.longest_tick
+        method = self.remembered_clocks + self.tick_to_velocity
+        return conditioned + 1 + window + max(method, silence) + self.tick_latency
 
     @property
     def remembered_clocks(self) -> int:
@@ -151,7 +207,7 @@ class TachometerSpec(Numbers):
         """Ports that enclose the true speed."""
         if not self.bounds:
             return ()
-        width = self.bound_width if self.output is None else self.output.port_width
+        width = self.bound_width if self.output is None else self.velocity_width
         return (
             *(
                 held(

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tachometry.spec.option import ParameterError
 
@@ -168,6 +168,32 @@ def signed_width(limit: int) -> int:
     return limit.bit_length() + 1
 
 
+class SpeedUnit(NamedTuple):
+    """The unit in which commands show speeds; everything else has them in rad/s.
+
+    Parameters
+    ----------
+    name : str
+        `rad/s`, `rev/s` or `rpm`.
+    """
+
+    name: str
+
+    @property
+    def rad_per_s(self) -> float:
+        """One of this unit in rad/s."""
+        return float(SPEED[self.name].exact)
+
+    def of(self, rad_per_s: Any) -> Any:
+        """A number or an array in rad/s, in this unit."""
+        return rad_per_s / self.rad_per_s
+
+    @property
+    def suffix(self) -> str:
+        """What the names of columns end with."""
+        return self.name.replace("/", "_")
+
+
 @dataclass(frozen=True)
 class Speed:
     """An angular speed with its unit, kept exactly as it was given.
@@ -198,11 +224,15 @@ class Speed:
         """The speed in rad/s."""
         return float(self.value * SPEED[self.unit].exact)
 
-    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
-        """⌈speed / ω_u⌉: the most counts that one tick can hold at this speed, ω_u = 2π/(P·T_s)."""
+    def counts(self, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
+        """Speed / ω_u, counts per tick, with ω_u = 2π/(P·T_s)."""
         size, pi = SPEED[self.unit]
         turns = size / (2 * PI) if pi is None else size * pi / 2
-        return math.ceil(self.value * turns * counts_per_rev * tick_seconds)
+        return self.value * turns * counts_per_rev * tick_seconds
+
+    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
+        """The most counts that one tick can hold at this speed."""
+        return math.ceil(self.counts(counts_per_rev, tick_seconds))
 
     def __str__(self) -> str:
         number = self.value.numerator if self.value.denominator == 1 else float(self.value)

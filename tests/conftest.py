@@ -1,7 +1,23 @@
 """What all tests share."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+
+import pytest
 
 # Compiled cores stay in the checkout.
 os.environ.setdefault("TACHOMETRY_CACHE", str(Path(__file__).parent.parent / "build" / "cache"))
+
+
+@pytest.fixture
+def generated(tmp_path: Path) -> Callable[..., Path]:
+    """The command `tachometry generate` in this process: the folder in which it has written a core's files."""
+
+    def generate(name: str, *words: str) -> Path:
+        from support.command import run
+
+        assert run("generate", "--name", name, "-o", tmp_path, *words) == 0
+        return tmp_path
+
+    return generate

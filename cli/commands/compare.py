@@ -14,9 +14,9 @@ from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import Make, common_core_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import FORMS, optional_motion_options
-from tachometry.cli.options.option import GroupedCommand, option, output
+from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.spec import Encoder, TachometerSpec
-from tachometry.spec.units import format_time, parse_time
+from tachometry.spec.units import SpeedUnit, format_time, parse_time, plural
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
@@ -54,7 +54,7 @@ Examples:
     "--replay",
     "capture",
     metavar="CAPTURE",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     help="Captured lines instead of a --motion: .sr, .csv or .vcd, as `tachometry replay` takes them.",
 )
 @capture_options
@@ -118,12 +118,17 @@ def compare(
         scores = [score(curve, duration, instants, source.true_speed) for curve in curves]
         sizes = _sizes(named, tools) if size else {}
         if path := outputs.get("--csv"):
-            _write(path, scores, sizes)
+            _write(path, scores, sizes, spec.shown_unit)
         if path := outputs.get("--plot"):
             from tachometry.sim.plots.compare import save_comparison
 
             save_comparison(path, spec, curves, scores, instants, source.true_speed)
-    _print(scores, sizes, named.left_out)
+    _print(scores, sizes, named, spec.shown_unit)
+    if merged := source.recording.n_merged(spec.timing.clock_hz, int(duration * spec.timing.clock_hz)):
+        click.echo(
+            f"WARNING: {plural(merged, 'edge')} came within one clock of another, which no core can tell apart: "
+            "--clock must be faster than the edges"
+        )
     return 0
 
 
@@ -204,11 +209,11 @@ def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Recording], Curv
     return [baseline(name) if spec is None else core(name, spec) for name, spec in named.specs.items()]
 
 
-_HEADS = ("method", "updates/s", "T_m mean", "T_m worst", "RMS (rad/s)", "max (rad/s)", "delay")
+_SPEEDS = ("rms", "max")  # of a score, in rad/s
 _SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
 
 
-def _print(scores: list[Score], sizes: dict[str, Measurement], left_out: dict[str, str]) -> None:
+def _print(scores: list[Score], sizes: dict[str, Measurement], named: Methods, unit: SpeedUnit) -> None:
     from rich.text import Text
 
     from tachometry.cli.reports.terminal import print_table, stdout_console
@@ -222,21 +227,26 @@ def _print(scores: list[Score], sizes: dict[str, Measurement], left_out: dict[st
             f"{row.updates_per_second:.4g}",
             time(row.mean_time),
             time(row.worst_time),
-            "-" if row.rms is None else f"{row.rms:.4g}",
-            "-" if row.max is None else f"{row.max:.4g}",
+            "-" if row.rms is None else f"{unit.of(row.rms):.4g}",
+            "-" if row.max is None else f"{unit.of(row.max):.4g}",
             time(row.delay),
             *(_size_cells(sizes.get(row.name)) if sizes else ()),
         )
         for row in scores
     ]
-    print_table((*_HEADS, *(_SIZE if sizes else ())), rows)
+    errors = (f"RMS ({unit.name})", f"max ({unit.name})")
+    heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay")
+    print_table((*heads, *(_SIZE if sizes else ())), rows)
     console = stdout_console()
     console.print()
     for row in scores:
         console.print(Text(f"{row.name}: {row.what}"))
     if sizes:
         console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/size.md")
-    for name, reason in left_out.items():
+    for name, spec in named.specs.items():
+        for note in spec.notes if spec is not None else ():
+            console.print(Text(f"{name}: {note}"))
+    for name, reason in named.left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
 
 
@@ -244,7 +254,7 @@ def _size_cells(size: Measurement | None) -> list[str]:
     return ["-" if size is None else form.format(size.figures[figure]) for figure, form in _SIZE.items()]
 
 
-def _write(path: Path, scores: list[Score], sizes: dict[str, Measurement]) -> None:
+def _write(path: Path, scores: list[Score], sizes: dict[str, Measurement], unit: SpeedUnit) -> None:
     from tachometry.sim.signals.files import write_csv
 
     names = [name for name in vars(scores[0]) if name != "what"]
@@ -252,6 +262,12 @@ def _write(path: Path, scores: list[Score], sizes: dict[str, Measurement]) -> No
 
     def cells(row: Score) -> list[object]:
         size = sizes.get(row.name)
-        return [getattr(row, name) for name in names] + [size and size.figures[figure] for figure in figures]
+        values = [getattr(row, name) for name in names]
+        shown = [
+            unit.of(value) if name in _SPEEDS and value is not None else value
+            for name, value in zip(names, values, strict=True)
+        ]
+        return shown + [size and size.figures[figure] for figure in figures]
 
-    write_csv(path, [*names, *figures], map(cells, scores))
+    heads = [f"{name}_{unit.suffix}" if name in _SPEEDS else name for name in names]
+    write_csv(path, [*heads, *figures], map(cells, scores))

@@ -11,7 +11,7 @@ import click
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.motion import FORMS, optional_motion_options
-from tachometry.cli.options.option import GroupedCommand, option
+from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
 
@@ -39,7 +39,7 @@ Examples:
     "--output",
     "-o",
     "directory",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     required=True,
     metavar="DIR",
     help="Directory to write to; it is made if it does not exist, and files in it are overwritten.",
@@ -72,6 +72,8 @@ def generate(
     DIR/NAME.sdc     constraints for Quartus and others
     with --testbench cocotb also DIR/test_NAME.py and DIR/NAME_vectors.json
 
+    What was built is printed: full scale, LSB, resolution, widths and latencies.
+
     Equal options give equal files, byte for byte, on every machine.
     """
     check_module_name(name)
@@ -92,4 +94,8 @@ def generate(
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:
         click.echo(click.format_filename(directory / file))
+    from tachometry.cli.reports.core import print_core
+
+    click.echo()
+    print_core(spec)
     return 0

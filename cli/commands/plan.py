@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.spec import Speed, TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
+from tachometry.spec.units import SpeedUnit
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     import numpy as np
@@ -40,7 +40,8 @@ Examples:
     "Range",
     "--speeds",
     metavar="LO:HI",
-    help="Speeds of the tables, in rad/s (default), rev/s or rpm; a LO without unit has that of HI. "
+    help="Speeds of the tables, in rad/s (default), rev/s or rpm; a LO without unit has that of HI. They are shown in "
+    "--unit, or for count/tick in the unit of HI. "
     "[default: one count in the maximum time to --max-speed, or to ten counts per tick]",
 )
 @option(
@@ -84,7 +85,7 @@ def plan(
             speed = dense_speeds(spec, low, high)
             dense, all_dense = plan_at(spec, speed), _plans(named, speed)
         if path := outputs.get("--csv"):
-            write_plans(path, all_dense) if all_dense else write_plan(path, dense)
+            write_plans(path, all_dense, spec.shown_unit) if all_dense else write_plan(path, dense, spec.shown_unit)
         if path := outputs.get("--plot"):
             from tachometry.sim.plots.plan import save_plan_plot, save_plans_plot
 
@@ -123,19 +124,15 @@ def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
         ) from error
     counts = last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
     if counts > spec.max_count or last.rad_per_s > spec.greatest_speed * (1 + 1e-12):
-        greatest = spec.greatest_speed / _rad_per_s(last.unit)
+        greatest = spec.greatest_speed / SpeedUnit(last.unit).rad_per_s
         raise ValueError(
             f"--speeds must be at most {spec.greatest_speed / spec.unit_velocity:.6g} counts per tick "
             f"({greatest:.6g}{last.unit}), "
             f"the most that this core measures, not {text!r}"
         )
     if first.rad_per_s < _SLOWEST * spec.unit_velocity:
-        least = _SLOWEST * spec.unit_velocity / _rad_per_s(first.unit)
+        least = _SLOWEST * spec.unit_velocity / SpeedUnit(first.unit).rad_per_s
         raise ValueError(f"--speeds must be at least {least:.6g}{first.unit}, not {text!r}")
     if first.rad_per_s >= last.rad_per_s:
         raise ValueError(f"--speeds must be LO:HI with LO less than HI, not {text!r}")
-    return first.rad_per_s, last.rad_per_s, last.unit
-
-
-def _rad_per_s(unit: str) -> float:
-    return Speed(Fraction(1), unit).rad_per_s
+    return first.rad_per_s, last.rad_per_s, last.unit if spec.unit == NATIVE else spec.unit

@@ -13,7 +13,7 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import engine_options
-from tachometry.cli.options.option import GroupedCommand, output_options
+from tachometry.cli.options.option import FilePath, GroupedCommand, output_options
 from tachometry.spec import TachometerSpec
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
@@ -33,7 +33,7 @@ Examples:
 Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
 a --clock that is a few times the edge rate then. Edges closer than a clock are flagged as errors or lost.""",
 )
-@click.argument("capture", type=click.Path(path_type=Path))
+@click.argument("capture", type=FilePath())
 @core_options
 @capture_options
 @output_options

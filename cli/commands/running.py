@@ -43,7 +43,7 @@ def run_and_report(
         _write(spec, found.trace, found.actual, truth, outputs)
     actual = found.actual
     missing = " (there is no C++ compiler)" if (engine, chosen.name) == ("auto", "pysim") else ""
-    print_summary(spec, actual, truth, found.n_mismatches, found.first, chosen.name + missing)
+    print_summary(spec, actual, recording, truth, found.n_mismatches, found.first, chosen.name + missing)
     if found.n_mismatches:
         return 1
     return interrupted(actual.n_clocks, wanted) if actual.n_clocks < wanted else 0

@@ -10,8 +10,9 @@ import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, tables_of
-from tachometry.cli.options.option import INTERRUPTED, GroupedCommand, option, output
+from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.options.sweep import by_name, point_options
+from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
 from tachometry.spec.units import parse_time, plural
 
@@ -19,11 +20,12 @@ if TYPE_CHECKING:  # numpy, pyarrow and Dask are slow to import, and --help need
     from tachometry.cli.sweeping.points import Points
     from tachometry.sim.studies.sweep_results import Results
 
-# What a heat map can show: the column, what it is, and whether colours go by its logarithm.
+# What a heat map can show: the column, what it is, and whether colours go by its logarithm. Columns of speeds are in
+# rad/s, and are shown in the unit of the cores.
 METRICS = {
     "relative-error": ("relative_error", "RMS error over true speed", True),
-    "rms-error": ("rms_error_rad_s", "RMS error (rad/s)", True),
-    "max-error": ("max_error_rad_s", "greatest error (rad/s)", True),
+    "rms-error": ("rms_error_rad_s", "RMS error ({unit})", True),
+    "max-error": ("max_error_rad_s", "greatest error ({unit})", True),
     "delay": ("delay_s", "delay (s)", False),
     "mean-time": ("mean_time_s", "mean measurement time (s)", True),
     "worst-time": ("worst_time_s", "longest measurement time (s)", True),
@@ -69,7 +71,7 @@ Examples:
   tachometry sweep docs/sweep.toml --vary seed=1..10:10 \\
       --scheduler tcp://host:8786""",
 )
-@click.argument("file", required=False, type=click.Path(path_type=Path))
+@click.argument("file", required=False, type=FilePath())
 @option(
     "Sweep",
     "--vary",
@@ -190,7 +192,11 @@ def sweep(
             column, what, log = METRICS[metric]
             columns = kept.columns("point", "method", column)
             at = [found.at[point] for point in columns["point"]]
-            save_heat_maps(path, columns["method"], at, columns[column], shown, what, log)
+            values = columns[column]
+            if "{unit}" in what:
+                what = what.format(unit=found.unit.name)
+                values = [None if value is None else found.unit.of(value) for value in values]
+            save_heat_maps(path, columns["method"], at, values, shown, what, log)
         n_wrong = print_sweep(kept, found, len(missing), time.monotonic() - begun, results)
     return 1 if n_wrong else 0
 

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tachometry.cli.options.option import INTERRUPTED, GroupedCommand, option, output_folder
+from tachometry.cli.options.option import GroupedCommand, option, output_folder
+from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS
 

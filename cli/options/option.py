@@ -1,6 +1,7 @@
 """Options that commands share, and how they are shown and explained."""
 
 import functools
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -8,8 +9,6 @@ from typing import Any, TypeVar
 import click
 
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
-
-INTERRUPTED = 130  # exit status: 128 + SIGINT, as shells have it
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -121,6 +120,18 @@ def all_of(options: list[Callable[[Any], Any]], command: Callable[..., Any]) -> 
     return command
 
 
+class FilePath(click.Path):
+    """A path, which must not be the empty text: that would be the current folder."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(path_type=Path, **attributes)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not os.fspath(value):
+            self.fail("must be a path, not ''", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 _OUTPUTS = "Outputs"
 
 
@@ -137,12 +148,12 @@ def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | N
 def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
     """Decorator for an option that names a file to be written, with one of some suffixes."""
     callback = _suffix(*suffixes) if suffixes else None
-    return option(_OUTPUTS, name, type=click.Path(path_type=Path), metavar="FILE", callback=callback, help=help)
+    return option(_OUTPUTS, name, type=FilePath(), metavar="FILE", callback=callback, help=help)
 
 
 def output_folder(default: str, *, help: str) -> Callable[[Any], Any]:
     """Decorator for the option that names the folder of all outputs, handed to the command as `directory`."""
-    kind = click.Path(path_type=Path, file_okay=False)
+    kind = FilePath(file_okay=False)
     return option(_OUTPUTS, "-o", "--output", "directory", type=kind, default=default, metavar="DIR", help=help)
 
 
@@ -161,7 +172,7 @@ _OUTPUT_OPTIONS = [
     output(
         "--trace",
         help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
-        "velocity in rad/s; then all other outputs that change with an update.",
+        "velocity in --unit (for count/tick in rad/s); then all other outputs that change with an update.",
     ),
     output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts), and what else ticks have."),
     output("--events", help="CSV with a row per index pulse, illegal transition and external tick that was wrong."),

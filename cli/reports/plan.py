@@ -2,24 +2,20 @@
 
 import math
 from collections.abc import Mapping
-from fractions import Fraction
 
 from rich.text import Text
 
+from tachometry.cli.reports.core import configuration, short_time
 from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
 from tachometry.sim.studies.plan import Plan
-from tachometry.spec import Speed, TachometerSpec
-from tachometry.spec.manifest import manifest
-from tachometry.spec.units import format_time, plural
-
-_UNITS = ("rad/s", "rev/s", "rpm")
-_WIDE = ("velocity", "pulse_count", "interval", "position")
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import SpeedUnit
 
 
 def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:
     """Print the configuration of a core and its plan, speeds in `unit`."""
-    print_rows(_configuration(spec))
-    per_unit = _rad_per_s(unit)
+    print_rows(configuration(spec))
+    per_unit = SpeedUnit(unit).rad_per_s
     heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
     rows = []
     columns = zip(*(column.tolist() for column in vars(expected).values()), strict=True)
@@ -47,7 +43,7 @@ def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:
 
 def print_plans(plans: Mapping[str, Plan], left_out: Mapping[str, str], unit: str) -> None:
     """Print a table for each quantity, with a column for each method, and why others were left out."""
-    per_unit = _rad_per_s(unit)
+    per_unit = SpeedUnit(unit).rad_per_s
     console = stdout_console()
     for head, cell in (
         (f"Q_V ({unit})", lambda plan, row: _number(plan.resolution[row] / per_unit, ".4g")),
@@ -68,58 +64,9 @@ def print_plans(plans: Mapping[str, Plan], left_out: Mapping[str, str], unit: st
         console.print(Text(f"\n{name}: left out: {reason}"))
 
 
-def _configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
-    encoder, timing = spec.encoder, spec.timing
-    counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
-    greatest = f"{_speed(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
-    latencies = manifest(spec)["latency_cycles"]
-    memory = spec.memory
-    return [
-        ("method", f"{spec.method.upper()}, {spec.description}"),
-        ("encoder", counts),
-        ("clock", f"{timing.clock_hz:,} Hz"),
-        ("tick", f"{_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
-        ("maximum time", f"{_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
-        ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
-        ("greatest speed", greatest),
-        (
-            "one LSB of velocity",
-            f"2^{-spec.frac_bits} {spec.unit} = {spec.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to "
-            f"{spec.rounding_lsb} of it",
-        ),
-        ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports if port.name in _WIDE)),
-        *([] if memory is None else [("reciprocal", _memory(*memory))]),
-        *((name, f"{plural(n, 'clock')} ({_time(spec.seconds(n))})") for name, n in latencies.items()),
-        ("standstill", _standstill(spec)),
-    ]
-
-
-def _memory(kind: str, entries: int, width: int) -> str:
-    return f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"
-
-
-def _standstill(spec: TachometerSpec) -> str:
-    rest = spec.standstill_ticks
-    time = _time(rest * spec.timing.tick_seconds)
-    return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
-
-
-def _rad_per_s(unit: str) -> float:
-    return Speed(Fraction(1), unit).rad_per_s
-
-
 def _number(value: float, form: str) -> str:
     return "-" if math.isnan(value) else format(value, form)
 
 
 def _duration(seconds: float) -> str:
-    return "-" if math.isnan(seconds) else _time(seconds)
-
-
-def _speed(rad_per_s: float) -> str:
-    return " = ".join(f"{rad_per_s / _rad_per_s(unit):.6g} {unit}" for unit in _UNITS)
-
-
-def _time(seconds: Fraction | float) -> str:
-    """A time to four digits."""
-    return format_time(Fraction(f"{float(seconds):.4g}"))
+    return "-" if math.isnan(seconds) else short_time(seconds)

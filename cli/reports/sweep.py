@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from tachometry.cli.sweeping.points import Points
     from tachometry.sim.studies.sweep_results import Results
 
-_HEADS = (*("method", "points", "error/V", "worst", "RMS (rad/s)", "worst", "delay", "T_m", "worst", "updates/s"),)
-
 
 def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, results: Path | None) -> int:
     """Print a row per method, of all its points, and what was run; values in which the hardware was wrong."""
@@ -26,7 +24,9 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
         *("mismatches", "clocks"),
     )
     checked = [wrong for wrong in columns["mismatches"] if wrong is not None]
-    heads = (*_HEADS, *(["differ"] if checked else []))
+    unit = found.unit
+    errors = ("error/V", "worst", f"RMS ({unit.name})", "worst")
+    heads = ("method", "points", *errors, "delay", "T_m", "worst", "updates/s", *(["differ"] if checked else []))
     table = []
     for method in dict.fromkeys(columns["method"]):
         rows = [k for k, name in enumerate(columns["method"]) if name == method]
@@ -35,7 +35,7 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
             method,
             str(len(rows)),
             *(_number(kind(of["relative_error"], default=None), 100, "%") for kind in (_median, max)),
-            *(_number(kind(of["rms_error_rad_s"], default=None)) for kind in (_median, max)),
+            *(_number(kind(of["rms_error_rad_s"], default=None), unit.of(1)) for kind in (_median, max)),
             _time(_median(of["delay_s"])),
             _time(_median(of["mean_time_s"])),
             _time(max(of["worst_time_s"], default=None)),

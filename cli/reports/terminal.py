@@ -6,10 +6,13 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 from rich.cells import cell_len
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
+
+from tachometry.cli.reports.streams import printable
 
 _PATIENCE = 2.0  # seconds of work without a bar
 _PLAIN_WIDTH = 1 << 16  # columns where there is no terminal: no line is broken
@@ -61,9 +64,20 @@ class PerSecond(ProgressColumn):
         return Text("" if task.speed is None else f"{task.speed:.3g} {self._what}/s")
 
 
+class _Console(Console):
+    """A console whose texts, which may come from files, cannot command the terminal."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else printable(text), style, control)
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError
+
+
 def stdout_console() -> Console:
     """Where to print: as wide as the terminal, or without breaking a line if there is none."""
-    return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
+    return _Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
 
 
 def print_rows(rows: list[tuple[str, str]]) -> None:

@@ -18,7 +18,7 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.studies.sweep import COLUMNS, Point
 from tachometry.spec import METHODS, TachometerSpec, methods_with, of_texts
-from tachometry.spec.units import FREQUENCY, SPEED, TIME, read_nearest
+from tachometry.spec.units import FREQUENCY, SPEED, TIME, SpeedUnit, read_nearest
 
 Words = tuple[str, ...]
 
@@ -47,6 +47,12 @@ class Points:
     at: dict[str, dict[str, str]]
     axes: dict[str, list[str]]
     left_out: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def unit(self) -> SpeedUnit:
+        """The unit in which speeds are shown: that of all points, else rad/s."""
+        units = {point.spec.shown_unit for point in self.points.values()}
+        return units.pop() if len(units) == 1 else SpeedUnit("rad/s")
 
     @property
     def values(self) -> list[str]:

@@ -39,6 +39,20 @@ class OwnTicks(Datapath, TickSource, Protocol):
     beyond: Signal
 
 
+@runtime_checkable
+class LongTicks(Datapath, Protocol):
+    """A datapath some of whose ticks are as long as 2^`tick_shift` nominal ones; valid with `tick`."""
+
+    tick_shift: Signal
+
+
+@runtime_checkable
+class OwnStandstill(Datapath, Protocol):
+    """A datapath that knows itself what `Standstill` reports of others."""
+
+    stalled: Signal
+
+
 def datapath_members(spec: TachometerSpec) -> dict[str, Member]:
     """Members of every datapath: `tick`, `pulse_count` with it, and the updates."""
     return {

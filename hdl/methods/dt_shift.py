@@ -23,8 +23,8 @@ class DtShift(wiring.Component):
 
     Members
     -------
-    opens, turns : In(1)
-        A window begins; with a count against the direction.
+    opens, anew : In(1)
+        A window begins; with a count that has nothing to do with the window before.
     nominal : In(1)
         The last clock of a nominal dt.
     n, high : In
@@ -40,7 +40,7 @@ class DtShift(wiring.Component):
         super().__init__(
             {
                 "opens": In(1),
-                "turns": In(1),
+                "anew": In(1),
                 "nominal": In(1),
                 "n": In(width),
                 "high": In(1),
@@ -71,8 +71,8 @@ class DtShift(wiring.Component):
             down.eq(falls | (self.high & (self.n >= 2 * rule.fewest - 1))),
         ]
         with m.If(self.opens):
-            m.d.sync += falling.eq(falls & (mask >> 1).any() & ~self.turns)
-            with m.If(self.turns):
+            m.d.sync += falling.eq(falls & (mask >> 1).any() & ~self.anew)
+            with m.If(self.anew):
                 m.d.sync += self.shift.eq(0)
             if spec.max_shift & (spec.max_shift + 1):  # an upset can lead beyond it
                 with m.Elif(self.shift > spec.max_shift):

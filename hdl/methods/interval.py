@@ -1,6 +1,6 @@
 """The window of a measurement: its length and the pulse numbers at its ends."""
 
-from amaranth import Module, Signal, signed
+from amaranth import Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -39,7 +39,7 @@ class IntervalAccumulator(wiring.Component):
     forced : Out(1)
         The window closes without an alteration.
     stalled : Out(1)
-        Nothing was counted in any tick of the window, its opening tick included.
+        Nothing was counted in more than `max_ticks` ticks in a row; from `tick` on, until the next.
 
     Raises
     ------
@@ -72,17 +72,25 @@ class IntervalAccumulator(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         opening = Signal.like(self.m_e)
+        silent = ~self.m_e.any()
+        rests = Signal()
+        nearly = Signal()  # the last tick ended a longest window, in which only the opening tick had a count
         longest = Signal()
         after_forced = self._kept_ticks + 1
         d1 = self.m_e - self.previous
         m.d.comb += [
             self.update.eq(self.tick & (self.alteration | longest)),
             self.forced.eq(longest & ~self.alteration),
-            # A forced window ends as it went on, in `previous`; only its opening tick may differ.
-            self.stalled.eq(self.forced & ~(opening | self.previous).any()),
+            # A longest window without an alteration goes on as it began, but for its opening tick; and a silence begins
+            # in the tick that opens a window, or in the one after it.
+            self.stalled.eq(
+                Mux(self.tick, silent & (rests | nearly | (longest & ~(opening | self.previous).any())), rests)
+            ),
             self.numerator.eq(opening - self.previous + d1 if self._cancel else d1),
         ]
+        m.d.sync += rests.eq(self.stalled)
         with m.If(self.tick):
+            m.d.sync += nearly.eq(self.forced & silent)
             m.d.sync += [self.m_s.eq(self.m_s + 1), longest.eq(self.m_s == self._max_ticks - 1)]
             with m.If(longest):
                 m.d.sync += [self.m_s.eq(after_forced), longest.eq(after_forced == self._max_ticks)]

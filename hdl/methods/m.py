@@ -35,8 +35,6 @@ class MovingSum(wiring.Component):
         Valid with `tick`.
     total : Out(signed(sum_width))
         Valid with `tick`.
-    empty : Out(1)
-        None of the n ticks counted anything; valid with `tick`.
     """
 
     def __init__(self, length: int, *, count_width: int, sum_width: int) -> None:
@@ -46,23 +44,15 @@ class MovingSum(wiring.Component):
                 "tick": In(1),
                 "m_e": In(signed(count_width)),
                 "total": Out(signed(sum_width)),
-                "empty": Out(1),
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         if self._length == 1:
-            m.d.comb += [self.total.eq(self.m_e), self.empty.eq(~self.m_e.any())]
+            m.d.comb += self.total.eq(self.m_e)
             return m
         last = self._length - 1
-        quiet = Signal(range(self._length), init=last)
-        m.d.comb += self.empty.eq(~self.m_e.any() & (quiet >= last))
-        with m.If(self.tick):
-            with m.If(self.m_e.any()):
-                m.d.sync += quiet.eq(0)
-            with m.Elif(quiet < last):
-                m.d.sync += quiet.eq(quiet + 1)
         if last == 1:
             previous = Signal.like(self.m_e)
             with m.If(self.tick):
@@ -115,15 +105,15 @@ class MMethod(wiring.Component):
     pulse_count : In(signed)
         m_e, valid with `tick`.
     updates : Out(stream)
-        `velocity` has `native_frac_bits` fraction bits, `interval` is n, `forced` is never high, and `stalled` is high
-        if none of the n ticks counted anything. The bounds are those of one count more and less in n ticks, rounded
-        outward; they are valid when none of the n ticks is the first. All is held until the next update.
+        `velocity` has `native_frac_bits` fraction bits, `interval` is n, and `forced` is never high. The bounds
+        are those of one count more and less in n ticks, rounded outward; they are valid when none of the n ticks is the
+        first. All is held until the next update.
     """
 
     def __init__(self, spec: MTachometer) -> None:
         super().__init__(datapath_members(spec))
         self._spec = spec
-        self._tag = data.StructLayout({"stalled": 1, **({"bounds_valid": 1} if spec.bounds else {})})
+        self._tag = data.StructLayout({"bounds_valid": 1} if spec.bounds else {})
         self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
         self.quotient: Quotient | None = None
         if spec.shift is None:
@@ -150,7 +140,6 @@ class MMethod(wiring.Component):
         m.d.comb += [
             moving_sum.tick.eq(self.tick),
             moving_sum.m_e.eq(self.pulse_count),
-            known.stalled.eq(moving_sum.empty),
             self.updates.p.interval.eq(spec.average),
         ]
         if spec.bounds:

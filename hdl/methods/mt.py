@@ -10,7 +10,8 @@ class MTMethod(TimedDatapath):
     """M/T-method datapath, eqs. (13) to (16) of Tsuji 2009: counts over the time that they take, longer than T_c.
 
     ½·s(opening) + counts between + ½·s(closing) is a sum over pairs of consecutive counts: a count of the same sign as
-    the one before adds one, and a count of the other sign, which meets the same edge again, adds none.
+    the one before adds one, and a count of the other sign, which meets the same edge again, adds none. On the lattice a
+    tick with m_e counts adds m_e, or one count less if their sign is not that before.
     """
 
     def __init__(self, spec: MTTachometer) -> None:
@@ -28,7 +29,7 @@ class MTMethod(TimedDatapath):
         m.d.comb += [
             ends.eq(timer.count & timer.opened & late & (self.quotient_velocity.free if spec.may_be_late else 1)),
             opens.eq(ends | ~timer.opened),
-            total.eq(travelled + (self._size if spec.on_lattice else Mux(self._same, self._one, 0))),
+            total.eq(travelled + self._distance),
         ]
         with m.If(timer.period):
             m.d.sync += length.eq(length + 1)
@@ -38,11 +39,12 @@ class MTMethod(TimedDatapath):
                 m.d.sync += [length.eq(1), late.eq(0)]
         with m.If(timer.count):
             m.d.sync += travelled.eq(Mux(opens, 0, total))
-        if spec.bounds and spec.on_lattice:
-            # Between the last edges of two ticks of opposite sign lies a count more or less than in the ticks after.
-            quotient = self.quotient_velocity
-            opening = Signal()
-            with m.If(timer.count & opens):
-                m.d.sync += opening.eq(timer.negative)
-            m.d.comb += [quotient.less.eq(opening & ~timer.negative), quotient.more.eq(~opening & timer.negative)]
         return ends, total, Mux(ends, length, timer.age)
+
+    @property
+    def _distance(self) -> Value:
+        """From the edge of the last count to that of this one; on the lattice, to the last edge of the tick."""
+        if not self._spec.on_lattice:
+            return Mux(self._same, self._one, 0)
+        # All counts of the tick, less the one that meets the same edge again.
+        return self._size + Mux(self._same, 0, Mux(self.gap_timer.negative, 1, -1))

@@ -35,12 +35,10 @@ class QuotientVelocity(wiring.Component):
         Distance in counts, times the timer periods in a tick.
     divisor : In(spec.interval_width)
         Time in timer periods.
-    forced_in, stalled_in, beyond_in : In(1)
+    forced_in, beyond_in : In(1)
         Valid with `measure` and `decay`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
-    less, more : In(1)
-        With `spec.bounds`: the distance may also have been a count less, or more.
     known, was_negative : In(1)
         With `spec.bounds`. `known`: there are bounds. `was_negative`: the sign of the last count.
     updates : Out(stream)
@@ -70,10 +68,9 @@ class QuotientVelocity(wiring.Component):
                 "dividend": In(signed(len(self.divider.dividend) - 1)),
                 "divisor": In(spec.interval_width),
                 "forced_in": In(1),
-                "stalled_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
-                **({"less": In(1), "more": In(1), "known": In(1), "was_negative": In(1)} if spec.bounds else {}),
+                **({"known": In(1), "was_negative": In(1)} if spec.bounds else {}),
                 "updates": Out(update_stream(update_layout(spec))),
             }
         )
@@ -99,12 +96,11 @@ class QuotientVelocity(wiring.Component):
             divider.divisor.eq(self.divisor),
             divider.dividend.eq(Mux(self.measure, halves, greatest) if spec.decays else halves),
         ]
-        forced, stalled, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "stalled", "beyond"))
+        forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
         with m.If(divider.start):
             m.d.sync += [
                 measuring.eq(self.measure),
                 forced.eq(self.forced_in),
-                stalled.eq(self.stalled_in),
                 beyond.eq(self.beyond_in),
             ]
 
@@ -126,7 +122,6 @@ class QuotientVelocity(wiring.Component):
                 new.velocity.eq(shown),
                 new.interval.eq(divider.by),
                 new.forced.eq(forced),
-                new.stalled.eq(stalled),
             ]
             if spec.flags_range:
                 m.d.sync += new.out_of_range.eq(beyond | saturated)
@@ -146,7 +141,7 @@ class QuotientVelocity(wiring.Component):
             m.submodules[f"divider_{name}"] = box
             upper = name == "velocity_upper"
             # The upper bound is rounded up: as the negative of what is rounded down.
-            distance = -(self.dividend + self.more) if upper else self.dividend - self.less
+            distance = -self.dividend if upper else self.dividend
             # While the velocity decays, the shaft is no farther back than its last edge.
             signs = new.velocity[-1], self.was_negative
             still = decays & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))

@@ -32,6 +32,8 @@ class RairanMethod(wiring.Component):
         Nep1 is saturated; valid with `last`.
     tick, pulse_count : In
         Not used.
+    tick_shift : Out
+        Only if dt is adaptive: k of the window of a tick, valid with `tick`.
     updates : Out(stream)
         `interval` is Ndt1 at low speeds, else 1. n1 = `n_ep1`/`n_dt1` of the velocity, 0 and 1 for the velocity 0; with
         `paper_exact` as in Table 1. If dt is adaptive, both are of dt·2^`dt_shift`. The bounds are n2 and n1, a clock
@@ -45,6 +47,7 @@ class RairanMethod(wiring.Component):
                 "last": Out(1),
                 "beyond": Out(1),
                 **datapath_members(spec),
+                **({"tick_shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
             }
         )
         self._spec = spec
@@ -61,12 +64,12 @@ class RairanMethod(wiring.Component):
         m.submodules.counters = counters = self.counters
         m.submodules.table = memory = Memory(shape=spec.table_width, depth=spec.depth, init=spec.table)
         read = memory.read_port()
-        tag = [counters.n, counters.high, counters.backward, counters.forced, counters.stalled]
+        tag = [counters.n, counters.high, counters.backward, counters.forced, counters.at_rest]
         if spec.paper_exact:
             tag += [counters.n_ep1, counters.n_dt1]
         if spec.adaptive:
             tag += [counters.shift]
-        update, n, high, backward, forced, stalled, *more = delay(m, counters.update, *tag, clocks=2)
+        update, n, high, backward, forced, at_rest, *more = delay(m, counters.update, *tag, clocks=2)
         entry = Signal(spec.table_width)
         m.d.sync += entry.eq(read.data)
         m.d.comb += [
@@ -75,25 +78,28 @@ class RairanMethod(wiring.Component):
             self.beyond.eq(counters.beyond),
             read.addr.eq(counters.n[: len(read.addr)]),
         ]
+        if counters.dt is not None:
+            m.d.comb += self.tick_shift.eq(*delay(m, counters.dt.shift, clocks=spec.tick_latency))
         m.d.sync += self.updates.valid.eq(update)
         shift = more[0] if spec.adaptive else 0
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())
         new = registers(self.updates.p.shape(), "new", init={"n_dt1": 1})
         m.d.comb += self.updates.p.eq(new)
         # At rest no update corrects what an upset has done to the outputs.
-        shown = update | stalled
+        shown = update | at_rest
         with m.If(shown):
             m.d.sync += [
                 new.velocity.eq(self._velocity(n, high, backward, entry, shift)),
                 new.interval.eq(low << shift if spec.adaptive else low),
                 new.forced.eq(forced),
-                new.stalled.eq(stalled),
                 Cat(new.n_ep1, new.n_dt1).eq(
                     Cat(*more) if spec.paper_exact else Cat(counts[: len(new.n_ep1)], low[: spec.interval_width])
                 ),
             ]
             if spec.adaptive:
                 m.d.sync += new.dt_shift.eq(shift)
+            if "rests" in new.shape().members:
+                m.d.sync += new.rests.eq(at_rest)
         if spec.bounds:
             self._bounds(m, new, shown=shown, backward=backward)
         return m
@@ -117,7 +123,7 @@ class RairanMethod(wiring.Component):
             m.d.comb += read.addr.eq(place[: len(read.addr)])
             m.d.sync += entry.eq(read.data)
         valid = Signal()
-        m.d.comb += valid.eq(counters.known & (counters.high | counters.n.any()))
+        m.d.comb += valid.eq(counters.high | counters.n.any())
         (valid,) = delay(m, valid, clocks=2)
         with m.If(shown):
             m.d.sync += [

@@ -32,15 +32,14 @@ class RairanCounters(wiring.Component):
         Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. This and all below are held until the next update.
     high, backward : Out(1)
         The regime, and the direction.
-    forced, stalled : Out(1)
-        `forced`: the last update came without a count. `stalled`: it came at the maximum time.
+    forced, at_rest : Out(1)
+        `forced`: the last update came without a count. `at_rest`: it came at the maximum time.
     n_ep1, n_dt1 : Out
         Only with `paper_exact`: as in Table 1.
     shift : Out
         Only if dt is adaptive: n is of dt·2^shift.
-    loose, unsynced, known : Out(1)
+    loose, unsynced : Out(1)
         Only with bounds. `loose`: n implies no least speed. `unsynced`: its measurement did not begin in step with dt.
-        `known`: there has been a count that dt was in step with.
     """
 
     def __init__(self, spec: RairanTachometer) -> None:
@@ -56,11 +55,11 @@ class RairanCounters(wiring.Component):
                 "high": Out(1),
                 "backward": Out(1),
                 "forced": Out(1),
-                "stalled": Out(1),
+                "at_rest": Out(1),
                 # Nep1 and Ndt1 as they are before anything has come.
                 **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
                 **({"shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
-                **({name: Out(1) for name in ("loose", "unsynced", "known")} if spec.bounds else {}),
+                **({name: Out(1) for name in ("loose", "unsynced")} if spec.bounds else {}),
             }
         )
         # Cep − 1, and whether there is any.
@@ -74,7 +73,8 @@ class RairanCounters(wiring.Component):
         m = Module()
         pulse = Signal()
         opens = Signal()
-        late = Signal()  # dt has ended since the last count, Cdt ≠ 0
+        exact = self._spec.paper_exact
+        late = Signal(init=not exact)  # dt has ended since the last count, Cdt ≠ 0, or there was none
         due = self._clock(m, opens)
         if self.dt is not None:
             m.submodules.dt = self.dt
@@ -82,7 +82,7 @@ class RairanCounters(wiring.Component):
             due = self.dt.last
         m.d.comb += pulse.eq(self.step.any())
         self._count(m, pulse, opens)
-        if self._spec.paper_exact:
+        if exact:
             # A count at the end of dt is in neither window.
             m.d.comb += [opens.eq(pulse & late), self.last.eq(due & ~opens)]
             with m.If(self.last):
@@ -93,7 +93,9 @@ class RairanCounters(wiring.Component):
             return m
         moved = Signal()
         turns = Signal()
+        fresh = Signal()  # the first count after reset or rest
         m.d.comb += [
+            fresh.eq(pulse & (~moved | self.rest)),
             turns.eq(pulse & moved & (self.step[1] ^ self.backward)),
             self.last.eq(due & ~(pulse & late) & ~turns),
             opens.eq(pulse & (late | due) | turns),
@@ -106,8 +108,12 @@ class RairanCounters(wiring.Component):
             # With the decay it is low from the second dt on.
             several, stays = self.c_more.any(), self.high & (self._spec.bound_decay | (self.c_dt == 1))
             measured = Mux(late, Mux(stays, self.n, self.c_dt), Mux(several, self.c_more, 1))
-            m.d.comb += [self.dt.turns.eq(turns), self.dt.high.eq(Mux(late, stays, several)), self.dt.n.eq(measured)]
-        self._update(m, pulse=pulse, opens=opens, turns=turns)
+            m.d.comb += [
+                self.dt.anew.eq(turns | fresh),
+                self.dt.high.eq(Mux(late, stays, several)),
+                self.dt.n.eq(measured),
+            ]
+        self._update(m, pulse=pulse, opens=opens, turns=turns, fresh=fresh)
         return m
 
     def _of_dt(self, constant: Callable[[int], int]) -> Value | int:
@@ -157,7 +163,7 @@ class RairanCounters(wiring.Component):
         """Whether Cdt reaches the maximum time with this end of dt, or has reached it before."""
         return self._is(self._spec.max_dt) | self._is(lambda k: self._spec.max_dt(k) - 1)
 
-    def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal) -> None:
+    def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal, fresh: Signal) -> None:
         """What a count or the end of dt makes of the estimate."""
         spec = self._spec
         several, one = self.c_more.any(), self.any
@@ -165,9 +171,6 @@ class RairanCounters(wiring.Component):
         waits = Signal()  # dt ends without a count
         with m.If(pulse):
             m.d.sync += in_step.eq(opens)
-        known = Signal()
-        with m.If(opens):
-            m.d.sync += known.eq(1)
         waited = self.c_dt + in_step
         m.d.comb += waits.eq(self.last & ~pulse)
         n: Value = self.n
@@ -182,20 +185,20 @@ class RairanCounters(wiring.Component):
             update: Value | int = 1,
             high: int = 0,
             forced: int = 0,
-            stalled: int = 0,
+            at_rest: int = 0,
             loose: Value | int = 0,
             unsynced: Value | int = 0,
         ) -> None:
             if self.dt is not None:
                 m.d.sync += self.shift.eq(self.dt.shift)
             if spec.bounds:
-                m.d.sync += [self.loose.eq(loose), self.unsynced.eq(unsynced), self.known.eq(known)]
+                m.d.sync += [self.loose.eq(loose), self.unsynced.eq(unsynced)]
             m.d.sync += [
                 self.update.eq(update),
                 self.n.eq(n),
                 self.high.eq(high),
                 self.forced.eq(forced),
-                self.stalled.eq(stalled),
+                self.at_rest.eq(at_rest),
             ]
 
         m.d.sync += self.update.eq(0)
@@ -206,11 +209,11 @@ class RairanCounters(wiring.Component):
         with m.Elif(self.last & (pulse | (one & self.high))):
             # Ndt1 ← 1 by a count just at the end of dt, or Nep1 ← 1.
             set_(1, loose=~pulse)
-        with m.Elif(opens & ((self.c_dt != 1) | ~self.high)):
-            set_(self.c_dt, loose=self.rest, unsynced=~in_step)
+        with m.Elif(opens & ~fresh & ((self.c_dt != 1) | ~self.high)):
+            set_(self.c_dt, unsynced=~in_step)
         with m.Elif(waits & self._is_longest()):
             # At rest no update would correct it after an upset.
-            set_(0, update=~self.rest, forced=1, stalled=1)
+            set_(0, update=~self.rest, forced=1, at_rest=1)
         if spec.bound_decay:
             with m.Elif(waits & Mux(self.high, waited != 0, (waited > n) & self.n.any())):
                 set_(waited, forced=1, loose=1)

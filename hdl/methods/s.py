@@ -2,6 +2,7 @@
 
 from amaranth import Module, Signal, Value
 from amaranth.lib import data, wiring
+from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.alteration import AlterationDetector
@@ -25,6 +26,8 @@ class SMethod(wiring.Component):
     tick : In(1)
     pulse_count : In(signed)
         m_e, valid with `tick`.
+    stalled : Out(1)
+        Of the tick, see `IntervalAccumulator`.
     updates : Out(stream)
         `velocity` has `native_frac_bits` fraction bits, `interval` is m_s in ticks. The bounds are those of one count
         more and less in the window, rounded outward; they are not valid for the first window. All is held until the
@@ -32,7 +35,7 @@ class SMethod(wiring.Component):
     """
 
     def __init__(self, spec: STachometer) -> None:
-        super().__init__(datapath_members(spec))
+        super().__init__({**datapath_members(spec), "stalled": Out(1)})
         self._spec = spec
         self.alteration = AlterationDetector(spec.count_width)
         self.interval_accumulator = IntervalAccumulator(
@@ -46,7 +49,7 @@ class SMethod(wiring.Component):
             spec.reciprocal,
             quotients=quotients(spec),
             numerator_width=spec.numerator_width,
-            tag=data.StructLayout({"forced": 1, "stalled": 1, **({"bounds_valid": 1} if spec.bounds else {})}),
+            tag=data.StructLayout({"forced": 1, **({"bounds_valid": 1} if spec.bounds else {})}),
             serial=spec.serial,
             margin=spec.numerator_per_count,
         )
@@ -80,7 +83,7 @@ class SMethod(wiring.Component):
             quotient.base.eq(alteration.previous),
             quotient.numerator.eq(interval.numerator),
             quotient.tag.forced.eq(interval.forced),
-            quotient.tag.stalled.eq(interval.stalled),
+            self.stalled.eq(interval.stalled),
             self.updates.valid.eq(found.valid),
             new.interval.eq(found.p.m),
             *(new[name].eq(found.p[name]) for name in found.p.shape().members if name != "m"),

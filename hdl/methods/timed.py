@@ -27,9 +27,8 @@ class TimedDatapath(wiring.Component):
     step : In(signed(2))
         As late as `tick`; only if times are counted in clocks.
     updates : Out(stream)
-        `interval` is in timer periods. `forced`: silence alone caused the update. `stalled`: in addition, there was no
-        count in the maximum time before it. `out_of_range`, only if that is possible: the velocity was too high to be
-        measured, and is saturated.
+        `interval` is in timer periods. `forced`: silence alone caused the update. `out_of_range`, only if that is
+        possible: the velocity was too high to be measured, and is saturated.
     """
 
     def __init__(self, spec: TimedTachometer) -> None:
@@ -92,7 +91,6 @@ class TimedDatapath(wiring.Component):
             quotient.dividend.eq(Mux(timer.count, distance, 0)),
             quotient.divisor.eq(time),
             quotient.forced_in.eq(~timer.count),
-            quotient.stalled_in.eq(~timer.count & ~timer.opened),
         ]
         if spec.bounds:
             # The first period after reset was not seen completely.

@@ -26,7 +26,7 @@ class LowPass(wiring.Component):
     layout : data.StructLayout
         Of an update; all of it but the velocity is handed on as it is.
     clears : bool
-        A `stalled` update is taken as it is, whatever its time.
+        An update that `rests` is taken as it is, whatever its time.
 
     Members
     -------
@@ -79,7 +79,7 @@ class LowPass(wiring.Component):
         factor = Signal(bits, reset_less=True)
         step = Signal(range(bits + 2), reset_less=True)
         second = Signal(reset_less=True)
-        clear = following.stalled if self._clears else Const(0)
+        clear = following.rests if self._clears else Const(0)
         low, *high = self._factors(m, take, interval)
         last = step == bits + 1
         m.d.comb += take.eq(waiting & ~working & ~adding)

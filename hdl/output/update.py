@@ -12,8 +12,13 @@ VELOCITIES = {"velocity": 0, **BOUNDS}
 
 
 def update_layout(spec: TachometerSpec) -> data.StructLayout:
-    """What a method hands on: all outputs that change only with `velocity_valid`, velocities in counts per tick."""
-    fields = {"velocity": signed(spec.native_width), "interval": spec.interval_width, "forced": 1, "stalled": 1}
+    """What a method hands on: all outputs that change only with `velocity_valid`, velocities in counts per tick.
+
+    `rests` is for the low-pass filter: no update will follow before the next count.
+    """
+    fields = {"velocity": signed(spec.native_width), "interval": spec.interval_width, "forced": 1}
+    if spec.last_at_rest and spec.lowpass is not None:
+        fields["rests"] = 1
     if spec.bounds:
         fields |= {name: signed(spec.bound_width) for name in BOUNDS} | {"bounds_valid": 1}
     fields |= {port.name: signed(port.width) if port.signed else port.width for port in spec.method_ports}
@@ -22,7 +27,7 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
 
 def shown_layout(layout: data.StructLayout, output: VelocityOutput) -> data.StructLayout:
     """What the output stage makes of such an update: velocities in another unit, and whether one was saturated."""
-    shown = {name: signed(output.port_width) for name in layout.members if name in VELOCITIES}
+    shown = {name: signed(output.width) for name in layout.members if name in VELOCITIES}
     return data.StructLayout({**layout.members, **shown, "velocity_overflow": 1})
 
 

@@ -13,11 +13,13 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
 FLAGS = ("-std=c++17", "-O2", "-w", "-fPIC", "-fvisibility=hidden", "-pthread")
 
+_UTF8: Any = {"encoding": "utf-8", "errors": "replace"}  # whatever the locale is
 _KEPT = 1000  # files
 _ABANDONED = 24 * 3600.0  # seconds after which a folder is no build that is under way
 
@@ -67,7 +69,7 @@ def compiler() -> tuple[str, ...]:
 @functools.cache
 def version(command: tuple[str, ...]) -> str:
     """What a compiler says that it is."""
-    return subprocess.run([*command, "--version"], capture_output=True, text=True).stdout
+    return subprocess.run([*command, "--version"], capture_output=True, **_UTF8).stdout
 
 
 def run(command: Sequence[str | Path], what: str, folder: Path | None = None, text: str | None = None) -> str:
@@ -78,7 +80,7 @@ def run(command: Sequence[str | Path], what: str, folder: Path | None = None, te
     OSError
         If it fails, with the line that says why.
     """
-    done = subprocess.run(list(map(str, command)), cwd=folder, input=text, capture_output=True, text=True)
+    done = subprocess.run(list(map(str, command)), cwd=folder, input=text, capture_output=True, **_UTF8)
     if done.returncode:
         said = (done.stderr + done.stdout).splitlines() or [f"exit status {done.returncode}"]
         raise OSError(f"{what}: {next((line for line in said if 'error' in line.lower()), said[-1])}")
@@ -88,6 +90,25 @@ def run(command: Sequence[str | Path], what: str, folder: Path | None = None, te
 def digest(*parts: object) -> str:
     """A name for some content: different content has another name."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def precompiled(folder: Path, name: str, *flags: str) -> list[str]:
+    """Options with which g++, and only that, takes a header that it has compiled before: half the time of a small core.
+
+    `folder` is one of include files; what is compiled with these options needs the same `flags`.
+    """
+    header = folder / name
+    command = compiler()
+    if "Free Software Foundation" not in version(command):
+        return []
+
+    def make(building: Path) -> Path:
+        made = building / "header.gch"
+        run([*command, *FLAGS, *flags, "-x", "c++-header", f"-I{folder}", "-o", made, header], "compiler")
+        return made
+
+    made = cached(digest(header.read_text(), version(command), command, FLAGS, flags), ".gch", make)
+    return ["-include", str(made.with_suffix(""))]
 
 
 def compile_library(source: str, folder: Path, *more: str | Path) -> Path:

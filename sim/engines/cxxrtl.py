@@ -84,7 +84,9 @@ class Cxxrtl(CompiledEngine):
 
         def make(folder: Path) -> Path:
             text = translate(netlist)
-            return build.compile_library(design.source(text + model_of(design, text)), folder, f"-I{headers()}")
+            source = design.source(text + model_of(design, text))
+            header = build.precompiled(headers(), "cxxrtl/cxxrtl.h")
+            return build.compile_library(source, folder, *header, f"-I{headers()}")
 
         return build.cached(key, ".so", make)
 

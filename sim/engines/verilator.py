@@ -89,8 +89,9 @@ class Verilator(CompiledEngine):
             made = ["Vcore.h", *sorted(path.name for path in (folder / "made").glob("*.cpp"))]
             model = _model(design, "\n".join(f'#include "{name}"' for name in made))
             objects = [_runtime(source, tools) for source in _RUNTIME]
+            options = [*build.precompiled(home() / "include", "verilated.h", *self.more), *self.more]
             return build.compile_library(
-                design.source(model), folder, f"-I{home() / 'include'}", f"-I{folder / 'made'}", *objects, *self.more
+                design.source(model), folder, *options, f"-I{home() / 'include'}", f"-I{folder / 'made'}", *objects
             )
 
         return build.cached(key, ".so", make)

@@ -9,6 +9,7 @@ from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
+from tachometry.sim.golden.standstill import with_stalled
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import TachometerSpec
@@ -24,12 +25,13 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
     steps = decoded(spec, trace)
     golden = model(spec)
     if spec.own_ticks:
-        last, beyond = golden.windows(steps, trace.n_clocks - spec.tick_latency)
+        last, beyond, nominal = golden.windows(steps, trace.n_clocks - spec.tick_latency)
         tick_errors = np.empty(0, dtype=np.int64)
     else:
         last, tick_errors = windows(spec, trace)
-        beyond = None
+        beyond, nominal = None, np.ones_like(last)
     ticks, index = count(spec, steps, last, beyond)
+    ticks = with_stalled(spec, ticks, nominal)
     updates = in_unit(spec, filtered(spec, ticks, golden.updates(ticks, steps, trace.n_clocks)))
     tables = {
         "tick": with_age(spec, ticks, updates),

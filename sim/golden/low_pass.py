@@ -21,7 +21,7 @@ def filtered(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
     came = updates.clock
     # Ticks from the clock of the update before, or from reset, on.
     intervals = np.diff(np.searchsorted(ticks.clock, came, side="left"), prepend=0)
-    clears = (updates.stalled & spec.last_when_stalled).tolist()
+    clears = (updates.get("rests") & spec.last_at_rest).tolist()
 
     taken: list[tuple[int, int, int]] = []  # clock, row, intervals
     free = 0

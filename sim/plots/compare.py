@@ -32,8 +32,9 @@ def _draw(
 ) -> Figure:
     heights = {"velocity": 3.2} | ({curve.name: 0.8 for curve in curves} if true_speed else {})
     figure, panels = place_panels(spec, heights, "Comparison")
-    truth = true_speed(instants) if true_speed else None
-    values = [curve.estimate.at(instants) for curve in curves]
+    unit = spec.shown_unit
+    truth = unit.of(true_speed(instants)) if true_speed else None
+    values = [unit.of(curve.estimate.at(instants)) for curve in curves]
     # What goes up and down most is drawn behind, as it would bury the others.
     calmest = sorted(range(len(curves)), key=lambda place: float(np.sum(np.abs(np.diff(values[place])))))
     for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
@@ -56,18 +57,20 @@ def _draw(
         axes.plot(instants[kept], error[kept], color=colour, linewidth=0.6)
         words = f"{curve.name}: {curve.what}"
         axes.text(0.005, 0.86, words, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
-        axes.text(0.995, 0.86, f"RMS {result.rms:.3g} rad/s", transform=axes.transAxes, ha="right", fontsize=7)
+        axes.text(
+            0.995, 0.86, f"RMS {unit.of(result.rms):.3g} {unit.name}", transform=axes.transAxes, ha="right", fontsize=7
+        )
     if truth is not None:
         kept = columns(instants, truth)
         panels["velocity"].plot(instants[kept], truth[kept], color="black", linewidth=0.9, label="shaft (true)")
         # Most of all errors set the scale; what leaves the panel is a spike.
-        reach = np.percentile([result.max for result in scores if result.max is not None], 60)
+        reach = np.percentile([unit.of(result.max) for result in scores if result.max is not None], 60)
         for curve in curves:
             panels[curve.name].set_ylim(-1.1 * reach, 1.1 * reach)
-    panels["velocity"].set_ylabel("velocity (rad/s)")
+    panels["velocity"].set_ylabel(f"velocity ({unit.name})")
     panels["velocity"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=12, fontsize=7)
     last = list(panels.values())[-1]
-    below = "; below the velocities the errors in rad/s, at one scale" if true_speed else ""
+    below = f"; below the velocities the errors in {unit.name}, at one scale" if true_speed else ""
     last.set_xlabel(f"time (s){below}")
     last.set_xlim(instants[0], instants[-1])
     return figure

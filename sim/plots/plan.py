@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from tachometry.sim.plots.style import COLOURS, ESTIMATE, FORCED, place_panels, save_figure
 from tachometry.sim.studies.plan import Plan
-from tachometry.spec import Speed, TachometerSpec
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import SpeedUnit
 
 _HEIGHTS = {"resolution": 3.4, "time": 2.4}  # inches
 
@@ -34,7 +35,7 @@ def save_plans_plot(path: Path, spec: TachometerSpec, plans: Mapping[str, Plan],
 
 def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Figure:
     figure, panels = place_panels(spec, dict.fromkeys(("resolution", "relative", "time", "product"), 2.2), "Methods")
-    per_unit = Speed.parse(f"1{unit}").rad_per_s
+    per_unit = SpeedUnit(unit).rad_per_s
     for (name, plan), colour in zip(plans.items(), COLOURS * len(plans), strict=False):
         values = (plan.resolution / per_unit, 100 * plan.relative, plan.measurement_time, plan.product)
         for axes, value in zip(panels.values(), values, strict=True):
@@ -52,7 +53,7 @@ def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Fig
 def _draw(spec: TachometerSpec, plan: Plan, unit: str) -> Figure:
     figure, panels = place_panels(spec, _HEIGHTS)
     resolution, time = panels["resolution"], panels["time"]
-    per_unit = Speed.parse(f"1{unit}").rad_per_s
+    per_unit = SpeedUnit(unit).rad_per_s
     speed, forced = plan.speed / per_unit, plan.forced
     left, right = speed[0] / 1.05, speed[-1] * 1.05
     marks = [("one count per tick", spec.unit_velocity / per_unit, ":")]

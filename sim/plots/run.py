@@ -66,14 +66,15 @@ def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figur
 
 
 def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None, scale: float) -> None:
-    clock_hz, updates = spec.timing.clock_hz, run.updates
-    clock, velocity = _held_to_end(updates.clock, updates.velocity * spec.rad_per_s_per_lsb, run.n_clocks)
+    clock_hz, updates, unit = spec.timing.clock_hz, run.updates, spec.shown_unit
+    velocity = unit.of(updates.velocity * spec.rad_per_s_per_lsb)
+    clock, velocity = _held_to_end(updates.clock, velocity, run.n_clocks)
     kept = columns(clock, velocity)
     time = clock[kept] / clock_hz * scale
     axes.plot(time, velocity[kept], color=ESTIMATE, drawstyle="steps-post", label="measured (held)")
     if true_speed:
         instants = np.linspace(0, run.n_clocks / clock_hz, max(_TRUE_POINTS, 2 * len(run.ticks.clock)))
-        speed = true_speed(instants)
+        speed = unit.of(true_speed(instants))
         # Below the steps where they can be told apart, else above the band that they merge to.
         over = len(clock) > COLUMNS // 4
         colour, width = ("black", 0.8) if over else ("0.6", 1.8)
@@ -86,9 +87,9 @@ def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
             zorder=3 if over else 1.9,
             label="shaft (true)",
         )
-    axes.set_ylabel("velocity (rad/s)")
+    axes.set_ylabel(f"velocity ({unit.name})")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=2)
-    _multiples(axes, spec.unit_velocity)
+    _multiples(axes, unit.of(spec.unit_velocity))
 
 
 def _held_to_end(clock: NDArray[np.int64], values: NDArray[np.generic], n_clocks: int) -> tuple[FloatArray, FloatArray]:
@@ -104,10 +105,10 @@ def _multiples(axes: Axes, unit_velocity: float) -> None:
     def counts(velocity: Any) -> Any:
         return velocity / unit_velocity
 
-    def rad_per_s(count: Any) -> Any:
+    def speed(count: Any) -> Any:
         return count * unit_velocity
 
-    right = axes.secondary_yaxis("right", functions=(counts, rad_per_s))
+    right = axes.secondary_yaxis("right", functions=(counts, speed))
     right.set_ylabel("counts per tick")
     right.spines["right"].set_visible(True)
     low, high = (v / unit_velocity for v in axes.get_ylim())
@@ -118,17 +119,17 @@ def _multiples(axes: Axes, unit_velocity: float) -> None:
 
 
 def _error(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed, scale: float) -> None:
-    held = held_velocity(spec, run)
-    error = held.velocity_rad_s - true_speed(held.time)
+    held, unit = held_velocity(spec, run), spec.shown_unit
+    error = unit.of(held.velocity_rad_s - true_speed(held.time))
     kept = columns(held.time, error)
     axes.axhline(0, color="0.6", linewidth=0.7)
     axes.plot(held.time[kept] * scale, error[kept], color=ERROR)
-    axes.set_ylabel("error (rad/s)")
+    axes.set_ylabel(f"error ({unit.name})")
     statistics = velocity_error(held, true_speed)
     if statistics:
         axes.set_title(
-            f"held − true at every tick: RMS {statistics.rms:.3g}, mean {statistics.mean:.3g}, "
-            f"max {statistics.max:.3g} rad/s",
+            f"held − true at every tick: RMS {unit.of(statistics.rms):.3g}, mean {unit.of(statistics.mean):.3g}, "
+            f"max {unit.of(statistics.max):.3g} {unit.name}",
             loc="left",
             fontsize=8,
         )

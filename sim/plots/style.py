@@ -98,12 +98,12 @@ def place_panels(
 
 
 def _title(spec: TachometerSpec, what: str | None) -> str:
-    timing = spec.timing
+    timing, unit = spec.timing, spec.shown_unit
     return (
         f"{what or spec.heading}: "
         f"{spec.encoder.pulses_per_rev} lines ×{spec.encoder.decoding}, "
         f"tick {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
-        f"clock {_frequency(timing.clock_hz)}, one count per tick = {spec.unit_velocity:.5g} rad/s"
+        f"clock {_frequency(timing.clock_hz)}, one count per tick = {unit.of(spec.unit_velocity):.5g} {unit.name}"
     )
 
 

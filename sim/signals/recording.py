@@ -108,10 +108,7 @@ class Recording(_Lines):
         ValueError
             If there are too many clocks to be told apart.
         """
-        if self.duration * clock_hz >= 1 << 53:
-            raise ValueError(f"a recording must last less than 2^53 clocks, not {self.duration:.6g} s")
-        edges = self.time * clock_hz
-        clock = np.ceil(edges - 2 * np.spacing(edges)).astype(np.int64)
+        clock = self._clock(clock_hz)
         n_clocks = int(np.floor(self.duration * clock_hz))
         last = np.append(clock[1:] != clock[:-1], True) & (
             clock < max(n_clocks, 1)
@@ -121,6 +118,31 @@ class Recording(_Lines):
         changed = np.append(True, level[1:] != level[:-1])
         lines = _split(level[changed], list(self.lines))
         return PinTrace(clock[row[changed]], n_clocks=max(n_clocks, 1), **lines)
+
+    def _clock(self, clock_hz: int) -> NDArray[np.int64]:
+        """The clock edge at which each row is seen."""
+        if self.duration * clock_hz >= 1 << 53:
+            raise ValueError(f"a recording must last less than 2^53 clocks, not {self.duration:.6g} s")
+        edges = self.time * clock_hz
+        return np.ceil(edges - 2 * np.spacing(edges)).astype(np.int64)
+
+    @property
+    def _edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows in which A or B changes, and how many of both do."""
+        changes = np.count_nonzero(np.diff(np.stack([self.a, self.b])), axis=0)
+        row = np.flatnonzero(changes) + 1
+        return row, changes[row - 1]
+
+    def n_merged(self, clock_hz: int, n_clocks: int) -> int:
+        """Edges of A and B that come in the same clock as an edge before them, within the first `n_clocks`."""
+        row, _ = self._edges
+        clock = self._clock(clock_hz)[row]
+        return int(np.count_nonzero(np.diff(clock[clock < n_clocks]) == 0))
+
+    @property
+    def n_together(self) -> int:
+        """Instants at which A and B both change."""
+        return int(np.count_nonzero(self._edges[1] == 2))
 
 
 @dataclass(frozen=True)

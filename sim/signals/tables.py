@@ -71,9 +71,10 @@ def velocity_error(
 def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
     """Write a CSV with a row per update: when it came, which tick closed its window, and what all its ports say.
 
-    The velocity stands there as the raw number and in rad/s; all else is raw, by the names of the ports.
+    The velocity stands there as the raw number and in the unit of the core (in rad/s, if that is counts per tick); all
+    else is raw, by the names of the ports.
     """
-    updates = run.updates
+    updates, unit = run.updates, spec.shown_unit
     tick = np.searchsorted(run.ticks.clock, updates.clock - spec.tick_to_velocity, side="right") - 1
     columns = {
         "clock": updates.clock,
@@ -81,7 +82,7 @@ def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
         "interval": updates.interval,
         "forced": updates.forced.astype(np.int64),
         "velocity_raw": updates.velocity,
-        "velocity_rad_s": updates.velocity * spec.rad_per_s_per_lsb,
+        f"velocity_{unit.suffix}": unit.of(updates.velocity * spec.rad_per_s_per_lsb),
     }
     columns |= {name: updates[name].astype(np.int64) for name in updates.columns if name not in (*columns, "velocity")}
     write_csv(path, tuple(columns), rows_of(list(columns.values())))

@@ -20,8 +20,9 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
     """Options of a method with the values that they take; the empty text leaves the option out.
 
     Values in words depend on the rest: `most - 20` fraction bits, 20 less than there can be; `needed - 2` bits of the
-    velocity, two less than it can need; `some counts per tick`, about the speed of the motions; the `longest` minimum
-    time. The maximum time is in ticks. A flag that needs another is a value of that: `yes index-reset`.
+    velocity, two less than it can need, if no speed must fit; `some counts per tick`, about the speed of the motions;
+    the `longest` minimum time. The maximum time is in ticks. A flag that needs another is a value of that: `yes
+    index-reset`.
     """
     spec = spec_class(method)
     found = {about.name: about.tested for about in own_options(method)}
@@ -124,7 +125,9 @@ def _texts(method: str, row: Texts) -> Texts:
         bits = max(fewest, most - _less(frac_bits)) if "-" in frac_bits else min(int(frac_bits), most)
         texts["frac-bits"] = str(bits)
     if width:
-        texts["velocity-width"] = str(max(8, of_texts(method, texts).velocity_width - _less(width)))
+        # The greatest speed must fit.
+        less = 0 if "max-speed" in texts else _less(width)
+        texts["velocity-width"] = str(max(8, of_texts(method, texts).velocity_width - less))
     return texts
 
 

@@ -12,6 +12,7 @@ from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.theory.performance import PERFORMANCES, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import TachometerSpec
+from tachometry.spec.units import SpeedUnit
 
 _UNITS = 10  # of the default range
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
@@ -101,26 +102,26 @@ def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.fl
     return np.unique(np.concatenate([steady, near[(near > low) & (near < high)]]))
 
 
-def write_plan(path: Path, plan: Plan) -> None:
+def write_plan(path: Path, plan: Plan, unit: SpeedUnit) -> None:
     """Write a CSV with a row per speed."""
-    columns = _columns(plan)
+    columns = _columns(plan, unit)
     write_csv(path, tuple(columns), rows_of(list(columns.values())))
 
 
-def write_plans(path: Path, plans: Mapping[str, Plan]) -> None:
+def write_plans(path: Path, plans: Mapping[str, Plan], unit: SpeedUnit) -> None:
     """Write a CSV with a row per method and speed."""
-    columns = [_columns(plan) | {"product_rad": plan.product} for plan in plans.values()]
+    columns = [_columns(plan, unit) | {"product_rad": plan.product} for plan in plans.values()]
     rows = ((name, *row) for name, one in zip(plans, columns, strict=True) for row in rows_of(list(one.values())))
     write_csv(path, ("method", *columns[0]), rows)
 
 
-def _columns(plan: Plan) -> dict[str, NDArray[Any]]:
+def _columns(plan: Plan, unit: SpeedUnit) -> dict[str, NDArray[Any]]:
     return {
-        "speed_rad_s": plan.speed,
+        f"speed_{unit.suffix}": unit.of(plan.speed),
         "counts_per_tick": plan.counts_per_tick,
         "interval_ticks": plan.interval,
         "measurement_time_s": plan.measurement_time,
-        "resolution_rad_s": plan.resolution,
+        f"resolution_{unit.suffix}": unit.of(plan.resolution),
         "relative_resolution": plan.relative,
         "forced": plan.forced.astype(np.int64),
     }

@@ -43,15 +43,15 @@ class VelocityOutput:
         LSBs of the output in one LSB of v, at most ¼; or 1, to hold v within fewer bits.
     max_native : int
         Largest |v|.
-    width : int or None
-        Bits of the output; None: as many as it can need.
+    width : int
+        Bits of the output.
     bounds : bool
         Whether v may be a bound.
     """
 
     ratio: Fraction
     max_native: int
-    width: int | None
+    width: int
     bounds: bool = False
 
     @property
@@ -85,20 +85,19 @@ class VelocityOutput:
         slack = 0 if exact else 1 << max(self.shift - 4, 0)
         return -slack if towards < 0 else (1 << self.shift) - 1 + slack
 
+    def scaled(self, native: int, towards: int = 0) -> int:
+        """The output for a raw native velocity, before it is held within the limit."""
+        return (native * self.multiplier + self.rounding(towards)) >> self.shift
+
     @property
     def greatest(self) -> int:
         """The greatest output, which may be that of an upper bound."""
-        return (self.max_native * self.multiplier + self.rounding(int(self.bounds))) >> self.shift
+        return self.scaled(self.max_native, int(self.bounds))
 
     @property
     def limit(self) -> int:
         """The greatest magnitude that is shown."""
-        return self.greatest if self.width is None else min(self.greatest, (1 << (self.width - 1)) - 1)
-
-    @property
-    def port_width(self) -> int:
-        """Bits of the output, signed."""
-        return self.greatest.bit_length() + 1 if self.width is None else self.width
+        return min(self.greatest, (1 << (self.width - 1)) - 1)
 
     @property
     def digits(self) -> tuple[tuple[int, int], ...]:

@@ -67,6 +67,14 @@ class MTTachometer(TimedTachometer):
         return max(self._min_time // self.timer_cycles, self.division_periods - 1)
 
     @property
+    def min_time_cycles(self) -> int:
+        return self.min_periods * self.timer_cycles
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (*self._raised("minimum time", self._min_time, self.min_time_cycles), *super().notes)
+
+    @property
     def max_interval(self) -> int:
         # A window stays open while the one before is divided.
         late = -(-self.division_clocks // self.min_tick_cycles) if self.may_be_late else 0
@@ -79,4 +87,4 @@ class MTTachometer(TimedTachometer):
 
     @property
     def parameters(self) -> dict[str, Any]:
-        return super().parameters | {"min_time": self._min_time}
+        return super().parameters | {"min_time": self.min_time_cycles}

@@ -61,7 +61,7 @@ class RairanTachometer(TachometerSpec):
     update_by = "count"
     own_ticks = True
     pairs_with = TachometerSpec.pairs_with | {"index", "index-reset", "lowpass"}
-    last_when_stalled = True
+    last_at_rest = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -122,6 +122,10 @@ class RairanTachometer(TachometerSpec):
             longest = min(longest, (MAX_TABLE // self.max_count).bit_length() - 1)
         # Nep1 or Nep1 − 1 of 2^k dt is not rounded.
         return longest if self.estimate == "n3" else min(longest, self.native_frac_bits)
+
+    @property
+    def max_tick_shift(self) -> int:
+        return self.max_shift
 
     @property
     def adaptive_dt(self) -> AdaptiveDt:
@@ -239,12 +243,14 @@ class RairanTachometer(TachometerSpec):
             held(
                 *(UPDATE, "n_ep1", self.max_pulse_count.bit_length()),
                 unit="counts",
-                help="Nep1 of the velocity: counts in a sampling period dt.",
+                help="Nep1 of the velocity: counts in a sampling period dt. With --paper-exact: the register Nep1 of "
+                "Table 1 as it is, whichever of Nep1 and Ndt1 the velocity comes from.",
             ),
             held(
                 *(UPDATE, "n_dt1", self.interval_width),
                 unit="dt",
-                help="Ndt1 of the velocity: sampling periods dt from one count to the next.",
+                help="Ndt1 of the velocity: sampling periods dt from one count to the next. With --paper-exact: the "
+                "register Ndt1 of Table 1 as it is.",
             ),
             *(
                 [

@@ -18,6 +18,11 @@ class TTachometer(TimedTachometer):
     equation = 9
 
     @property
+    def max_velocity(self) -> int:
+        # On the lattice at most one count in a tick.
+        return min(self.max_count, self.max_quotient)
+
+    @property
     def max_interval(self) -> int:
         return self.max_periods
 

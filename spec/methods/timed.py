@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 from tachometry.spec.option import ParameterError, option
 from tachometry.spec.port import UPDATE, Port, held
 from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.units import plural
 
 _TIMERS = ("clock", "tick")
 
@@ -88,6 +89,25 @@ class TimedTachometer(TachometerSpec):
     def max_periods(self) -> int:
         """Timer periods without a count after which a 0 is forced: the maximum time, or a division if longer."""
         return max(self.timing.max_ticks * self.timer_periods, self.division_periods)
+
+    @property
+    def max_time_cycles(self) -> int:
+        return self.max_periods * self.timer_cycles
+
+    @property
+    def standstill_ticks(self) -> int:
+        return -(-self.max_time_cycles // self.timing.tick_cycles)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        given = self.timing.max_ticks * self.timing.tick_cycles
+        return (*super().notes, *self._raised("maximum time", given, self.max_time_cycles))
+
+    def _raised(self, what: str, given: int, built: int) -> tuple[str, ...]:
+        """A note if a time is longer than it was asked for."""
+        if built == given:
+            return ()
+        return (f"{what} raised from {plural(given, 'clock')} to {built}: a division takes {self.division_clocks}",)
 
     @property
     def remembered_periods(self) -> int:

@@ -1,5 +1,10 @@
 """Outputs appear whole and all together, or not at all."""
 
+import os
+import resource
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -95,3 +100,82 @@ def test_a_link_is_replaced_and_what_it_points_at_stays(tmp_path: Path) -> None:
     with Outputs({"a": tmp_path / "link"}) as outputs:
         outputs["a"].write_text("A")
     assert everything(tmp_path) == {"file": "before", "link": "A"}
+
+
+def in_a_child(folder: Path, work: Callable[[Outputs], None]) -> tuple[int, int]:
+    """A process that is within the block, its files not yet renamed; and what it waits for until it ends."""
+    ready, let = os.pipe(), os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            with Outputs({"a": folder / "a", "b": folder / "b"}) as outputs:
+                work(outputs)
+                os.write(ready[1], b".")
+                os.close(let[1])
+                os.read(let[0], 1)
+                raise KeyboardInterrupt
+        finally:
+            os._exit(0)
+    os.close(ready[1])
+    os.close(let[0])
+    assert os.read(ready[0], 1) == b"."
+    os.close(ready[0])
+    return child, let[1]
+
+
+def test_what_a_killed_process_has_left_is_removed_and_what_a_living_one_has_stays(tmp_path: Path) -> None:
+    (tmp_path / "b").write_text("before")
+
+    def killed_while_renaming(outputs: Outputs) -> None:
+        outputs["a"].write_text("half")
+        (tmp_path / "b").replace(outputs["b"].parent.parent / "old" / "b")
+
+    child, gate = in_a_child(tmp_path, killed_while_renaming)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    os.close(gate)
+    assert not (tmp_path / "b").exists()
+    assert len(list(tmp_path.glob(".tachometry-*"))) == 1
+
+    living, gate = in_a_child(tmp_path, lambda outputs: None)
+    kept = list(tmp_path.glob(".tachometry-*"))
+    assert len(kept) == 1
+    assert (tmp_path / "b").read_text() == "before"
+    with Outputs({"a": tmp_path / "a"}) as outputs:
+        outputs["a"].write_text("A")
+    assert list(tmp_path.glob(".tachometry-*")) == kept
+    os.close(gate)
+    os.waitpid(living, 0)
+    assert everything(tmp_path) == {"a": "A", "b": "before"}
+
+
+def test_a_full_disk_names_the_output(tmp_path: Path) -> None:
+    def written() -> None:
+        with Outputs({"a": tmp_path / "a", "b": tmp_path / "b"}) as outputs:
+            outputs["a"].write_text("A")
+            with limited(resource.RLIMIT_FSIZE, 1000), outputs["b"].open("w") as file:
+                file.write("B" * 100_000)
+
+    with pytest.raises(OSError, match=rf"^cannot write {tmp_path}/b: File too large$"):
+        written()
+    assert everything(tmp_path) == {}
+
+
+@contextmanager
+def limited(what: int, soft: int) -> Iterator[None]:
+    before = resource.getrlimit(what)
+    resource.setrlimit(what, (soft, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(what, before)
+
+
+def test_an_error_that_names_a_temporary_file_is_of_its_output(tmp_path: Path) -> None:
+    def written() -> None:
+        with Outputs({"a": tmp_path / "a"}) as outputs:
+            outputs["a"].mkdir()
+            outputs["a"].write_text("A")
+
+    with pytest.raises(OSError, match=rf"^cannot write {tmp_path}/a: Is a directory$"):
+        written()

@@ -35,7 +35,7 @@ CORE = """
     --ppr --decoding --clock --tick --max-time --external-tick --max-tick-period --unit --frac-bits --lsb
     --velocity-width --cancel --no-cancel --max-speed --position-width --filter --index --index-reset
 """.split()
-DEFAULTS = ("48MHz", "20us", "10ms", "count/tick", "16 in count/tick, else 10 or as many as there can be", "4")
+DEFAULTS = ("48MHz", "20us", "10ms", "count/tick", "4", "as many as it can need")
 FAULTS = "--jitter --nonuniformity --phase-error --duty-error --bounce --lost --illegal".split()
 OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
 

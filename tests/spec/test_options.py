@@ -53,7 +53,7 @@ def test_every_option_does_what_it_says() -> None:
         max_tick_cycles=150,
         unit="rpm",
         frac_bits=3,
-        velocity_bits=20,
+        velocity_width=20,
         max_speed=Speed.parse("900rpm"),
         position_width=20,
         filter_clocks=3,

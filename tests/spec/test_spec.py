@@ -146,7 +146,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "max_ticks": 500,
         "unit": "count/tick",
         "frac_bits": 16,
-        "velocity_bits": None,
+        "velocity_width": 19,
         "max_speed": "400rad/s",
         "position_width": 32,
         "filter_clocks": 0,

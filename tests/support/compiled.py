@@ -5,28 +5,9 @@ from pathlib import Path
 from amaranth.back import rtlil
 from amaranth.lib import wiring
 
-from tachometry.sim.engines.build import FLAGS, cached, compiler, digest, run, version
+from tachometry.sim.engines.build import FLAGS, compiler, precompiled, run
 from tachometry.sim.engines.cxxrtl import headers, translate
 from tachometry.sim.engines.verilator import verilate
-
-
-def precompiled(folder: Path, name: str, *flags: str) -> list[str]:
-    """Options with which g++, and only that, takes a header that it has compiled before: half the time of a small text.
-
-    `folder` is one of include files; what is compiled with these options needs the same `flags`.
-    """
-    header = folder / name
-    command = compiler()
-    if "Free Software Foundation" not in version(command):
-        return []
-
-    def make(building: Path) -> Path:
-        made = building / "header.gch"
-        run([*command, *FLAGS, *flags, "-x", "c++-header", f"-I{folder}", "-o", made, header], "compiler")
-        return made
-
-    made = cached(digest(header.read_text(), version(command), FLAGS, flags), ".gch", make)
-    return ["-include", str(made.with_suffix(""))]
 
 
 def build(component: wiring.Component, main: str, folder: Path) -> Path:

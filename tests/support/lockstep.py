@@ -2,6 +2,7 @@
 
 import itertools
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -21,6 +22,7 @@ from tachometry.spec import (
     Encoder,
     MTachometer,
     MTTachometer,
+    ParameterError,
     RairanTachometer,
     Speed,
     STachometer,
@@ -40,6 +42,7 @@ COMMON = [
     "m_e saturated",
     "sign change",
     "stalled",
+    "count after stalled",
     "position wrapped",
     "glitch swallowed",
     "index captured",
@@ -221,7 +224,9 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
         spec = replace(spec, unit=unit, frac_bits=int(rng.integers(max(coarsest, finest - 12), finest + 1)))
     if rng.random() < 0.3:
         narrower = 10 if isinstance(spec, TimedTachometer) else 4
-        spec = replace(spec, velocity_bits=max(8, spec.velocity_width - int(rng.integers(-2, narrower))))
+        width = max(8, spec.velocity_width - int(rng.integers(-2, narrower)))
+        with suppress(ParameterError):  # too narrow for the greatest speed
+            spec = replace(spec, velocity_width=width)
     return spec
 
 
@@ -242,15 +247,15 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         kind = "one tick" if n == 1 else "a power of two" if spec.shift is not None else "another number"
         return {kind: len(updates.clock)}
     if isinstance(spec, RairanTachometer):
-        rows, stalled = len(updates.clock), updates.stalled
+        rows, rest = len(updates.clock), updates.forced & (updates["n_ep1"] == 0)
         shift = updates.get("dt_shift")
         return {
             "low": _count(updates.interval > 1),
             "high": _count(updates["n_ep1"] > 1),
-            "reversal": _count((updates["n_ep1"] == 0) & ~stalled),
-            "speed that fell": _count(updates.forced & ~stalled),
-            "rest": _count(stalled),
-            "count after rest": _count(stalled[:-1] & (updates["n_ep1"][1:] == 1)),
+            "reversal": _count((updates["n_ep1"] == 0) & ~rest),
+            "speed that fell": _count(updates.forced & ~rest),
+            "rest": _count(rest),
+            "count after rest": _count(rest[:-1] & (updates["n_ep1"][1:] == 1)),
             "dt longer than nominal": _count(np.diff(run.ticks.clock) > spec.timing.tick_cycles),
             "to the letter": rows * spec.paper_exact,
             "dt longer": _count(shift),
@@ -288,8 +293,8 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
         "count after a silence": _count(overdue[:-1] & ~forced[1:]),
         "count at the maximum time": _count(~forced & (interval == spec.max_periods)),
         "one after the other": _count(np.diff(updates.clock) == spec.update_spacing),
-        "forced after the maximum time": _count(overdue & ~updates.stalled),
-        "forced again": _count(updates.stalled),
+        "forced after the maximum time": _count(overdue),
+        "forced again": _count(overdue[1:] & overdue[:-1]),
         "decay": _count(decay),
         "decay backward": _count(decay & (velocity < 0)),
         "decay again": _count(decay[1:] & decay[:-1]),
@@ -307,7 +312,8 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
         | {
             "m_e saturated": _count(run.ticks.overflow),
             "sign change": _count(np.diff(sign[sign != 0])),
-            "stalled": _count(updates.stalled),
+            "stalled": _count(run.ticks.stalled),
+            "count after stalled": _count(np.diff(run.ticks.stalled.astype(np.int64)) < 0),
             "index captured": len(run.index.clock),
             "position reset": len(run.index.clock) * spec.index_reset,
             "external tick": len(run.ticks.clock) * (spec.max_tick_cycles is not None),

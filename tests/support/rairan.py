@@ -44,7 +44,7 @@ class Row:
     n_dt1: int
     sign: int
     forced: bool
-    stalled: bool
+    rests: bool
     k: int = 0
 
 
@@ -90,15 +90,18 @@ def clock_by_clock(
     for now, s in enumerate(step):
         clock += 1
         new: tuple[int, int] | None = None
-        forced = stalled = False
-        then, measured = k, None
+        forced = rests = False
+        then, measured, anew = k, None, False
         if s and sign and s != sign:  # against the last direction: a new window, and no estimate
             sign, clock, c_ep, c_dt, in_step, new = s, 0, 1, 0, True, (0, 1)
             then = 0
-        elif s and c_dt:  # the first count after dt opens the next window
-            if c_dt >= 2 or n_ep <= 1:
-                new = (1, c_dt)
-            measured = new or (n_ep, n_dt)
+        elif s and (c_dt or not sign):  # the first count, and the first after dt, opens the next window
+            if not sign or c_dt == max_ticks >> k:  # after reset or rest nothing is known of the time before it
+                then, anew = 0, True
+            else:
+                if c_dt >= 2 or n_ep <= 1:
+                    new = (1, c_dt)
+                measured = new or (n_ep, n_dt)
             sign, clock, c_ep, c_dt, in_step = s, 0, 1, 0, True
         elif clock == dt << k:
             ends.append(now)
@@ -113,7 +116,7 @@ def clock_by_clock(
                 measured = new
                 sign, c_ep, c_dt, in_step = s, 1, 0, True
             elif new is None and c_dt == max_ticks >> k and rest_is_new:
-                new, forced, stalled = (0, 1), True, True
+                new, forced, rests = (0, 1), True, True
             elif new is None and bound_decay and n_ep:
                 waited = c_dt if in_step else c_dt - 1
                 if waited and (n_ep > 1 or waited << k > n_dt << k_of_n):
@@ -124,11 +127,11 @@ def clock_by_clock(
         if new is not None:
             n_ep, n_dt = new
             k_of_n = k
-            rows.append(Row(now, *new, sign, forced, stalled, k))
+            rows.append(Row(now, *new, sign, forced, rests, k))
         if adaptive is not None:
             if measured is not None:
                 k, falls = next_k(k, falls, *measured, *adaptive)
-            elif then != k or (new == (0, 1) and not forced):
+            elif anew or then != k or (new == (0, 1) and not forced):
                 k, falls = 0, False
     return rows, ends
 

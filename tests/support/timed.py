@@ -10,11 +10,11 @@ from tachometry.hdl.methods import DATAPATHS
 from tachometry.spec import METHODS, Encoder, Timing
 from tachometry.spec.methods.timed import TimedTachometer
 
-OUTPUTS = ["velocity_valid", "velocity", "interval", "forced", "stalled"]
+OUTPUTS = ["velocity_valid", "velocity", "interval", "forced"]
 TICK, MAX_TICKS, FRAC_BITS = 20, 20, 8
 SILENCE = TICK * MAX_TICKS  # clocks after which a 0 is forced
 
-Row = tuple[int, int, int, bool, bool]  # clock of the cause, velocity, interval, forced, stalled
+Row = tuple[int, int, int, bool]  # clock of the cause, velocity, interval, forced
 
 
 def spec_of(method: str, **options: Any) -> TimedTachometer:
@@ -43,7 +43,7 @@ def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list
         held = row if row["velocity_valid"] else held
         assert {**row, "velocity_valid": 0} == {**held, "velocity_valid": 0}
     return [
-        (clock - spec.datapath_latency, row["velocity"], row["interval"], bool(row["forced"]), bool(row["stalled"]))
+        (clock - spec.datapath_latency, row["velocity"], row["interval"], bool(row["forced"]))
         for clock, row in enumerate(seen)
         if row["velocity_valid"]
     ]
@@ -62,11 +62,11 @@ def decay(last_count: int, velocity: int, until: int) -> list[Row]:
             most = speed(3 if velocity > 0 else -3, 2 * (clock - last_count))
             if abs(most) < abs(velocity):
                 velocity = most
-                rows.append((clock, most, clock - last_count, True, False))
+                rows.append((clock, most, clock - last_count, True))
     return rows
 
 
 def silence(last_count: int, until: int) -> list[Row]:
     """The zeros that silence forces."""
     ends = range(last_count + SILENCE, until, SILENCE)
-    return [(end, 0, SILENCE, True, end != last_count + SILENCE) for end in ends]
+    return [(end, 0, SILENCE, True) for end in ends]

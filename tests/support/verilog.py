@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from support.compiled import lint, precompiled
+from support.compiled import lint
 from tachometry.hdl import export
 from tachometry.sim.engines.compiled import Design
-from tachometry.sim.engines.verilator import Verilator, home
+from tachometry.sim.engines.verilator import Verilator
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import Port, TachometerSpec
@@ -72,8 +72,7 @@ class LintingVerilator(Verilator):
     def __init__(self, folder: Path, *, few: bool) -> None:
         super().__init__()
         self._folder = folder
-        level = "-O0" if few else "-Og"
-        self.more = (level, *precompiled(home() / "include", "verilated.h", level))
+        self.more = ("-O0" if few else "-Og",)
 
     def text(self, design: Design) -> str:
         text = super().text(design)

@@ -39,13 +39,14 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
     while node != end:
         due = clock[node] + (spec.timing.tick_cycles << shift)
         after = bisect_left(clock, due, node + 1, end)
-        then = min(after, turn[node + 1])
+        then = min(after, turn[node + 1]) if node else 1
         found.append((node, then, shift))
         c_ep = min(after - max(node, 1), spec.max_count << shift)
         waited = (clock[then] - clock[node] - 1) // (due - clock[node])
         high = c_ep > 1 and waited <= 1
         n = c_ep if high else min(max(waited, 1), spec.max_dt(shift))
-        shift, falling = (0, False) if then == turn[then] else next_shift(rule, shift, n, high=high, falling=falling)
+        anew = not node or then == turn[then] or waited >= spec.max_dt(shift)
+        shift, falling = (0, False) if anew else next_shift(rule, shift, n, high=high, falling=falling)
         node = then
     nodes, thens, shifts = np.array(found, dtype=np.int64).T
     return nodes, thens, shifts

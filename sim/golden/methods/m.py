@@ -24,12 +24,9 @@ class Model:
         """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
         n = self._spec.average
 
-        def moving(row: np.ndarray) -> np.ndarray:
-            total = np.concatenate([np.zeros(n, dtype=np.int64), np.cumsum(row)])
-            return total[n:] - total[:-n]
-
         m_e = ticks.pulse_count
-        total, length = moving(m_e), np.full(len(m_e), n)
+        sums = np.concatenate([np.zeros(n, dtype=np.int64), np.cumsum(m_e)])
+        total, length = sums[n:] - sums[:-n], np.full(len(m_e), n)
 
         def quotient(counts: int, towards: int) -> np.ndarray:
             return round_quotient(total + counts, length, self._spec.native_frac_bits, towards)
@@ -38,7 +35,6 @@ class Model:
             "velocity": quotient(0, 0),
             "interval": length,
             "forced": np.zeros(len(m_e), dtype=np.bool_),
-            "stalled": moving(m_e != 0) == 0,
         }
         if self._spec.bounds:
             columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}

@@ -37,16 +37,12 @@ class Model:
         opening, ends = opening[~first[ends]], ends[~first[ends]]
         none = np.zeros(len(ends), dtype=np.bool_)
         distance, time = self._distance(counts.size, opening, ends), period[ends] - period[opening]
-        # On the lattice, whole ticks are summed: if they differ, the distance from edge to edge is a count more or
-        # less.
-        differ = (np.sign(counts.size[opening]) - np.sign(counts.size[ends])) // 2 * spec.on_lattice
-        least, most = enclosure(distance, time, less=np.maximum(-differ, 0), more=np.maximum(differ, 0))
+        least, most = enclosure(distance, time)
         found = Measurements(
             clock=counts.clock(period[ends]),
             distance=2 * distance,
             time=time,
             forced=none,
-            stalled=none,
             beyond=none,
             least=least,
             most=most,
@@ -60,15 +56,16 @@ class Model:
         What is being divided is the window that ended with the opening count, or the 0 forced before it.
         """
         clock = counts.clock(counts.period)
-        zeros = counts.clock(counts.silences(self._spec.max_periods)[0])
+        zeros = counts.clock(counts.silences(self._spec.max_periods))
         forced = np.append(zeros, -self._spec.division_clocks)[np.searchsorted(zeros, clock) - 1]
         begun = np.where(first, forced, clock)
         return np.searchsorted(clock, begun + self._spec.division_clocks)
 
     def _distance(self, size: Ints, opening: Ints, closing: Ints) -> Ints:
-        """Counts from an opening to a closing one."""
+        """Counts from the edge of an opening count to that of a closing one; on the lattice, the last of each tick."""
         through = np.cumsum(size)
-        if self._spec.on_lattice or self._spec.paper_exact:
-            return through[closing] - through[opening]
-        between = through[closing - 1] - through[opening]
-        return (size[opening] + 2 * between + size[closing]) // 2
+        whole = through[closing] - through[opening]
+        if self._spec.paper_exact:
+            return whole
+        sign = np.sign(size)
+        return whole + (sign[opening] - sign[closing]) // 2

@@ -65,7 +65,7 @@ def windows(spec: RairanTachometer, steps: Steps, n_clocks: int) -> Windows:
     counted = (steps.step != 0) & (steps.clock < n_clocks)
     at, sign = steps.clock[counted], steps.step[counted]
     n, dt, exact = len(at), spec.timing.tick_cycles, spec.paper_exact
-    # Node 0 is the reset, node k the k-th count, node n + 1 the end of time.
+    # Node 0 is the reset, node k the k-th count, node n + 1 the end of time. The first count opens a window.
     start = np.concatenate([[-1], at, [n_clocks]])
     turns = np.zeros(n + 2, dtype=np.bool_)
     if not exact:
@@ -77,14 +77,15 @@ def windows(spec: RairanTachometer, steps: Steps, n_clocks: int) -> Windows:
         # The first count after dt, or with its end, or the first against the direction.
         after_dt = 1 + np.searchsorted(at, start[:-1] + dt, side="right" if exact else "left")
         following = np.append(np.minimum(after_dt, next_turn[1:]), n + 1)
+        following[0] = following[0] if exact else 1
         node = orbit(following, 0)
         then, shift = following[node], np.zeros_like(node)
     length = dt << shift
     counts_before_end = np.searchsorted(at, start[node] + length, side="left")
-    c_ep = counts_before_end - np.maximum(node - 1, 0)
+    c_ep = np.where((node > 0) | exact, counts_before_end - np.maximum(node - 1, 0), 0)
     within = np.maximum(start[then] - start[node] - 1, 0)
     # A count at the very end of the first dt leaves it whole.
-    whole = (start[then] - start[node] == length) & ~turns[then] & (then <= n)
+    whole = (start[then] - start[node] == length) & ~turns[then] & (then <= n) & ((node > 0) | exact)
     signs = np.concatenate([[sign[0] if n else 0], sign, [0]])
     return Windows(
         start=start[node],
@@ -139,12 +140,13 @@ class Model:
     def __init__(self, spec: RairanTachometer) -> None:
         self._spec = spec
 
-    def windows(self, steps: Steps, n_clocks: int) -> tuple[Ints, Bools]:
-        """Last clocks of all ticks, and whether Nep1 is saturated in them."""
+    def windows(self, steps: Steps, n_clocks: int) -> tuple[Ints, Bools, Ints]:
+        """Last clocks of all ticks, whether Nep1 is saturated in them, and nominal ticks that they are long."""
         found, dt = windows(self._spec, steps, n_clocks), self._spec.timing.tick_cycles
         nth = counting(found.n_dt)
         last = np.repeat(found.start, found.n_dt) + (nth + 1) * np.repeat(dt << found.shift, found.n_dt)
-        return last, (nth == 0) & np.repeat(found.c_ep > self._spec.max_count << found.shift, found.n_dt)
+        beyond = (nth == 0) & np.repeat(found.c_ep > self._spec.max_count << found.shift, found.n_dt)
+        return last, beyond, np.repeat(1 << found.shift, found.n_dt)
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
         """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
@@ -156,7 +158,7 @@ class Model:
             "velocity": self._velocity(events),
             "interval": np.where(events.high | (events.n == 0), 1, events.n) << events.shift,
             "forced": events.forced,
-            "stalled": events.stalled,
+            "rests": events.stalled,
             "n_ep1": events.n_ep1,
             "n_dt1": events.n_dt1,
             "dt_shift": events.shift,
@@ -203,17 +205,17 @@ class Model:
             np.repeat(found.sign, 2),
         )
 
-    def _regime(self, value: Ints, is_nep: Bools, happens: Bools, turns: Bools) -> tuple[Bools, Ints, Bools]:
-        """Which events set n, n after each, and whether that is Nep1."""
+    def _regime(self, value: Ints, is_nep: Bools, happens: Bools, anew: Bools) -> tuple[Bools, Ints, Bools]:
+        """Which events set n, n after each, and whether that is Nep1; `anew` are those that set n to 0."""
         # 1 for Nep1 ends the high regime, for Ndt1 it leaves it; what else happens sets it.
-        sets_regime = happens & (is_nep | (value > 1) | turns)
+        sets_regime = happens & (is_nep | (value > 1) | anew)
         regime = latest(sets_regime, (is_nep & (value > 1)).astype(np.int64), 0) == 1
         before = np.append(False, regime[:-1])
         alone = is_nep & (value == 1)
-        sets = happens & (turns | (value > 1) | np.where(alone, before, ~before))
+        sets = happens & (anew | (value > 1) | np.where(alone, before, ~before))
         if self._spec.paper_exact:
             sets |= happens & alone & (np.cumsum(happens) == 1)
-        return sets, latest(sets, np.where(turns, 0, value), 0), regime
+        return sets, latest(sets, np.where(anew, 0, value), 0), regime
 
     def _events(self, found: Windows) -> Events:
         spec = self._spec
@@ -221,11 +223,13 @@ class Model:
         clock, value, is_nep, happens, sign = self._alternating(found)
         turns = ~is_nep & np.repeat(found.turns, 2)
         sign = np.where(turns, -sign, sign)
-        sets, n, high = self._regime(value, is_nep, happens, turns)
         nth = np.arange(len(found.start)) > 0  # the first window is not one that a count opened
-        loose = np.stack([found.c_ep == 1, found.n_dt >= most], axis=1).ravel()
+        # After reset or rest a count is no measurement.
+        fresh = ~turns & ~is_nep & np.repeat(~nth | (found.n_dt >= most), 2)
+        sets, n, high = self._regime(value, is_nep, happens, turns | fresh)
+        sets &= ~fresh
+        loose = is_nep & np.repeat(found.c_ep == 1, 2)
         unsynced = np.stack([np.zeros_like(nth), ~found.in_step & (found.end > found.start + dt)], axis=1).ravel()
-        known = np.repeat(nth, 2)
         shift = np.repeat(found.shift, 2)
         # With no count for long, from what the end of the first dt left: how many dt may pass without contradiction.
         n0, high0 = n[::2], high[::2]
@@ -243,20 +247,17 @@ class Model:
         n = np.concatenate([n[sets], whole - np.repeat(~found.in_step, n_forced), np.zeros_like(rest_at)])
         forced = np.arange(len(clock)) >= np.count_nonzero(sets)
         high = np.append(high[sets], np.zeros(np.count_nonzero(forced), dtype=np.bool_))
-        sign = np.concatenate(
-            [sign[sets], np.repeat(found.sign, n_forced), np.where(nth | (found.c_ep > 0), found.sign, 1)[rests]]
-        )
+        sign = np.concatenate([sign[sets], np.repeat(found.sign, n_forced), np.where(nth, found.sign, 1)[rests]])
         alone = forced[np.count_nonzero(sets) :]
         shift = np.concatenate([shift[sets], np.repeat(found.shift, n_forced), found.shift[rests]])
         loose, unsynced = np.append(loose[sets], alone), np.append(unsynced[sets], ~alone)
-        known = np.concatenate([known[sets], np.repeat(nth, n_forced), nth[rests]])
         order = np.argsort(clock, kind="stable")
-        loose, unsynced, known = loose[order], unsynced[order], known[order]
+        loose, unsynced = loose[order], unsynced[order]
         clock, n, high, sign, forced = clock[order], n[order], high[order], sign[order], forced[order]
         shift = shift[order]
         n_ep1 = np.where(high, n, np.minimum(n, 1))
         n_dt1 = np.where(high | (n == 0), 1, n)
-        stalled, valid = forced & (n == 0), known & (n > 0)
+        stalled, valid = forced & (n == 0), n > 0
         return Events(clock, n, high, sign, forced, stalled, n_ep1, n_dt1, shift, loose, unsynced, valid)
 
     def _to_the_letter(self, found: Windows) -> Events:

@@ -94,7 +94,6 @@ class Model:
         else:
             # Eq. (17): Σ_{j=0}^{m_s−1} m_e(i−j), over m_s.
             numerator = total[at + 1] - total[at - m_s + 1]
-        moving = np.concatenate([[0], np.cumsum(numbers != 0)])
 
         def quotient(counts: int, towards: int) -> NDArray[np.int64]:
             whole = 2 if spec.cancel else 1
@@ -104,7 +103,6 @@ class Model:
             "velocity": quotient(0, 0),
             "interval": m_s,
             "forced": forced,
-            "stalled": forced & (moving[at + 1] == moving[at - m_s]),
         }
         if spec.bounds:
             columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}

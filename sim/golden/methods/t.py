@@ -34,7 +34,6 @@ class Model:
             distance=2 * distance,
             time=time,
             forced=none,
-            stalled=none,
             beyond=many,
             least=least,
             most=most,

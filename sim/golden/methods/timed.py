@@ -67,13 +67,13 @@ class Counts:
         """Periods from the count before to each count; reset is taken for one in period −1."""
         return np.diff(self.period, prepend=-1)
 
-    def silences(self, max_periods: int) -> tuple[Ints, NDArray[np.bool_]]:
-        """Periods in which a 0 is forced, and whether no count had come in the maximum time before either."""
+    def silences(self, max_periods: int) -> Ints:
+        """Periods in which a 0 is forced."""
         begin = np.append(-1, self.period)
         end = np.append(self.period, self.n_periods)
         times = (end - begin - 1) // max_periods
         nth = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times) + 1
-        return np.repeat(begin, times) + nth * max_periods, (nth > 1) | (np.repeat(begin, times) < 0)
+        return np.repeat(begin, times) + nth * max_periods
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Measurements:
     clock : int64 array, shape (n,)
     distance : int64 array, shape (n,), half counts
     time : int64 array, shape (n,), timer periods
-    forced, stalled, beyond : bool arrays, shape (n,)
+    forced, beyond : bool arrays, shape (n,)
         `beyond`: out of range before any division.
     least, most : int64 arrays, shape (n, 2)
         Distance and time for the least and for the greatest possible speed; time 0: that bound is absent.
@@ -97,7 +97,6 @@ class Measurements:
     distance: Ints
     time: Ints
     forced: NDArray[np.bool_]
-    stalled: NDArray[np.bool_]
     beyond: NDArray[np.bool_]
     least: Ints
     most: Ints
@@ -113,21 +112,17 @@ class Measurements:
         return both[np.argsort(both.clock, kind="stable")]
 
 
-def enclosure(distance: Ints, time: Ints, less: Ints | int = 0, more: Ints | int = 0) -> tuple[Ints, Ints]:
-    """`least` and `most` of distances between edges; each edge lies within a period before its count.
-
-    The true distance may also be shorter by `less` counts, or longer by `more`.
-    """
-    low, high = distance - less, distance + more
+def enclosure(distance: Ints, time: Ints) -> tuple[Ints, Ints]:
+    """`least` and `most` of distances between edges; each edge lies within a period before its count."""
     return (
-        np.stack([low, np.where(low < 0, time - 1, time + 1)], axis=1),
-        np.stack([high, np.where(high > 0, time - 1, time + 1)], axis=1),
+        np.stack([distance, np.where(distance < 0, time - 1, time + 1)], axis=1),
+        np.stack([distance, np.where(distance > 0, time - 1, time + 1)], axis=1),
     )
 
 
 def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) -> Measurements:
     """The measurements, and a forced 0 for every silence."""
-    period, stalled = counts.silences(spec.max_periods)
+    period = counts.silences(spec.max_periods)
     none = np.zeros(len(period), dtype=np.int64)
     time = np.full(len(period), spec.max_periods)
     silent = Measurements(
@@ -135,13 +130,12 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
         distance=none,
         time=time,
         forced=none == 0,
-        stalled=stalled,
         beyond=none > 0,
         # The shaft is between the same two edges at both ends.
         least=np.stack([none - 1, time], axis=1),
         most=np.stack([none + 1, time], axis=1),
         # The first period after reset was not seen completely.
-        known=(np.arange(len(period)) > 0) | ~stalled,
+        known=(np.arange(len(period)) > 0) | (period >= np.append(counts.period, counts.n_periods)[0]),
     )
     return found.merged(silent)
 
@@ -193,7 +187,7 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     # The shaft is no farther back than its last edge.
     least = np.stack([np.where((sign > 0) & (last_size > 0), 0, -1), age], axis=1)
     most = np.stack([np.where((sign < 0) & (last_size < 0), 0, 1), age], axis=1)
-    return Measurements(clock, 3 * sign, age, ~none, none, none, least, most, ~none)[nearer]
+    return Measurements(clock, 3 * sign, age, ~none, none, least, most, ~none)[nearer]
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
@@ -209,7 +203,6 @@ def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: T
         "velocity": velocity,
         "interval": shown.time,
         "forced": shown.forced,
-        "stalled": shown.stalled,
         "out_of_range": saturated | shown.beyond,
     }
     return Table(shown.clock + spec.datapath_latency, columns | (_bounds(spec, shown) if spec.bounds else {}))

@@ -23,7 +23,7 @@ def test_all_methods_in_one_table(tmp_path: Path, capsys: pytest.CaptureFixture[
     with (tmp_path / "c.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["name"] for row in rows] == names
-    assert all(0 < float(row["rms"]) < float(row["max"]) for row in rows)
+    assert all(0 < float(row["rms_rad_s"]) < float(row["max_rad_s"]) for row in rows)
     assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -76,7 +76,7 @@ def test_a_capture_in_place_of_a_motion(tmp_path: Path, capsys: pytest.CaptureFi
         assert known[:4] == unknown[:4]
         assert unknown[4:] == ["-", "-", "-"]
     with (tmp_path / "c.csv").open() as file:
-        assert [row["rms"] for row in csv.DictReader(file)] == ["", "", ""]
+        assert [row["rms_rad_s"] for row in csv.DictReader(file)] == ["", "", ""]
     assert (tmp_path / "c.png").stat().st_size > 1000
 
 

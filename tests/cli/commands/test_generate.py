@@ -29,7 +29,7 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
     )
     written = {path.name: path.read_bytes().decode() for path in (tmp_path / "new" / "rtl").iterdir()}
     assert written == export(spec, "spindle")
-    assert capsys.readouterr().out.split() == [
+    assert capsys.readouterr().out.split("\n\n")[0].split() == [
         str(tmp_path / "new" / "rtl" / f"spindle{suffix}")
         for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")
     ]
@@ -46,7 +46,7 @@ def test_defaults(tmp_path: Path) -> None:
         "max_ticks": 500,
         "unit": "count/tick",
         "frac_bits": 16,
-        "velocity_bits": None,
+        "velocity_width": 27,
         "max_speed": None,
         "position_width": 32,
         "filter_clocks": 0,
@@ -67,7 +67,7 @@ def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
     expected = {
         "unit": "rpm",
         "frac_bits": 3,
-        "velocity_bits": 12,
+        "velocity_width": 12,
         "index": True,
         "index_reset": True,
         "filter_clocks": 4,

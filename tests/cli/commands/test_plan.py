@@ -43,9 +43,9 @@ def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[st
     assert rows["unit velocity"] == "314.159 rad/s = 50 rev/s = 3000 rpm (1 count per tick)"
     assert rows["greatest speed"] == "628.319 rad/s = 100 rev/s = 6000 rpm (2 counts per tick)"
     assert float(rows["one LSB of velocity"].split()[3]) == pytest.approx(100 * math.pi / 65536, rel=1e-5)
-    widths = {port["name"]: port["width"] for port in described["ports"]}
+    assert rows["full scale"] == "2 count/tick = 628.319 rad/s, either way"
     assert {name: int(bits) for name, bits in (pair.split() for pair in rows["widths"].split(", "))} == {
-        name: widths[name] for name in ("velocity", "pulse_count", "interval", "position")
+        port["name"]: port["width"] for port in described["ports"] if port["width"] > 1
     }
     entries, width = len(spec.reciprocal.table), max(spec.reciprocal.table).bit_length()
     assert rows["reciprocal"] == f"table: {entries} x {width} = {entries * width} bits of block RAM"

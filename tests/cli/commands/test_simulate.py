@@ -72,7 +72,7 @@ def test_trace_has_a_row_per_update(tmp_path: Path, golden_run: Run) -> None:
     assert run("simulate", *CORE, *MOTION, "--trace", tmp_path / "t.csv") == 0
     with (tmp_path / "t.csv").open(newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["clock", "tick", "interval", "forced", "velocity_raw", "velocity_rad_s", "stalled"]
+    assert rows[0] == ["clock", "tick", "interval", "forced", "velocity_raw", "velocity_rad_s"]
     updates = golden_run.updates
     assert [list(map(int, row[:5])) for row in rows[1:]] == [
         [clock, (clock - SPEC.tick_to_velocity - SPEC.tick_latency + 1) // 20 - 1, m_s, forced, raw]
@@ -91,9 +91,9 @@ def test_counts_have_a_row_per_tick(tmp_path: Path, golden_run: Run) -> None:
     assert run("simulate", *CORE, *MOTION, "--counts", tmp_path / "c.csv") == 0
     text = (tmp_path / "c.csv").read_bytes().decode()
     ticks = golden_run.ticks
-    rows = zip(ticks.pulse_count.tolist(), ticks.position.tolist(), strict=True)
-    wanted = "".join(f"{i},{m_e},{x},0\n" for i, (m_e, x) in enumerate(rows))
-    assert text == f"tick,pulse_count,position,overflow\n{wanted}"
+    rows = zip(ticks.pulse_count.tolist(), ticks.position.tolist(), ticks.stalled.astype(int).tolist(), strict=True)
+    wanted = "".join(f"{i},{m_e},{x},0,{rests}\n" for i, (m_e, x, rests) in enumerate(rows))
+    assert text == f"tick,pulse_count,position,overflow,stalled\n{wanted}"
 
 
 def test_events_have_a_row_each(tmp_path: Path) -> None:

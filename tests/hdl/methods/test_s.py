@@ -11,7 +11,7 @@ from tachometry.hdl.methods.interval import IntervalAccumulator
 from tachometry.hdl.methods.s import SMethod
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
-OUTPUTS = ["velocity_valid", "velocity", "interval", "forced", "stalled"]
+OUTPUTS = ["velocity_valid", "velocity", "interval", "forced"]
 
 
 def datapath_spec(*, cancel: bool = True, serial: bool = True, frac_bits: int = 16) -> STachometer:
@@ -39,7 +39,6 @@ def check_paper_sequences(*, cancel: bool = True, serial: bool = True) -> None:
         wanted = []
         for tick, m_s, forced, eq17, eq21 in updates:
             velocity = rounded(eq21 if cancel else eq17, spec.frac_bits)
-            whole_window = m_e[max(tick - m_s, 0) : tick + 1]
             wanted.append(
                 (
                     tick * spec.timing.tick_cycles + spec.tick_to_velocity,
@@ -48,7 +47,6 @@ def check_paper_sequences(*, cancel: bool = True, serial: bool = True) -> None:
                         "velocity": velocity,
                         "interval": m_s,
                         "forced": int(forced),
-                        "stalled": int(forced and not any(whole_window)),
                     },
                 )
             )
@@ -85,7 +83,6 @@ MUTANTS = {
         "with m.If(self.update):",
         "with m.If(self.alteration):",
     ),
-    "stalled without the opening tick": (IntervalAccumulator, "(opening | self.previous).any()", "self.previous.any()"),
 }
 
 

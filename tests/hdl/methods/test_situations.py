@@ -31,7 +31,6 @@ class Update:
     lower: float
     upper: float
     interval: int
-    stalled: bool
 
 
 def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
@@ -39,14 +38,13 @@ def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
     rows: list[dict[str, int]] = []
     for number in m_e:
         rows += [{"tick": 1, "pulse_count": number}, *[{"tick": 0}] * (T - 1)]
-    names = ["velocity_valid", "velocity", "velocity_lower", "velocity_upper", "interval", "stalled", "bounds_valid"]
+    names = ["velocity_valid", "velocity", "velocity_lower", "velocity_upper", "interval", "bounds_valid"]
     seen = clock_by_clock(DATAPATHS[spec.method](spec), rows, names)
     found = []
     for clock, row in enumerate(seen):
         if row["velocity_valid"]:
             velocity, lower, upper = (row[name] / (1 << spec.frac_bits) for name in names[1:4])
-            tick, stalled = (clock - spec.datapath_latency) // T, bool(row["stalled"])
-            found.append(Update(tick, velocity, lower, upper, row["interval"], stalled))
+            found.append(Update((clock - spec.datapath_latency) // T, velocity, lower, upper, row["interval"]))
     assert all(update.lower <= update.velocity <= update.upper for update in found)
     assert all(abs(update.velocity) <= spec.max_count for update in found)
     return found
@@ -64,7 +62,6 @@ def check_rest(spec: TachometerSpec, updates: list[Update], last: int, n_ticks: 
     assert at_rest[0].tick <= last + 2 * longest(spec)
     assert n_ticks - at_rest[-1].tick <= MAX_TICKS
     assert all(update.velocity == 0 and update.lower < 0 < update.upper for update in at_rest)
-    assert at_rest[-1].stalled
 
 
 def steady(counts: int, ticks: int) -> list[int]:

@@ -12,10 +12,10 @@ def test_a_count_while_the_divider_runs_opens_the_next_window() -> None:
     busy = spec.division_clocks
     at = {5: 1, 45: 1, 45 + busy - 1: 1, 45 + busy + 10: 1}
     got = run(spec, at, 45 + busy + 11)
-    assert got == [(45, speed(1, 40), 40, False, False), (45 + busy + 10, speed(1, 11), 11, False, False)]
+    assert got == [(45, speed(1, 40), 40, False), (45 + busy + 10, speed(1, 11), 11, False)]
     # A clock later it is free.
     got = run(spec, {5: 1, 45: 1, 45 + busy: 1}, 46 + busy)
-    assert got[-1] == (45 + busy, speed(1, busy), busy, False, False)
+    assert got[-1] == (45 + busy, speed(1, busy), busy, False)
 
 
 def check_lattice() -> None:

@@ -17,16 +17,16 @@ from tachometry.spec import Encoder, STachometer, Timing
 
 
 class Resting(STachometer):
-    """An S tachometer whose `stalled` updates are taken as they are."""
+    """An S tachometer whose updates that `rests` are taken as they are."""
 
-    last_when_stalled = True
+    last_at_rest = True
 
 
 ONE_TABLE = Resting(encoder=Encoder(500), timing=Timing(48_000_000, 20, 60), frac_bits=6, lowpass=Fraction(100_000))
 TWO_TABLES = replace(ONE_TABLE, timing=Timing(48_000_000, 20, 5000), lowpass=Fraction(2000))
 
 
-LAYOUT = data.StructLayout({"velocity": signed(ONE_TABLE.native_width), "stalled": 1, "tag": 4})
+LAYOUT = data.StructLayout({"velocity": signed(ONE_TABLE.native_width), "rests": 1, "tag": 4})
 COLUMNS = ("filtered.p.velocity", "filtered.p.tag")
 
 
@@ -45,14 +45,14 @@ def check(spec: STachometer, n: int = 150) -> None:
         rng.random(n_clocks) < np.repeat(rng.choice([0, 0.02, 0.9], n_clocks // 50 + 1), 50)[:n_clocks]
     )
     clears = rng.random(n) < 0.1
-    updates = Table(came, {"velocity": velocity, "stalled": clears, "tag": np.arange(n) % 16})
+    updates = Table(came, {"velocity": velocity, "rests": clears, "tag": np.arange(n) % 16})
     wanted = filtered(spec, Table(tick, {}), updates)
     at = {clock: k for k, clock in enumerate(came.tolist())}
     ticks = set(tick.tolist())
     rows = []
     for clock in range(n_clocks):
         k = at.get(clock, 0)
-        known = {"velocity": int(velocity[k]), "stalled": int(clears[k]), "tag": k % 16}
+        known = {"velocity": int(velocity[k]), "rests": int(clears[k]), "tag": k % 16}
         rows.append({"velocity_valid": int(clock in at), "tick": int(clock in ticks), **known})
     seen = clock_by_clock(low_pass.LowPass(form, LAYOUT, clears=True), rows, ["filtered.valid", *COLUMNS])
     got = [(k, *(row[name] for name in COLUMNS)) for k, row in enumerate(seen) if row["filtered.valid"]]

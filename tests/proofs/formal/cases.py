@@ -51,6 +51,8 @@ _METHOD_PROBES = {
     "core_numerator": "datapath.interval.numerator",
     "core_previous": "datapath.alteration.previous",
     "core_offset": "datapath.alteration.offset",
+    "core_rests": "datapath.interval.rests",
+    "core_nearly": "datapath.interval.nearly",
 }
 _SERIAL_PROBES = {
     "core_running": "datapath.quotient.scaler_velocity.running",
@@ -61,6 +63,7 @@ _CARRIED_PROBES = {
     "core_q": "datapath.quotient.scaler_velocity.q",
     "core_r": "datapath.quotient.scaler_velocity.r",
 }
+_STANDSTILL_PROBES = {"core_rests": "standstill.shown", "core_empty": "standstill.left"}
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
 
 
@@ -119,6 +122,7 @@ def m_method(name: str, spec: MTachometer) -> Proof:
         "N": spec.average,
         "MAX_COUNT": spec.max_count,
         "COUNT_WIDTH": spec.count_width,
+        "MAX_TICKS": spec.timing.max_ticks,
         "INTERVAL_WIDTH": spec.interval_width,
         "BOUND_WIDTH": spec.bound_width,
         "FRAC_BITS": spec.frac_bits,
@@ -129,7 +133,7 @@ def m_method(name: str, spec: MTachometer) -> Proof:
         spec,
         "m_method",
         parameters,
-        {},
+        _STANDSTILL_PROBES,
         depth=max(spec.tick_to_velocity + spec.average + 2, 3 * spec.average + 1),
     )
 
@@ -181,7 +185,7 @@ _RAIRAN_PROBES = {
     "core_rest": "datapath.counters.rest",
     "core_beyond": "datapath.counters.beyond",
     "core_forced": "datapath.counters.forced",
-    "core_stalled": "datapath.counters.stalled",
+    "core_at_rest": "datapath.counters.at_rest",
 }
 
 
@@ -199,10 +203,11 @@ def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof
         "T": tick_cycles,
         "MAX_TICKS": max_ticks,
         "MAX_COUNT": max_count,
+        "COUNT_WIDTH": spec.count_width,
         "VELOCITY_WIDTH": spec.velocity_width,
         "FRAC_BITS": spec.frac_bits,
     }
-    return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES, depth=10)
+    return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES | _STANDSTILL_PROBES, depth=10)
 
 
 _TIMED_PROBES = {
@@ -215,7 +220,6 @@ _TIMED_PROBES = {
     "core_rounds": "datapath.quotient_velocity.rounds",
     "core_compared": "datapath.quotient_velocity.compared",
     "core_forced": "datapath.quotient_velocity.forced",
-    "core_stalled": "datapath.quotient_velocity.stalled",
     "core_rounded": "datapath.quotient_velocity.rounded",
     "core_running": "datapath.quotient_velocity.divider.running",
     "core_remainder": "datapath.quotient_velocity.divider.remainder",
@@ -256,6 +260,7 @@ def timed(
         "T": tick_cycles,
         "COUNT_WIDTH": spec.count_width,
         "MAX_COUNT": max_count,
+        "MAX_TICKS": max_ticks,
         "MAX_PERIODS": spec.max_periods,
         "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,
         "MAX_QUOTIENT": spec.max_quotient,
@@ -266,7 +271,7 @@ def timed(
         "FRAC_BITS": spec.frac_bits,
         "DIVISION_CLOCKS": spec.division_clocks,
     }
-    probes = _TIMED_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
+    probes = _TIMED_PROBES | _STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
     probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
@@ -291,8 +296,8 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
 # What can be said of M/T without what is divided; the last one takes as long as all the others.
 _MT_GIVEN = (
     "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
-    "lemma_left lemma_steps lemma_rest lemma_rested lemma_length lemma_unopened lemma_core_length lemma_window_free "
-    "pt_update pt_held pt_spacing pt_rest",
+    "lemma_left lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
+    "lemma_window_free pt_update pt_held pt_spacing pt_rest",
     "lemma_travelled",
 )
 
@@ -356,7 +361,7 @@ PROOFS = [
     after_upset("upset, eq. (21)", method("", small(tick_cycles=1)), "lemma_core"),
     after_upset("upset, carried", method("", small(tick_cycles=1, max_ticks=5), max_table=4), "lemma_core"),
     after_upset("upset, M of 4", m_method("", small_m(4)), "lemma_bounded"),
-    after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left"),
+    after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_stalled"),
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
 ]

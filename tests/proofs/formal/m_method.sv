@@ -4,6 +4,7 @@ module m_method #(
     parameter N = 1,              // ticks that are averaged
     parameter MAX_COUNT = 1,
     parameter COUNT_WIDTH = 2,
+    parameter MAX_TICKS = 4,
     parameter INTERVAL_WIDTH = 1,
     parameter BOUND_WIDTH = 7,
     parameter FRAC_BITS = 4,
@@ -29,16 +30,14 @@ module m_method #(
   wire [COUNT_WIDTH*(N+1)-1:0] m_e = {past, pulse_count};
   reg signed [S-1:0] sum;
   reg signed [COUNT_WIDTH-1:0] m_e_j;
-  reg empty, bounded;
+  reg bounded;
   integer j;
   always @* begin
     sum = 0;
-    empty = 1;
     bounded = 1;
     for (j = 0; j < N; j = j + 1) begin
       m_e_j = m_e[COUNT_WIDTH*j+:COUNT_WIDTH];
       sum = sum + m_e_j;
-      if (m_e_j != 0) empty = 0;
       if (m_e_j > MAX_COUNT || m_e_j < -MAX_COUNT) bounded = 0;
     end
   end
@@ -49,10 +48,16 @@ module m_method #(
       ticks <= ticks < N ? ticks + 1 : N;
     end
 
+  wire rests, rested;
+  wire [31:0] quiet;
+  wire [$clog2(MAX_TICKS+1)-1:0] core_empty;
+  wire core_rests;
+  standstill #(MAX_TICKS, COUNT_WIDTH) still (clk, rst, tick, pulse_count, rests, rested, quiet);
+
   // As late as the core shows them.
-  wire tick_, empty_, known_;
+  wire tick_, known_;
   wire signed [S-1:0] sum_;
-  delay #(3 + S, TICK_TO_VELOCITY) delays (clk, rst, {tick, empty, ticks == N, sum}, {tick_, empty_, known_, sum_});
+  delay #(2 + S, TICK_TO_VELOCITY) delays (clk, rst, {tick, ticks == N, sum}, {tick_, known_, sum_});
 
   // n times what is shown, against 2^f times what was counted.
   wire signed [S+FRAC_BITS:0] scaled = sum_ <<< FRAC_BITS, one = 1 <<< FRAC_BITS;
@@ -60,9 +65,11 @@ module m_method #(
   wire signed [S+FRAC_BITS:0] below = scaled - one - lower, above = upper - scaled - one;
   always @* begin
     lemma_bounded: assert (bounded && ticks <= N);
+    lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
+        && core_empty == (rested ? 0 : MAX_TICKS - quiet));
     pm_update: assert (velocity_valid == tick_ && interval == N && !forced);
     pm_velocity: assert (!velocity_valid || (2 * shown <= 2 * scaled + N && 2 * scaled + N < 2 * shown + 2 * N));
-    pm_stalled: assert (!velocity_valid || stalled == empty_);
+    pm_stalled: assert (stalled == rests);
     pm_bounds: assert (!velocity_valid || (below >= 0 && below < N && above >= 0 && above < N));
     pm_known: assert (!velocity_valid || bounds_valid == known_);
   end

@@ -29,7 +29,7 @@ module method #(
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
   wire [I-1:0] core_m_s;
-  wire core_longest;
+  wire core_longest, core_rests, core_nearly;
   wire signed [COUNT_WIDTH-1:0] core_opening, core_previous, core_offset;
   wire signed [NUMERATOR_WIDTH-1:0] core_numerator;
   wire signed [$clog2(T + 1):0] core_count;
@@ -57,14 +57,13 @@ module method #(
 
   // Twice the sum of eq. (21), where the ends count half, or of eq. (17), without the opening tick.
   reg signed [S-1:0] sum;
-  reg alike, empty;  // all numbers inside the window are the same; all are 0, its opening included
+  reg alike;  // all numbers inside the window are the same
   reg bounded;
   reg signed [COUNT_WIDTH-1:0] m_e_j, opening;
   integer j;
   always @* begin
     sum = 0;
     alike = 1;
-    empty = 1;
     bounded = 1;
     opening = 0;
     for (j = 0; j <= MAX_TICKS; j = j + 1) begin
@@ -74,7 +73,6 @@ module method #(
       else if (j == m_s && CANCEL) sum = sum + m_e_j;
       if (j == m_s) opening = m_e_j;
       if (j > 0 && j < m_s && m_e_j != previous) alike = 0;
-      if (j <= m_s && m_e_j != 0) empty = 0;
       if (m_e_j > MAX_COUNT || m_e_j < -MAX_COUNT) bounded = 0;
     end
   end
@@ -83,43 +81,45 @@ module method #(
 
   // Ticks since the last update, and what that was: once here, and once from the ports.
   reg [I-1:0] since = 0, since_update = 0;
-  reg after_forced = 0, after_stalled = 0, was_forced = 0, was_stalled = 0;
+  reg after_forced = 0, was_forced = 0;
   always @(posedge clk)
-    if (rst) {since, after_forced, after_stalled} <= 0;
+    if (rst) {since, after_forced} <= 0;
     else if (tick) begin
       since <= update ? 0 : since + 1;
-      if (update) {after_forced, after_stalled} <= {!alteration, !alteration && empty};
+      if (update) after_forced <= !alteration;
     end
 
+  wire rests, rested;
+  wire [31:0] quiet;
+  standstill #(MAX_TICKS, COUNT_WIDTH) still (clk, rst, tick, pulse_count, rests, rested, quiet);
+
   // As late as the core shows them.
-  wire tick_, update_, forced_, empty_, after_forced_, after_stalled_;
+  wire tick_, update_, forced_, after_forced_;
   wire [I-1:0] m_s_, since_;
   wire signed [S-1:0] sum_;
-  wire signed [COUNT_WIDTH-1:0] pulse_count_;
-  delay #(6 + 2 * I + S + COUNT_WIDTH, TICK_TO_VELOCITY) delays (
+  delay #(4 + 2 * I + S, TICK_TO_VELOCITY) delays (
       clk, rst,
-      {tick, update, !alteration, empty, after_forced, after_stalled, m_s, since, sum, pulse_count},
-      {tick_, update_, forced_, empty_, after_forced_, after_stalled_, m_s_, since_, sum_, pulse_count_}
+      {tick, update, !alteration, after_forced, m_s, since, sum},
+      {tick_, update_, forced_, after_forced_, m_s_, since_, sum_}
   );
-  reg [V+I+1:0] held = 0;
-  wire [V+I+1:0] outputs = {velocity, interval, forced, stalled};
+  reg [V+I:0] held = 0;
+  wire [V+I:0] outputs = {velocity, interval, forced};
   always @(posedge clk)
-    if (rst) {since_update, was_forced, was_stalled, held} <= 0;
+    if (rst) {since_update, was_forced, held} <= 0;
     else begin
       if (tick_) since_update <= since_update + 1;
-      if (velocity_valid) {since_update, was_forced, was_stalled} <= {{I{1'b0}}, forced, stalled};
+      if (velocity_valid) {since_update, was_forced} <= {{I{1'b0}}, forced};
       held <= outputs;
     end
 
   // What is shown: this update, or the last one.
   reg signed [S-1:0] last_sum = 0;
   reg [I-1:0] last_m_s = 0;  // 0: none
-  reg last_forced = 0, last_empty = 0;
+  reg last_forced = 0;
   wire signed [S-1:0] shown_sum = velocity_valid ? sum_ : last_sum;
   wire [I-1:0] shown_m_s = velocity_valid ? m_s_ : last_m_s;
-  wire shown_forced = velocity_valid ? forced_ : last_forced, shown_empty = velocity_valid ? empty_ : last_empty;
-  always @(posedge clk)
-    {last_sum, last_m_s, last_forced, last_empty} <= rst ? 0 : {shown_sum, shown_m_s, shown_forced, shown_empty};
+  wire shown_forced = velocity_valid ? forced_ : last_forced;
+  always @(posedge clk) {last_sum, last_m_s, last_forced} <= rst ? 0 : {shown_sum, shown_m_s, shown_forced};
 
   // 2^f x + 1/2 = (2^f sum + m_s) / (2 m_s), rounded down.
   wire signed [S+FRAC_BITS:0] wanted = (shown_sum <<< FRAC_BITS) + $signed({1'b0, shown_m_s});
@@ -145,8 +145,12 @@ module method #(
     lemma_m_s: assert (m_s >= 1 && m_s <= MAX_TICKS && m_s == since + 1 + (after_forced ? KEPT : 0));
     lemma_alike: assert (alike);
     lemma_offset: assert (m_s == 1 || offset == previous);
-    lemma_stalled: assert (!after_stalled || (previous == 0 && offset == 0));
-    lemma_since: assert ({since_update, was_forced, was_stalled} == {since_, after_forced_, after_stalled_});
+    lemma_rests: assert (core_rests == rested && quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS));
+    // A silence begins in the opening tick, or in the one after it.
+    lemma_quiet: assert (quiet == 0 || (previous == 0 && (rested || (m_s == quiet && opening == 0)
+        || (m_s == quiet + 1 && opening != 0) || (core_nearly && quiet == MAX_TICKS))));
+    lemma_nearly: assert (!core_nearly || quiet >= MAX_TICKS);
+    lemma_since: assert ({since_update, was_forced} == {since_, after_forced_});
   end
   generate
     if (SERIAL) begin : serial
@@ -184,7 +188,7 @@ module method #(
     p4_held: assert (velocity_valid || outputs == held);
     p5_numerator: assert (sum == reduced);
     p5_velocity: assert ((have <= wanted && wanted < have + divisor) || (shown_m_s == 0 && velocity == 0));
-    p7_stalled: assert (stalled == (forced && shown_empty));
-    p7_falls: assert (!(was_stalled && tick_ && pulse_count_ != 0) || (velocity_valid && !stalled));
+    p7_stalled: assert (stalled == rests);
+    p7_falls: assert (!(tick && pulse_count != 0) || !stalled);
   end
 endmodule

@@ -22,6 +22,7 @@ from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.hdl.methods.rairan import RairanMethod
 from tachometry.hdl.methods.rairan_counters import RairanCounters
+from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update_age import UpdateAge
 
 
@@ -103,20 +104,22 @@ MUTANTS = [
         "~self.previous.any()",
     ),
     Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
-    Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & ~known.stalled)"),
+    Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & total.any())"),
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
-    Mutant("M of 4", "pm_stalled", MovingSum, "(quiet >= last)", "(quiet >= last - 1)"),
+    Mutant("M of 4", "pm_stalled", Standstill, "init=self._max_ticks - 1", "init=self._max_ticks - 2"),
     Mutant("M of 3", "pm_bounds", MMethod, "margin=1", "margin=0"),
     Mutant(
         "M of 4", "pm_known", MMethod, "known.bounds_valid.eq(seen >= spec.average)", "known.bounds_valid.eq(seen != 0)"
     ),
-    Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "self.stalled.eq(self.forced & ", "self.stalled.eq("),
+    Mutant("eq. (21), 1 clock", "p7_falls", IntervalAccumulator, "silent & (rests |", "(rests | silent &"),
     Mutant("Rairán", "pr_tick", RairanCounters, "start = cycles - 2", "start = cycles - 1"),
     Mutant("Rairán", "pr_update", RairanCounters, "pulse & (late | due) | turns", "pulse & late | turns"),
     Mutant("Rairán", "pr_estimate", RairanCounters, "in_step.eq(opens)", "in_step.eq(0)", 32),
+    Mutant("Rairán", "pr_update", RairanCounters, "(~moved | self.rest)", "~moved", 32),
     Mutant("Rairán", "pr_velocity", RairanMethod, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
     Mutant("Rairán", "pr_rest", RairanCounters, "set_(0, update=~self.rest", "set_(1, update=~self.rest", 32),
+    Mutant("Rairán", "pr_stalled", Standstill, "left.eq(self._max_ticks)", "left.eq(self._max_ticks - 1)", 32),
     Mutant("Rairán", "pr_range", RairanCounters, "with m.If(full):", "with m.If(0):"),
     Mutant("Rairán", "pr_flag", RairanCounters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
     Mutant("T", "pt_update", QuotientVelocity, "compared & (measuring | nearer)", "compared & nearer"),
@@ -146,7 +149,7 @@ MUTANTS = [
         "self.period & longest & self.count",
         40,
     ),
-    Mutant("T", "pt_stalled", QuotientVelocity, "stalled.eq(self.stalled_in)", "stalled.eq(self.forced_in)", 32),
+    Mutant("T", "pt_stalled", Standstill, "silent & (shown", "(shown", 32),
     Mutant(
         "T",
         "pt_held",
@@ -165,7 +168,7 @@ MUTANTS = [
     ),
     Mutant("upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(self.m == preset):", "with m.If(0):"),
     Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),
-    Mutant("upset, Rairán", "pr_estimate", RairanMethod, "shown = update | stalled", "shown = update"),
+    Mutant("upset, Rairán", "pr_estimate", RairanMethod, "shown = update | at_rest", "shown = update"),
     Mutant("upset, T", "pt_interval", Divider, "steps.eq(steps - 1)", "steps.eq(steps - (steps < self._steps))"),
     Mutant("upset, M/T: given", "pt_update", MTMethod, "length.eq(length + 1)", "length.eq(length + ~length.all())"),
     Mutant(

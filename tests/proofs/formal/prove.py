@@ -19,7 +19,7 @@ _SECONDS = 280
 _UPSET = "setattr -unset init w:* w:*fresh* %d"
 
 _SCRIPT = """\
-read_verilog -defer -sv -formal {top}.sv delay.sv
+read_verilog -defer -sv -formal {top}.sv delay.sv standstill.sv
 read_verilog {name}.v
 hierarchy -check -top {top} {parameters}
 rename -top {top}

@@ -5,6 +5,7 @@ module rairan #(
     parameter T = 3,              // tick_cycles
     parameter MAX_TICKS = 4,
     parameter MAX_COUNT = 2,
+    parameter COUNT_WIDTH = 3,
     parameter VELOCITY_WIDTH = 7,
     parameter FRAC_BITS = 4,
     parameter UPSET = 0           // the phase of dt and the direction are those of the core, which may have any
@@ -14,10 +15,11 @@ module rairan #(
   localparam V = VELOCITY_WIDTH, W = 8;
   wire tick, velocity_valid, forced, stalled, overflow;
   wire signed [V-1:0] velocity;
+  wire signed [COUNT_WIDTH-1:0] pulse_count;
   wire [$clog2(MAX_COUNT+1)-1:0] n_ep1;
   wire [$clog2(MAX_TICKS+1)-1:0] n_dt1;
   tachometer core (
-      .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .velocity(velocity), .velocity_valid(velocity_valid),
+      .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity), .velocity_valid(velocity_valid),
       .forced(forced), .stalled(stalled), .overflow(overflow), .n_ep1(n_ep1), .n_dt1(n_dt1)
   );
   wire signed [1:0] core_step;
@@ -25,7 +27,12 @@ module rairan #(
   wire [$clog2(MAX_COUNT<3?2:MAX_COUNT)-1:0] core_more;
   wire [$clog2(MAX_TICKS+1)-1:0] core_dt;
   wire [$clog2((MAX_TICKS>MAX_COUNT?MAX_TICKS:MAX_COUNT)+1)-1:0] core_n;
-  wire core_forced, core_stalled, core_any, core_high, core_backward, core_moved, core_late, core_in_step, core_rest, core_beyond;
+  wire [$clog2(MAX_TICKS+1)-1:0] core_empty;
+  wire core_rests, core_forced, core_at_rest, core_any, core_high, core_backward, core_moved, core_late, core_in_step, core_rest, core_beyond;
+
+  wire still, rested;
+  wire [31:0] quiet;
+  standstill #(MAX_TICKS, COUNT_WIDTH) standing (clk, rst, tick, pulse_count, still, rested, quiet);
 
   reg [W-1:0] clock = 0, c_ep = 0, c_dt = 0, n_ep = 0, n_dt = 1, idle = 0;
   reg moved = 0, back = 0, in_step = 0;
@@ -34,7 +41,7 @@ module rairan #(
   wire signed [W:0] shown_clock = T - 2 - core_left;
   wire [W-1:0] elapsing = UPSET ? $unsigned(shown_clock) : clock;
   wire turns = count && has_moved && backward != was_back;
-  wire late = count && !turns && c_dt != 0;
+  wire late = count && !turns && (c_dt != 0 || !has_moved), fresh = !has_moved || c_dt == MAX_TICKS;
   wire ends = !turns && !late && elapsing == T - 1;
   wire [W-1:0] held = c_ep > MAX_COUNT ? MAX_COUNT : c_ep;
   wire [W-1:0] waited = in_step ? c_dt + 1 : c_dt;
@@ -46,7 +53,7 @@ module rairan #(
     dt = n_dt;
     if (turns) {update, alone, rests, ep, dt} = {3'b100, {W{1'b0}}, {{W-1{1'b0}}, 1'b1}};
     else if (late) begin
-      if (c_dt >= 2 || n_ep < 2) begin
+      if (!fresh && (c_dt >= 2 || n_ep < 2)) begin
         {update, alone, rests} = 3'b100;
         ep = 1;
         dt = c_dt;
@@ -88,12 +95,10 @@ module rairan #(
     end
 
   // As late as the core shows them.
-  wire update_, alone_, rests_, back_, tick_, more_;
+  wire update_, alone_, back_, tick_, more_;
   wire [W-1:0] ep_, idle_, n_ep_;
   wire [W-1:0] less_, dt_ = less_ + 1'd1;  // after reset Ndt1 is 1
-  delay #(3 + 2 * W, 4) delays (
-      clk, rst, {update, alone, rests, ep, dt - 1'd1}, {update_, alone_, rests_, ep_, less_}
-  );
+  delay #(2 + 2 * W, 4) delays (clk, rst, {update, alone, ep, dt - 1'd1}, {update_, alone_, ep_, less_});
   delay #(2 * W + 1, 3) delayed_registers (clk, rst, {back, idle, n_ep}, {back_, idle_, n_ep_});
   delay #(2, 2) delayed_ends (clk, rst, {ends, ends && c_ep > MAX_COUNT}, {tick_, more_});
 
@@ -109,7 +114,8 @@ module rairan #(
     lemma_left: assert (core_left == T - 2 - elapsed);
     lemma_clock: assert (clock < T && c_ep <= clock + 1);
     lemma_count: assert (core_any == (c_ep != 0) && core_more == (held == 0 ? 0 : held - 1));
-    lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0) && core_rest == (c_dt == MAX_TICKS));
+    lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0 || !moved) && core_rest == (c_dt == MAX_TICKS));
+    lemma_moved: assert (moved || (c_ep == 0 && n_ep == 0));
     lemma_in_dt: assert (c_dt == 0 || c_ep == 0);
     lemma_flags: assert (core_moved == moved && core_backward == back
         && (c_dt == MAX_TICKS || core_in_step == in_step));
@@ -117,7 +123,9 @@ module rairan #(
     lemma_n: assert (core_high == (n_ep >= 2) && core_n == (n_ep >= 2 ? n_ep - 1 : n_ep == 0 ? 0 : n_dt));
     lemma_pair: assert (n_dt >= 1 && n_dt <= MAX_TICKS && n_ep <= MAX_COUNT && (n_ep == 1 || n_dt == 1));
     lemma_held: assert (n_ep_ != 0 || velocity == 0);
-    lemma_rest: assert (core_forced == was_alone && core_stalled == was_rest && (!was_rest || n_ep == 0));
+    lemma_rest: assert (core_forced == was_alone && core_at_rest == was_rest && (!was_rest || n_ep == 0));
+    lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
+        && core_empty == (rested ? 0 : MAX_TICKS - quiet));
     lemma_waits: assert (c_dt == MAX_TICKS ? n_ep == 0 : idle <= c_dt * T + clock);
   end
   always @* begin
@@ -125,8 +133,9 @@ module rairan #(
     pr_range: assert (c_dt <= MAX_TICKS && core_dt <= MAX_TICKS && core_more < MAX_COUNT && core_left >= -1
         && core_more + core_any == (c_ep > MAX_COUNT ? MAX_COUNT : c_ep));
     pr_update: assert (velocity_valid == update_);
-    pr_estimate: assert (n_ep1 == ep_ && n_dt1 == dt_ && forced == alone_ && stalled == rests_);
+    pr_estimate: assert (n_ep1 == ep_ && n_dt1 == dt_ && forced == alone_);
     pr_velocity: assert (ep_ == 0 ? velocity == 0 : have <= wanted && wanted < have + 2 * q);
+    pr_stalled: assert (stalled == still);
     pr_rest: assert (idle_ < MAX_TICKS * T || velocity == 0);
     pr_flag: assert (!more_ || overflow);
   end

@@ -8,6 +8,7 @@ module timed #(
     parameter T = 4,              // tick_cycles
     parameter COUNT_WIDTH = 3,
     parameter MAX_COUNT = 2,
+    parameter MAX_TICKS = 4,
     parameter MAX_PERIODS = 16,   // timer periods in the maximum time
     parameter MIN_PERIODS = 4,    // M/T: in T_c
     parameter MAX_QUOTIENT = 4,
@@ -32,7 +33,9 @@ module timed #(
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
-  wire core_running, core_rounds, core_compared, core_measuring, core_forced, core_stalled, core_opened;
+  wire core_running, core_rounds, core_compared, core_measuring, core_forced, core_opened;
+  wire [$clog2(MAX_TICKS+1)-1:0] core_empty;
+  wire core_rests;
   wire core_negative, core_longest;
   wire signed [1:0] core_step;
   wire [$clog2(MAX_PERIODS+1)-1:0] core_age;
@@ -51,6 +54,10 @@ module timed #(
       assign beyond = out_of_range != 0;
     end else assign beyond = 0;
   endgenerate
+
+  wire rests, rested;
+  wire [31:0] quiet;
+  standstill #(MAX_TICKS, COUNT_WIDTH) rest (clk, rst, tick, pulse_count, rests, rested, quiet);
 
   // What a timer period counted, as late as `tick`.
   wire moved, back;
@@ -85,7 +92,8 @@ module timed #(
 
   // The window of M/T: its length, and what it has travelled so far, in counts.
   reg signed [W-1:0] travelled = 0;
-  wire signed [W-1:0] pair = MT && LATTICE ? size : negative != last_negative ? 0 : negative ? -1 : 1;
+  wire signed [W-1:0] turned = negative == last_negative ? 0 : negative ? 1 : -1;
+  wire signed [W-1:0] pair = MT && LATTICE ? size + turned : negative != last_negative ? 0 : negative ? -1 : 1;
   wire closes = MT && count && opened && lasted > MIN_PERIODS;
   always @(posedge clk)
     if (rst) begin
@@ -98,7 +106,7 @@ module timed #(
 
   // The division under way: clocks since it began, whether it is of a measurement, its distance in half counts, its time.
   reg [4:0] since = 0;
-  reg measuring = 0, silent = 0, still = 0, many_now = 0;
+  reg measuring = 0, silent = 0, many_now = 0;
   reg signed [I+Q:0] distance = 0;
   reg [I-1:0] times = 1;
   wire free = UPSET ? !core_measuring || !(core_running || core_rounds) : since == 0 || since == B || !measuring;
@@ -113,7 +121,6 @@ module timed #(
       if (overdue || measured || decays) begin
         measuring <= overdue || measured;
         silent <= !count;
-        still <= !count && !opened;
         many_now <= many;
         distance <= overdue ? 0 : measured ? 2 * P * pairs : velocity < 0 ? -3 * P : 3 * P;
         times <= measured ? (MT ? length : many ? 1 : age) : age;
@@ -121,13 +128,13 @@ module timed #(
     end
 
   // The one that was due in the last clock, and what was shown before.
-  reg due = 0, due_measuring = 0, due_silent = 0, due_still = 0, due_many = 0;
+  reg due = 0, due_measuring = 0, due_silent = 0, due_many = 0;
   reg signed [I+Q:0] due_distance = 0;
   reg [I-1:0] due_times = 1;
-  reg [V+I+2:0] held = 0;
+  reg [V+I+1:0] held = 0;
   reg signed [V-1:0] past = 0;
   reg [4:0] spacing = B;  // clocks since the last update
-  wire [V+I+2:0] outputs = {velocity, interval, forced, stalled, beyond};
+  wire [V+I+1:0] outputs = {velocity, interval, forced, beyond};
   always @(posedge clk)
     if (rst) begin
       {due, held, past} <= 0;
@@ -135,7 +142,7 @@ module timed #(
     end else begin
       spacing <= velocity_valid ? 1 : spacing < B ? spacing + 1 : B;
       due <= since == B;
-      {due_measuring, due_silent, due_still, due_many} <= {measuring, silent, still, many_now};
+      {due_measuring, due_silent, due_many} <= {measuring, silent, many_now};
       due_distance <= distance;
       due_times <= times;
       held <= outputs;
@@ -143,17 +150,17 @@ module timed #(
     end
 
   // What is shown: the one that was due at the last update; where there is one due that makes none, that.
-  reg was_silent = 0, was_still = 0, was_many = 0;
+  reg was_silent = 0, was_many = 0;
   reg signed [I+Q:0] was_distance = 0;
   reg [I-1:0] was_times = 0;  // 0: none
-  wire shown_silent = due ? due_silent : was_silent, shown_still = due ? due_still : was_still;
+  wire shown_silent = due ? due_silent : was_silent;
   wire shown_many = due ? due_many : was_many, kept = due && !velocity_valid;
   wire signed [I+Q:0] shown_distance = due ? due_distance : was_distance;
   wire [I-1:0] shown_times = due ? due_times : was_times;
   always @(posedge clk)
-    if (rst) {was_silent, was_still, was_many, was_distance, was_times} <= 0;
+    if (rst) {was_silent, was_many, was_distance, was_times} <= 0;
     else if (!kept) begin
-      {was_silent, was_still, was_many} <= {shown_silent, shown_still, shown_many};
+      {was_silent, was_many} <= {shown_silent, shown_many};
       {was_distance, was_times} <= {shown_distance, shown_times};
     end
 
@@ -202,7 +209,7 @@ module timed #(
     lemma_free: assert (since == 0 || !measuring || since >= (age - 1) * PHASES + phase);
     lemma_running: assert (core_running == (since >= 1 && since <= N + 1) && core_rounds == (since == N + 2)
         && core_compared == (since == B));
-    lemma_kept: assert (!fresh_division || since == 0 || (core_measuring == measuring && core_forced == silent && core_stalled == still
+    lemma_kept: assert (!fresh_division || since == 0 || (core_measuring == measuring && core_forced == silent
         && core_by == times));
     lemma_asked: assert (!fresh_division || since == 0 || (times >= 1 && distance <= most && -distance <= most));
     lemma_times: assert (!fresh_division || since == 0 || times <= MAX_PERIODS + (MT ? MIN_PERIODS : 0));
@@ -220,10 +227,10 @@ module timed #(
         || (due_distance == (past < 0 ? -3 * P : 3 * P) && due_silent));
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
-    lemma_still: assert (!fresh_past || since == 0 || measuring || !still || velocity == 0);
-    lemma_due_still: assert (!fresh_past || !due || due_measuring || !due_still || past == 0);
+    lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
+        && core_empty == (rested ? 0 : MAX_TICKS - quiet));
     lemma_fresh: assert (fresh && fresh_past);
-    lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+2-:V]));
+    lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+1-:V]));
   end
   generate
     if (FLAGS) begin : flag
@@ -276,11 +283,11 @@ module timed #(
         || (shown_times == 0 && velocity == 0));
     pt_flag: assert (!fresh || kept || shown_times == 0 || beyond == (FLAGS && (!fits || shown_many)));
     pt_saturated: assert (!fresh || fits || kept || shown_times == 0 || velocity == (shown_distance < 0 ? -LIMIT : LIMIT));
-    pt_decays: assert (!fresh_past || !fresh_due || !velocity_valid || due_measuring || (forced && !stalled
+    pt_decays: assert (!fresh_past || !fresh_due || !velocity_valid || due_measuring || (forced
         && (past < 0 ? velocity <= 0 && velocity > past : velocity >= 0 && velocity < past)));
     pt_bound: assert (!fresh_due || !due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
     pt_rest: assert (idle < LONG + B || velocity == 0);
-    pt_stalled: assert (!fresh || kept || stalled == shown_still);
+    pt_stalled: assert (stalled == rests);
     pt_held: assert (velocity_valid || outputs == held);
   end
 endmodule

@@ -21,6 +21,10 @@ ARGUED = {
         "the limit of the output is 123 instead of 127; velocities are 2^5·2π/m, and the nearest ones are 100 and 201"
     ),
     ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
+    ("mt, in clocks", "earlier = Signal()  # a count in an earlier period of this tick", "S[0] const0"): (
+        "it outlasts a reset until the next tick, and only withholds a comparison there: the velocity is 0 and would "
+        "not decay, and the first measurement takes the divider whether it is idle or not"
+    ),
     ("mt, in clocks", "change = Signal(signed(max(len(shown), spec.native_width) + 1))", "change[6] const0"): (
         "it is read to decide whether the velocity decays: the change is at most 48, from −48 to 0, and less than 64"
     ),

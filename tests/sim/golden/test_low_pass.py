@@ -25,15 +25,15 @@ def spec_of(lowpass: Fraction, max_ticks: int = 500, frac_bits: int = 16) -> STa
     return STachometer(encoder=Encoder(500), timing=timing, lowpass=lowpass, frac_bits=frac_bits)
 
 
-def through(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, stalled: bool = False) -> Table:
+def through(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, rests: bool = False) -> Table:
     """What the filter of a core makes of velocities, each so many ticks after the one before."""
-    return filtered(spec, *far_apart(spec, velocity, elapsed, stalled))
+    return filtered(spec, *far_apart(spec, velocity, elapsed, rests))
 
 
-def far_apart(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, stalled: bool) -> tuple[Table, Table]:
+def far_apart(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, rests: bool) -> tuple[Table, Table]:
     came = TICK * np.cumsum(elapsed)
     tick = TICK * np.arange(int(elapsed.sum()))
-    columns = {"velocity": velocity, "interval": elapsed, "stalled": np.full(len(velocity), stalled)}
+    columns = {"velocity": velocity, "interval": elapsed, "rests": np.full(len(velocity), rests)}
     return Table(tick, {}), Table(came, columns)
 
 
@@ -112,7 +112,7 @@ def test_takes_the_last_of_those_that_come_meanwhile_for_the_time_of_all() -> No
     spec = spec_of(Fraction(2000))
     latency = spec.low_pass_latency
     n = np.array([100, 200, 300, 400]) << 16
-    updates = Table(np.array([50, 53, 57, 500]), {"velocity": n, "stalled": np.zeros(4, dtype=np.bool_)})
+    updates = Table(np.array([50, 53, 57, 500]), {"velocity": n, "rests": np.zeros(4, dtype=np.bool_)})
     tick = np.concatenate([np.arange(0, 50, 10), [51, 52, 54, 55, 55, 55], [400]])
     got = filtered(spec, Table(tick, {}), updates)
     assert got.velocity.tolist() == through(spec, n[[0, 2, 3]], np.array([5, 6, 1])).velocity.tolist()
@@ -131,14 +131,14 @@ def test_time_is_what_has_passed_and_not_what_was_measured() -> None:
 
 
 def test_a_method_without_updates_at_rest_ends_at_0() -> None:
-    """Its last update is `stalled`: no later update would let the velocity decay."""
+    """Its last update `rests`: no later update would let the velocity decay."""
     rairan = RairanTachometer(
         encoder=Encoder(100), timing=Timing(1_000_000, 100, 50), lowpass=Fraction(100), max_speed=Speed(Fraction(200))
     )
     encoding = VirtualEncoder(100, seed=1).record(parse_motion("constant:50rad/s:20ms+stop:30ms"))
     run = golden.run(rairan, encoding.recording.place(1_000_000)).updates
-    assert run.stalled[-1]
+    assert run.forced[-1]
     assert run.velocity[-1] == 0
     assert run.velocity.max() > 0
-    ends = through(spec_of(Fraction(50)), np.array([1 << 16, 0]), np.array([20, 1]), stalled=True).velocity
+    ends = through(spec_of(Fraction(50)), np.array([1 << 16, 0]), np.array([20, 1]), rests=True).velocity
     assert ends[-1] > 0  # others go on, and so does the filter

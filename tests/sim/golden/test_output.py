@@ -62,13 +62,13 @@ def test_bounds_stay_bounds(unit: str, ppr: int) -> None:
 
 def test_what_does_not_fit_saturates_and_is_flagged() -> None:
     timing = Timing(1_000_000, 8, 4)
-    spec = STachometer(encoder=Encoder(25), timing=timing, frac_bits=4, velocity_bits=8)
+    spec = STachometer(encoder=Encoder(25), timing=timing, frac_bits=4, velocity_width=8)
     done = in_unit(spec, updates_of(np.array([127, 128, -127, -128, 0])))
     assert done.velocity.tolist() == [127, 127, -127, -127, 0]
     assert done.velocity_overflow.tolist() == [False, True, False, True, False]
 
 
 def test_a_wider_port_never_saturates() -> None:
-    spec = STachometer(encoder=Encoder(25), timing=Timing(1_000_000, 8, 4), velocity_bits=40)
+    spec = STachometer(encoder=Encoder(25), timing=Timing(1_000_000, 8, 4), velocity_width=40)
     assert spec.velocity_width == 40
     assert not in_unit(spec, updates_of(np.array([8 << 16, -8 << 16]))).velocity_overflow.any()

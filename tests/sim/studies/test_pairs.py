@@ -6,6 +6,7 @@ import pytest
 
 from tachometry.sim.studies.pairs import apart, configurations, factors, spec_of
 from tachometry.spec import METHODS, TachometerSpec, common_options, own_options
+from tachometry.spec.option import is_derived
 
 # What cannot be together at all, of every method that has both.
 APART = {
@@ -60,7 +61,7 @@ def test_the_extremes_are_there() -> None:
     assert values("s", "index", "index_reset") == {(False, False), (True, False), (True, True)}
     for method in METHODS:
         assert values(method, "tick_cycles") >= {(1,), (3,), (960,)}
-        widths = [spec for spec in cores[method] if spec.velocity_bits is not None]
+        widths = [spec for spec in cores[method] if not is_derived(spec.velocity_width)]
         assert 0 < len(widths) < len(cores[method])
         assert any(spec.native_frac_bits == 24 for spec in cores[method])
         assert any(spec.max_speed for spec in cores[method])
@@ -80,4 +81,4 @@ def test_words_and_specs_are_the_same() -> None:
         for words in configurations(method):
             spec = spec_of(words)
             assert spec.method == method
-            assert spec.velocity_bits is not None or "--velocity-width" not in words
+            assert not is_derived(spec.velocity_width) or "--velocity-width" not in words

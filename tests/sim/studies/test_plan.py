@@ -152,7 +152,7 @@ def test_dense_speeds_are_not_too_many(high: float) -> None:
 
 def test_csv(tmp_path: Path) -> None:
     expected = plan_at(SPEC, dense_speeds(SPEC, 1.0, 1000.0))
-    write_plan(tmp_path / "p.csv", expected)
+    write_plan(tmp_path / "p.csv", expected, SPEC.shown_unit)
     table = np.genfromtxt(tmp_path / "p.csv", delimiter=",", names=True)
     assert table["speed_rad_s"].tolist() == expected.speed.tolist()
     assert table["interval_ticks"].tolist() == expected.interval.tolist()

@@ -8,6 +8,7 @@ from support.sequences import MAX_TICKS, PAPER, rounded
 
 from tachometry.sim.golden.methods.s import Model
 from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.golden.standstill import with_stalled
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, STachometer, Timing
 
@@ -24,16 +25,13 @@ def as_ticks(m_e: list[int]) -> Table:
 
 
 def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
-    """(tick, m_s, forced, stalled, raw velocity) of every update."""
-    s_model = model(max_ticks, **options)
-    found = s_model.updates(as_ticks(m_e), None, 1 << 40)
-    latency = s_model._spec.datapath_latency
-    return [
-        (int(clock - latency) // 16, int(m_s), bool(forced), bool(stalled), int(raw))
-        for clock, m_s, forced, stalled, raw in zip(
-            found.clock, found.interval, found.forced, found.stalled, found.velocity, strict=True
-        )
-    ]
+    """(tick, m_s, forced, stalled, raw velocity) of every update; `stalled` is that of the tick."""
+    s_model, ticks = model(max_ticks, **options), as_ticks(m_e)
+    found = s_model.updates(ticks, None, 1 << 40)
+    cause = (found.clock - s_model._spec.datapath_latency) // 16
+    stalled = with_stalled(s_model._spec, ticks, np.ones(len(m_e), dtype=np.int64)).stalled[cause]
+    columns = (cause, found.interval, found.forced, stalled, found.velocity)
+    return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 @pytest.mark.parametrize("cancel", [True, False])
@@ -47,7 +45,7 @@ def test_the_papers_sequences(name: str, cancel: bool) -> None:
 
 
 def definition(m_e: list[int], max_ticks: int, cancel: bool) -> list[tuple[int, int, bool, bool, int]]:
-    """The semantics in plain words, tick by tick, with fractions."""
+    """The semantics in plain words, tick by tick, with fractions; S rests if nothing was counted in a forced window."""
 
     def number(tick: int) -> int:
         return 0 if tick < 0 else m_e[tick]

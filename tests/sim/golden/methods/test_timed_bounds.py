@@ -123,7 +123,7 @@ def test_true_mean_speed_is_always_enclosed(spec: TimedTachometer, n: int) -> No
 
 @pytest.mark.parametrize(
     ("right", "wrong"),
-    [("np.where(low < 0, time - 1, time + 1)", "time"), ("np.where(high > 0, time - 1, time + 1)", "time")],
+    [("np.where(distance < 0, time - 1, time + 1)", "time"), ("np.where(distance > 0, time - 1, time + 1)", "time")],
 )
 def test_mutants_are_caught(right: str, wrong: str) -> None:
     with mutant(timed.enclosure, right, wrong), caught():

@@ -1,0 +1,93 @@
+"""What `generate` and `plan` print of a core: what it is, what it measures, and how wide and late its outputs are."""
+
+import math
+from fractions import Fraction
+
+from tachometry.cli.reports.terminal import print_rows
+from tachometry.sim.studies.plan import default_range, plan_at
+from tachometry.spec import TachometerSpec
+from tachometry.spec.formats.velocity_output import NATIVE
+from tachometry.spec.manifest import manifest
+from tachometry.spec.units import SPEED, SpeedUnit, format_time, plural
+
+
+def print_core(spec: TachometerSpec) -> None:
+    """Print the configuration of a core, and what it measures at low and at high speed."""
+    print_rows([*configuration(spec), *_resolution(spec)])
+
+
+def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
+    """Rows of the table: a name and its value."""
+    encoder, timing = spec.encoder, spec.timing
+    counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
+    greatest = f"{_speed(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
+    latencies = manifest(spec)["latency_cycles"]
+    memory = spec.memory
+    return [
+        ("method", f"{spec.method.upper()}, {spec.description}"),
+        ("encoder", counts),
+        ("clock", f"{timing.clock_hz:,} Hz"),
+        ("tick", f"{short_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
+        ("maximum time", f"{short_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
+        ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
+        ("greatest speed", greatest),
+        ("full scale", _full_scale(spec)),
+        (
+            "one LSB of velocity",
+            f"2^{-spec.frac_bits} {spec.unit} = {spec.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to "
+            f"{spec.rounding_lsb} of it",
+        ),
+        ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.outputs if port.width > 1)),
+        *([] if memory is None else [("reciprocal", _memory(*memory))]),
+        *((name, f"{plural(n, 'clock')} ({short_time(spec.seconds(n))})") for name, n in latencies.items()),
+        ("standstill", _standstill(spec)),
+        *(("note", note) for note in spec.notes),
+    ]
+
+
+def _full_scale(spec: TachometerSpec) -> str:
+    value = f"{spec.full_scale * 2.0**-spec.frac_bits:.9g} {spec.unit}"
+    if spec.unit == NATIVE:
+        value += f" = {spec.full_scale * spec.rad_per_s_per_lsb:.6g} rad/s"
+    value += ", either way"
+    if not spec.narrow:
+        return value
+    counted = spec.shown_unit.of(spec.max_velocity * spec.unit_velocity)
+    held = f"{value}; that is what {spec.velocity_width} bits hold"
+    return f"{held}, counted is up to {counted:.6g} {spec.shown_unit.name}"
+
+
+def _resolution(spec: TachometerSpec) -> list[tuple[str, str]]:
+    """What the equations of the method promise at the ends of its range."""
+    found, unit, rows = plan_at(spec, default_range(spec)), spec.shown_unit, []
+    columns = zip(("low", "high"), found.speed, found.resolution, found.measurement_time, strict=True)
+    for name, speed, resolution, time in columns:
+        if math.isnan(resolution):
+            shown = "unknown: there are no equations for the method, or it is too fast for it"
+        else:
+            rounding = spec.rounding_lsb * spec.rad_per_s_per_lsb
+            shown = (
+                f"{unit.of(resolution):.4g} {unit.name} and {unit.of(rounding):.2g} by rounding, at "
+                f"{unit.of(speed):.6g} {unit.name}, measured in {short_time(float(time))}"
+            )
+        rows.append((f"resolution, {name}", shown))
+    return rows
+
+
+def _memory(kind: str, entries: int, width: int) -> str:
+    return f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"
+
+
+def _standstill(spec: TachometerSpec) -> str:
+    rest = spec.standstill_ticks
+    time = short_time(rest * spec.timing.tick_seconds)
+    return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
+
+
+def _speed(rad_per_s: float) -> str:
+    return " = ".join(f"{SpeedUnit(unit).of(rad_per_s):.6g} {unit}" for unit in SPEED)
+
+
+def short_time(seconds: Fraction | float) -> str:
+    """A time to four digits."""
+    return format_time(Fraction(f"{float(seconds):.4g}"))

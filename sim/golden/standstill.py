@@ -1,0 +1,18 @@
+"""Golden standstill: whether nothing has been counted for longer than the maximum time."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.signals.run import Table
+from tachometry.spec import TachometerSpec
+
+
+def with_stalled(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64]) -> Table:
+    """Ticks with whether the shaft rests; `nominal` says how many nominal ticks each is long.
+
+    It does if the ticks in a row that counted nothing, this one included, are together long enough. The tick before the
+    first one counts as empty.
+    """
+    through = np.cumsum(nominal)
+    counted = np.maximum.accumulate(np.where(ticks.pulse_count != 0, through, -1))
+    return ticks.having(stalled=through - counted >= spec.stalled_after_ticks)

@@ -1,0 +1,106 @@
+"""`stalled` is the same with every method: it rises after the same silence, and falls with the next count."""
+
+import numpy as np
+import pytest
+from amaranth.lib import wiring
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.methods.interval import IntervalAccumulator
+from tachometry.hdl.methods.s import SMethod
+from tachometry.hdl.output.standstill import Standstill
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import METHODS, Encoder, STachometer, Timing, of_texts
+from tachometry.spec.manifest import manifest
+
+WIDTH = 4
+
+
+def numbers(max_ticks: int) -> list[int]:
+    """Steady numbers, single ones, and silences of about the maximum time, after a reset as well."""
+    rng = np.random.default_rng(max_ticks)
+    found = [0] * (max_ticks + 1)
+    while len(found) < 30 * max_ticks:
+        steady = [int(rng.integers(-3, 4))] * int(rng.integers(1, 4))
+        found += [0] * int(max_ticks + rng.integers(-2, 3)) + steady + [0] * int(rng.integers(0, 2 * max_ticks))
+        found += rng.integers(-2, 3, 6).tolist() + [1] * int(rng.integers(0, 2 * max_ticks))
+    return found
+
+
+def expected(m_e: list[int], max_ticks: int, length: list[int]) -> list[int]:
+    """Tick by tick: the silence so far, with the tick before the first, is longer than the maximum time."""
+    silence, found = 1, []
+    for number, ticks in zip(m_e, length, strict=True):
+        silence = 0 if number else silence + ticks
+        found.append(int(silence > max_ticks))
+    return found
+
+
+def check(box: wiring.Component, max_ticks: int, name: str, pause: int, shifts: bool = False) -> None:
+    """It changes with a tick, and stays from tick to tick."""
+    m_e = numbers(max_ticks)
+    k = np.random.default_rng(1).integers(0, 3 if shifts else 1, len(m_e)).tolist()
+    rows: list[dict[str, int]] = []
+    for number, shift in zip(m_e, k, strict=True):
+        rows += [{"tick": 1, name: number} | ({"shift": shift} if shifts else {}), *[{"tick": 0}] * pause]
+    seen = [row["stalled"] for row in clock_by_clock(box, rows, ["stalled"])]
+    wanted = expected(m_e, max_ticks, [1 << shift for shift in k])
+    assert seen == [value for value in wanted for _ in range(1 + pause)]
+    assert {*wanted} == {0, 1}
+
+
+def check_box(max_ticks: int = 5) -> None:
+    check(Standstill(max_ticks, WIDTH), max_ticks, "m_e", 1)
+
+
+def check_s(max_ticks: int = 5) -> None:
+    spec = STachometer(encoder=Encoder(25), timing=Timing(1_000_000, 3, max_ticks))
+    check(SMethod(spec), max_ticks, "pulse_count", 2)
+
+
+@pytest.mark.parametrize("max_ticks", [2, 3, 4, 5, 8])
+def test_after_the_maximum_time(max_ticks: int) -> None:
+    check_box(max_ticks)
+    check_s(max_ticks)
+    check(Standstill(max_ticks, WIDTH), max_ticks, "m_e", 0)
+    check(Standstill(max_ticks, WIDTH, max_shift=2), max_ticks, "m_e", 1, shifts=True)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method(method: str) -> None:
+    texts = {"ppr": "1", "clock": "1MHz", "tick": "5", "max-time": "30", "frac-bits": "4", "position-width": "8"}
+    for more in ({}, {"adaptive": "25%"} if method == "rairan" else {"external-tick": "yes"}):
+        spec = of_texts(method, texts | more)
+        assert manifest(spec)["stalled_after_ticks"] == 7
+        found = lockstep(spec, stress(spec, 1, 30), PySim())
+        assert found.n_mismatches == 0, found.first
+        ticks = found.actual.ticks
+        if "adaptive" not in more:
+            ones = [1] * len(ticks)
+            assert ticks.stalled.astype(int).tolist() == expected(ticks.pulse_count.tolist(), 6, ones)
+        assert np.count_nonzero(np.diff(ticks.stalled.astype(int))) > 2
+
+
+MUTANTS = {
+    "a tick late": (Standstill, "init=self._max_ticks - 1", "init=self._max_ticks", check_box),
+    "a tick early": (Standstill, "left.eq(self._max_ticks)", "left.eq(self._max_ticks - 1)", check_box),
+    "in spite of a count": (Standstill, "silent & (shown", "(shown", check_box),
+    "not held": (Standstill, "less[-1]), shown)", "less[-1]), 0)", check_box),
+    "S: without the opening tick": (
+        IntervalAccumulator,
+        "(opening | self.previous).any()",
+        "self.previous.any()",
+        check_s,
+    ),
+    "S: only with a forced update": (IntervalAccumulator, "rests | nearly |", "rests |", check_s),
+    "S: in spite of a count": (IntervalAccumulator, "self.forced & silent", "self.forced", check_s),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    box, right, wrong, check = MUTANTS[name]
+    with mutant(box, right, wrong), caught():
+        check()

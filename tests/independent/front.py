@@ -1,0 +1,150 @@
+"""From the lines of an encoder to steps, sampling periods, positions and what goes wrong, a clock at a time."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from independent.settings import Settings
+
+# Levels of (A, B) in the order of forward motion: A leads B.
+CYCLE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+Level = tuple[int, int, int, int]  # a, b, z, tick_in
+Play = list[tuple[int, Level]]  # how many clocks each level is held, from the first clock after reset on
+
+
+@dataclass
+class Front:
+    """What the front end makes of the lines, by clocks of the core.
+
+    Parameters
+    ----------
+    steps : dict of int to int
+        Counts by the clock in whose window they belong.
+    errors, index, rises : list of int
+        Clocks of illegal transitions, of rises of Z and of the external tick.
+    glitches : list of int
+        Clocks in which a line went back before it was believed.
+    """
+
+    n_clocks: int
+    steps: dict[int, int] = field(default_factory=dict)
+    errors: list[int] = field(default_factory=list)
+    index: list[int] = field(default_factory=list)
+    rises: list[int] = field(default_factory=list)
+    glitches: list[int] = field(default_factory=list)
+
+
+def believed(changes: list[tuple[int, int]], n_clocks: int, clocks: int) -> tuple[dict[int, int], list[int]]:
+    """Levels that hold for so many clocks, by the clock of their first sample; and clocks in which others went back."""
+    level, passed, gone = changes[0][1], {}, []
+    for nth, (at, new) in enumerate(changes):
+        until = changes[nth + 1][0] if nth + 1 < len(changes) else n_clocks + clocks
+        if new == level:
+            continue
+        if until - at >= clocks:
+            level = passed[at] = new
+        else:
+            gone.append(until)
+    return passed, gone
+
+
+def count_of(decoding: int, old: tuple[int, int], new: tuple[int, int]) -> int:
+    """±1 or 0 of a change of one line."""
+    turn = (CYCLE.index(new) - CYCLE.index(old)) % 4
+    step = {1: 1, 3: -1}[turn]
+    of_a = new[0] != old[0]
+    counted = {4: True, 2: of_a, 1: of_a and new[1] == 0}[decoding]
+    return step if counted else 0
+
+
+def conditioned(settings: Settings, play: Play, latency: int) -> Front:
+    """Steps and errors; a level that is sampled in clock c acts in clock c + latency."""
+    n_clocks = sum(clocks for clocks, _ in play)
+    front, lines = Front(n_clocks), []
+    for which in range(4):
+        changes: list[tuple[int, int]] = []
+        at = 0
+        for clocks, level in play:
+            if not changes or changes[-1][1] != level[which]:
+                changes.append((at, level[which]))
+            at += clocks
+        filtered = settings.filter if which < 3 else 0
+        passed, gone = believed(changes, n_clocks, filtered)
+        front.glitches += gone if which < (3 if settings.flag("index") else 2) else []
+        lines.append(passed)
+    a, b = play[0][1][:2]
+    for at in sorted({*lines[0], *lines[1]}):
+        new = (lines[0].get(at, a), lines[1].get(at, b))
+        if new[0] != a and new[1] != b:
+            front.errors.append(at + latency)
+        elif step := count_of(settings.decoding, (a, b), new):
+            front.steps[at + latency] = step
+        a, b = new
+    front.index = [at + latency for at, level in lines[2].items() if level]
+    front.rises = [at for at, level in lines[3].items() if level]
+    return front
+
+
+def external_ends(rises: Iterable[int], n_clocks: int, fewest: int, most: int) -> tuple[list[int], list[int]]:
+    """Last clocks of windows that rises end, none shorter than `fewest` or longer than `most`; and of what is wrong."""
+    ends, wrong, before, waiting = [], [], -1, sorted(rises)
+    for clock in range(n_clocks):
+        rise = bool(waiting) and waiting[0] == clock
+        if rise:
+            waiting.pop(0)
+        early = rise and clock - before < fewest
+        late = not rise and clock - before == most
+        if early or late:
+            wrong.append(clock)
+        if (rise and not early) or late:
+            ends.append(clock)
+            before = clock
+    return ends, wrong
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A sampling period: its last clock, its counts as shown, whether they were too many, and the position after it."""
+
+    last: int
+    count: int
+    overflow: bool
+    position: int
+    empty: bool  # no count came in it at all
+
+
+def ticks_of(settings: Settings, front: Front, ends: list[int], most: int, held: bool = False) -> list[Tick]:
+    """Sampling periods that end with these clocks; `most` counts are shown.
+
+    `held`: a sum that was once beyond stays there, as in periods that may be longer than nominal.
+    """
+    found, position, rises = [], 0, set(front.index)
+    events = [clock for clock in sorted({*front.steps, *rises}, reverse=True)]
+    for last in ends:
+        total, came, left = 0, False, 0
+        while events and events[-1] <= last:
+            clock = events.pop()
+            step = front.steps.get(clock, 0)
+            total, position, came = total + step, position + step, came or step != 0
+            left = left or (1 if total > most else -1 if total < -most else 0)
+            if clock in rises and settings.flag("index-reset"):
+                position = 0
+        shown = left * most if held and left else max(-most, min(most, total))
+        over = bool(left) if held else abs(total) > most
+        found.append(Tick(last, shown, over, wrapped(position, settings.position_bits), not came))
+    return found
+
+
+def wrapped(number: int, bits: int) -> int:
+    """In two's complement."""
+    return (number + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
+
+
+def index_positions(settings: Settings, front: Front) -> list[tuple[int, int]]:
+    """Clock and position of each rise of Z, before any reset of the position."""
+    found, position, rises = [], 0, set(front.index)
+    for clock in sorted({*front.steps, *rises}):
+        position += front.steps.get(clock, 0)
+        if clock in rises:
+            found.append((clock, wrapped(position, settings.position_bits)))
+            position = 0 if settings.flag("index-reset") else position
+    return found

@@ -1,0 +1,303 @@
+"""What the manifest must say, computed from the words of the command line; and that nothing in it goes unchecked."""
+
+import math
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from independent.bench import Manifest
+from independent.settings import Settings
+
+# What a method can be asked for: the entry of the manifest's `parameters`, and the word of the command line.
+_SHARED = {
+    "pulses_per_rev": "ppr",
+    "decoding": "decoding",
+    "clock_hz": "clock",
+    "tick_cycles": "tick",
+    "max_ticks": "max-time",
+    "unit": "unit",
+    "frac_bits": "frac-bits",
+    "velocity_bits": "velocity-width",
+    "max_speed": "max-speed",
+    "position_width": "position-width",
+    "filter_clocks": "filter",
+    "index": "index",
+    "index_reset": "index-reset",
+    "max_tick_cycles": "external-tick",
+    "age": "age",
+    "bounds": "bounds",
+    "lowpass": "lowpass",
+}
+_TIMED = {"timer": "timer", "bound_decay": "bound-decay", "paper_exact": "paper-exact"}
+_RAIRAN = {"estimate": "estimate", "paper_exact": "paper-exact", "bound_decay": "bound-decay", "adaptive": "adaptive"}
+WORDS = {
+    "s": {**_SHARED, "cancel": "cancel"},
+    "m": {**_SHARED, "average": "average"},
+    "t": {**_SHARED, **_TIMED},
+    "mt": {**_SHARED, **_TIMED, "min_time": "min-time"},
+    "rairan": {**_SHARED, **_RAIRAN},
+}
+_FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact")
+
+
+def parameter(settings: Settings, name: str, shown: object) -> object:
+    """The canonical value of a parameter; `shown` is what the manifest has."""
+    word = WORDS[settings.method][name]
+    if word in _FLAGS:
+        return settings.flag(word)
+    if name == "bound_decay":
+        return settings.decays if settings.method != "rairan" else settings.flag(word, True)
+    if name == "cancel":
+        return settings.flag(word, True)
+    if name in ("max_speed", "lowpass", "adaptive"):
+        return _canonical_quantity(settings, name, shown)
+    values: dict[str, object] = {
+        "pulses_per_rev": settings.ppr,
+        "clock_hz": settings.clock_hz,
+        "tick_cycles": settings.tick,
+        "max_ticks": settings.max_ticks,
+        "frac_bits": settings.frac_bits,
+        "velocity_bits": settings.velocity_bits,
+        "position_width": settings.position_bits,
+        "filter_clocks": settings.filter,
+        "max_tick_cycles": settings.longest_tick if settings.external else None,
+        "timer": "tick" if settings.lattice else "clock",
+        "min_time": settings.min_time,
+        "unit": settings.unit,
+        "decoding": settings.decoding,
+        "average": settings.average,
+        "estimate": settings.estimate,
+    }
+    return values[name]
+
+
+def _canonical_quantity(settings: Settings, name: str, shown: object) -> object:
+    """The text of a quantity may be written in several ways: if it means the same, it is right."""
+    wanted = {"max_speed": settings.max_speed, "lowpass": settings.lowpass, "adaptive": settings.target}[name]
+    if wanted is None or shown is None:
+        return None if wanted is None else wanted
+    if isinstance(wanted, tuple):
+        value, unit = wanted
+        return shown if Fraction(str(shown).removesuffix(unit)) == value else settings.words["max-speed"]
+    given = float(Fraction(str(shown).removesuffix("rad/s")))
+    return shown if given == pytest.approx(float(wanted), rel=1e-12) else wanted
+
+
+def signed(limit: Fraction | int) -> int:
+    """Bits of a two's complement number that holds ±limit."""
+    return int(limit).bit_length() + 1
+
+
+class Expected:
+    """Entries of a manifest, by their path with dots.
+
+    Parameters
+    ----------
+    settings : Settings
+    manifest : Manifest
+        Its latencies are taken from it: they are measured on the Verilog.
+    """
+
+    def __init__(self, settings: Settings, manifest: Manifest) -> None:
+        self.settings, self.manifest = settings, manifest
+        self.to_velocity = manifest["latency_cycles"]["tick_to_velocity"]
+        self.counts = settings.max_count << settings.greatest_shift
+
+    @property
+    def division(self) -> int:
+        """Clocks of a division: it ends a clock before the update, where that is in counts per tick."""
+        return int(self.to_velocity) - 1
+
+    @property
+    def silence(self) -> int:
+        """Timer periods until a 0 is forced."""
+        least = math.ceil(self.division / self.settings.period)
+        return max(self.settings.max_ticks * self.settings.tick // self.settings.period, least)
+
+    @property
+    def longest_window(self) -> int:
+        """In units of `interval`."""
+        settings = self.settings
+        if settings.method == "m":
+            return settings.average
+        if settings.method not in ("t", "mt"):
+            return settings.max_ticks
+        if settings.method == "t":
+            return self.silence
+        least = max(settings.min_time // settings.period, math.ceil(self.division / settings.period) - 1)
+        if settings.lattice and settings.external:
+            least = max(least, math.ceil(self.division / 2))
+        return least + self.silence
+
+    @property
+    def greatest_bound(self) -> int:
+        """In counts per tick, as wide as the port of a bound holds it."""
+        settings = self.settings
+        if settings.method in ("t", "mt"):
+            on_lattice = 1 if settings.method == "t" else settings.max_count
+            most = 2 * (on_lattice if settings.lattice else settings.tick) + 1
+        else:
+            most = settings.max_count + 1
+        return 1 << most.bit_length()
+
+    def none(self) -> int:
+        """Magnitude of an absent bound: the greatest that its port shows."""
+        settings, shown = self.settings, int(self.manifest["bounds"]["none"])
+        if settings.native and settings.velocity_bits is None:
+            return (self.greatest_bound << settings.frac_bits) - 1
+        greatest = self.greatest_bound * settings.lsb_per_count
+        limit = math.inf if settings.velocity_bits is None else (1 << settings.velocity_bits - 1) - 1
+        if limit < greatest - 2:
+            return int(limit)
+        return shown if abs(shown - greatest) <= 2 else round(greatest)
+
+    def recovery(self) -> int:
+        """docs/verification.md: all counters may have to wrap, one after the other, before all is forgotten."""
+        settings = self.settings
+        lines = 2 + (1 << max(settings.filter - 1, 1).bit_length() if settings.filter else 0) + 1
+        tick = 1 + (1 << max(settings.longest_tick - 2, 0).bit_length())
+        most = settings.max_ticks
+        periods = {
+            "s": lambda: (1 << most.bit_length()) + most + 1,
+            "m": lambda: settings.average + 1,
+            "t": lambda: (1 << self.silence.bit_length()) + self.silence + 1,
+            "mt": lambda: (1 << self.longest_window.bit_length()) + self.silence + self.longest_window + 2,
+            "rairan": lambda: ((1 << most.bit_length()) + 2 * most + 3) << settings.greatest_shift,
+        }[settings.method]()
+        timed = settings.method in ("t", "mt")
+        clocks = periods * (1 if timed and not settings.lattice else settings.longest_tick)
+        if timed:
+            shown = int(self.manifest["recovery_cycles"])
+            least = lines + tick + clocks + 2 + self.to_velocity
+            # In other units a division is shorter than the way to the velocity, by how much is not told.
+            if not settings.native and least + 10 < shown < least + self.division:
+                return shown
+            clocks += self.division
+        return lines + tick + clocks + 2 + int(self.to_velocity)
+
+    def entries(self) -> dict[str, Callable[[], object]]:
+        """What each entry must be."""
+        settings, manifest = self.settings, self.manifest
+        external = manifest.get("external_tick_cycles", {})
+        return {
+            "generator": lambda: manifest["generator"] if manifest["generator"].startswith("tachometry ") else None,
+            "method": lambda: settings.method,
+            "clock_hz": lambda: settings.clock_hz,
+            "tick_cycles": lambda: settings.tick,
+            "max_ticks": lambda: settings.max_ticks,
+            "counts_per_rev": lambda: settings.counts_per_turn,
+            "decoding": lambda: settings.decoding,
+            "velocity.width": lambda: next(p["width"] for p in manifest["ports"] if p["name"] == "velocity"),
+            "velocity.frac_bits": lambda: settings.frac_bits,
+            "velocity.unit": lambda: settings.unit,
+            "velocity.rad_per_s_per_lsb": lambda: pytest.approx(float(settings.rad_per_s_per_lsb), rel=1e-13),
+            "bounds.none": self.none,
+            "interval_unit_cycles": lambda: settings.period if settings.method in ("t", "mt") else settings.tick,
+            "latency_cycles.pin_to_count": lambda: 2 + settings.filter,
+            # Measured: every tick and every update is compared at its clock.
+            "latency_cycles.tick_latency": lambda: manifest["latency_cycles"]["tick_latency"],
+            "latency_cycles.tick_to_velocity": lambda: self.to_velocity,
+            "latency_cycles.tick_in_to_window_end": lambda: 2,
+            "recovery_cycles": self.recovery,
+            # Measured: external ticks that are as close as this, and a clock closer.
+            "external_tick_cycles.min": lambda: external["min"] if 2 <= external["min"] <= settings.tick else None,
+            "external_tick_cycles.max": lambda: settings.longest_tick,
+        }
+
+    def optional(self) -> dict[str, bool]:
+        """Entries that not every core has, and whether this one has them."""
+        settings = self.settings
+        return {
+            "bounds.none": settings.flag("bounds"),
+            "recovery_cycles": settings.lowpass is None and not (settings.method == "rairan" and settings.paper_exact),
+            **dict.fromkeys(
+                ("latency_cycles.tick_in_to_window_end", "external_tick_cycles.min", "external_tick_cycles.max"),
+                settings.external,
+            ),
+        }
+
+
+def _flat(entries: dict[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in entries.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{before}{name}.")
+        else:
+            yield before + name, value
+
+
+def check_manifest(settings: Settings, manifest: Manifest, name: str) -> None:
+    """Every entry, and that there is none without a rule here."""
+    rest = dict(manifest)
+    parameters, ports = rest.pop("parameters"), rest.pop("ports")
+    assert rest.pop("module") == name
+    assert {"method", *WORDS[settings.method]} == set(parameters)
+    for key in WORDS[settings.method]:
+        assert parameters[key] == parameter(settings, key, parameters[key]), key
+    assert parameters["method"] == settings.method
+    expected = Expected(settings, manifest)
+    entries, optional = expected.entries(), expected.optional()
+    shown = dict(_flat(rest))
+    assert set(shown) == {key for key in entries if optional.get(key, True)}
+    for key, value in shown.items():
+        assert value == entries[key](), key
+    check_ports(expected, ports)
+
+
+def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
+    """Names, directions, signs and widths, as docs/ports.md has them."""
+    settings = expected.settings
+    bound = signed(expected.greatest_bound - 1) + settings.frac_bits
+    own = settings.native and settings.velocity_bits is None
+    timed = settings.method in ("t", "mt")
+    fast = not settings.lattice and settings.tick > settings.max_count
+    beyond = timed and (fast or (settings.lattice and settings.method == "t"))
+    widths: dict[str, int | None] = {
+        "velocity": settings.velocity_bits or (signed(settings.max_count) + settings.frac_bits if own else None),
+        "interval": expected.longest_window.bit_length() if own or not timed else None,
+        "pulse_count": signed(expected.counts),
+        "position": settings.position_bits,
+        **({"age": settings.max_ticks.bit_length()} if settings.flag("age") else {}),
+        **(
+            dict.fromkeys(("velocity_lower", "velocity_upper"), bound if own else None)
+            if settings.flag("bounds")
+            else {}
+        ),
+        **({"n_ep1": expected.counts.bit_length()} if settings.method == "rairan" else {}),
+        **({"n_dt1": settings.max_ticks.bit_length()} if settings.method == "rairan" else {}),
+        **({"dt_shift": settings.greatest_shift.bit_length()} if settings.target else {}),
+        **({"index_position": settings.position_bits} if settings.flag("index") else {}),
+        **({"swallowed_edges": 16} if settings.filter else {}),
+    }
+    single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "stalled"]
+    single += ["velocity_overflow"] * (not own) + ["bounds_valid"] * settings.flag("bounds")
+    single += ["out_of_range"] * beyond + ["index_valid"] * settings.flag("index")
+    single += ["tick_error"] * settings.external
+    inputs = ["clk", "rst", "a", "b"] + ["z"] * settings.flag("index") + ["tick_in"] * settings.external
+    found = {port["name"]: port for port in ports}
+    assert len(found) == len(ports)
+    assert [port["name"] for port in ports if port["direction"] == "input"] == inputs
+    assert {port["name"] for port in ports if port["direction"] == "output"} == {*widths, *single}
+    unsigned = ("interval", "age", "n_ep1", "n_dt1", "dt_shift", "swallowed_edges")
+    for name, port in found.items():
+        assert set(port) == {"name", "direction", "width", "signed"}
+        assert port["signed"] == (name in widths and name not in unsigned), name
+        wanted = widths.get(name, 1)
+        if wanted is None:
+            check_width(expected, name, port["width"])
+        elif name != "velocity" or not (settings.method == "t" and settings.lattice):
+            assert port["width"] == wanted, name
+
+
+def check_width(expected: Expected, name: str, width: int) -> None:
+    """The port of a velocity in another unit: wide enough for all, and no wider; that of an interval: for all."""
+    settings = expected.settings
+    if name == "interval":
+        assert width >= (settings.max_ticks * settings.tick // settings.period).bit_length()
+        return
+    if settings.velocity_bits is not None:
+        assert width == settings.velocity_bits
+        return
+    greatest = expected.greatest_bound if settings.flag("bounds") else settings.max_count
+    most = greatest * settings.lsb_per_count
+    assert signed(most - 2) <= width <= signed(most + 2), name

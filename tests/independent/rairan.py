@@ -1,0 +1,178 @@
+"""The method of Rairán 2013, a clock at a time: Table 1, and what docs/rairan.md makes of it."""
+
+import math
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from independent.front import Front
+from independent.methods import Bound, Update
+from independent.settings import Settings
+
+
+def estimate(kind: str, n_ep: int, n_dt: int) -> Fraction:
+    """Eqs. (2), (6) and (11): the upper end of the speed, the lower one, or their harmonic mean."""
+    if n_ep == 0:
+        return Fraction(0)
+    low = n_dt > 1 or n_ep == 1
+    n1 = Fraction(n_ep, n_dt)
+    n2 = Fraction(1, n_dt + 1) if low else Fraction(n_ep - 1)
+    return {"n1": n1, "n2": n2, "n3": 2 * n1 * n2 / (n1 + n2)}[kind]
+
+
+def table_1(settings: Settings, front: Front) -> tuple[list[Update], list[int]]:
+    """Table 1 to the letter, line by line: every assignment is an update; and the ends of dt."""
+    dt, most = settings.tick, settings.max_ticks
+    c_ep = c_dt = n_ep1 = clock = 0
+    n_dt1, shown, found, ends = 1, (0, 1), [], []
+    for now in range(front.n_clocks):
+        iep = now in front.steps
+        assigned = False
+        clock += 1  # line 4
+        if iep and c_dt:  # lines 5 to 7
+            n_dt1, clock, assigned = c_dt, 0, True
+            if n_dt1 > 1 or shown[0] <= 1:
+                shown = (1, n_dt1)
+        if clock == dt and c_ep:  # lines 8 and 9
+            n_ep1, assigned = min(c_ep, settings.max_count), True
+            if n_ep1 > 1 or shown[1] == 1:
+                shown = (n_ep1, 1)
+        if iep:  # lines 10 and 11
+            c_ep, c_dt = c_ep + 1, 0
+        if clock == dt:  # lines 12 to 14
+            c_dt, c_ep, clock = min(c_dt + 1, most), 0, 0
+            ends.append(now)
+        if assigned:
+            others = {"n_ep1": n_ep1, "n_dt1": n_dt1}
+            interval = shown[1]
+            found.append(Update(now, estimate(settings.estimate, *shown), interval, others=others))
+    return found, ends
+
+
+@dataclass
+class Rairan:
+    """The core while it runs."""
+
+    settings: Settings
+    found: list[Update] = field(default_factory=list)
+    ends: list[int] = field(default_factory=list)
+    clock: int = 0
+    c_ep: int = 0
+    c_dt: int = 0
+    sign: int = 0
+    k: int = 0
+    falling: bool = False
+    alone: bool = True  # no count came in the window's first dt but the one that opened it
+    n: tuple[int, int] = (0, 1)  # Nep1, Ndt1 of the velocity
+    k_of_n: int = 0
+    resting: bool = True
+
+    @property
+    def dt(self) -> int:
+        return self.settings.tick << self.k
+
+    @property
+    def most(self) -> int:
+        """dt in the maximum time."""
+        return self.settings.max_ticks >> self.k
+
+    def open(self, sign: int) -> None:
+        """A count opens a window."""
+        self.sign, self.clock, self.c_ep, self.c_dt, self.alone, self.resting = sign, 0, 1, 0, True, False
+
+    def show(self, now: int, n: tuple[int, int], *, forced: bool = False, least: Bound = None, spare: int = 0) -> None:
+        """An update; `spare` clocks more may be missing in the time of the upper bound."""
+        t, dt = self.settings.tick, self.dt
+        n_ep, n_dt = n
+        speed = self.sign * estimate(self.settings.estimate, n_ep, n_dt) / (1 << self.k)
+        if n_ep > 1:
+            low, high = Fraction((n_ep - 1) * t, dt + 1), (n_ep * t, dt - 1)
+        else:
+            low, high = Fraction(t, (n_dt + 1) * dt + 1), (t, n_dt * dt - 1 - spare)
+        low = low if least is None else least
+        ends: tuple[Bound, Bound] = (low, Fraction(*high) if high[1] > 0 else None)
+        if self.sign < 0:
+            ends = (None if ends[1] is None else -ends[1], -low)
+        others = {"n_ep1": n_ep, "n_dt1": n_dt} | ({"dt_shift": self.k} if self.settings.target else {})
+        self.found.append(Update(now, speed, n_dt << self.k, forced, *ends, n_ep > 0, others))
+        self.n, self.k_of_n = n, self.k
+
+    def adapt(self) -> None:
+        """k of the window that begins, by what the one before it measured."""
+        target = self.settings.target
+        if target is None:
+            return
+        n_ep, n_dt = self.n
+        least = next(n for n in range(1, 10**6) if Fraction(1, 2 * n - 1) <= target)
+        slow = min(least - 1, math.isqrt(1 << self.settings.greatest_shift)) + (self.k > 0)
+        rare = n_dt << self.k >= slow * n_ep
+        if rare or (self.falling and n_ep < least):
+            self.falling = self.k > 1
+            self.k = max(0, self.k - 1)
+            return
+        self.falling = False
+        if n_ep < least:
+            self.k = min(self.k + 1, self.settings.greatest_shift)
+        elif n_ep >= 2 * least:
+            self.k = max(0, self.k - 1)
+
+    def step(self, now: int, count: int) -> None:
+        """One clock."""
+        self.clock += 1
+        if count and self.sign and count != self.sign:
+            self.sign = count
+            self.show(now, (0, 1))
+            self.open(count)
+            self.k, self.falling = 0, False
+        elif count and self.resting:
+            self.open(count)
+            self.n, self.k, self.falling = (0, 1), 0, False
+        elif count and self.c_dt:
+            if self.c_dt > 1 or self.n[0] <= 1:
+                least = Fraction(0) if self.c_dt >= self.most else None
+                self.show(now, (1, self.c_dt), least=least, spare=0 if self.alone else self.dt)
+            self.adapt()
+            self.open(count)
+        elif self.clock == self.dt:
+            self.end(now, count)
+        elif count:
+            self.c_ep += 1
+            self.alone = False
+
+    def end(self, now: int, count: int) -> None:
+        """dt ends; a count in this clock comes after it."""
+        self.ends.append(now)
+        counted, self.clock, self.c_ep = min(self.c_ep, self.settings.max_count << self.k), 0, 0
+        before = self.c_dt
+        self.c_dt = min(self.c_dt + 1, self.most)
+        if counted > 1:
+            self.show(now, (counted, 1))
+        elif count and counted == 1:
+            self.show(now, (1, 1))
+        elif counted == 1 and self.n[0] > 1:
+            self.show(now, (1, 1), least=Fraction(0))
+        elif not count and not self.resting:
+            self.quiet(now, before)
+        if count and not self.resting:
+            self.adapt()
+            self.open(count)
+
+    def quiet(self, now: int, before: int) -> None:
+        """An end of dt that finds no count: decay, and rest."""
+        if self.c_dt == self.most and before < self.most:
+            self.show(now, (0, 1), forced=True)
+            self.resting = True
+            return
+        silent = self.c_dt if self.alone else self.c_dt - 1
+        slower = self.n[0] > 1 or silent << self.k > self.n[1] << self.k_of_n
+        if self.settings.decays and self.n[0] and silent and slower:
+            self.show(now, (1, silent), forced=True, least=Fraction(0))
+
+
+def rairan_updates(settings: Settings, front: Front) -> tuple[list[Update], list[int]]:
+    """All updates, and the ends of all dt."""
+    if settings.paper_exact:
+        return table_1(settings, front)
+    core = Rairan(settings)
+    for now in range(front.n_clocks):
+        core.step(now, front.steps.get(now, 0))
+    return core.found, core.ends

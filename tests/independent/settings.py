@@ -1,0 +1,217 @@
+"""What a core was asked for, read from the words of the command line without the program that is tested."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+PI = Fraction(31415926535897932384626433832795028841971, 10**40)
+# How many of each unit are one revolution per second.
+PER_TURN = {"rad/s": 2 * PI, "rev/s": Fraction(1), "rpm": Fraction(60)}
+
+Words = Mapping[str, str]  # options without their dashes; a flag has the word "yes" or "no"
+
+
+def arguments(words: Words) -> list[str]:
+    """The words as the command line takes them."""
+    flags = {"yes": "--{}", "no": "--no-{}"}
+    return [
+        part
+        for name, word in words.items()
+        for part in ([flags[word].format(name)] if word in flags else [f"--{name}", word])
+    ]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The words, and the numbers that the pages of the project say they mean.
+
+    Times are given in clocks here, so that a reader of units is not needed twice.
+    """
+
+    method: str
+    words: Words
+
+    def _whole(self, name: str, default: int) -> int:
+        return int(self.words.get(name, default))
+
+    def flag(self, name: str, default: bool = False) -> bool:
+        """Whether a flag is set."""
+        return self.words.get(name, "yes" if default else "no") == "yes"
+
+    @cached_property
+    def clock_hz(self) -> int:
+        return int(self.words.get("clock", "48000000").removesuffix("Hz"))
+
+    @cached_property
+    def tick(self) -> int:
+        """T, clocks of a tick: 20 µs if it is not given."""
+        return self._whole("dt" if "dt" in self.words else "tick", self.clock_hz // 50_000)
+
+    @cached_property
+    def max_ticks(self) -> int:
+        """Ticks of the maximum time: 10 ms if it is not given."""
+        return self._whole("max-time", self.clock_hz // 100) // self.tick
+
+    @cached_property
+    def longest_tick(self) -> int:
+        """Clocks of the longest tick: from outside it may last two nominal ticks if nothing is said."""
+        return self._whole("max-tick-period", 2 * self.tick) if self.external else self.tick
+
+    @cached_property
+    def external(self) -> bool:
+        return self.flag("external-tick")
+
+    @cached_property
+    def ppr(self) -> int:
+        return self._whole("ppr", 0)
+
+    @cached_property
+    def decoding(self) -> int:
+        return self._whole("decoding", 4)
+
+    @cached_property
+    def counts_per_turn(self) -> int:
+        """P."""
+        return self.ppr * self.decoding
+
+    @cached_property
+    def tick_seconds(self) -> Fraction:
+        """T_s."""
+        return Fraction(self.tick, self.clock_hz)
+
+    @cached_property
+    def unit(self) -> str:
+        return self.words.get("unit", "count/tick")
+
+    @cached_property
+    def native(self) -> bool:
+        """Whether the velocity is in counts per tick."""
+        return self.unit == "count/tick"
+
+    @cached_property
+    def filter(self) -> int:
+        return self._whole("filter", 0)
+
+    @cached_property
+    def position_bits(self) -> int:
+        return self._whole("position-width", 32)
+
+    def per_count(self, unit: str) -> Fraction:
+        """One count per tick in a unit: 1/(P·T_s) turns per second."""
+        return Fraction(1) if unit == "count/tick" else PER_TURN[unit] / (self.counts_per_turn * self.tick_seconds)
+
+    @cached_property
+    def max_speed(self) -> tuple[Fraction, str] | None:
+        """The greatest speed as number and unit."""
+        word = self.words.get("max-speed")
+        if word is None:
+            return None
+        unit = next(name for name in PER_TURN if word.endswith(name))
+        return Fraction(word.removesuffix(unit)), unit
+
+    @cached_property
+    def max_count(self) -> int:
+        """The most counts that a tick can show: ⌈max_speed/ω_u⌉ of the longest tick, and never more than its clocks."""
+        if self.max_speed is None:
+            return self.longest_tick
+        value, unit = self.max_speed
+        turns = value / PER_TURN[unit]
+        return min(
+            self.longest_tick, math.ceil(turns * self.counts_per_turn * Fraction(self.longest_tick, self.clock_hz))
+        )
+
+    @cached_property
+    def frac_bits(self) -> int:
+        """Of the velocity: 16 in counts per tick, else 10, or as many as leave a count per tick within 2^22 LSB."""
+        if "lsb" in self.words:
+            return -int(self.words["lsb"].removeprefix("2^"))
+        if "frac-bits" in self.words:
+            return int(self.words["frac-bits"])
+        if self.native:
+            return 16
+        count = self.per_count(self.unit)
+        most = next(bits for bits in range(60, -200, -1) if count * Fraction(2) ** bits <= 1 << 22)
+        # The greatest speed must be more than one LSB.
+        fewest = next(bits for bits in range(-200, 60) if count * self.max_count * Fraction(2) ** bits > 1)
+        return max(fewest, min(10, most))
+
+    @cached_property
+    def lsb_per_count(self) -> Fraction:
+        """LSBs of the velocity in one count per tick."""
+        return self.per_count(self.unit) * Fraction(2) ** self.frac_bits
+
+    @cached_property
+    def rad_per_s_per_lsb(self) -> Fraction:
+        """An LSB of the velocity in rad/s."""
+        return self.per_count("rad/s") / self.lsb_per_count
+
+    @cached_property
+    def velocity_bits(self) -> int | None:
+        """Bits that the velocity was limited to."""
+        return int(self.words["velocity-width"]) if "velocity-width" in self.words else None
+
+    @cached_property
+    def lowpass(self) -> Fraction | None:
+        """G in rad/s; a bandwidth in Hz is 2π times as many."""
+        word = self.words.get("lowpass")
+        if word is None:
+            return None
+        for suffix, factor in (("rad/s", Fraction(1)), ("kHz", 2000 * PI), ("Hz", 2 * PI)):
+            if word.endswith(suffix):
+                return Fraction(word.removesuffix(suffix)) * factor
+        raise AssertionError(word)
+
+    @cached_property
+    def average(self) -> int:
+        return self._whole("average", 1)
+
+    @cached_property
+    def lattice(self) -> bool:
+        return self.words.get("timer") == "tick"
+
+    @cached_property
+    def period(self) -> int:
+        """Clocks of a timer period."""
+        return self.tick if self.lattice else 1
+
+    @cached_property
+    def min_time(self) -> int:
+        """T_c in clocks: a tick if it is not given."""
+        return self._whole("min-time", self.tick)
+
+    @cached_property
+    def paper_exact(self) -> bool:
+        return self.flag("paper-exact")
+
+    @cached_property
+    def decays(self) -> bool:
+        return self.flag("bound-decay", True) and not self.paper_exact
+
+    @cached_property
+    def estimate(self) -> str:
+        return self.words.get("estimate", "n3")
+
+    @cached_property
+    def target(self) -> Fraction | None:
+        """What the error of eq. (13) may be, for an adaptive dt."""
+        word = self.words.get("adaptive")
+        return None if word is None else Fraction(word.removesuffix("%")) / (100 if word.endswith("%") else 1)
+
+    @cached_property
+    def greatest_shift(self) -> int:
+        """K of an adaptive dt, see docs/rairan.md."""
+        if self.target is None:
+            return 0
+        found = 0
+        while self._shift_fits(found + 1):
+            found += 1
+        return found
+
+    def _shift_fits(self, k: int) -> bool:
+        in_time = 2 << k <= self.max_ticks
+        in_tables = self.max_count << k <= 2048
+        if self.estimate == "n3" or self.flag("bounds"):
+            return in_time and in_tables and (self.estimate == "n3" or k <= self.frac_bits)
+        return in_time and k <= self.frac_bits

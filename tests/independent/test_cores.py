@@ -1,0 +1,141 @@
+"""Every method, unit and option as exported Verilog, against the models of this folder."""
+
+import json
+import random
+from bisect import bisect_right
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from independent.bench import Manifest, Row, in_icarus
+from independent.cases import CASES, Case
+from independent.front import Front, Tick, conditioned, external_ends, index_positions, ticks_of
+from independent.manifest import check_manifest
+from independent.methods import Update, m_updates, s_updates
+from independent.rairan import rairan_updates
+from independent.settings import Settings, arguments
+from independent.show import check_age, check_updates
+from independent.stimulus import Lines, external, motion
+from independent.timed import timed_updates
+
+# Cores that show `bounds.none` at some time, because there is no bound.
+ABSENT = {"t_native": {"velocity_upper"}, "rairan_rpm": {"velocity_lower", "velocity_upper"}}
+Generated = Callable[..., Path]
+
+
+def made(generated: Generated, case: Case) -> tuple[Path, Manifest]:
+    """The folder of a core, and its manifest."""
+    words = case.settings.words
+    folder = generated(case.name, "--method", case.settings.method, *arguments(words))
+    return folder, json.loads((folder / f"{case.name}.json").read_text())
+
+
+def lines_of(case: Case, manifest: Manifest) -> Lines:
+    """A motion and a rest, with all else that the core has pins for."""
+    settings, rng = case.settings, random.Random(case.seed or case.name)
+    tick, hold = settings.tick, settings.filter
+    lines = Lines(case.clocks + 3 * settings.max_ticks * tick, rng.randrange(4))
+    least, start = max(case.least, hold + 1), 3 * hold
+    there = [start + 5 + nth * least for nth in range(8)]  # forth and back: a reversal, before all else
+    lines.edges = [(at, 1 if nth < 4 else -1) for nth, at in enumerate(there)]
+    moves = motion(rng, tick, case.clocks, least=least, turns=case.turns, within=case.within)
+    lines.edges += [(at, by) for at, by in moves if at > there[-1] + least]
+    if not case.within and case.turns:
+        free = [
+            at + 1 for (at, _), (then, _) in zip(lines.edges, lines.edges[1:], strict=False) if then > at + 3 + 2 * hold
+        ]
+        lines.edges += [(at + hold, 2) for at in rng.sample(free, min(6, len(free)))]
+    if hold:
+        spans = [(rng.randrange(start, case.clocks), rng.randrange(2), rng.randrange(1, hold + 1)) for _ in range(20)]
+        lines.glitches = spans
+    if settings.flag("index"):
+        begins = range(start, case.clocks, 8 * tick + 3)
+        lines.pulses = [(at + rng.randrange(tick), 2, rng.choice((hold + 1, hold, tick))) for at in begins]
+    if settings.external:
+        ends = manifest["external_tick_cycles"]
+        least = ends["min"] if settings.lowpass is None else tick * 3 // 4
+        rises = external(rng, tick, lines.n_clocks, least=least, most=ends["max"], regular=bool(case.within))
+        lines.pulses += rises
+    return lines
+
+
+def model(case: Case, manifest: Manifest, front: Front) -> tuple[list[Update], list[Tick], list[int]]:
+    """Updates, ticks, and clocks of `tick_error` without its latency."""
+    settings = case.settings
+    if settings.method == "rairan":
+        updates, ends = rairan_updates(settings, front)
+        most = settings.max_count << settings.greatest_shift
+        return updates, ticks_of(settings, front, ends, most, held=True), []
+    ends = list(range(settings.tick - 1, front.n_clocks, settings.tick))
+    wrong: list[int] = []
+    if settings.external:
+        late, bounds = manifest["latency_cycles"]["tick_in_to_window_end"], manifest["external_tick_cycles"]
+        rises = [at + late for at in front.rises]
+        ends, wrong = external_ends(rises, front.n_clocks, bounds["min"], bounds["max"])
+    ticks = ticks_of(settings, front, ends, settings.max_count)
+    if settings.method in ("s", "m"):
+        return (s_updates if settings.method == "s" else m_updates)(settings, ticks), ticks, wrong
+    # The update comes a clock after the division; in other units the motion keeps clear of it.
+    return timed_updates(settings, front, ticks, manifest["latency_cycles"]["tick_to_velocity"] - 1), ticks, wrong
+
+
+def check_front(
+    case: Case, manifest: Manifest, front: Front, ticks: list[Tick], rows: list[Row], wrong: list[int]
+) -> None:
+    """Ticks, pulse numbers, positions, index, errors and swallowed edges."""
+    settings, late, n = case.settings, manifest["latency_cycles"]["tick_latency"], front.n_clocks
+    seen = [row for row in rows if row["tick"]]
+    first = ticks[0].last
+    keys = ("clock", "pulse_count", "overflow", "position")
+    assert [tuple(row[key] for key in keys) for row in seen if row["clock"] >= first + late] == [
+        (tick.last + late, tick.count, tick.overflow, tick.position) for tick in ticks if tick.last + late < n
+    ]
+    errors = [row["clock"] for row in rows if row["decode_error"]]
+    assert errors == [at for at in front.errors if at < n]
+    if settings.flag("index"):
+        captured = [(row["clock"] - late, row["index_position"]) for row in rows if row["index_valid"]]
+        assert captured == [pair for pair in index_positions(settings, front) if pair[0] + late < n]
+        assert captured
+    if settings.external:
+        assert [row["clock"] - late for row in rows if row["tick_error"]] == [at for at in wrong if at + late < n]
+        assert wrong
+    if settings.filter:
+        glitches = sorted(front.glitches)
+        for row in seen:
+            gone = [bisect_right(glitches, row["clock"] - spare) for spare in (2, 4)]
+            assert 2 * gone[1] <= row["swallowed_edges"] <= 2 * gone[0]
+        assert seen[-1]["swallowed_edges"] == 2 * len(front.glitches) > 0
+
+
+def from_reversal(
+    settings: Settings, updates: list[Update], ticks: list[Tick], rows: list[Row], late: int
+) -> tuple[list[Update], list[Tick], list[Row]]:
+    """What comes with and after the first reversal, and the ticks that begin after it."""
+    if settings.method != "rairan" or settings.paper_exact:
+        return updates, ticks, rows
+    first = next(nth for nth, update in enumerate(updates) if not update.others["n_ep1"] and not update.forced)
+    cause = updates[first].cause
+    begun = [tick for tick in ticks if tick.last > cause][1:]
+    return updates[first:], begun, [row for row in rows if row["clock"] >= cause + late]
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+def test_core(case: Case, generated: Generated) -> None:
+    folder, manifest = made(generated, case)
+    check_manifest(case.settings, manifest, case.name)
+    latency = manifest["latency_cycles"]
+    lines = lines_of(case, manifest)
+    play = lines.play()
+    rows = in_icarus(folder, manifest, play)
+    front = conditioned(case.settings, play, latency["pin_to_count"])
+    updates, ticks, wrong = model(case, manifest, front)
+    late = latency["tick_latency"] + latency["tick_to_velocity"]
+    updates, begun, shown = from_reversal(case.settings, updates, ticks, rows, late)
+    check_front(case, manifest, front, begun, rows, wrong)
+    shown = [row for row in shown if row["velocity_valid"]]
+    updates = [update for update in updates if update.cause + late < front.n_clocks]
+    absent = check_updates(case.settings, manifest, updates, shown, ticks)
+    if case.settings.flag("age"):
+        check_age(case.settings, rows)
+    assert absent >= ABSENT.get(case.name, set())
+    assert len(updates) > 12

@@ -1,0 +1,16 @@
+"""The manifest of cores whose numbers lie at the edge of a rule."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from independent.cases import DESCRIBED, Case
+from independent.manifest import check_manifest
+from independent.settings import arguments
+
+
+@pytest.mark.parametrize("case", DESCRIBED, ids=[case.name for case in DESCRIBED])
+def test_manifest(case: Case, generated: Callable[..., Path]) -> None:
+    folder = generated(case.name, "--method", case.settings.method, *arguments(case.settings.words))
+    check_manifest(case.settings, json.loads((folder / f"{case.name}.json").read_text()), case.name)

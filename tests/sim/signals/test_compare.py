@@ -1,0 +1,97 @@
+"""The comparison of runs finds every difference: any cell of any row, and any row that only one run has."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from tachometry.sim.signals.run import Mismatch, Run, Table, compare
+from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
+
+TIMING = Timing(1_000_000, 20, 64)
+N_ROWS = 4
+
+
+def spec_of(method: str) -> TachometerSpec:
+    """A core with as many outputs as the method can have."""
+    options: dict[str, object] = {"bounds": True, "age": True, "index": True, "filter_clocks": 2, "unit": "rpm"}
+    own: dict[str, object] = {"adaptive": Fraction(1, 10)} if method == "rairan" else {"max_tick_cycles": 40}
+    return METHODS[method](encoder=Encoder(500), timing=TIMING, **options, **own)  # type: ignore[arg-type]
+
+
+def run_of(spec: TachometerSpec) -> Run:
+    """A run with some rows in every table, and another number in every cell."""
+    numbers = iter(range(10**6))
+    tables = {}
+    for strobe, names in spec.strobes.items():
+        columns = {name: np.array([next(numbers) for _ in range(N_ROWS)]) for name in names}
+        tables[strobe] = Table(np.arange(N_ROWS) * 7 + 3, columns)
+    return Run(1000, tables)
+
+
+def cells(spec: TachometerSpec) -> list[tuple[str, str]]:
+    """Every column of every table."""
+    return [(strobe, name) for strobe, names in spec.strobes.items() for name in ("clock", *names)]
+
+
+def with_cell(run: Run, strobe: str, name: str, row: int, change: int) -> Run:
+    """The run with another number in one cell."""
+    table = run.tables[strobe]
+    column = table[name].copy()
+    column[row] ^= change
+    return Run(run.n_clocks, run.tables | {strobe: table.having(**{name: column})})
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_output_of_the_manifest_is_compared(method: str) -> None:
+    spec = spec_of(method)
+    compared = {name for strobe, names in spec.strobes.items() for name in (strobe, *names)}
+    assert compared == {port.name for port in spec.outputs}
+    assert {"velocity_lower", "velocity_upper", "bounds_valid", "interval", "stalled", "age"} <= compared
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_equal_runs_are_equal(method: str) -> None:
+    assert compare(run_of(spec_of(method)), run_of(spec_of(method))) == (0, [])
+
+
+@pytest.mark.parametrize("change", [1, 1 << 40, 1 << 62])
+@pytest.mark.parametrize("method", METHODS)
+def test_any_cell(method: str, change: int) -> None:
+    spec = spec_of(method)
+    run = run_of(spec)
+    for strobe, name in cells(spec):
+        for row in range(N_ROWS):
+            wrong = with_cell(run, strobe, name, row, change)
+            for pair in ((run, wrong), (wrong, run)):
+                was, got = (int(side.tables[strobe][name][row]) for side in pair)
+                clock = min(int(side.tables[strobe].clock[row]) for side in pair)
+                assert compare(*pair) == (1, [Mismatch(f"{strobe}.{name}", row, was, got, clock)])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rows_that_only_one_run_has(method: str) -> None:
+    spec = spec_of(method)
+    run = run_of(spec)
+    for strobe, names in spec.strobes.items():
+        for kept in (slice(0, N_ROWS - 1), slice(0, 1), slice(0, 0)):
+            fewer = Run(run.n_clocks, run.tables | {strobe: run.tables[strobe].rows(kept)})
+            missing = N_ROWS - kept.stop
+            for pair in ((run, fewer), (fewer, run)):
+                count, first = compare(*pair)
+                assert count == missing * (1 + len(names))
+                assert [found.signal for found in first] == [f"{strobe}.{name}" for name in ("clock", *names)]
+                assert all(found.row == kept.stop for found in first)
+                assert all((found.expected is None) == (pair[0] is fewer) for found in first)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_row_that_is_missing_at_the_begin_or_in_the_middle(method: str) -> None:
+    spec = spec_of(method)
+    run = run_of(spec)
+    for strobe in spec.strobes:
+        for missing in range(N_ROWS - 1):
+            rows = np.delete(np.arange(N_ROWS), missing)
+            fewer = Run(run.n_clocks, run.tables | {strobe: run.tables[strobe].rows(rows)})
+            assert compare(run, fewer)[0] > 0
+            assert compare(fewer, run)[0] > 0
