@@ -95,7 +95,17 @@ class Numbers(Parameters):
     @property
     def max_bound(self) -> int:
         """Largest bound in counts per tick, rounded up: a window may have missed a count at its ends."""
-        return self.max_count + 1
+        return self.max_count + math.ceil(self.uncertainty)
+
+    @property
+    def uncertainty(self) -> Fraction:
+        """A shaft may have travelled as many counts more or less than were counted in a window, exclusive."""
+        return 1 + self.edge_error
+
+    @property
+    def error_bits(self) -> int:
+        """Fraction bits of a number of counts to which `edge_error` is added."""
+        return self.edge_error.denominator.bit_length() - 1
 
     @property
     def bound_width(self) -> int:

@@ -9,7 +9,7 @@ from tachometry.spec.encoder import Encoder
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
 from tachometry.spec.option import Derived, Option, option, parse_flag, parse_whole
 from tachometry.spec.timing import MAX_TICK_CYCLES, Timing, whole_clocks
-from tachometry.spec.units import Speed, parse_bandwidth
+from tachometry.spec.units import FRACTION, Speed, parse_bandwidth, read_exactly
 
 # The longest external tick, if nothing else is said.
 TWO_TICKS: Any = Derived(lambda spec: min(2 * spec.timing.tick_cycles, MAX_TICK_CYCLES))
@@ -53,7 +53,9 @@ class Parameters:
         Output `age`: ticks since the update.
     bounds : bool
         Outputs `velocity_lower` and `velocity_upper`, which enclose the true mean speed over the measured window, and
-        `bounds_valid`.
+        `bounds_valid`; for a disc and lines whose edges are within `edge_error`, while no count is lost or added.
+    edge_error : Fraction
+        The distance of any two edges is off by at most so many counts, 0 to 1; it is rounded up to eighths.
     lowpass : Fraction or None
         G of the low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, in rad/s; None: no filter.
 
@@ -144,11 +146,22 @@ class Parameters:
     bounds: bool = option(
         False,
         "Outputs velocity_lower and velocity_upper, which enclose the true mean speed over the measured window, and "
-        "bounds_valid.",
+        "bounds_valid. They hold for an ideal disc and ideal lines, or within --edge-error, while no count is lost.",
+    )
+    edge_error: Fraction = option(  # noqa: RUF009
+        Fraction(0),
+        "The distance of any two edges is off by at most E counts, 0 to 1, because of the disc and the lines, so "
+        "--bounds are wider. It is rounded up to eighths.",
+        shown="0",
+        metavar="E",
+        parse=lambda what, text: read_exactly(what, text, FRACTION),
+        needs="bounds",
+        tests=("0.3",),
     )
     lowpass: Fraction | None = option(  # noqa: RUF009
         None,
-        "Low-pass filter of the velocity for measurements of different length, eq. (22), in rad/s, Hz or kHz.",
+        "Low-pass filter of the velocity for measurements of different length, eq. (22), in rad/s, Hz or kHz. The "
+        "length is the time since the last update.",
         metavar="BANDWIDTH",
         unit="rad/s",
         parse=parse_bandwidth,

@@ -11,7 +11,7 @@ from tachometry.spec.numbers import Numbers
 from tachometry.spec.option import ParameterError, is_derived, options_of, settle
 from tachometry.spec.port import UPDATE, Port, held, ports_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
-from tachometry.spec.units import SpeedUnit, plural, signed_width
+from tachometry.spec.units import PI, SpeedUnit, plural, signed_width
 
 TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
 # The ends of what encloses the true speed, and which way each is rounded: outward.
@@ -48,10 +48,6 @@ class TachometerSpec(Numbers):
     pairs_all: ClassVar[bool] = False
     # Tenths of the maximum time after which it shows that the shaft stands, counted from the last count but one.
     rest_tenths: ClassVar[int] = 17
-    # Options that all methods have and that matter to this one: pairwise tests give them some of their values.
-    pairs_with: ClassVar[frozenset[str]] = frozenset(
-        ("tick", "max-time", "unit", "frac-bits", "velocity-width", "max-speed", "bounds")
-    )
 
     def __post_init__(self) -> None:
         if self.unit not in UNITS:
@@ -67,10 +63,21 @@ class TachometerSpec(Numbers):
             raise ParameterError("filter_clocks", f"must be from 0 to 255, not {self.filter_clocks}")
         if self.index_reset and not self.index:
             raise ParameterError("index_reset", "must be given together with an index")
-        if self.lowpass is not None and (self.lowpass <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS):
-            least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))
+        if not 0 <= self.edge_error <= 1:
+            raise ParameterError("edge_error", f"must be from 0 to 1, not {float(self.edge_error):.9g}")
+        if self.edge_error and not self.bounds:
+            raise ParameterError("edge_error", "must be given together with bounds")
+        object.__setattr__(self, "edge_error", Fraction(math.ceil(8 * self.edge_error), 8))
+        if self.lowpass is not None:
+            self._check_lowpass(self.lowpass)
+
+    def _check_lowpass(self, bandwidth: Fraction) -> None:
+        least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))
+        greatest = 2 * PI * self.timing.clock_hz  # nothing is faster than the clock
+        if bandwidth <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS or bandwidth > greatest:
             raise ParameterError(
-                "lowpass", f"must be at least {least:.4g} rad/s here, not {float(self.lowpass):.9g} rad/s"
+                "lowpass",
+                f"must be from {least:.4g} to {float(greatest):.4g} rad/s here, not {float(bandwidth):.9g} rad/s",
             )
 
     def _check_ticks(self) -> None:
@@ -216,8 +223,9 @@ class TachometerSpec(Numbers):
                     *(UPDATE, name, width),
                     signed=True,
                     unit=f"2^{-self.frac_bits} {self.unit}",
-                    help=f"{side} end of what the true mean speed over the measured window was; {sign} bounds.none of "
-                    "the manifest means that there is none.",
+                    help=f"{side} end of what the true mean speed over the measured window was, for edges within "
+                    "--edge-error (0: an ideal disc and ideal lines) while no count is lost or added; "
+                    f"{sign} bounds.none of the manifest means that there is none.",
                 )
                 for name, side, sign in zip(BOUNDS, ("Lower", "Upper"), ("minus", "plus"), strict=True)
             ),

@@ -17,6 +17,8 @@ PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-zµμ/%]*)"
 _QUANTITY = re.compile(QUANTITY, re.ASCII)
 _LONGEST = 400  # characters of a number
+# Sizes of a number: products of several still are floats.
+_LEAST, _GREATEST = Fraction(1, 10**30), Fraction(10**30)
 
 
 class Unit(NamedTuple):
@@ -76,7 +78,7 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
     Raises
     ------
     ParameterError
-        If the text is not of this form.
+        If the text is not of this form, or the number absurdly large or small.
     """
     number = text.strip()
     match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
@@ -86,7 +88,10 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
         allowed = f"or one in {names}" if "" in units else allowed
         raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
-    return Fraction(match[1]), unit
+    value = Fraction(match[1])
+    if value and not _LEAST <= abs(value) <= _GREATEST:
+        raise ParameterError(what, f"must be 0 or of a size from 1e-30 to 1e30, not {text!r}")
+    return value, unit
 
 
 def plain_unit(unit: str) -> str:
@@ -101,15 +106,9 @@ def read_exactly(what: str, text: str, units: Units, default: str = "") -> Fract
 
 
 def read_nearest(what: str, text: str, units: Units, default: str = "") -> float:
-    """The quantity in the first of the units as a float, which must be finite; else as `read_quantity`."""
+    """The quantity in the first of the units as a float; arguments and errors as of `read_quantity`."""
     value, unit = read_quantity(what, text, units, default)
-    try:
-        nearest = units[unit].nearest(value)
-    except OverflowError:
-        nearest = math.inf
-    if not math.isfinite(nearest):
-        raise ParameterError(what, f"must be finite, not {text!r}")
-    return nearest
+    return units[unit].nearest(value)
 
 
 def ratio(unit: str, other: str) -> Fraction | None:

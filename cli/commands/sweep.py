@@ -113,7 +113,8 @@ Examples:
     "Machines",
     "--scheduler",
     metavar="ADDRESS",
-    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry.",
+    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
+    "Whoever can connect to it can run code there and here, see docs/sweep.md.",
 )
 @output(
     "--results",
@@ -166,6 +167,8 @@ def sweep(
         raise ValueError(f"--from must be at least 0, not {start}")
     if jobs is not None and scheduler is not None:
         raise ValueError("--jobs must not be given together with --scheduler")
+    if axes is not None and plot is None:
+        raise ValueError("--axes must be given together with --plot")
     if jobs is not None and jobs < 1:
         raise ValueError(f"--jobs must be at least 1, not {jobs}")
 

@@ -6,10 +6,11 @@ import functools
 import os
 import shlex
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from multiprocessing import Pool
+from multiprocessing import Pool, parent_process
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -158,9 +159,18 @@ def _check(core: _Configuration, *, engines: list[str], clocks: int, seed: int, 
 
 
 def _heed_only_the_pool() -> None:
-    """In a process of the pool: ignore Ctrl-C, which the main process handles by ending the others."""
+    """In a process of the pool: ignore Ctrl-C, which the main process handles by ending the others; end after it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+
+
+def _end_with_the_parent() -> None:
+    """The main process may be killed, and then nobody else ends this one."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.option import all_of, option, refuse_without
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import parse_frequency
 
@@ -71,6 +71,8 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
             rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
             return read_capture(capture, a, b, rate, index, tick, time)
 
+        if others.get("capture") is None:
+            refuse_without("--replay", _OPTIONS)
         return command(read=read, **others)
 
     return all_of(_OPTIONS, build)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.option import all_of, option, refuse_without
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import DEGREES, FRACTION, Units, read_nearest
 
@@ -170,6 +170,7 @@ def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
             return encoder(spec).record(parse_motion(motion))
 
         if motion is None:
+            refuse_without("--motion", _OPTIONS)
             return command(record=None, tables=[], **others)
         return command(record=record, tables=tables_of(motion), **others)
 

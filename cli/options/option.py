@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 
@@ -111,6 +112,24 @@ class GroupedCommand(click.Command):
 def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Command]:
     """Decorator for an option in a group; defaults are shown."""
     return click.option(*names, cls=Option, group=group, show_default=True, **attributes)
+
+
+def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:
+    """See that none of some options is given to the running command: without another one they have no effect.
+
+    Raises
+    ------
+    ValueError
+        If one is.
+    """
+    context = click.get_current_context()
+    command = click.command()(lambda: None)
+    all_of(options, command)
+    names = {parameter.name for parameter in command.params}
+    for parameter in context.command.get_params(context):
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name in names and source is ParameterSource.COMMANDLINE:
+            raise ValueError(f"{parameter.opts[0]} must be given together with {needed}")
 
 
 def all_of(options: list[Callable[[Any], Any]], command: Callable[..., Any]) -> Callable[..., Any]:

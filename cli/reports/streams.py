@@ -3,6 +3,7 @@
 import io
 import os
 import sys
+from typing import TextIO
 
 INTERNAL = 70  # exit status: a fault of the program, as sysexits.h has it
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
@@ -28,7 +29,7 @@ def prepare_streams() -> None:
             stream.reconfigure(encoding="utf-8", errors="backslashreplace")
 
 
-def silence(stream: io.TextIOBase | None) -> None:
+def silence(stream: TextIO | None) -> None:
     """Send what is still written to a stream nowhere: its reader is gone."""
     try:
         nothing = os.open(os.devnull, os.O_WRONLY)

@@ -76,6 +76,8 @@ def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
     """
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError(f"{path} must be TOML of few levels: it is nested too deeply") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path} must be TOML: {error}") from None
     try:

@@ -123,7 +123,7 @@ class MMethod(wiring.Component):
                 numerator_width=spec.numerator_width,
                 tag=self._tag,
                 serial=spec.serial,
-                margin=1,
+                margin=spec.margin,
                 constant=spec.average,
             )
 
@@ -163,16 +163,21 @@ class MMethod(wiring.Component):
             m.d.comb += [
                 quotient.load.eq(start),
                 quotient.start.eq(start),
-                quotient.numerator.eq(total),
+                quotient.numerator.eq(total << self._spec.error_bits),
                 quotient.tag.eq(known),
             ]
             return quotient.results.valid, quotient.results.p
-        velocities = quotients(self._spec)
+        assert shift is not None
+        velocities, finer = quotients(self._spec), self._spec.error_bits
+        left = shift - finer
         valid = Signal()
         layout = {name: signed(width) for name, (width, _) in velocities.items()} | self._tag.members
         new = registers(data.StructLayout(layout), "new")
         m.d.sync += valid.eq(self.tick)
         with m.If(self.tick):
-            m.d.sync += [new[name].eq((total + count) << shift) for name, (_, count) in velocities.items()]
+            m.d.sync += [
+                new[name].eq(((total << finer) + count * self._spec.margin) << left)
+                for name, (_, count) in velocities.items()
+            ]
             m.d.sync += [new[name].eq(known[name]) for name in self._tag.members]
         return valid, new

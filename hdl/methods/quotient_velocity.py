@@ -56,8 +56,8 @@ class QuotientVelocity(wiring.Component):
         self.bound_dividers = {
             name: Divider(
                 divisor_width=(spec.max_interval + 1).bit_length(),
-                integer_bits=spec.max_bound.bit_length(),
-                scale_bits=spec.native_frac_bits,
+                integer_bits=spec.max_bound.bit_length() + spec.error_bits,
+                scale_bits=spec.native_frac_bits - spec.error_bits,
             )
             for name in (BOUNDS if spec.bounds else ())
         }
@@ -132,7 +132,12 @@ class QuotientVelocity(wiring.Component):
     def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
         """Two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
         counted = Signal()
-        greatest = self._spec.timer_periods
+        # Distances in 2^−finer counts, and by how much edges may be off.
+        finer, off = (
+            self._spec.error_bits,
+            int(self._spec.edge_error * (self._spec.timer_periods << self._spec.error_bits)),
+        )
+        greatest = (self._spec.timer_periods << finer) + off
         m.d.comb += counted.eq(self.measure & ~self.forced_in)
         known = Signal(reset_less=True)
         with m.If(self.divider.start):
@@ -148,7 +153,7 @@ class QuotientVelocity(wiring.Component):
             end = Signal.like(box.dividend)
             none = Signal(reset_less=True)
             m.d.comb += [
-                end.eq(Mux(counted, distance, Mux(still, 0, -greatest))),
+                end.eq(Mux(counted, (distance << finer) - off, Mux(still, -off, -greatest))),
                 box.start.eq(self.divider.start),
                 box.dividend.eq(end),
                 # Each edge lies within one period before the count that reports it.

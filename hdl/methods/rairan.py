@@ -113,7 +113,15 @@ class RairanMethod(wiring.Component):
         if spec.adaptive:
             mark = Mux(counters.high, spec.high_depth << counters.shift, Const(spec.low_depth) >> counters.shift)
             n, above = n | mark, above | mark
-        places = {"lower": Mux(counters.loose, 0, Cat(counters.high, n)), "upper": Cat(counters.high, above)}
+        lowest = Cat(counters.high, n)
+        if spec.edge_error:
+            # What implies no least speed has the other half of the table.
+            half = (len(spec.lower_table) - 1).bit_length() - 1
+            lowest = Cat(lowest, Const(0, half))[:half]
+            lowest = Cat(lowest, counters.loose)
+        else:
+            lowest = Mux(counters.loose, 0, lowest)
+        places = {"lower": lowest, "upper": Cat(counters.high, above)}
         entries: dict[str, Signal] = {}
         for name, place in places.items():
             table = getattr(spec, f"{name}_table")
@@ -124,11 +132,12 @@ class RairanMethod(wiring.Component):
             m.d.sync += entry.eq(read.data)
         valid = Signal()
         m.d.comb += valid.eq(counters.high | counters.n.any())
-        (valid,) = delay(m, valid, clocks=2)
+        valid, *negative = delay(m, valid, *([counters.loose] if spec.edge_error else []), clocks=2)
+        lower = Mux(negative[0], -entries["lower"], entries["lower"]) if negative else entries["lower"]
         with m.If(shown):
             m.d.sync += [
-                new.velocity_lower.eq(Mux(backward, -entries["upper"], entries["lower"])),
-                new.velocity_upper.eq(Mux(backward, -entries["lower"], entries["upper"])),
+                new.velocity_lower.eq(Mux(backward, -entries["upper"], lower)),
+                new.velocity_upper.eq(Mux(backward, -lower, entries["upper"])),
                 new.bounds_valid.eq(valid),
             ]
 

@@ -51,7 +51,7 @@ class SMethod(wiring.Component):
             numerator_width=spec.numerator_width,
             tag=data.StructLayout({"forced": 1, **({"bounds_valid": 1} if spec.bounds else {})}),
             serial=spec.serial,
-            margin=spec.numerator_per_count,
+            margin=spec.margin,
         )
 
     @property
@@ -81,7 +81,7 @@ class SMethod(wiring.Component):
             quotient.load.eq(self.tick),
             quotient.start.eq(interval.update),
             quotient.base.eq(alteration.previous),
-            quotient.numerator.eq(interval.numerator),
+            quotient.numerator.eq(interval.numerator << self._spec.finer),
             quotient.tag.forced.eq(interval.forced),
             self.stalled.eq(interval.stalled),
             self.updates.valid.eq(found.valid),

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tachometry.sim.signals.files import replacing
+from tachometry.sim.signals.recording import MAX_EDGES
 from tachometry.spec.option import ParameterError
 
 Channel = str | int
@@ -29,6 +30,12 @@ def reading(path: Path) -> Iterator[None]:
         raise CaptureError(f"{path} does not exist") from None
     except OSError as error:
         raise CaptureError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def check_edges(path: Path, n: int) -> None:
+    """See that a capture has no more changes than a recording may have."""
+    if n > MAX_EDGES:
+        raise CaptureError(f"{path} must have at most {MAX_EDGES} changes of the lines, and has more")
 
 
 @contextmanager

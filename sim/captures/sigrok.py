@@ -5,6 +5,7 @@ with the edges and with one chunk, never with the length of the capture.
 """
 
 import configparser
+import io
 import os
 import re
 import struct
@@ -19,10 +20,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, writing
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading, writing
 from tachometry.sim.signals.recording import PinTrace, Recording
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
+# Limits of a session, which may be packed a thousand times as tightly: bytes of the list of members, of the metadata,
+# and of all samples. Samples take no memory, their changes do.
+_MOST_LISTED = 16 << 20
+_MOST_METADATA = 1 << 20
+_MOST_SAMPLES = 1 << 36
 _CHANNELS = {"a": "A", "b": "B", "z": "Z", "tick_in": "TICK_IN"}
 UNIT_HZ = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 # What zipfile raises for a damaged file: besides its own error, those of the layers below, by what is damaged.
@@ -58,13 +64,13 @@ def read_sr(
     Raises
     ------
     CaptureError
-        If the file is missing, damaged or not a session, if it has no samples, for an unknown channel, or for a
-        samplerate that is missing or is not the one in the file.
+        If the file is missing, damaged, not a session or beyond the limits above, if it has no samples, for an unknown
+        channel, or for a samplerate that is missing or is not the one in the file.
     """
     path = Path(path)
     if samplerate_hz is not None and not 0 < samplerate_hz < float("inf"):
         raise CaptureError(f"samplerate must be above 0 Hz and finite, not {samplerate_hz} Hz")
-    with reading(path), _damage_named(path), zipfile.ZipFile(path) as archive:
+    with reading(path), _damage_named(path), _Bounded(path) as file, zipfile.ZipFile(file) as archive:
         session = _read_session(path, archive)
         rate = agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
         bits = choose_channels(path, session.channels, a, b, others)
@@ -140,8 +146,25 @@ def _metadata(samplerate_hz: int, channels: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
+class _Bounded(io.FileIO):
+    """A file of which `zipfile` reads the list of members at once, before anything else is known of it."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > max(_MOST_LISTED, CHUNK):
+            raise CaptureError(f"the list of members of {self.name} must have at most {_MOST_LISTED} bytes, not {size}")
+        return super().read(size)
+
+
+def _small(path: Path, archive: zipfile.ZipFile, name: str) -> bytes:
+    """A member that is read at once."""
+    if (size := archive.getinfo(name).file_size) > _MOST_METADATA:
+        raise CaptureError(f"{name} of {path} must have at most {_MOST_METADATA} bytes, not {size}")
+    return archive.read(name)
+
+
 @dataclass(frozen=True)
 class _Session:
+    path: Path
     channels: dict[int, str]  # bit of a sample: name
     unitsize: int  # bytes a sample
     samplerate_hz: float | None
@@ -166,12 +189,12 @@ def _read_session(path: Path, archive: zipfile.ZipFile) -> _Session:
     for needed in ("version", "metadata"):
         if needed not in names:
             raise CaptureError(f"{path} must be a sigrok session, but has no member {needed!r}")
-    version = archive.read("version").strip()
+    version = _small(path, archive, "version").strip()
     if version not in (b"1", b"2"):
         raise CaptureError(f"version of sigrok session {path} must be 1 or 2, not {version.decode('latin-1')!r}")
     ini = configparser.ConfigParser(interpolation=None, delimiters=("=",), comment_prefixes=("#",))
     try:
-        ini.read_string("\n".join(archive.read("metadata").decode().splitlines()))
+        ini.read_string("\n".join(_small(path, archive, "metadata").decode().splitlines()))
     except (configparser.Error, UnicodeDecodeError) as error:
         raise CaptureError(f"metadata of {path} must be an INI text: {' '.join(str(error).split())}") from error
     devices = [ini[name] for name in ini.sections() if name.startswith("device ") and "capturefile" in ini[name]]
@@ -187,7 +210,7 @@ def _read_session(path: Path, archive: zipfile.ZipFile) -> _Session:
             raise CaptureError(f"probes of {path} must be 1 to {8 * int(unitsize)} (unitsize {unitsize}), not {number}")
     channels = {number - 1: name.strip() or f"D{number - 1}" for number, name in probes}
     members = _members(path, archive, device["capturefile"].strip())
-    return _Session(channels, int(unitsize), parse_samplerate(path, device.get("samplerate")), members)
+    return _Session(path, channels, int(unitsize), parse_samplerate(path, device.get("samplerate")), members)
 
 
 def _members(path: Path, archive: zipfile.ZipFile, capturefile: str) -> list[zipfile.ZipInfo]:
@@ -205,6 +228,8 @@ def _members(path: Path, archive: zipfile.ZipFile, capturefile: str) -> list[zip
                     f"but {capturefile}-{number} is missing"
                 )
         members = [chunks[number] for number in sorted(chunks)]
+    if (size := sum(info.file_size for info in members)) > _MOST_SAMPLES:
+        raise CaptureError(f"samples of {path} must have at most {_MOST_SAMPLES} bytes, not {size}")
     for info in members:
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise CaptureError(f"{info.filename} of {path} must be stored or deflated, not method {info.compress_type}")
@@ -248,7 +273,7 @@ def _changes(
     session: _Session, bits: tuple[int, ...], pieces: Iterator[NDArray[np.uint8]]
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], int]:
     """Give the samples that differ from the one before (the first always does), their levels, and the sample count."""
-    n_samples, before = 0, 255
+    n_samples, n_changes, before = 0, 0, 255
     sample, level = [], []
     for data in pieces:
         now = np.zeros(len(data), np.uint8)
@@ -259,6 +284,8 @@ def _changes(
             changed = np.append(0, changed)
         sample.append(changed + n_samples)
         level.append(now[changed])
+        n_changes += len(changed)
+        check_edges(session.path, n_changes)
         n_samples += len(now)
         before = int(now[-1])
     if not sample:

@@ -10,13 +10,15 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, choose_channels, reading, writing
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading, writing
 from tachometry.sim.captures.header import COMMENTS, Header, read_header
 from tachometry.sim.signals import files
 from tachometry.sim.signals.recording import Recording
 
 BLOCK = 4 << 20  # bytes of text parsed at once
 _COMMENT = re.compile(rb"^[#;].*\n", re.MULTILINE)
+# Beyond it a time or the number of a sample is a mistake.
+_LATEST, _LAST_SAMPLE = 1e30, 1e15
 
 
 def read_csv(
@@ -85,6 +87,7 @@ def read_csv(
             changed = np.diff(block_level, prepend=np.uint8(last_level)) != 0
             times.append(block_time[changed] - start)
             level.append(block_level[changed])
+            check_edges(path, sum(map(len, level)))
             last_time, last_level = float(block_time[-1]), int(block_level[-1])
     if not level:
         raise CaptureError(f"{path} must have at least one row after its header, not 0")
@@ -166,8 +169,11 @@ def _parse(
         _refuse(path, line, (value != 0) & (value != 1), f"level of {names[column]} must be 0 or 1", value)
     if header.time is None:
         return n_before + np.arange(len(values), dtype=np.float64), values
-    _refuse(path, line, ~np.isfinite(values[:, 0]), f"time must be a finite number of {header.unit_name}", values[:, 0])
-    return values[:, 0], values[:, 1:]
+    time = values[:, 0]
+    _refuse(path, line, ~np.isfinite(time), f"time must be a finite number of {header.unit_name}", time)
+    latest = _LATEST if header.samplerate_hz is None else _LAST_SAMPLE
+    _refuse(path, line, np.abs(time) > latest, f"time must be at most {latest:g} {header.unit}", time)
+    return time, values[:, 1:]
 
 
 def _refuse(

@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 from vcd.reader import ScopeDecl, Token, TokenKind, VarDecl, VCDParseError, tokenize
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, choose_channels, reading
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_edges, choose_channels, reading
 from tachometry.sim.signals.recording import Recording
 
 _UNITS = {"s": 0, "ms": 3, "us": 6, "ns": 9, "ps": 12, "fs": 15}
@@ -46,16 +46,28 @@ def read_vcd(
     if samplerate_hz is not None:
         raise OptionError("samplerate", f"must not be given for {path}: a waveform has its times")
     with reading(path), path.open("rb") as file:
+        _check_end(path, file)
         tokens = _tokens(path, file)
         names, codes, scale = _declarations(path, tokens)
         numbers = choose_channels(path, names, *_default(names, a, b), others)
         return _changes(path, tokens, dict(zip(("a", "b", *others), (codes[k] for k in numbers), strict=True)), scale)
 
 
+def _check_end(path: Path, file: BinaryIO) -> None:
+    """See that the last line is whole: of one that is cut, a part may read as another time or variable."""
+    if file.seek(0, os.SEEK_END):
+        file.seek(-1, os.SEEK_END)
+        if not file.read(1).isspace():
+            raise CaptureError(f"{path} must be a complete VCD file: its last line does not end")
+    file.seek(0)
+
+
 def _tokens(path: Path, file: BinaryIO) -> Iterator[Token]:
     try:
         yield from tokenize(file)
-    except VCDParseError as error:
+    except CaptureError:
+        raise
+    except (VCDParseError, ValueError) as error:
         raise CaptureError(f"{path} must be a complete VCD file: {str(error).splitlines()[0]}") from error
 
 
@@ -99,6 +111,7 @@ def _changes(path: Path, tokens: Iterator[Token], lines: dict[str, str], scale: 
     level = dict.fromkeys(lines.values(), "x")
     times: list[int] = []
     levels: list[tuple[str, ...]] = []
+    distinct: dict[tuple[str, ...], tuple[str, ...]] = {}
     now = 0
 
     def note() -> None:
@@ -109,7 +122,8 @@ def _changes(path: Path, tokens: Iterator[Token], lines: dict[str, str], scale: 
             if not {*row} <= {"0", "1"}:
                 raise CaptureError(f"levels of {path} must be 0 or 1, not {''.join(row)} at time {now}")
             times.append(now)
-            levels.append(row)
+            levels.append(distinct.setdefault(row, row))
+            check_edges(path, len(times))
 
     for token in tokens:
         if token.kind is TokenKind.CHANGE_TIME:
@@ -123,6 +137,8 @@ def _changes(path: Path, tokens: Iterator[Token], lines: dict[str, str], scale: 
             change = token.scalar_change
             if change.id_code in level:
                 level[change.id_code] = change.value.lower()
+        elif token.kind in (TokenKind.CHANGE_VECTOR, TokenKind.CHANGE_REAL) and token.data.id_code in level:
+            level[token.data.id_code] = str(token.data.value).lower()
     note()
     if not times:
         raise CaptureError(f"{path} must contain the levels of all lines, 0 or 1, at least once")

@@ -97,7 +97,7 @@ def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
 def _split(function: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:
     """`time` and the zeros of a function that is continuous between them, but may jump at them."""
     low, high = time[:-1], np.nextafter(time[1:], -np.inf)
-    cell = np.flatnonzero(function(low) * function(high) < 0)
+    cell = np.flatnonzero(np.sign(function(low)) * np.sign(function(high)) < 0)
     zeros = _sign_change(lambda t, _: function(t), low[cell], high[cell])
     return np.unique(np.concatenate([time, zeros]))
 

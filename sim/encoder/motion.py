@@ -30,6 +30,7 @@ _FIELDS: dict[str, dict[str, Units]] = {
 }
 _FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items())
 _CSV_HEADER = ["time", "angle_rad"]
+_BELOW = 1e30  # times, angles, speeds and accelerations: what is computed of them is finite
 
 # (-1)^n (2 pi)^(2n+1) / (2n+1)!, highest power first
 _SINE_SERIES = (
@@ -98,7 +99,7 @@ class Motion:
     Raises
     ------
     ValueError
-        If a segment is too short to be distinguished from a moment, or a number is not finite.
+        If a segment is too short to be distinguished from a moment, or a number is 1e30 or more.
     """
 
     breakpoints: FloatArray
@@ -109,8 +110,8 @@ class Motion:
     sine_frequency: FloatArray
 
     def __post_init__(self) -> None:
-        if not all(np.all(np.isfinite(values)) for values in vars(self).values()):
-            raise ValueError("times, angles and speeds of a motion must be finite")
+        if not all(np.all(np.abs(values) < _BELOW) for values in vars(self).values()):
+            raise ValueError("times, angles, speeds and accelerations of a motion must be below 1e30, in s and rad")
         if len(self.breakpoints) < 2 or self.breakpoints[0] != 0 or np.any(np.diff(self.breakpoints) <= 0):
             raise ValueError("times of a motion must begin at 0 and increase by more than their rounding error")
 
@@ -306,8 +307,8 @@ def _read_csv(file: str) -> Motion:
     if len(rows) < 2:
         raise ValueError(f"{file}:{len(lines)}: file must have at least 2 rows, not {len(rows)}")
     table = np.array(rows)
-    breakpoints, angle_rad = table[:, 0] - table[0, 0], table[:, 1]
     zero = np.zeros(len(rows) - 1)
     with np.errstate(all="ignore"):  # Motion refuses what is not finite
+        breakpoints, angle_rad = table[:, 0] - table[0, 0], table[:, 1]
         slope = np.diff(angle_rad) / np.diff(breakpoints)
     return Motion(breakpoints, angle_rad[:-1], slope, zero, zero, zero)

@@ -14,11 +14,11 @@ from tachometry.sim.encoder import imperfections
 from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY, Bounce
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration
-from tachometry.sim.signals.recording import Recording, quadrature
+from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
 from tachometry.spec.option import ParameterError
 
-MAX_EDGES = 200_000_000
 MAX_PULSES_PER_REV = 1 << 26
+MAX_UNEVEN_PULSES = 1 << 20  # of a disc whose edges are all displaced: each takes memory
 
 
 @dataclass(frozen=True)
@@ -132,6 +132,11 @@ class VirtualEncoder:
             raise ValueError(
                 "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical "
                 f"degrees, not {errors:.6g}"
+            )
+        if self.nonuniformity and self.pulses_per_rev > MAX_UNEVEN_PULSES:
+            raise ParameterError(
+                "nonuniformity",
+                f"must be 0 with more than {MAX_UNEVEN_PULSES} pulses per revolution, not {self.nonuniformity}",
             )
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")

@@ -129,21 +129,28 @@ def _own_folder() -> "tempfile.TemporaryDirectory[str]":
 def cache_folder() -> Path:
     """Where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache; it is made if need be.
 
-    Where there is none that can be written, a folder that ends with this process.
+    Where there is none that can be written, a folder that ends with this process. It has code that this process runs:
+    it must be the user's, and nobody else may write to it.
 
     Raises
     ------
     OSError
-        If TACHOMETRY_CACHE names one that cannot be written.
+        If TACHOMETRY_CACHE names one that cannot be written; if another user owns the folder, or can write to it.
     """
     given = os.environ.get("TACHOMETRY_CACHE")
     folder = Path(given) if given else platformdirs.user_cache_path("tachometry")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         writable = os.access(folder, os.W_OK | os.X_OK)
+        status = folder.stat()
     except OSError:
         writable = False
     if writable:
+        if os.name == "posix" and (status.st_uid != os.getuid() or status.st_mode & 0o022):
+            raise OSError(
+                f"the build cache must be a folder of yours that nobody else can write, which {folder} is not: "
+                "chmod go-w, or set TACHOMETRY_CACHE to another"
+            )
         return folder
     if given:
         raise OSError(f"TACHOMETRY_CACHE must be a folder that can be written, not {given!r}")
@@ -167,13 +174,18 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     if (found := _intact(folder, key)) is not None:
         return found
     _prune(folder)
-    with tempfile.TemporaryDirectory(prefix=".building-", dir=folder, ignore_cleanup_errors=True) as name:
-        made = make(Path(name))
-        target = folder / f"{hashlib.sha256(made.read_bytes()).hexdigest()}{suffix}"
-        made.replace(target)
-        index = Path(name) / "index"
-        index.write_text(target.name)
-        index.replace(folder / key)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".building-", dir=folder, ignore_cleanup_errors=True) as name:
+            made = make(Path(name))
+            target = folder / f"{hashlib.sha256(made.read_bytes()).hexdigest()}{suffix}"
+            made.replace(target)
+            index = Path(name) / "index"
+            index.write_text(target.name, encoding="ascii")
+            index.replace(folder / key)
+    except OSError as error:
+        if error.errno is None or error.filename is not None:
+            raise
+        raise OSError(f"cannot write to the build cache {folder}: {error.strerror}") from error
     return target
 
 

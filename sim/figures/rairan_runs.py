@@ -130,10 +130,10 @@ def fig5(lab: Lab) -> Result:
             ),
             Claim(
                 "the actual speed on the ramps is between ω_m2 and ω_m1",
-                f"so is the mean speed over what an update has measured, in {np.count_nonzero(enclosed)} of "
-                f"{len(enclosed)} updates; the speed of the moment, which runs ahead of it, in "
-                f"{100 * float(np.mean(outside <= 0)):.0f} % of the time",
-                bool(np.all(enclosed)),
+                f"in {100 * float(np.mean(outside <= 0)):.0f} % of the time: it runs ahead of what an update has "
+                f"measured, the mean speed, which is between them in {np.count_nonzero(enclosed)} of {len(enclosed)} "
+                "updates",
+                bool(np.all(outside <= 0)),
             ),
             Claim(
                 "the bounds also apply to variable speeds, if the acceleration does not go beyond eq. (14)",

@@ -17,7 +17,7 @@ from tachometry.sim.theory.performance import (
     s_performance,
     t_performance,
 )
-from tachometry.sim.theory.tsuji import tsuji_eq18_resolution, unit_velocity
+from tachometry.sim.theory.tsuji import tsuji_eq14_resolution, tsuji_eq18_resolution, unit_velocity
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing, TTachometer
 
 # Table I: 500 pulses per revolution, T_s = 1 ms; Sec. V-B: T_c = 4 ms, 10 ms at most; Sec. VI: mean of 4 ticks.
@@ -143,9 +143,9 @@ def fig07(lab: Lab) -> Result:
     slow = speed < UNIT
     better = slow & (mt < t * (1 - 1e-9))
     low, high = speed[better].min(), speed[better].max()
-    # In the same measurement time eq. (14) is |Σ m_e| times eq. (18): compared at all m_s and sums.
+    # In the same measurement time: eqs. (14) and (18) are equal if the sum is 1, else eq. (18) is less.
     m_s, counted = np.arange(MIN_TICKS, 200), np.arange(1, 100)[:, np.newaxis]
-    by_time = counted * tsuji_eq18_resolution(m_s, COUNTS, TICK)
+    by_time = tsuji_eq14_resolution(counted, m_s, MIN_TICKS, COUNTS, TICK)
     s_same = tsuji_eq18_resolution(m_s, COUNTS, TICK)
     same = bool(np.all(by_time[0] == s_same) and np.all(by_time[1:] > s_same))
     summed = UNIT / MIN_TICKS

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 def round_quotient(
     numerator: NDArray[np.int64], denominator: NDArray[np.int64], frac_bits: int, towards: int = 0
 ) -> NDArray[np.int64]:
-    """2^frac_bits · numerator/denominator as an integer; the denominators are positive.
+    """2^frac_bits · numerator/denominator as an integer; the denominators are positive and below 2^61.
 
-    The integer part is taken off first, so that nothing overflows while denominators are below 2^(62−frac_bits).
+    It is a long division, some bits at a time, so that no remainder overflows. The result must fit.
 
     Parameters
     ----------
@@ -18,7 +18,10 @@ def round_quotient(
     towards : int
         ⌊x + ½⌋ (0), ⌊x⌋ (−1) or ⌈x⌉ (1).
     """
-    whole, rest = numerator // denominator, numerator % denominator
-    # Twice x, and what rounds it, in units of 1/denominator.
-    rounding = (denominator, 2 * denominator - 1, 0)[towards]
-    return (whole << frac_bits) + ((rest << (frac_bits + 1)) + rounding) // (2 * denominator)
+    quotient, rest = np.divmod(numerator, denominator)
+    most = 62 - int(np.max(denominator, initial=1)).bit_length()  # bits at a time
+    for bits in [most] * (frac_bits // most) + [frac_bits % most]:
+        digits, rest = np.divmod(rest << bits, denominator)
+        quotient = (quotient << bits) + digits
+    up: NDArray[np.bool_] = (2 * rest >= denominator, rest > 0, rest < 0)[towards]
+    return quotient + up

@@ -14,8 +14,13 @@ from numpy.typing import NDArray
 
 from tachometry.spec import TachometerSpec
 from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
+from tachometry.spec.units import format_time
 
 LINES = ("a", "b", "z", "tick_in")
+
+# What a computer's memory holds: an edge and a tick take some 300 bytes each on their way to a report.
+MAX_EDGES = 10_000_000
+MAX_TICKS = 10_000_000
 
 
 _QUADRATURE = np.array([0, 1, 3, 2], dtype=np.uint8)
@@ -176,7 +181,14 @@ class PinTrace(_Lines):
     @classmethod
     def of(cls, recording: Recording, spec: TachometerSpec) -> "PinTrace":
         """What the pins of a core see of a recording; with nominal external ticks if the core takes them and there are
-        none."""
+        none.
+
+        Raises
+        ------
+        ValueError
+            If there are too many clocks to be told apart, or more than `MAX_TICKS` ticks.
+        """
+        check_ticks(recording.duration, spec)
         return recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
 
     def until(self, n_clocks: int) -> "PinTrace":
@@ -202,6 +214,17 @@ class PinTrace(_Lines):
         if not spec.max_tick_cycles or self.tick_in is not None:
             return self
         return self.with_tick_in(nominal_ticks(spec, self.n_clocks))
+
+
+def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS) -> None:
+    """See that so many seconds are not too many ticks to be held; ValueError if they are."""
+    ticks = duration / float(spec.timing.tick_seconds)
+    if not ticks <= most:
+        longest = format_time(most * spec.timing.tick_seconds)
+        raise ValueError(
+            f"what is run must have at most {most} ticks, {longest} of this tick, not {ticks:.6g}: shorten it, or take "
+            "longer ticks"
+        )
 
 
 def nominal_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.golden.front_end import decode
-from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.recording import MAX_TICKS, Recording
 
 IntArray = NDArray[np.int64]
 
@@ -96,6 +96,10 @@ class _Readings(NamedTuple):
 def _read(steps: Steps, period_s: float) -> _Readings:
     if not period_s > 0:
         raise ValueError(f"control period must be more than 0 s, not {period_s} s")
+    if not steps.duration / period_s <= MAX_TICKS:
+        raise ValueError(
+            f"what is compared must have at most {MAX_TICKS} control periods of {period_s:g} s: shorten it"
+        )
     n_periods = math.floor(steps.duration / period_s * (1 + 1e-12))
     time = period_s * np.arange(1, n_periods + 1, dtype=np.float64)
     seen = np.searchsorted(steps.time, time, side="right")

@@ -10,7 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tachometry.spec.option import ParameterError
 from tachometry.spec.units import plural
@@ -23,15 +23,18 @@ if TYPE_CHECKING:
 _PATIENCE = 10.0  # seconds until a scheduler has answered
 _AT_ONCE = 1000  # points that are sent to the scheduler together
 # Dask has its workers give all memory back at once, which takes longer than a point itself: they keep so many bytes.
-_MEMORY = {
+_LOCAL: dict[str, Any] = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 25,
+    # Anybody on this machine can ask their HTTP servers, which shall have no answers.
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
 }
 
 
 def require() -> None:
-    """See that the extra is there: distributed and pyarrow."""
-    for name in ("distributed", "pyarrow"):
+    """See that the extra is there: distributed, pyarrow and cryptography."""
+    for name in ("distributed", "pyarrow", "cryptography"):
         try:
             __import__(name)
         except ImportError:
@@ -44,13 +47,16 @@ def require() -> None:
 def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
     """A client of a scheduler, or, without an address, of so many processes here, by default one for each core.
 
+    Whoever may talk to a Dask scheduler or worker may run Python there. The processes here talk to nobody else: by TLS,
+    with certificates that are made for them and only live in their memory.
+
     Raises
     ------
     OSError
         If the scheduler does not answer.
     """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
 
     with ExitStack() as stack:
         stack.callback(logging.disable, logging.root.manager.disable)
@@ -65,11 +71,14 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
                 print(f"tachometry: {scheduler} has no workers yet: waiting for them", file=sys.stderr)
         else:
             try:
-                with _deaf_to_interrupts(), dask.config.set(_MEMORY):
+                with _deaf_to_interrupts(), dask.config.set(_LOCAL):
                     local = LocalCluster(
                         n_workers=jobs,
                         threads_per_worker=1,
+                        protocol="tls://",
+                        security=Security.temporary(),
                         dashboard_address="127.0.0.1:0",
+                        scheduler_kwargs={"dashboard": False},
                         silence_logs=logging.CRITICAL,
                     )
             except RuntimeError as error:

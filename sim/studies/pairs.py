@@ -21,22 +21,24 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
 
     Values in words depend on the rest: `most - 20` fraction bits, 20 less than there can be; `needed - 2` bits of the
     velocity, two less than it can need, if no speed must fit; `some counts per tick`, about the speed of the motions;
-    the `longest` minimum time. The maximum time is in ticks. A flag that needs another is a value of that: `yes
-    index-reset`.
+    the `longest` minimum time. The maximum time is in ticks. An option that needs a flag is a value of that: `yes
+    index-reset`, `yes edge-error 0.3`.
     """
-    spec = spec_class(method)
+    every = spec_class(method).pairs_all
     found = {about.name: about.tested for about in own_options(method)}
-    for about in common_options():
-        if spec.pairs_all:
-            found[about.name] = about.tested
-        elif about.name in spec.pairs_with:
-            found[about.name] = about.tested[: about.few]
+    found |= {about.name: about.tested if every else about.tested[: about.few] for about in common_options()}
     known = _known(method)
     for name in [name for name in found if known[name].needs]:
         values = found.pop(name)
         if known[name].needs in found and values:
-            found[known[name].needs] += (f"yes {name}",)
-    return {name: values for name, values in found.items() if len(values) > 1}
+            more = [f"yes {name}"] if known[name].flag else [f"yes {name} {value}" for value in values]
+            # Where there are to be few values, the flag comes with the other option only.
+            flag = known[name].needs
+            found[flag] = (*(found[flag] if every else found[flag][:1]), *more)
+    possible = {
+        name: tuple(value for value in values if _possible(method, {name: value})) for name, values in found.items()
+    }
+    return {name: values for name, values in possible.items() if len(values) > 1}
 
 
 def apart(method: str) -> set[frozenset[tuple[str, str]]]:
@@ -45,15 +47,13 @@ def apart(method: str) -> set[frozenset[tuple[str, str]]]:
     for (one, its), (other, others) in combinations(factors(method).items(), 2):
         for pair in product(its, others):
             row = dict(zip((one, other), pair, strict=True))
-            try:
-                of_texts(method, _texts(method, row))
-            except ValueError:
+            if not _possible(method, row):
                 found.add(frozenset(row.items()))
     return found
 
 
-def configurations(method: str) -> list[tuple[str, ...]]:
-    """Words of the command line, for each configuration of a method."""
+def rows(method: str) -> list[Texts]:
+    """Values of all factors of a method, one row for each configuration."""
     from covertable import make
 
     never = [
@@ -67,7 +67,12 @@ def configurations(method: str) -> list[tuple[str, ...]]:
         for pair in sorted(apart(method), key=sorted)
     ]
     every = {name: list(values) for name, values in factors(method).items()}
-    return [words_of(method, _texts(method, dict(row))) for row in make(every, constraints=never)]
+    return [dict(row) for row in make(every, constraints=never)]
+
+
+def configurations(method: str) -> list[tuple[str, ...]]:
+    """Words of the command line, for each configuration of a method."""
+    return [words_of(method, _texts(method, row)) for row in rows(method)]
 
 
 def words_of(method: str, texts: Texts) -> tuple[str, ...]:
@@ -98,6 +103,14 @@ def spec_of(words: tuple[str, ...]) -> TachometerSpec:
     return of_texts(method, texts)
 
 
+def _possible(method: str, row: Texts) -> bool:
+    try:
+        of_texts(method, _texts(method, row))
+    except ValueError:
+        return False
+    return True
+
+
 def _known(method: str) -> dict[str, Option]:
     return {about.name: about for about in (*common_options(), *own_options(method))}
 
@@ -107,7 +120,8 @@ def _texts(method: str, row: Texts) -> Texts:
     texts = {"ppr": str(_PPR), "clock": str(_CLOCK_HZ)}
     for name, value in row.items():
         if value.startswith("yes "):
-            texts |= {name: "yes", value.removeprefix("yes "): "yes"}
+            other, _, given = value.removeprefix("yes ").partition(" ")
+            texts |= {name: "yes", other: given or "yes"}
         elif value:
             texts[name] = value
     cycles, decoding = int(texts.get("tick", "960")), int(texts.get("decoding", "4"))

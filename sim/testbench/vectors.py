@@ -11,7 +11,7 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.recording import Recording, check_ticks
 from tachometry.sim.signals.run import Run
 from tachometry.spec import TachometerSpec
 from tachometry.spec.option import ParameterError
@@ -20,6 +20,7 @@ from tachometry.spec.provenance import LICENSE, generator, notice
 # Clocks of the motion, and of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING, _STANDING = 160_000, 800_000
 _FEWEST_TICKS, _MOST_TICKS = 3, 1000
+_MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 
 
 def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = None) -> dict[str, str]:
@@ -36,9 +37,11 @@ def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = 
     Raises
     ------
     ValueError
-        If it does not last for a tick.
+        If it does not last for a tick, or for too many.
     """
-    trace = (usual_motion(spec) if recording is None else recording).place(spec.timing.clock_hz)
+    recording = usual_motion(spec) if recording is None else recording
+    check_ticks(recording.duration, spec, _MOST_BENCH_TICKS)
+    trace = recording.place(spec.timing.clock_hz)
     if spec.max_tick_cycles:
         trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
     run = golden.run(spec, trace)

@@ -31,7 +31,6 @@ class MTachometer(TachometerSpec):
 
     method = "m"
     summary = "counts the pulses of one tick, or of several"
-    pairs_with = TachometerSpec.pairs_with | {"external-tick", "age", "lowpass"}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -60,18 +59,28 @@ class MTachometer(TachometerSpec):
     def shift(self) -> int | None:
         """What the sum is shifted left by, where n is a power of two of at most 2^frac_bits; else None."""
         halvings = self.average.bit_length() - 1
-        exact = self.average == 1 << halvings and halvings <= self.native_frac_bits
+        exact = self.average == 1 << halvings and halvings + self.error_bits <= self.native_frac_bits
         return self.native_frac_bits - halvings if exact else None
 
     @property
     def reciprocal(self) -> Reciprocal:
         """The reciprocal 1/n, where a shift is not enough."""
-        return Reciprocal(self.average, self.max_sum + self.bounds, self.native_frac_bits, 0)
+        return Reciprocal(self.average, self.max_numerator, self.native_frac_bits, self.error_bits)
+
+    @property
+    def margin(self) -> int:
+        """How far the sum is off for the bounds, in 2^−error_bits counts."""
+        return int(self.uncertainty * (1 << self.error_bits))
+
+    @property
+    def max_numerator(self) -> int:
+        """Largest |N| that is multiplied by the reciprocal, in 2^−error_bits counts."""
+        return (self.max_sum << self.error_bits) + self.bounds * self.margin
 
     @property
     def numerator_width(self) -> int:
         """Bits of the number that is multiplied by the reciprocal, signed."""
-        return signed_width(self.max_sum + self.bounds)
+        return signed_width(self.max_numerator)
 
     @property
     def interval_width(self) -> int:

@@ -1,5 +1,6 @@
 """The method of Rairán 2013: counts and sampling periods, both begun by a count."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -61,7 +62,6 @@ class RairanTachometer(TachometerSpec):
     summary = "begins its ticks with a count (Rairán 2013)"
     update_by = "count"
     own_ticks = True
-    pairs_with = TachometerSpec.pairs_with | {"index", "index-reset", "lowpass"}
     last_at_rest = True
 
     def __post_init__(self) -> None:
@@ -168,14 +168,13 @@ class RairanTachometer(TachometerSpec):
         """Bits of an entry."""
         return max(self.table).bit_length()
 
-    def _bound(self, d: int, shift: int, more: int, towards: int) -> int:
-        """Bound for `d` counts in dt·2^shift, or one in −d of these, `more` clocks longer; outward, and clipped."""
-        dt = self.timing.tick_cycles
-        up, down = (d * dt, (dt << shift) + more) if d >= 0 else (dt, (-d * dt << shift) + more)
-        if down <= 0:
+    def _bound(self, counts: Fraction, periods: int, shift: int, more: int, towards: int) -> int:
+        """Bound for so many counts in so many dt·2^shift, `more` clocks longer; outward, and clipped."""
+        clocks = (periods * self.timing.tick_cycles << shift) + more
+        if clocks <= 0:
             return self.absent_bound
-        raw = (up << self.native_frac_bits) // down if towards < 0 else -((-up << self.native_frac_bits) // down)
-        return min(raw, self.absent_bound)
+        exact = counts * self.timing.tick_cycles * (1 << self.native_frac_bits) / clocks
+        return min(math.floor(exact) if towards < 0 else math.ceil(exact), self.absent_bound)
 
     def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
         """The table of a bound; `one` gives the entry for n, k and the regime.
@@ -195,19 +194,27 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def lower_table(self) -> tuple[int, ...]:
-        """Lower bounds: n2 for a dt, or for Ndt1 + 1 of them, that took a clock longer; 0 for the estimate 0."""
+        """Lower bounds: n2 for a dt, or for Ndt1 + 1 of them, that took a clock longer; 0 for the estimate 0.
+
+        With an edge error, there are as many again, for what implies no least speed: their negatives.
+        """
 
         def lower(n: int, shift: int, high: bool) -> int:
-            return self._bound(n if high else -n - 1, shift, 1, -1) if n or high else 0
+            counts = max(Fraction(n if high else 1) - self.edge_error, Fraction(0))
+            return self._bound(counts, 1 if high else n + 1, shift, 1, -1) if n or high else 0
 
-        return self._by_address(lower)
+        def loose(n: int, shift: int, high: bool) -> int:
+            return self._bound(self.edge_error, n, shift, -1, 1) if n and not high else 0
+
+        return self._by_address(lower) + (self._by_address(loose) if self.edge_error else ())
 
     @property
     def upper_table(self) -> tuple[int, ...]:
         """Upper bounds: n1 for a dt, or for Ndt1 of them, that took a clock less; absent for the estimate 0."""
 
         def upper(n: int, shift: int, high: bool) -> int:
-            return self._bound(n + 1 if high else -n, shift, -1, 1) if n or high else self.absent_bound
+            counts = (n if high else 0) + self.uncertainty
+            return self._bound(counts, 1 if high else n, shift, -1, 1) if n or high else self.absent_bound
 
         return self._by_address(upper)
 

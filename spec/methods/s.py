@@ -65,17 +65,27 @@ class STachometer(TachometerSpec):
     @property
     def max_numerator(self) -> int:
         """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
-        return (2 * self.max_count + self.bounds) * self.numerator_per_count
+        return 2 * self.max_count * self.numerator_per_count + self.bounds * self.margin
 
     @property
     def numerator_per_count(self) -> int:
-        """What one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17)."""
-        return 2 if self.cancel else 1
+        """What one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17); or finer parts."""
+        return (2 if self.cancel else 1) << self.finer
+
+    @property
+    def finer(self) -> int:
+        """Bits by which N is finer than the counts, for an edge error that is a fraction."""
+        return max(0, self.error_bits - self.cancel)
+
+    @property
+    def margin(self) -> int:
+        """How far N is off for the bounds."""
+        return int(self.uncertainty * self.numerator_per_count)
 
     @property
     def reciprocal(self) -> Reciprocal | CarriedReciprocal:
         """The reciprocal of m_s: looked up, or carried along where a table would be large."""
-        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, int(self.cancel))
+        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
         carried = CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
         return carried if self.timing.max_ticks > max(MAX_TABLE, carried.depth) else Reciprocal(*shape)
 

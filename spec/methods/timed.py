@@ -1,5 +1,6 @@
 """What the methods that measure the time between counts share (Tsuji 2009, Sec. IV-B and C)."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -42,7 +43,6 @@ class TimedTachometer(TachometerSpec):
     equation: ClassVar[int]
     update_by = "count"
     rest_tenths = 22
-    pairs_with = TachometerSpec.pairs_with | {"external-tick", "lowpass"}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -131,8 +131,9 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def max_bound(self) -> int:
-        # Distance/(time − 1) is at most twice distance/time; on the lattice reversals may add a count.
-        return 2 * self.max_quotient + 1
+        # Distance/(time − 1) is at most twice distance/time; on the lattice reversals may add a count. An edge error is
+        # divided by a period at least.
+        return 2 * self.max_quotient + 1 + math.ceil(self.edge_error * self.timer_periods)
 
     @property
     def saturates(self) -> bool:

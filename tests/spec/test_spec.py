@@ -155,6 +155,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "max_tick_cycles": None,
         "age": False,
         "bounds": False,
+        "edge_error": 0.0,
         "lowpass": None,
         "cancel": False,
     }

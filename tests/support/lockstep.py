@@ -183,6 +183,8 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     )
     if rng.random() < 0.25 and getattr(spec, "adaptive", None) is None:
         spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))
+    if spec.bounds and rng.random() < 0.5:
+        spec = replace(spec, edge_error=Fraction(int(rng.integers(1, 9)), 8))
     if method == "mt" and rng.random() < 0.6:
         longest = int(rng.choice([2, max_ticks]))
         unit_cycles = spec.interval_unit_cycles

@@ -29,7 +29,9 @@ class Model:
         total, length = sums[n:] - sums[:-n], np.full(len(m_e), n)
 
         def quotient(counts: int, towards: int) -> np.ndarray:
-            return round_quotient(total + counts, length, self._spec.native_frac_bits, towards)
+            # In eighths of a count, which edges may be off by.
+            more = int(8 * counts * (1 + self._spec.edge_error))
+            return round_quotient(8 * total + more, 8 * length, self._spec.native_frac_bits, towards)
 
         columns = {
             "velocity": quotient(0, 0),

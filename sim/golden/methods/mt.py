@@ -37,7 +37,7 @@ class Model:
         opening, ends = opening[~first[ends]], ends[~first[ends]]
         none = np.zeros(len(ends), dtype=np.bool_)
         distance, time = self._distance(counts.size, opening, ends), period[ends] - period[opening]
-        least, most = enclosure(distance, time)
+        least, most = enclosure(spec, distance, time)
         found = Measurements(
             clock=counts.clock(period[ends]),
             distance=2 * distance,

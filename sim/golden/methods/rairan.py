@@ -166,17 +166,23 @@ class Model:
         return Table(events.clock + delay, columns | self._bounds(events))
 
     def _bounds(self, events: Events) -> dict[str, NDArray[Any]]:
-        """n2 and n1 of a time that is a clock longer and shorter, rounded outward."""
+        """n2 and n1 of a time that is a clock longer and shorter, rounded outward; all in eighths of a count."""
         spec, one = self._spec, self._spec.timing.tick_cycles
         if not spec.bounds:
             return {}
         dt = one << events.shift
         n, high, none = events.n, events.high, spec.absent_bound
-        bits = spec.native_frac_bits
-        lower = round_quotient(np.where(high, n - 1, 1) * one, np.where(high, dt + 1, (n + 1) * dt + 1), bits, -1)
-        lower[events.loose | (n == 0)] = 0
+        bits, off = spec.native_frac_bits, int(8 * spec.edge_error)
+        least, most = 8 * np.where(high, n - 1, 1) - off, 8 * np.where(high, n, 1) + off
+        lower = round_quotient(least * one, 8 * np.where(high, dt + 1, (n + 1) * dt + 1), bits, -1)
+        # Where no least speed is implied, two edges may be off for all that.
+        alone = np.full_like(n, -off * one)
+        alone = round_quotient(alone, 8 * np.maximum(n * dt - 1, 1), bits, -1)
+        alone[(n * dt <= 1) & (off > 0)] = -none
+        lower = np.where(events.loose, np.maximum(alone, -none), lower)
+        lower[n == 0] = 0
         time = np.where(high, 1, n - events.unsynced) * dt - 1
-        upper = round_quotient(np.where(high, n, 1) * one, np.maximum(time, 1), bits, 1)
+        upper = round_quotient(most * one, 8 * np.maximum(time, 1), bits, 1)
         upper = np.where((time <= 0) | (n == 0), none, np.minimum(upper, none))
         lower = np.minimum(lower, none)
         back = events.sign < 0

@@ -97,7 +97,9 @@ class Model:
 
         def quotient(counts: int, towards: int) -> NDArray[np.int64]:
             whole = 2 if spec.cancel else 1
-            return round_quotient(numerator + whole * counts, whole * m_s, spec.native_frac_bits, towards)
+            # In eighths of a count, which edges may be off by.
+            more = int(8 * counts * (1 + spec.edge_error))
+            return round_quotient(8 * numerator + whole * more, 8 * whole * m_s, spec.native_frac_bits, towards)
 
         columns = {
             "velocity": quotient(0, 0),

@@ -28,7 +28,7 @@ class Model:
         same = np.append(False, sign[1:] == sign[:-1])[: len(sign)] | spec.paper_exact | many
         none = np.zeros(len(sign), dtype=np.bool_)
         distance, time = np.where(same, sign, 0), np.where(many, 1, gap)
-        least, most = enclosure(distance, time)
+        least, most = enclosure(spec, distance, time)
         found = Measurements(
             clock=counts.clock(counts.period),
             distance=2 * distance,

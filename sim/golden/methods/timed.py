@@ -88,7 +88,8 @@ class Measurements:
     forced, beyond : bool arrays, shape (n,)
         `beyond`: out of range before any division.
     least, most : int64 arrays, shape (n, 2)
-        Distance and time for the least and for the greatest possible speed; time 0: that bound is absent.
+        Distance, in eighths of a count, and time for the least and for the greatest possible speed; time 0: that bound
+        is absent.
     known : bool array, shape (n,)
         Whether `least` and `most` are valid.
     """
@@ -112,11 +113,17 @@ class Measurements:
         return both[np.argsort(both.clock, kind="stable")]
 
 
-def enclosure(distance: Ints, time: Ints) -> tuple[Ints, Ints]:
+def eighths(spec: TimedTachometer, counts: Any, side: int) -> Any:
+    """Counts in eighths, with what edges may be off by on this side, −1 or 1."""
+    return 8 * counts + side * int(8 * spec.edge_error)
+
+
+def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, Ints]:
     """`least` and `most` of distances between edges; each edge lies within a period before its count."""
+    low, high = eighths(spec, distance, -1), eighths(spec, distance, 1)
     return (
-        np.stack([distance, np.where(distance < 0, time - 1, time + 1)], axis=1),
-        np.stack([distance, np.where(distance > 0, time - 1, time + 1)], axis=1),
+        np.stack([low, np.where(low < 0, time - 1, time + 1)], axis=1),
+        np.stack([high, np.where(high > 0, time - 1, time + 1)], axis=1),
     )
 
 
@@ -132,8 +139,8 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
         forced=none == 0,
         beyond=none > 0,
         # The shaft is between the same two edges at both ends.
-        least=np.stack([none - 1, time], axis=1),
-        most=np.stack([none + 1, time], axis=1),
+        least=np.stack([eighths(spec, none - 1, -1), time], axis=1),
+        most=np.stack([eighths(spec, none + 1, 1), time], axis=1),
         # The first period after reset was not seen completely.
         known=(np.arange(len(period)) > 0) | (period >= np.append(counts.period, counts.n_periods)[0]),
     )
@@ -185,8 +192,8 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     none = np.zeros(len(clock), dtype=np.bool_)
     last_size = np.append(0, counts.size)[np.searchsorted(counts.period, period)]
     # The shaft is no farther back than its last edge.
-    least = np.stack([np.where((sign > 0) & (last_size > 0), 0, -1), age], axis=1)
-    most = np.stack([np.where((sign < 0) & (last_size < 0), 0, 1), age], axis=1)
+    least = np.stack([eighths(spec, np.where((sign > 0) & (last_size > 0), 0, -1), -1), age], axis=1)
+    most = np.stack([eighths(spec, np.where((sign < 0) & (last_size < 0), 0, 1), 1), age], axis=1)
     return Measurements(clock, 3 * sign, age, ~none, none, least, most, ~none)[nearer]
 
 
@@ -213,6 +220,6 @@ def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any
     found: dict[str, NDArray[Any]] = {"bounds_valid": taken.known}
     for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
         distance, time = ends.T
-        exact = round_quotient(distance * spec.timer_periods, np.maximum(time, 1), spec.native_frac_bits, towards)
+        exact = round_quotient(distance * spec.timer_periods, 8 * np.maximum(time, 1), spec.native_frac_bits, towards)
         found[name] = np.where(time > 0, exact, towards * spec.absent_bound)
     return found

@@ -55,6 +55,7 @@ def test_defaults(tmp_path: Path) -> None:
         "max_tick_cycles": None,
         "age": False,
         "bounds": False,
+        "edge_error": 0.0,
         "lowpass": None,
         "cancel": True,
     }
@@ -124,7 +125,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr 9 --frac-bits 30", "--frac-bits must be from 4 to 24, not 30"),
         ("--ppr 9 --max-speed 5", "--max-speed must be a number with one of the units rad/s, rev/s, rpm, not '5'"),
         ("--ppr 9 --max-speed 0rpm", "--max-speed must be greater than 0, not 0rpm"),
-        ("--ppr 9 --clock 1e99GHz", "--clock must be from 1 Hz to 100 GHz, not 1e+108 Hz"),
+        ("--ppr 9 --clock 1e29GHz", "--clock must be from 1 Hz to 100 GHz, not 1e+38 Hz"),
         ("--ppr 9 --name tick", "--name must not be that of a port, which 'tick' is"),
         ("--ppr 9 --name module", "--name must not be a Verilog keyword, which 'module' is"),
         ("--ppr 9 --name 9lives", "--name must be a letter or _ and up to 63 letters, digits or _, not '9lives'"),

@@ -255,7 +255,7 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
         ("--motion stop:1s --lost nan", "--lost must be from 0 to 1, not nan"),
         ("--motion stop:1s --seed -1", "--seed must be at least 0, not -1"),
         ("--motion stop:1s --max-time 1ms", "--max-time, in ticks, must be from 2 to 1048576, not 1"),
-        ("--motion constant:1e9:1e9s", "--motion must be of at most 200000000 encoder edges"),
+        ("--motion constant:1e9:1e9s", "--motion must be of at most 10000000 encoder edges"),
         ("--motion stop:1s --plot {new}/p.jpg", "Invalid value for '--plot': file must end in .png or .pdf"),
         ("--motion stop:1s --plot {new}/p", "file must end in .png or .pdf, not '{new}/p'"),
         ("--motion stop:1s --vcd {new}/v.gtkw", "Invalid value for '--vcd': file must end in .vcd"),

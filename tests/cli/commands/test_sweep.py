@@ -230,7 +230,7 @@ def test_what_fails_on_the_way_is_told_and_the_rest_is_kept(
     line = [*CORE, *MOTION, "--methods", "m", *scheduler, "--results", tmp_path / "r.parquet"]
     assert run(*line, "--vary", "speed=1e12,5,1e13") == 2
     err = capsys.readouterr().err
-    assert err.startswith("tachometry: error: --motion must be of at most 200000000 encoder edges")
+    assert err.startswith("tachometry: error: --motion must be of at most 10000000 encoder edges")
     assert re.search(r" \(method m, motion constant:1e1[23]:100ms\); 2 of 3 points could not be run\n$", err)
     assert [row["speed"] for row in rows(tmp_path / "r.parquet")] == [5]
 

@@ -1,8 +1,12 @@
 """`tachometry verify`."""
 
+import os
 import re
 import shlex
+import signal
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.command import run
@@ -97,6 +101,31 @@ def test_ctrl_c_tells_what_was_done(
     assert told.out.splitlines()[1].split()[:3] == ["m", "pysim", "1"]
     assert "interrupted after 1 of 2 configurations" in told.err
     assert "PASS" not in told.out
+
+
+def begin_and_wait(begun: int, core: object) -> None:
+    os.write(begun, b".")
+    signal.pause()
+
+
+def test_workers_end_with_a_command_that_is_killed() -> None:
+    begun, alive = os.pipe(), os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            check: Any = partial(begin_and_wait, begun[1])
+            with command._each(check, [None, None], 2) as results:  # type: ignore[list-item]
+                list(results)
+        finally:
+            os._exit(1)
+    os.close(begun[1])
+    os.close(alive[1])
+    assert os.read(begun[0], 1) + os.read(begun[0], 1) == b".."
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    assert os.read(alive[0], 1) == b""  # until the last of those who have its other end is gone
+    os.close(begun[0])
+    os.close(alive[0])
 
 
 @pytest.mark.parametrize(

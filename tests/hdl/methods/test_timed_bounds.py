@@ -79,7 +79,7 @@ MUTANTS = {
     "the time is not widened": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "0"),
     "it is widened on one side": ("Mux(end[-1], -1, 1), 0)", "1, 0)"),
     "it is widened in silence": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "Mux(end[-1], -1, 1)"),
-    "over its last edge": ("Mux(still, 0, -greatest)", "-greatest"),
+    "over its last edge": ("Mux(still, -off, -greatest)", "-greatest"),
     "not over it after a reversal": ("~(signs[0] | signs[1])", "~signs[0]"),
     "still in a forced 0": ("still = decays & (", "still = ("),
     "none is a number": ("Mux(none, limit, box.quotient)", "box.quotient"),

@@ -40,6 +40,13 @@ def test_two_variables_by_name_from_where_both_are_known(tmp_path: Path) -> None
     assert recording.duration == pytest.approx(250e-9)
 
 
+def test_changes_in_the_form_of_vectors(tmp_path: Path) -> None:
+    text = HEAD + BODY.replace("1!\n#9", "b1 !\n#9")
+    assert text != HEAD + BODY
+    vectors, scalars = (read_capture(write(tmp_path / "w.vcd", t), "top.a", "top.b") for t in (text, HEAD + BODY))
+    assert np.array_equal(vectors.a, scalars.a)
+
+
 def test_by_number(tmp_path: Path) -> None:
     swapped = read_capture(write(tmp_path / "w.vcd", HEAD + BODY), "1", "0")
     assert swapped.b.tolist() == [0, 1, 1]
@@ -71,6 +78,12 @@ def test_the_waveform_of_a_simulation_replays_as_the_same_pins(tmp_path: Path, c
         (HEAD + BODY + "#40\nz!\n", ("0", "1"), "levels of {path} must be 0 or 1, not z1 at time 40"),
         (HEAD + "#0\n1!\n", ("0", "1"), "{path} must contain the levels of all lines, 0 or 1, at least once"),
         ("no waveform", ("0", "1"), "{path} must be a complete VCD file: "),
+        (HEAD + BODY + "#40", ("0", "1"), "{path} must be a complete VCD file: its last line does not end"),
+        (HEAD + BODY + "#40\n1", ("0", "1"), "{path} must be a complete VCD file: its last line does not end"),
+        (HEAD + BODY + "#40\nb !\n", ("0", "1"), "{path} must be a complete VCD file: invalid literal"),
+        (HEAD + BODY + "#40\nb10 !\n", ("0", "1"), "levels of {path} must be 0 or 1, not 21 at time 40"),
+        (HEAD + BODY + "#40\nr0.5 !\n", ("0", "1"), "levels of {path} must be 0 or 1, not 0.51 at time 40"),
+        (HEAD + BODY + f"#{'9' * 5000}\n", ("0", "1"), "{path} must be a complete VCD file: "),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(tmp_path: Path, text: str, channels: tuple[str, str], message: str) -> None:

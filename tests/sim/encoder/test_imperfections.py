@@ -365,7 +365,7 @@ def test_parameters_out_of_range(parameters: dict[str, object], message: str) ->
 
 
 def test_bounce_is_of_the_edges_that_a_motion_may_have() -> None:
-    message = r"^motion must be of at most 200000000 encoder edges, start angle and bounce included, not 8e\+08$"
+    message = r"^motion must be of at most 10000000 encoder edges, start angle and bounce included, not 8e\+08$"
     with pytest.raises(ValueError, match=message):
         record("constant:1000rev/s:100s", bounce=Bounce(1000, 1e-9), pulses_per_rev=1)
 

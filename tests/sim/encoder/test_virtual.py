@@ -213,17 +213,17 @@ def test_decoding_must_exist() -> None:
         (
             "constant:1e6rev/s:100s",
             {},
-            "motion must be of at most 200000000 encoder edges, start angle included, not 4e+11",
+            "motion must be of at most 10000000 encoder edges, start angle included, not 4e+11",
         ),
         (
             "stop:1s",
             {"start_angle_rad": 1e9},
-            "motion must be of at most 200000000 encoder edges, start angle included, not 6.37e+11",
+            "motion must be of at most 10000000 encoder edges, start angle included, not 6.37e+11",
         ),
         (
             "stop:1s",
             {"vibration": Vibration(1.0, 1e6)},
-            "motion must be of at most 200000000 encoder edges, start angle included, not 2.55e+09",
+            "motion must be of at most 10000000 encoder edges, start angle included, not 2.55e+09",
         ),
         (
             "stop:1s",

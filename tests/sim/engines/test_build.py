@@ -1,5 +1,6 @@
 """The cache of compiled cores."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -61,6 +62,28 @@ def test_a_build_that_fails_leaves_nothing(folder: Path) -> None:
     with pytest.raises(OSError, match=r"cannot compile the core: .*error.*wrong"):
         cached("one", ".so", lambda inside: compile_library("wrong", inside))
     assert not list(folder.iterdir())
+
+
+def test_the_cache_is_the_users_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cached("one", ".bin", Maker())
+    assert folder.stat().st_mode & 0o777 == 0o700
+    for mode in (0o720, 0o702, 0o777):
+        folder.chmod(mode)
+        with pytest.raises(OSError, match=f"must be a folder of yours that nobody else can write, which {folder} is"):
+            cached("one", ".bin", Maker())
+    folder.chmod(0o755)
+    cached("one", ".bin", Maker())
+    monkeypatch.setattr("os.getuid", lambda: folder.stat().st_uid + 1)
+    with pytest.raises(OSError, match="must be a folder of yours"):
+        cached("one", ".bin", Maker())
+
+
+def test_a_full_disk_names_the_cache(folder: Path) -> None:
+    def full(_: Path) -> Path:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match=f"^cannot write to the build cache {folder}: No space left on device$"):
+        cached("one", ".bin", full)
 
 
 def test_without_a_cache_that_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,20 +1,32 @@
 """The papers' figures: what they must show, and that docs/figures.md says what they say."""
 
 import functools
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from types import FunctionType
+from typing import Any
 
 import numpy as np
 import pytest
 
+from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.figures import FIGURES
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Result
+from tachometry.sim.signals.run import Run
+from tachometry.sim.theory.performance import Performance
+from tachometry.sim.theory.table1 import Row, table1_rows
+from tachometry.spec import TachometerSpec
 
 DOCS = (Path(__file__).parents[3] / "docs" / "figures.md").read_text(encoding="utf-8")
 
 # What the papers say and the figures do not bear out, by the beginning of the claim.
 DISAGREE = {
     ("rairan2", "the time between updates"),
+    ("rairan5", "the actual speed on the ramps"),
     ("rairan5", "the bounds also apply"),
     ("rairan7", "relative errors always"),
     ("rairan7", "ω_m3 consistently"),
@@ -34,6 +46,90 @@ def test_figure_agrees_with_what_its_paper_says(name: str) -> None:
     for claim in result.claims:
         expected = not any(name == figure and claim.paper.startswith(text) for figure, text in DISAGREE)
         assert claim.agrees == expected, f"{claim.paper}: {claim.found}"
+
+
+def wrong_equation(right: Any, factor: float) -> Any:
+    """What computes another number: resolutions and times as well, if there are several."""
+
+    def wrong(*values: Any) -> Any:
+        found = right(*values)
+        if isinstance(found, Performance):
+            return replace(found, time=factor * found.time, resolution=factor * found.resolution)
+        return factor * found
+
+    return wrong
+
+
+def wrong_table(factor: float) -> Any:
+    """Table 1 with dt twice as long and updates by the other event, or with the floor of the counts."""
+
+    def wrong(pulses: Iterable[int], dt: int, duration: int) -> list[Row]:
+        if factor > 1:
+            rows = table1_rows(pulses, 2 * dt, duration)
+            return [replace(row, new_n_ep1=row.pulse, new_n_dt1=row.end) for row in rows]
+        return [replace(row, n_ep1=max(row.n_ep1 - 1, 1)) for row in table1_rows(pulses, dt, duration)]
+
+    return wrong
+
+
+class WrongLab(Lab):
+    """Golden models that count each edge twice, and whose velocity and measurement time jump."""
+
+    def golden(self, spec: TachometerSpec, encoding: Encoding) -> Run:
+        run = super().golden(spec, encoding)
+        ticks, updates = run.ticks, run.updates
+        jumping = np.where(np.arange(len(updates)) % 5 < 2, 2 * updates.velocity, updates.velocity // 3)
+        tables = {
+            "tick": ticks.having(pulse_count=2 * ticks.pulse_count),
+            "velocity_valid": updates.having(velocity=jumping, interval=updates.interval + 1),
+        }
+        return replace(run, tables=run.tables | tables)
+
+
+class Remembering(Lab):
+    """A lab that turns and measures once, however often it is asked to."""
+
+    def __init__(self) -> None:
+        super().__init__(hdl=False)
+        self._turned: dict[Any, Encoding] = {}
+        self._measured: dict[Any, Run] = {}
+
+    def turn(self, spec: TachometerSpec, motion: Any, **options: Any) -> Encoding:
+        key = (spec.encoder, motion, *sorted(options.items()))
+        if key not in self._turned:
+            self._turned[key] = super().turn(spec, motion, **options)
+        return self._turned[key]
+
+    def golden(self, spec: TachometerSpec, encoding: Encoding) -> Run:
+        key = (spec, id(encoding))
+        if key not in self._measured:
+            self._measured[key] = super().golden(spec, encoding)
+        return self._measured[key]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_claim_can_be_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By an equation that gives three times as much, or a third, by a wrong Table 1 or by wrong golden models."""
+    compute = FIGURES[name].compute
+    module = import_module(compute.__module__)
+    left = {claim.paper for claim in computed(name).claims if claim.agrees}
+
+    def refute(lab: Lab) -> None:
+        with suppress(ValueError):  # no other equation takes what the wrong one gives
+            left.intersection_update({claim.paper for claim in compute(lab).claims if claim.agrees})
+
+    if left:
+        refute(WrongLab(hdl=False))
+    lab = Remembering()
+    for what, right in list(vars(module).items()):
+        if isinstance(right, FunctionType) and right.__module__.startswith("tachometry.sim.theory"):
+            for factor in (3, 1 / 3):
+                if left:
+                    wrong = wrong_table(factor) if right is table1_rows else wrong_equation(right, factor)
+                    monkeypatch.setattr(module, what, wrong)
+                    refute(lab)
+                    monkeypatch.undo()
+    assert not left
 
 
 @pytest.mark.parametrize("name", FIGURES)

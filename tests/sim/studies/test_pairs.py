@@ -4,14 +4,14 @@ from itertools import combinations, product
 
 import pytest
 
-from tachometry.sim.studies.pairs import apart, configurations, factors, spec_of
+from tachometry.sim.studies.pairs import apart, configurations, factors, rows, spec_of
 from tachometry.spec import METHODS, TachometerSpec, common_options, own_options
 from tachometry.spec.option import is_derived
 
 # What cannot be together at all, of every method that has both.
 APART = {
     frozenset({("tick", "1"), ("external-tick", "yes")}),
-    frozenset({("paper-exact", "yes"), ("bounds", "yes")}),
+    frozenset({("paper-exact", "yes"), ("bounds", "yes edge-error 0.3")}),
     frozenset({("paper-exact", "yes"), ("adaptive", "25%")}),
     frozenset({("adaptive", "25%"), ("max-time", "2")}),
     frozenset({("adaptive", "25%"), ("max-time", "3")}),
@@ -43,6 +43,16 @@ def test_every_two_options_meet(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_pairs_are_counted(method: str) -> None:
+    """Of every two options that are declared, all their values, but for those that are known to be apart."""
+    factors_ = [(name, value) for name, values in factors(method).items() for value in values]
+    wanted = {frozenset(pair) for pair in combinations(factors_, 2) if pair[0][0] != pair[1][0]}
+    met = {frozenset(pair) for row in rows(method) for pair in combinations(row.items(), 2)}
+    assert met == wanted - APART
+    assert len(met) == len(wanted) - len(wanted & APART) > 300
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_what_cannot_be_together_is_known(method: str) -> None:
     assert apart(method) <= APART
 
@@ -67,13 +77,15 @@ def test_the_extremes_are_there() -> None:
         assert any(spec.max_speed for spec in cores[method])
 
 
-def test_every_option_of_a_method_is_a_factor() -> None:
-    for method in METHODS:
-        assert {about.name for about in own_options(method)} <= set(factors(method))
-    reset = {about.name for about in common_options() if about.needs}
-    without = {about.name for about in common_options()} - set(factors("s")) - reset
-    assert without == {"ppr", "clock", "dt", "lsb"}
-    assert "yes index-reset" in factors("s")["index"]
+@pytest.mark.parametrize("method", METHODS)
+def test_every_option_is_a_factor(method: str) -> None:
+    """Or a value of one, of every method: what can be in one core alone, and the size of the encoder, are not."""
+    found = factors(method)
+    assert {about.name for about in own_options(method)} <= set(found)
+    without = {about.name for about in common_options() if not about.needs} - set(found)
+    assert without == {"ppr", "clock", "dt", "lsb"} | ({"external-tick"} if METHODS[method].own_ticks else set())
+    assert "yes index-reset" in found["index"]
+    assert "yes edge-error 0.3" in found["bounds"]
 
 
 def test_words_and_specs_are_the_same() -> None:

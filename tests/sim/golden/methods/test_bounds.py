@@ -1,6 +1,7 @@
 """The bounds of the methods that work on ticks: they enclose the true mean speed of every window, and no less would."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -31,12 +32,21 @@ def true_travel(
     return later + (earlier if getattr(spec, "cancel", False) else later)
 
 
+def displaced(spec: TachometerSpec, angle: NDArray[np.int64], seed: int) -> NDArray[np.int64]:
+    """How much later than that of an ideal disc each edge comes: half because of the disc, half of the lines."""
+    rng = np.random.default_rng(seed)
+    most = int(spec.edge_error * SUBCOUNTS) // 2
+    disc = rng.choice([0, most], 101) if seed % 2 else rng.integers(0, most + 1, 101)
+    return disc[angle // SUBCOUNTS % 101] + rng.integers(0, most + 1, len(angle))
+
+
 def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000) -> tuple[int, float]:
     """Every window of random motions; how many there were, and how near the truth came to a bound, in counts."""
     windows, nearest = 0, 1.0
     for seed in range(n_motions):
         angle = motion(n_ticks + 1, spec.max_count, seed)
-        updates = model(spec).updates(ticks_of(angle[1:]), None, 1 << 40)
+        seen = angle[1:] - displaced(spec, angle[1:], seed)
+        updates = model(spec).updates(ticks_of(seen), None, 1 << 40)
         at = updates.clock - spec.tick_to_velocity
         m_s, valid = updates.interval, updates["bounds_valid"]
         windows += int(np.count_nonzero(valid))
@@ -47,7 +57,7 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
         assert (above >= 0).all(), f"seed {seed}: above the upper bound at {at[valid][above < 0][:1]}"
         assert (below >= 0).all(), f"seed {seed}: below the lower bound at {at[valid][below < 0][:1]}"
         width = updates["velocity_upper"] - updates["velocity_lower"]
-        assert (width * m_s < (2 << spec.native_frac_bits) + 2 * m_s).all()
+        assert (width * m_s < 2 * (1 + spec.edge_error) * (1 << spec.native_frac_bits) + 2 * m_s).all()
         scale = 2 * SUBCOUNTS << spec.native_frac_bits
         nearest = min(nearest, above.min() / scale, below.min() / scale)
     return windows, nearest
@@ -66,11 +76,26 @@ def test_true_mean_speed_is_always_enclosed(spec: TachometerSpec, n_motions: int
 
 
 @pytest.mark.parametrize(
+    ("spec", "n_motions", "least"),
+    [(S, 12, 300_000), (PLAIN, 12, 300_000), (M, 2, 490_000), (replace(M, average=5), 1, 240_000)],
+    ids=["eq. (21)", "eq. (17)", "M", "M of 5"],
+)
+def test_discs_and_lines_within_the_edge_error(spec: TachometerSpec, n_motions: int, least: int) -> None:
+    for error in (Fraction(3, 8), Fraction(1)):
+        windows, nearest = check_enclosure(replace(spec, edge_error=error), n_motions // 2 or 1)
+        assert windows > least // 2
+        assert nearest < 0.5
+    # Bounds of an ideal disc do not enclose it.
+    with mutant(type(model(spec)), "1 + ", "1 + 0 * "), caught():
+        check_enclosure(replace(spec, edge_error=Fraction(1)), 2, 20_000)
+
+
+@pytest.mark.parametrize(
     ("module", "right", "wrong", "spec"),
     [
-        (s_method, "numerator + whole * counts", "numerator + counts", S),
+        (s_method, "+ whole * more", "+ more", S),
         (s_method, "np.arange(len(i)) > 0", "np.arange(len(i)) >= 0", replace(S, frac_bits=20)),
-        (m_method, "total + counts", "total + 0 * counts", M),
+        (m_method, "8 * total + more", "8 * total + 0 * more", M),
     ],
 )
 def test_mutants_are_caught(module: object, right: str, wrong: str, spec: TachometerSpec) -> None:

@@ -1,6 +1,7 @@
 """The bounds of the methods that measure times enclose the true mean speed, by whole numbers."""
 
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -41,15 +42,17 @@ def check_silence(spec: TimedTachometer, updates: Table) -> None:
     forced = updates.forced & updates["bounds_valid"]
     lasted = (updates.interval * spec.interval_unit_cycles)[forced]
     lower, upper = (updates[name][forced] * lasted for name in BOUNDS)
-    one, velocity = TICK << spec.native_frac_bits, updates.velocity[forced]
+    off = int(spec.edge_error * (TICK << spec.native_frac_bits))
+    one, velocity = (TICK << spec.native_frac_bits) + off, updates.velocity[forced]
     assert (velocity == 0).sum() > 5
     assert ((upper >= one) & (upper < one + lasted))[velocity >= 0].all()
     assert ((lower <= -one) & (lower > -one - lasted))[velocity <= 0].all()
     if spec.bound_decay:
         assert (velocity != 0).sum() > 5
     # While the velocity decays, the shaft has not come back over its last edge; after a reversal it may go either way.
-    assert ((lower == 0) | (lower <= -one))[velocity > 0].all()
-    assert ((upper == 0) | (upper >= one))[velocity < 0].all()
+    near = ((lower <= -off) & (lower > -off - lasted), (upper >= off) & (upper < off + lasted))
+    assert (near[0] | (lower <= -one))[velocity > 0].all()
+    assert (near[1] | (upper >= one))[velocity < 0].all()
 
 
 def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, float, float]:
@@ -82,19 +85,25 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     last, first = last[chosen], first[chosen]
     # Where the shaft is when it passes: half a count before or after the counts on its sides.
     way = through[last + 1] - through[first + 1] - (step[last] - step[first]) // 2
+    # Each edge comes later by up to the edge error: half because of the disc, half of the lines.
+    rng, most = np.random.default_rng(seed), int(8 * spec.edge_error)
+    late = rng.integers(0, most + 1, 64)[(through[1:] + through[:-1] + 1) // 2 % 64] + rng.integers(
+        0, most + 1, len(step)
+    )
+    way = 16 * way + late[last] - late[first]
     scale = INSTANTS * TICK << spec.native_frac_bits
     lasted = time[last] - time[first]
     lower, upper = updates["velocity_lower"][chosen], updates["velocity_upper"][chosen]
     above, below = upper == spec.absent_bound, lower == -spec.absent_bound  # there is none
-    assert (below | (lower * lasted <= way * scale)).all()
-    assert (above | (upper * lasted >= way * scale)).all()
+    assert (below | (16 * lower * lasted <= way * scale)).all()
+    assert (above | (16 * upper * lasted >= way * scale)).all()
     if not spec.saturates:
         # A velocity that decays is that of half a count more than can have been.
         measured = updates["bounds_valid"] & ~(updates.forced & (updates.velocity != 0))
         assert (updates["velocity_lower"] <= updates.velocity)[measured].all()
         assert (updates["velocity_upper"] >= updates.velocity)[measured].all()
     finite = ~above & ~below & (way != 0)
-    exact = way[finite] * scale / lasted[finite]
+    exact = way[finite] * scale / (16 * lasted[finite])
     lower, upper = lower[finite], upper[finite]
     nearest = np.minimum(upper - exact, exact - lower).min()
     return len(way), float(nearest), float(np.median((upper - lower) / np.abs(exact)))
@@ -121,9 +130,21 @@ def test_true_mean_speed_is_always_enclosed(spec: TimedTachometer, n: int) -> No
     assert width < 0.5
 
 
+@pytest.mark.parametrize("timer", ["clock", "tick"])
+@pytest.mark.parametrize("method", [T, MT], ids=["T", "M/T"])
+def test_discs_and_lines_within_the_edge_error(method: TimedTachometer, timer: str) -> None:
+    spec = replace(method, timer=timer, frac_bits=8, edge_error=Fraction(3, 8))
+    checked, nearest, _ = check_enclosure(spec, 200_000)
+    assert checked > 25_000
+    assert nearest < 1 << 8
+    # Bounds of an ideal disc do not enclose it.
+    with mutant(timed.eighths, "side * int(8 * spec.edge_error)", "0"), caught():
+        check_enclosure(spec, 100_000)
+
+
 @pytest.mark.parametrize(
     ("right", "wrong"),
-    [("np.where(distance < 0, time - 1, time + 1)", "time"), ("np.where(distance > 0, time - 1, time + 1)", "time")],
+    [("np.where(low < 0, time - 1, time + 1)", "time"), ("np.where(high > 0, time - 1, time + 1)", "time")],
 )
 def test_mutants_are_caught(right: str, wrong: str) -> None:
     with mutant(timed.enclosure, right, wrong), caught():

@@ -1,0 +1,69 @@
+"""Bounds for discs and lines that are not ideal, in gates: to the bit those of the golden model."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+
+from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
+from tachometry.hdl.methods.rairan import RairanMethod
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import TachometerSpec, of_texts
+
+CORE = {"ppr": "25", "clock": "1MHz", "tick": "12", "max-time": "120", "frac-bits": "6", "bounds": "yes"}
+CASES: list[tuple[str, dict[str, str]]] = [
+    ("s", {}),
+    ("s", {"cancel": "no", "max-speed": "100000rpm"}),
+    ("s", {"max-time": "96000", "tick": "12", "frac-bits": "4"}),
+    ("m", {}),
+    ("m", {"average": "8"}),
+    ("m", {"average": "16", "frac-bits": "4"}),
+    ("m", {"average": "5", "unit": "rpm", "frac-bits": "1"}),
+    ("t", {}),
+    ("t", {"timer": "tick"}),
+    ("mt", {}),
+    ("mt", {"timer": "tick"}),
+    ("mt", {"unit": "rev/s", "frac-bits": "2", "velocity-width": "12"}),
+    ("rairan", {}),
+    ("rairan", {"estimate": "n1", "tick": "3", "max-time": "60"}),
+    ("rairan", {"adaptive": "25%"}),
+    ("rairan", {"tick": "1", "max-time": "20"}),
+]
+
+
+def spec_of(method: str, options: dict[str, str], error: str) -> TachometerSpec:
+    return of_texts(method, CORE | options | {"edge-error": error})
+
+
+def check(spec: TachometerSpec, seed: int) -> Any:
+    trace = stress(spec, seed, 12)
+    found = lockstep(spec, trace.until(min(trace.n_clocks, 3000)), pick("pysim"))
+    assert found.n_mismatches == 0, found.first
+    return found.actual.updates
+
+
+@pytest.mark.parametrize(("method", "options"), CASES, ids=str)
+def test_gates_have_the_bounds_of_the_golden_model(method: str, options: dict[str, str]) -> None:
+    updates = check(spec_of(method, options, "1" if options.get("frac-bits") else "0.375"), 1)
+    assert np.count_nonzero(updates["bounds_valid"]) > 3
+
+
+def test_it_is_rounded_up_to_eighths() -> None:
+    assert [spec_of("s", {}, text).edge_error * 8 for text in ("0.01", "0.125", "12.6%", "1")] == [1, 1, 2, 8]
+
+
+@pytest.mark.parametrize(
+    ("box", "right", "wrong", "method"),
+    [
+        (QuotientVelocity, "(distance << finer) - off", "(distance << finer) + off", "t"),
+        (QuotientVelocity, "Mux(still, -off, -greatest)", "Mux(still, 0, -greatest)", "t"),
+        (RairanMethod, "Mux(negative[0], -entries", "Mux(negative[0], entries", "rairan"),
+    ],
+)
+def test_mutants_are_caught(box: type, right: str, wrong: str, method: str) -> None:
+    with mutant(box, right, wrong), caught():
+        for seed in range(1, 4):
+            check(spec_of(method, {}, "0.5"), seed)
