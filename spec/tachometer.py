@@ -32,6 +32,8 @@ class TachometerSpec(Numbers):
 
     # Name of the method.
     method: ClassVar[str]
+    # What texts call it; empty: its name in capitals.
+    title: ClassVar[str] = ""
     # What it does, for --help: it stands behind the name.
     summary: ClassVar[str] = ""
     # What makes its updates.
@@ -133,7 +135,7 @@ class TachometerSpec(Numbers):
     @property
     def heading(self) -> str:
         """What figures call it."""
-        return f"{self.method.upper()} method"
+        return f"{self.title or self.method.upper()} method"
 
     @property
     def remark(self) -> str:
