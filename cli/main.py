@@ -10,6 +10,8 @@ from typing import NoReturn
 
 from tachometry.cli.reports.streams import INTERNAL, INTERRUPTED, UNREAD, prepare_streams, printable, silence
 
+_LONGEST = 2000  # characters of a message, which may quote what is in a file
+
 
 def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit; errors are reported in one line on stderr, never by a traceback."""
@@ -84,8 +86,11 @@ def _report(error: Exception) -> str:
 
 
 def _fail(message: str, code: int = 2) -> int:
+    line = printable(" ".join(message.split()))
+    if len(line) > _LONGEST:
+        line = f"{line[: _LONGEST // 2]} … {line[-_LONGEST // 2 :]}"
     try:
-        print(f"tachometry: {printable(' '.join(message.split()))}", file=sys.stderr, flush=True)
+        print(f"tachometry: {line}", file=sys.stderr, flush=True)
     except OSError:  # nobody reads it
         silence(sys.stderr)
     return code

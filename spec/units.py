@@ -90,7 +90,7 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
         raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
     value = Fraction(match[1])
     if value and not _LEAST <= abs(value) <= _GREATEST:
-        raise ParameterError(what, f"must be 0 or of a size from 1e-30 to 1e30, not {text!r}")
+        raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")
     return value, unit
 
 

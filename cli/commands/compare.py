@@ -102,7 +102,7 @@ def compare(
     named = named_methods(methods, make, BASELINES)
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
     source = _source(record, capture, read, spec)
-    earliest = 0.0 if start is None else float(parse_time("from", start))
+    earliest = 0.0 if start is None else float(parse_time("start", start))
     if earliest < 0:
         raise ValueError(f"--from must be at least 0, not {start}")
     tools = _tools() if size else {}

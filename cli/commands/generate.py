@@ -83,13 +83,14 @@ def generate(
     if testbench:
         files += [f"test_{name}.py", f"{name}_vectors.json"]
     with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
-        from tachometry.hdl import export
-
-        texts = export(spec, name)
-        if testbench:
+        bench: dict[str, str] = {}
+        if testbench:  # first: what is wrong with a motion is found at once
             from tachometry.sim.testbench.vectors import cocotb_bench
 
-            texts |= cocotb_bench(spec, name, None if record is None else record(spec).recording)
+            bench = cocotb_bench(spec, name, None if record is None else record(spec).recording)
+        from tachometry.hdl import export
+
+        texts = export(spec, name) | bench
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:

@@ -49,7 +49,7 @@ class _Command(GroupedCommand):
         options = by_name(self) | point_options()
         file = raw.get("file")
         settings = of_command_line(raw, options)
-        if isinstance(file, str):
+        if isinstance(file, str) and file:
             settings = settings.over(of_file(Path(file), options))
         ctx.obj = settings
         first = {name: text for name, text in settings.first().items() if name in options}
@@ -162,7 +162,7 @@ def sweep(
     from tachometry.sim.studies import cluster
 
     cluster.require()
-    earliest = 0.0 if start is None else float(parse_time("from", start))
+    earliest = 0.0 if start is None else float(parse_time("start", start))
     if earliest < 0:
         raise ValueError(f"--from must be at least 0, not {start}")
     if jobs is not None and scheduler is not None:

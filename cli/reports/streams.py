@@ -29,11 +29,11 @@ def prepare_streams() -> None:
             stream.reconfigure(encoding="utf-8", errors="backslashreplace")
 
 
-def silence(stream: TextIO | None) -> None:
+def silence(stream: TextIO) -> None:
     """Send what is still written to a stream nowhere: its reader is gone."""
     try:
         nothing = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nothing, stream.fileno() if stream else 1)
+        os.dup2(nothing, stream.fileno())
         os.close(nothing)
     except (OSError, ValueError):  # not a file
         pass

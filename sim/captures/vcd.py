@@ -11,6 +11,7 @@ from vcd.reader import ScopeDecl, Token, TokenKind, VarDecl, VCDParseError, toke
 from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_edges, choose_channels, reading
 from tachometry.sim.signals.recording import Recording
 
+_LONGEST_NAME = 4096
 _UNITS = {"s": 0, "ms": 3, "us": 6, "ns": 9, "ps": 12, "fs": 15}
 
 
@@ -87,6 +88,8 @@ def _declarations(path: Path, tokens: Iterator[Token]) -> tuple[dict[int, str], 
             scopes.pop()
         elif isinstance(data, VarDecl) and data.size == 1:
             names[len(codes)] = ".".join([*scopes, data.ref_str])
+            if len(names[len(codes)]) > _LONGEST_NAME:
+                raise CaptureError(f"names of {path} with their scopes must have at most {_LONGEST_NAME} characters")
             codes.append(data.id_code)
         elif token.kind is TokenKind.ENDDEFINITIONS:
             if scale is None:

@@ -18,10 +18,10 @@ def round_quotient(
     towards : int
         ⌊x + ½⌋ (0), ⌊x⌋ (−1) or ⌈x⌉ (1).
     """
-    quotient, rest = np.divmod(numerator, denominator)
+    quotient, rest = numerator // denominator, numerator % denominator
     most = 62 - int(np.max(denominator, initial=1)).bit_length()  # bits at a time
     for bits in [most] * (frac_bits // most) + [frac_bits % most]:
-        digits, rest = np.divmod(rest << bits, denominator)
-        quotient = (quotient << bits) + digits
-    up: NDArray[np.bool_] = (2 * rest >= denominator, rest > 0, rest < 0)[towards]
-    return quotient + up
+        rest = rest << bits
+        quotient, rest = (quotient << bits) + rest // denominator, rest % denominator
+    up = (2 * rest >= denominator, rest > 0, rest < 0)[towards]
+    return quotient + up.astype(np.int64)

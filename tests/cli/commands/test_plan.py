@@ -187,7 +187,7 @@ finally:
         ("--speeds 1e999:1", "--speeds must be LO:HI, both greater than 0"),
         ("--speeds 1e-29:1", "--speeds must be at least 1.5708e-07rad/s, not '1e-29:1'"),
         ("--speeds 1e-9:1rpm", "--speeds must be at least 1.5e-06rpm, not '1e-9:1rpm'"),
-        ("--max-speed 1e999rpm", "--max-speed must be 0 or of a size from 1e-30 to 1e30, not '1e999rpm'"),
+        ("--max-speed 1e999rpm", "--max-speed must be of a size from 1e-30 to 1e30, not '1e999rpm'"),
         ("--max-time 1us", "--max-time must be a whole number of ticks"),
         ("--plot {new}/p.svg", "Invalid value for '--plot': file must end in .png or .pdf, not '{new}/p.svg'"),
         ("--plot {new}/p.png --csv {new}/p.png", "--plot and --csv must be different files, not both {new}/p.png"),
