@@ -66,8 +66,9 @@ formal: $(VENV)/.formal ## properties of the exported core, proven by induction,
 upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.upset
 
-mutate: $(VENV)/.test ## how many wrong cores the tests' motions notice, see docs/verification.md
+mutate: $(VENV)/.test icarus ## how many wrong cores and wrong lines of Python the tests notice, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.mutation
+	PYTHONPATH=tests $(BIN)/python -m proofs.python_mutation
 
 bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, in one run, written to docs/bench.md
 	$(BIN)/python bench/golden.py -o docs/bench.md

@@ -95,7 +95,7 @@ class Tachometer(wiring.Component):
             conditioner.b.eq(self.b),
             decoder.level_a.eq(conditioner.level_a),
             decoder.level_b.eq(conditioner.level_b),
-            decoder.ready.eq(conditioner.ready),
+            decoder.ready.eq(conditioner.ready_a & conditioner.ready_b),
             self.decode_error.eq(decoder.decode_error),
             position_counter.step.eq(decoder.step),
             self.position.eq(position_counter.position),
@@ -123,7 +123,7 @@ class Tachometer(wiring.Component):
             m.d.comb += [
                 conditioner.z.eq(self.z),
                 index.level_z.eq(conditioner.level_z),
-                index.ready.eq(conditioner.ready),
+                index.ready.eq(conditioner.ready_z),
                 index.position.eq(position_counter.next),
                 position_counter.clear.eq(index.rises & int(self._spec.index_reset)),
                 self.index_position.eq(index.index_position),

@@ -32,6 +32,8 @@ class TachometerSpec(Numbers):
 
     # Name of the method.
     method: ClassVar[str]
+    # What texts call it; empty: its name in capitals.
+    title: ClassVar[str] = ""
     # What it does, for --help: it stands behind the name.
     summary: ClassVar[str] = ""
     # What makes its updates.
@@ -133,7 +135,7 @@ class TachometerSpec(Numbers):
     @property
     def heading(self) -> str:
         """What figures call it."""
-        return f"{self.method.upper()} method"
+        return f"{self.title or self.method.upper()} method"
 
     @property
     def remark(self) -> str:
@@ -191,7 +193,9 @@ class TachometerSpec(Numbers):
         """
         if self.lowpass is not None:
             return None
-        conditioned = 2 + (1 << max(self.filter_clocks - 1, 1).bit_length() if self.filter_clocks else 0)
+        # A line that must be known anew has to hold still once more.
+        held = 1 << max(self.filter_clocks - 1, 1).bit_length()
+        conditioned = 2 + (held + self.filter_clocks if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
         # What counts the ticks of a silence may have to begin anew.

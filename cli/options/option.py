@@ -123,7 +123,7 @@ def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:
         If one is.
     """
     context = click.get_current_context()
-    command = click.command()(lambda: None)
+    command = click.Command(None)
     all_of(options, command)
     names = {parameter.name for parameter in command.params}
     for parameter in context.command.get_params(context):
@@ -191,7 +191,7 @@ _OUTPUT_OPTIONS = [
     output(
         "--trace",
         help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
-        "velocity in --unit (for count/tick in rad/s); then all other outputs that change with an update.",
+        "velocity in rad/s; then all other outputs that change with an update.",
     ),
     output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts), and what else ticks have."),
     output("--events", help="CSV with a row per index pulse, illegal transition and external tick that was wrong."),

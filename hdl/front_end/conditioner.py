@@ -26,8 +26,8 @@ class InputConditioner(wiring.Component):
         Asynchronous pins, one for each line.
     level_a, level_b … : Out(1)
         Synchronised and filtered levels.
-    ready : Out(1)
-        High from the first clock in which the level before the present one is real as well.
+    ready_a, ready_b … : Out(1)
+        High from the first clock in which the level of this line before the present one is real as well.
     swallowed_edges : Out(16)
         Edges that the filter has kept out, two for each glitch; stays at 65534.
     """
@@ -38,15 +38,15 @@ class InputConditioner(wiring.Component):
         super().__init__(
             {name: In(1) for name in lines}
             | {f"level_{name}": Out(1) for name in lines}
-            | {"ready": Out(1), "swallowed_edges": Out(16)}
+            | {f"ready_{name}": Out(1) for name in lines}
+            | {"swallowed_edges": Out(16)}
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        # Two clocks for the synchroniser, one for the filter, one for the decoder's memory of the level before.
-        clocks_since_reset = Signal(4 if self._filter_clocks else 3)
+        # Two clocks for the synchroniser, one for the decoder's memory of the level before.
+        clocks_since_reset = Signal(3)
         m.d.sync += clocks_since_reset.eq((clocks_since_reset << 1) | 1)
-        m.d.comb += self.ready.eq(clocks_since_reset[-1])
         swallowed = []
         for name in self._lines:
             level = Signal(name=f"synchronised_{name}") if self._filter_clocks else getattr(self, f"level_{name}")
@@ -55,10 +55,13 @@ class InputConditioner(wiring.Component):
                 m.submodules[f"filter_{name}"] = line = GlitchFilter(self._filter_clocks)
                 m.d.comb += [
                     line.level.eq(level),
-                    line.load.eq(~clocks_since_reset[2]),
+                    line.valid.eq(clocks_since_reset[1]),
                     getattr(self, f"level_{name}").eq(line.filtered),
                 ]
+                m.d.sync += getattr(self, f"ready_{name}").eq(line.known)
                 swallowed.append(line.swallowed)
+            else:
+                m.d.comb += getattr(self, f"ready_{name}").eq(clocks_since_reset[-1])
         if self._filter_clocks:
             glitches = Signal(15)
             sum_ = Signal(16)

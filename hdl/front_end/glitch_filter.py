@@ -1,12 +1,14 @@
 """Against glitches."""
 
-from amaranth import Module, Signal
+from amaranth import Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 
 class GlitchFilter(wiring.Component):
     """Passes a level when it has held for `clocks` consecutive clocks.
+
+    Until the first level has held for so long, nothing is known of the line.
 
     Latency: a level that holds from clock c on is at the output in clock c + `clocks`.
 
@@ -17,9 +19,11 @@ class GlitchFilter(wiring.Component):
     Members
     -------
     level : In(1)
-    load : In(1)
-        Take the level as it is: there is no past yet.
+    valid : In(1)
+        The level is one of the line.
     filtered : Out(1)
+    known : Out(1)
+        `filtered` is a level that has held long enough.
     swallowed : Out(1)
         High for one clock when a level went back before it had held long enough; two edges are swallowed.
 
@@ -33,16 +37,22 @@ class GlitchFilter(wiring.Component):
         if clocks < 1:
             raise ValueError(f"clocks must be at least 1, not {clocks}")
         self._clocks = clocks
-        super().__init__({"level": In(1), "load": In(1), "filtered": Out(1), "swallowed": Out(1)})
+        super().__init__({"level": In(1), "valid": In(1), "filtered": Out(1), "known": Out(1), "swallowed": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         held = Signal(range(max(self._clocks, 2)))  # no signal is without a bit
         differs = self.level ^ self.filtered
-        m.d.comb += self.swallowed.eq(~differs & held.any() & ~self.load)
-        m.d.sync += held.eq(0)
-        with m.If(self.load | (differs & (held == self._clocks - 1))):
-            m.d.sync += self.filtered.eq(self.level)
-        with m.Elif(differs):
-            m.d.sync += held.eq(held + 1)
+        first = int(self._clocks > 1)  # clocks that a first level has held with its first, if these are not enough
+        m.d.comb += self.swallowed.eq(~differs & held.any() & self.known)
+        # The first level is what stays the same for so long, and all others are what differs for so long.
+        with m.If(self.valid):
+            with m.If(differs != self.known):
+                m.d.sync += held.eq(Mux(self.known, 0, first))
+                with m.If(~self.known):
+                    m.d.sync += [self.filtered.eq(self.level), self.known.eq(not first)]
+            with m.Elif(held == self._clocks - 1):
+                m.d.sync += [self.filtered.eq(self.level), self.known.eq(1), held.eq(0)]
+            with m.Else():
+                m.d.sync += held.eq(held + 1)
         return m

@@ -1,6 +1,5 @@
 """Golden front end: from sampled levels to steps, pulse numbers and positions."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +40,7 @@ def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[N
 def filter_line(
     clock: NDArray[np.int64], level: NDArray[np.uint8], clocks: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.int64]]:
-    """Glitch filter: a level counts only when it holds for so many clocks; the first one counts at once.
+    """Glitch filter: a level counts only when it holds for so many clocks; before the first one that does, none counts.
 
     Parameters
     ----------
@@ -57,7 +56,8 @@ def filter_line(
         Clocks at which a level that did not pass went back.
     """
     lasts = np.append(clock[1:] - clock[:-1] >= clocks, True)
-    lasts[0] = True
+    first = int(np.argmax(lasts))
+    clock, level, lasts = clock[first:], level[first:], lasts[first:]
     latest = np.maximum.accumulate(np.where(lasts, np.arange(len(clock)), 0))
     believed = level[latest]  # after each change, once it has held or gone
     glitch = np.flatnonzero(~lasts & (level != believed))
@@ -65,17 +65,11 @@ def filter_line(
     return clock[changed], level[changed], clock[glitch + 1]
 
 
-def filter_lines(trace: PinTrace, names: Sequence[str], clocks: int) -> tuple[PinTrace, NDArray[np.int64]]:
-    """The filter on the lines of these names: the trace of what passes, and when glitches ended, in order."""
-    passed = {}
-    for name in names:
-        level = trace.lines[name]
-        changed = np.append(True, level[1:] != level[:-1])
-        passed[name] = filter_line(trace.clock[changed], level[changed], clocks)
-    common = np.unique(np.concatenate([clock for clock, _, _ in passed.values()]))
-    lines = {name: level[np.searchsorted(at, common, side="right") - 1] for name, (at, level, _) in passed.items()}
-    returned = np.sort(np.concatenate([glitches for _, _, glitches in passed.values()]))
-    return PinTrace(common, n_clocks=trace.n_clocks, **lines), returned
+def changes(trace: PinTrace, name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Change list of one line: the clocks from which its levels are sampled, and the levels."""
+    level = trace.lines[name]
+    changed = np.append(True, level[1:] != level[:-1])
+    return trace.clock[changed], level[changed]
 
 
 @dataclass(frozen=True)
@@ -105,15 +99,25 @@ class Steps:
 
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     """Conditioned and decoded lines."""
-    returned = np.empty(0, dtype=np.int64)
-    if spec.filter_clocks:
-        trace, returned = filter_lines(trace, ("a", "b", "z") if spec.index else ("a", "b"), spec.filter_clocks)
-    step, illegal = decode(trace.a, trace.b, spec.encoder.decoding)
-    at = trace.clock[1:] + spec.pin_to_count
-    errors = at[illegal]
-    rises = at[:0] if trace.z is None or not spec.index else at[(trace.z[1:] == 1) & (trace.z[:-1] == 0)]
+    lines, returned = {}, [np.empty(0, dtype=np.int64)]
+    for name in ("a", "b", "z") if spec.index else ("a", "b"):
+        lines[name] = changes(trace, name)
+        if spec.filter_clocks:
+            *lines[name], gone = filter_line(*lines[name], spec.filter_clocks)
+            returned.append(gone)
+    (at_a, a), (at_b, b) = lines["a"], lines["b"]
+    # From the first clock on from which both are known.
+    clock = np.union1d(at_a, at_b)
+    clock = clock[clock >= max(at_a[0], at_b[0])]
+    a, b = a[np.searchsorted(at_a, clock, side="right") - 1], b[np.searchsorted(at_b, clock, side="right") - 1]
+    step, illegal = decode(a, b, spec.encoder.decoding)
+    at = clock[1:] + spec.pin_to_count
+    rises = at[:0]
+    if spec.index:
+        at_z, z = lines["z"]
+        rises = at_z[1:][z[1:] == 1] + spec.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
-    return Steps(at, step, errors, rises, returned + 3)
+    return Steps(at, step, at[illegal], rises, np.sort(np.concatenate(returned)) + 3)
 
 
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tachometry.sim.encoder.motion import FloatArray
-from tachometry.sim.plots.style import COLOURS, columns, place_panels, save_figure
+from tachometry.sim.plots.style import COLOURS, columns, in_words, place_panels, save_figure
 from tachometry.sim.studies.compare import Curve, Score, TrueSpeed
 from tachometry.spec import TachometerSpec
 
@@ -46,7 +46,7 @@ def _draw(
             color=colour,
             linewidth=0.7,
             drawstyle="steps-post",
-            label=curve.name,
+            label=in_words(curve.name),
             zorder=2 - calmest.index(place) / 100,
         )
         if truth is None:
@@ -68,7 +68,10 @@ def _draw(
         for curve in curves:
             panels[curve.name].set_ylim(-1.1 * reach, 1.1 * reach)
     panels["velocity"].set_ylabel(f"velocity ({unit.name})")
-    panels["velocity"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=12, fontsize=7)
+    n_columns = len(curves) // 2 + 1  # two lines, which fit below the title
+    panels["velocity"].legend(
+        loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, ncols=n_columns, columnspacing=1.2, fontsize=7
+    )
     last = list(panels.values())[-1]
     below = f"; below the velocities the errors in {unit.name}, at one scale" if true_speed else ""
     last.set_xlabel(f"time (s){below}")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from tachometry.sim.plots.style import COLOURS, ESTIMATE, FORCED, place_panels, save_figure
+from tachometry.sim.plots.style import COLOURS, ESTIMATE, FORCED, in_words, place_panels, save_figure
 from tachometry.sim.studies.plan import Plan
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import SpeedUnit
@@ -39,12 +39,12 @@ def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Fig
     for (name, plan), colour in zip(plans.items(), COLOURS * len(plans), strict=False):
         values = (plan.resolution / per_unit, 100 * plan.relative, plan.measurement_time, plan.product)
         for axes, value in zip(panels.values(), values, strict=True):
-            axes.loglog(plan.speed / per_unit, value, color=colour, label=name)
+            axes.loglog(plan.speed / per_unit, value, color=colour, label=in_words(name))
     labels = (f"resolution ({unit})", "resolution/speed (%)", "measurement time (s)", "resolution × time (rad)")
     for axes, label in zip(panels.values(), labels, strict=True):
         axes.axvline(spec.unit_velocity / per_unit, color="0.4", linestyle=":")
         axes.set_ylabel(label)
-    panels["resolution"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=10)
+    panels["resolution"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=6)
     panels["product"].set_xlabel(f"speed ({unit})")
     panels["product"].set_xlim(plan.speed[0] / per_unit / 1.05, plan.speed[-1] / per_unit * 1.05)
     return figure

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tachometry.spec import TachometerSpec
+from tachometry.spec import METHODS, TachometerSpec
 from tachometry.spec.units import format_time
 
 FloatArray = NDArray[np.float64]
@@ -105,6 +105,14 @@ def _title(spec: TachometerSpec, what: str | None) -> str:
         f"tick {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
         f"clock {_frequency(timing.clock_hz)}, one count per tick = {unit.of(spec.unit_velocity):.5g} {unit.name}"
     )
+
+
+def in_words(name: str) -> str:
+    """A method for a legend, such as `M method (average=8)` of `m:average=8`; what is no method keeps its name."""
+    method, _, options = name.partition(":")
+    if method not in METHODS:
+        return name
+    return f"{METHODS[method].title or method.upper()} method" + (f" ({options})" if options else "")
 
 
 def _frequency(hertz: int) -> str:

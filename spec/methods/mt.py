@@ -41,6 +41,7 @@ class MTTachometer(TimedTachometer):
     )
 
     method = "mt"
+    title = "M/T"
     summary = "takes the time of many counts"
     equation = 13
 

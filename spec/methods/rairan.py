@@ -58,6 +58,7 @@ class RairanTachometer(TachometerSpec):
     )
 
     method = "rairan"
+    title = "Rairán's"
     summary = "begins its ticks with a count (Rairán 2013)"
     update_by = "count"
     own_ticks = True

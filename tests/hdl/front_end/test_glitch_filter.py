@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
@@ -5,15 +7,25 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
+from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.golden.front_end import filter_line
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import Encoder, STachometer, Timing
 
 
 def definition(levels: list[int], clocks: int) -> tuple[list[int], int]:
-    """Clock by clock, in plain words: what is believed in the clock after each, and how many levels went back."""
-    believed, held, gone = levels[0], 0, 0
-    shown = []
-    for level in levels:
-        if level == believed:
+    """Clock by clock, in plain words: what is believed in the clock after each, and how many levels went back.
+
+    −1 stands for nothing: no level has held long enough yet.
+    """
+    believed, held, gone = -1, 0, 0
+    shown: list[int] = []
+    for clock, level in enumerate(levels):
+        if believed < 0:
+            if clock + 1 >= clocks and len({*levels[clock + 1 - clocks : clock + 1]}) == 1:
+                believed = level
+        elif level == believed:
             gone += held > 0
             held = 0
         else:
@@ -32,10 +44,10 @@ def random_levels(seed: int) -> list[int]:
 
 def check_definition(clocks: int, seed: int) -> None:
     levels = random_levels(seed)
-    rows = [{"load": 1, "level": levels[0]}] + [{"load": 0, "level": level} for level in levels]
-    seen = clock_by_clock(GlitchFilter(clocks), [*rows, {}], ["filtered", "swallowed"])
+    rows = [{"valid": 0, "level": 1 - levels[0]}] * 2 + [{"valid": 1, "level": level} for level in levels]
+    seen = clock_by_clock(GlitchFilter(clocks), [*rows, {}], ["filtered", "known", "swallowed"])
     shown, gone = definition(levels, clocks)
-    assert [row["filtered"] for row in seen[2:]] == shown, seed
+    assert [row["filtered"] if row["known"] else -1 for row in seen[3:]] == shown, seed
     assert sum(row["swallowed"] for row in seen[:-1]) == gone, seed
 
 
@@ -53,17 +65,59 @@ def test_golden_filter_against_the_definition(clocks: int, seed: int) -> None:
     at, level, returned = filter_line(changes, levels[changes], clocks)
     shown, gone = definition(levels.tolist(), clocks)
     # What holds from clock c on is believed after clock c + clocks − 1.
-    found = [int(level[np.searchsorted(at + clocks * (at > 0), c + 1, side="right") - 1]) for c in range(len(levels))]
+    level = np.append(-1, level.astype(int))
+    found = [int(level[np.searchsorted(at + clocks, c + 1, side="right")]) for c in range(len(levels))]
     assert (found, len(returned)) == (shown, gone), seed
 
 
 @pytest.mark.parametrize("clocks", [1, 4])
 @pytest.mark.parametrize("level", [0, 1])
-def test_the_first_level_is_believed_at_once(clocks: int, level: int) -> None:
-    rows = [{"a": level, "b": level}] * 9
-    seen = clock_by_clock(InputConditioner(clocks), rows, ["level_a", "level_b", "ready", "swallowed_edges"])
-    assert [row["ready"] for row in seen] == [0] * 4 + [1] * 5
+def test_the_first_level_is_believed_after_as_many_clocks_as_any(clocks: int, level: int) -> None:
+    rows = [{"a": level, "b": level}] * 12
+    seen = clock_by_clock(
+        InputConditioner(clocks), rows, ["level_a", "level_b", "ready_a", "ready_b", "swallowed_edges"]
+    )
+    for name in ("ready_a", "ready_b"):
+        assert [row[name] for row in seen] == [0] * (3 + clocks) + [1] * (9 - clocks)
     assert all((row["level_a"], row["level_b"], row["swallowed_edges"]) == (level, level, 0) for row in seen[3:])
+
+
+def check_first_samples(line: str) -> None:
+    """Neither a step nor an error comes of what rattles at first, whatever level the lines rest at."""
+    rattles = [[1], [0, 1], [1, 1, 1, 1], [0, 0, 0, 0, 1], [1, 0, 1, 1, 0, 0, 0, 0, 1, 0, 1]]
+    spec = STachometer(
+        encoder=Encoder(25), timing=Timing(1_000_000, 4, 3), filter_clocks=5, index=True, position_width=8, frac_bits=4
+    )
+    for rest, rattle in itertools.product((0, 1), rattles):
+        lines = {name: np.full(60, rest, dtype=np.uint8) for name in ("a", "b", "z")}
+        lines[line][: len(rattle)] = rest ^ np.array(rattle, dtype=np.uint8)
+        lines["a"][40:] ^= 1  # a real one
+        found = lockstep(spec, PinTrace(np.arange(60), n_clocks=60, **lines), PySim())
+        assert found.n_mismatches == 0, found.first
+        run = found.actual
+        assert np.abs(run.ticks.position).tolist() == [0] * 11 + [1] * 3
+        assert len(run.errors) == len(run.index) == 0
+        assert not run.ticks["swallowed_edges"].any()
+
+
+@pytest.mark.parametrize("line", ["a", "b", "z"])
+def test_the_first_samples_are_filtered(line: str) -> None:
+    check_first_samples(line)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("self.known.eq(not first)", "self.known.eq(1)"),
+        ("Mux(self.known, 0, first)", "0"),
+        ("with m.If(self.valid):", "with m.If(1):"),
+    ],
+)
+def test_mutants_of_the_first_samples_are_caught(right: str, wrong: str) -> None:
+    with mutant(GlitchFilter, right, wrong), caught():
+        check_definition(3, seed=0)
+        check_definition(7, seed=1)
+        check_first_samples("a")
 
 
 def test_swallowed_edges_of_both_lines_are_counted() -> None:
@@ -73,7 +127,7 @@ def test_swallowed_edges_of_both_lines_are_counted() -> None:
 
 
 def test_the_count_of_swallowed_edges_stays_at_its_end() -> None:
-    dithering = [{"a": k & 1, "b": k & 1} for k in range(2 * 16400)]
+    dithering = [{"a": 0, "b": 0}] * 4 + [{"a": k & 1, "b": k & 1} for k in range(2 * 16400)]
     assert clock_by_clock(InputConditioner(2), dithering, ["swallowed_edges"])[-1]["swallowed_edges"] == 65534
 
 

@@ -64,7 +64,7 @@ def test_serial(ratio: Fraction, width: int) -> None:
 @pytest.mark.parametrize("towards", [-1, 1])
 @pytest.mark.parametrize("serial", [False, True])
 def test_bounds_are_rounded_outward(ratio: Fraction, towards: int, serial: bool) -> None:
-    if len(VelocityOutput(ratio, MAX_NATIVE, None).digits) > 2 or not serial:
+    if len(VelocityOutput(ratio, MAX_NATIVE, 40).digits) > 2 or not serial:
         check(serial, ratio, 8, towards=towards)
 
 

@@ -42,6 +42,8 @@ _FILTER_PROBES = {
     "core_held_b": "conditioner.filter_b.held",
     "core_a": "conditioner.filter_a.filtered",
     "core_b": "conditioner.filter_b.filtered",
+    "core_known_a": "conditioner.filter_a.known",
+    "core_known_b": "conditioner.filter_b.known",
 }
 _METHOD_PROBES = {
     "core_count": "pulse_counter.count",
@@ -357,7 +359,9 @@ PROOFS = [
     timed("M/T", MTTachometer, 2, 1),
     timed("T in ticks", TTachometer, 2, 2, 12, timer="tick"),
     timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),
-    after_upset("upset, x4, filter 3", front("", core(3, filter_clocks=3)), "lemma_held lemma_window", "p1_* p2_*"),
+    after_upset(
+        "upset, x4, filter 3", front("", core(3, filter_clocks=3)), "lemma_held lemma_window", "p1_* p2_* p6_quiet"
+    ),
     after_upset("upset, eq. (21)", method("", small(tick_cycles=1)), "lemma_core"),
     after_upset("upset, carried", method("", small(tick_cycles=1, max_ticks=5), max_table=4), "lemma_core"),
     after_upset("upset, M of 4", m_method("", small_m(4)), "lemma_bounded"),

@@ -21,34 +21,42 @@ module front #(
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .position(position),
       .decode_error(decode_error), .overflow(overflow)
   );
-  localparam READY = FILTER == 0 ? 3 : 4;  // clocks after reset
-  wire [READY-1:0] core_clocks;
+  wire [2:0] core_clocks;
   wire signed [$clog2(T + 1):0] core_count;
 
-  // The conditioned pins: two flip-flops, then a filter that follows when the last FILTER levels all differ from it.
-  // The first real level is that of the first clock after reset.
+  // The conditioned pins: two flip-flops, then a filter that follows when the last FILTER levels all differ from it, and
+  // that begins when the last FILTER levels were the same. The first real level is that of the first clock after reset.
   reg [1:0] stage0 = 0, stage1 = 0;
-  reg [2:0] clocks = 0;  // since reset, at most 4
+  reg [1:0] clocks = 0;  // since reset, at most 3
   always @(posedge clk) begin
     {stage1, stage0} <= {stage0, {a, b}};
-    clocks <= rst ? 0 : clocks == 4 ? 4 : clocks + 1;
+    clocks <= rst ? 0 : clocks == 3 ? 3 : clocks + 1;
   end
   wire [1:0] level;
+  wire ready;
   generate
-    if (FILTER == 0) assign level = stage1;
-    else begin : glitch
+    if (FILTER == 0) begin
+      assign level = stage1;
+      assign ready = clocks >= 3;
+    end else begin : glitch
       reg [1:0] filtered = 0;
       reg [2*FILTER-1:0] recent = 0;  // the levels before stage1
       wire [2*FILTER+1:0] levels = {recent, stage1};
       wire [$clog2(FILTER < 2 ? 2 : FILTER)-1:0] core_held_a, core_held_b;
-      wire core_a, core_b;
+      wire core_a, core_b, core_known_a, core_known_b;
+      reg [1:0] known = 0;
+      reg begun = 0;
+      reg [7:0] same_a = 0, same_b = 0;  // real levels before this one that were the same, at most FILTER
+      wire [1:0] is_known = UPSET ? {core_known_a, core_known_b} : known;
+      wire [7:0] now_a = clocks < 2 ? 0 : same_a == 0 || stage1[1] != recent[1] ? 1 : same_a < FILTER ? same_a + 1 : FILTER;
+      wire [7:0] now_b = clocks < 2 ? 0 : same_b == 0 || stage1[0] != recent[0] ? 1 : same_b < FILTER ? same_b + 1 : FILTER;
       wire [1:0] passed = UPSET ? {core_a, core_b} : filtered;
       reg [1:0] held, run;
       reg [7:0] held_a, held_b;  // for how many clocks before this one the level has differed
       integer k;
       always @* begin
         held = 2'b11;
-        run = clocks < 3 ? 0 : 2'b11;
+        run = is_known;
         {held_a, held_b} = 0;
         for (k = 0; k < FILTER; k = k + 1) begin
           held = held & (levels[2*k+:2] ^ passed);
@@ -56,16 +64,24 @@ module front #(
           held_a = held_a + run[1];
           held_b = held_b + run[0];
         end
-        lemma_held: assert (held_a == core_held_a && held_b == core_held_b && filtered == {core_a, core_b});
+        lemma_held: assert ((is_known[1] ? held_a : same_a) == core_held_a && (is_known[0] ? held_b : same_b) == core_held_b
+            && (!is_known[1] || filtered[1] == core_a) && (!is_known[0] || filtered[0] == core_b));
+        lemma_known: assert (known == {core_known_a, core_known_b} && (known[1] || same_a < FILTER)
+            && (known[0] || same_b < FILTER));
+        lemma_same: assert ((known[1] || same_a == 0 || core_a == recent[1]) && (known[0] || same_b == 0 || core_b == recent[0])
+            && (clocks >= 2 || {same_a, same_b, known} == 0) && (clocks < 3 || (same_a >= 1 && same_b >= 1)));
       end
       always @(posedge clk) begin
         recent <= levels;
-        filtered <= rst ? 0 : clocks < 3 ? stage1 : passed ^ held;
+        filtered <= rst ? 0 : (is_known & (passed ^ held)) | (~is_known & stage1);
+        {same_a, same_b} <= rst ? 0 : {now_a, now_b};
+        known <= rst ? 0 : is_known | {now_a == FILTER, now_b == FILTER};
+        begun <= !rst && is_known == 2'b11;
       end
       assign level = filtered;
+      assign ready = begun;
     end
   endgenerate
-  wire ready = clocks >= READY;
 
   // Steps by the Gray phase 00, 10, 11, 01 = 0, 1, 2, 3.
   wire [1:0] phase = {level[0], level[1] ^ level[0]};
@@ -126,9 +142,9 @@ module front #(
       always @* lemma_window: assert (core_left == T - 2 - elapsed);
     end else assign elapsing = clock;
   endgenerate
-  wire [READY-1:0] thermometer = (1 << clocks) - 1;
+  wire [2:0] thermometer = (1 << clocks) - 1;
   always @* begin
-    lemma_clocks: assert (clocks <= 4 && core_clocks == thermometer);
+    lemma_clocks: assert (core_clocks == thermometer);
     lemma_clock: assert (clock < T);
     lemma_open: assert (open <= elapsed && -open <= elapsed);
     lemma_count: assert (core_count == (clock == 0 ? sum : open));

@@ -95,7 +95,7 @@ MUTANTS = [
     Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
     Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
-    Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "clocks_since_reset[-1]", "clocks_since_reset[-2]"),
+    Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "(clocks_since_reset[-1])", "(clocks_since_reset[-2])"),
     Mutant(
         "eq. (21), 1 clock",
         "p7_stalled",

@@ -36,18 +36,21 @@ def _case(
     name: str,
     tick_cycles: int,
     max_ticks: int,
-    max_count: int,
+    max_count: int | None,
     mutants: int = 510,
     max_table: int = 2048,
     decoding: int = 4,
     **options: Any,
 ) -> Case:
-    """A core by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each."""
+    """A core by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each.
+
+    None: a count in every clock, so that a velocity of few bits may saturate.
+    """
     # One revolution a second is a count a tick.
     spec = METHODS[method](
         encoder=Encoder(1, decoding),
         timing=Timing(decoding * tick_cycles, tick_cycles, max_ticks),
-        max_speed=Speed.parse(f"{max_count}rev/s"),
+        max_speed=None if max_count is None else Speed.parse(f"{max_count}rev/s"),
         position_width=8,
         **{"frac_bits": 4} | options,
     )
@@ -72,7 +75,7 @@ CASES = [
         lowpass=Fraction(1, 2),
     ),
     _case("t", "in clocks", 7, 5, 3, bounds=True, age=True),
-    _case("t", "in ticks", 5, 44, 2, timer="tick", unit="rad/s", frac_bits=5, velocity_width=8, **_FRONT),
+    _case("t", "in ticks", 5, 44, None, timer="tick", unit="rad/s", frac_bits=5, velocity_width=8, **_FRONT),
     _case("mt", "in clocks", 7, 5, 3, bounds=True, age=True),
     _case("mt", "in ticks", 9, 12, 1, timer="tick", max_tick_cycles=11, decoding=1),
     _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),

@@ -10,7 +10,7 @@ from tachometry.spec.manifest import manifest
 
 CORE = {"ppr": "25", "clock": "1MHz", "tick": "16", "max-time": "160"}
 RAD_PER_S = {"count/tick": 2 * np.pi / 100 / 16e-6, "rpm": 2 * np.pi / 60, "rev/s": 2 * np.pi}
-OUTPUTS = (
+OUTPUTS: tuple[dict[str, str], ...] = (
     {},
     {"unit": "rpm"},
     {"unit": "rev/s", "velocity-width": "14"},
@@ -28,7 +28,7 @@ def spec_of(**options: str) -> TachometerSpec:
 def fastest(sign: int) -> PinTrace:
     """A count in every clock."""
     level = quadrature(sign * np.arange(600))
-    return PinTrace(np.arange(600), level & 1, level >> 1, 600)
+    return PinTrace(np.arange(600), level & np.uint8(1), level >> np.uint8(1), 600)
 
 
 @pytest.mark.parametrize("options", OUTPUTS, ids=str)

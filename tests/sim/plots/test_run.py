@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tachometry.sim.plots.style import columns
+from tachometry.sim.plots.style import columns, in_words
 
 
 @pytest.mark.parametrize("n", [0, 1, 400])
@@ -31,3 +31,16 @@ def test_one_spike_in_a_million_is_kept() -> None:
     y = np.zeros(1_000_000)
     y[345_678] = 1
     assert 345_678 in columns(np.arange(1_000_000.0), y)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("s", "S method"),
+        ("mt:min-time=1ms", "M/T method (min-time=1ms)"),
+        ("rairan", "Rairán's method"),
+        ("odrive", "odrive"),
+    ],
+)
+def test_legends_speak_in_words(name: str, words: str) -> None:
+    assert in_words(name) == words

@@ -144,7 +144,7 @@ def test_discs_and_lines_within_the_edge_error(method: TimedTachometer, timer: s
 
 @pytest.mark.parametrize(
     ("right", "wrong"),
-    [("np.where(distance < 0, time - 1, time + 1)", "time"), ("np.where(distance > 0, time - 1, time + 1)", "time")],
+    [("np.where(low < 0, time - 1, time + 1)", "time"), ("np.where(high > 0, time - 1, time + 1)", "time")],
 )
 def test_mutants_are_caught(right: str, wrong: str) -> None:
     with mutant(timed.enclosure, right, wrong), caught():

@@ -1,0 +1,87 @@
+"""Which tests run which lines, and how long each takes: one run of the tests, of which every test is a context."""
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import coverage
+import pytest
+
+Covered = dict[str, dict[str, Any]]  # by the name of a test: "seconds", and "lines" by file
+
+
+class Contexts:
+    """A plugin of pytest: notes the lines of the test that runs, and its time."""
+
+    def __init__(self, root: Path, files: Sequence[str]) -> None:
+        self._cov = coverage.Coverage(data_file=None, include=[str(root / file) for file in files], config_file=False)
+        self._paths = {str((root / file).resolve()): file for file in files}
+        self.found: Covered = {}
+        self._cov.start()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        self._cov.switch_context(item.nodeid)
+        start = time.monotonic()
+        result = yield
+        self.found[item.nodeid] = {"seconds": round(time.monotonic() - start, 3), "lines": {}}
+        return result
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self.found.pop(report.nodeid, None)
+
+    def lines(self) -> Covered:
+        """What every test ran; "" is what ran when modules were imported."""
+        self._cov.stop()
+        data = self._cov.get_data()
+        self.found[""] = {"seconds": 0.0, "lines": {}}
+        for path in data.measured_files():
+            file = self._paths.get(str(Path(path).resolve()))
+            if file is None:
+                continue
+            for line, contexts in data.contexts_by_lineno(path).items():
+                for context in contexts:
+                    if context in self.found:
+                        self.found[context]["lines"].setdefault(file, []).append(line)
+        return self.found
+
+
+def covered(root: Path, files: Sequence[str], tests: Sequence[str], folder: Path) -> Covered:
+    """What the tests cover; a file in the folder keeps it as long as no source and no test changes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = [path.read_bytes() for path in sorted([*(root / "tests").rglob("*.py"), *(root / file for file in files)])]
+    key = hashlib.sha256(b"\0".join([*texts, repr(tests).encode()])).hexdigest()[:16]
+    kept = folder / f"covered-{key}.json"
+    if not kept.exists():
+        child = os.fork()
+        if not child:  # this process must not import what is to be mutated
+            plugin = Contexts(root, files)
+            words = ["-q", "-p", "no:cacheprovider", f"--basetemp={folder / 'baseline'}", *tests]
+            status = pytest.main(words, plugins=[plugin])
+            kept.write_text(json.dumps(plugin.lines()))
+            os._exit(int(status))
+        if os.waitpid(child, 0)[1]:
+            kept.unlink(missing_ok=True)
+            raise SystemExit("the tests must pass before there are mutants")
+    found: Covered = json.loads(kept.read_text())
+    return found
+
+
+def chosen_for(found: Covered, file: str, line: int, budget: float) -> list[str]:
+    """Tests that run a line, the fastest first, as many as take `budget` seconds; or, if it only runs at import, those
+    that run anything of its file."""
+    of_line = [test for test, entry in found.items() if test and line in entry["lines"].get(file, ())]
+    chosen = of_line or [test for test, entry in found.items() if test and file in entry["lines"]]
+    chosen.sort(key=lambda test: found[test]["seconds"])
+    seconds, taken = 0.0, list[str]()
+    for test in chosen:
+        seconds += found[test]["seconds"]
+        if seconds > budget and taken:
+            break
+        taken.append(test)
+    return taken

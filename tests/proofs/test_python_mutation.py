@@ -1,0 +1,81 @@
+"""The short form of the second half of `make mutate`: what is mutated, and that a mutant is noticed or not."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from proofs.python_mutation.__main__ import report
+from proofs.python_mutation.covered import chosen_for
+from proofs.python_mutation.equivalent import ARGUED
+from proofs.python_mutation.judge import Verdict
+from proofs.python_mutation.mutants import ROOMS, Mutant, files, mutants_of, mutated, sample
+
+ROOT = Path(__file__).parents[2]
+FILE = "spec/methods/adaptive.py"
+
+
+def test_mutants_change_one_expression_each() -> None:
+    source = ast.unparse(ast.parse((ROOT / FILE).read_text(encoding="utf-8")))
+    found = {ast.unparse(mutated(ROOT, mutant)) for mutant in mutants_of(ROOT, FILE)}
+    assert source not in found
+    assert len(found) == len(mutants_of(ROOT, FILE)) > 20
+
+
+def test_the_same_thousand_is_drawn_from_every_room() -> None:
+    chosen = sample(ROOT, 1000, seed=1)
+    assert len(chosen) == len(set(chosen)) == 1000
+    assert chosen == sample(ROOT, 1000, seed=1)
+    assert {mutant.room for mutant in chosen} == set(ROOMS)
+
+
+def test_every_argument_is_of_a_mutant() -> None:
+    assert ARGUED.keys() <= {mutant.name for file in files(ROOT) for mutant in mutants_of(ROOT, file)}
+
+
+def test_the_fastest_tests_of_a_line_are_taken() -> None:
+    found = {
+        "": {"seconds": 0.0, "lines": {"x.py": [1]}},
+        "slow": {"seconds": 9.0, "lines": {"x.py": [2, 3]}},
+        "fast": {"seconds": 1.0, "lines": {"x.py": [2]}},
+        "other": {"seconds": 0.1, "lines": {"y.py": [2]}},
+    }
+    assert chosen_for(found, "x.py", 2, 20) == ["fast", "slow"]
+    assert chosen_for(found, "x.py", 2, 5) == ["fast"]
+    assert chosen_for(found, "x.py", 3, 5) == ["slow"]
+    assert chosen_for(found, "x.py", 1, 20) == ["fast", "slow"]
+    assert chosen_for(found, "z.py", 1, 20) == []
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from proofs.python_mutation.judge import judge_all
+from proofs.python_mutation.mutants import mutants_of
+root, folder = Path(sys.argv[1]), Path(sys.argv[2])
+tests = ["tests/spec/test_spec.py::test_widths_hold_what_they_must"]
+jobs = [(m, tests, 1.0) for m in mutants_of(root, "spec/units.py") if m.where == "signed_width"][:1]
+jobs += [(m, tests, 1.0) for m in mutants_of(root, "spec/methods/adaptive.py")][:1]
+jobs += [(jobs[0][0], [], 0.0)]
+for verdict in sorted(judge_all(root, jobs, 2, folder, lambda verdict: None), key=lambda v: v.mutant.file + v.what):
+    print(verdict.what)
+"""
+
+
+def test_a_wrong_line_is_noticed_by_its_tests_alone(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", SCRIPT, str(ROOT), str(tmp_path)]
+    env = {**os.environ, "PYTHONPATH": str(ROOT / "tests")}
+    done = subprocess.run(command, cwd=ROOT, env=env, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["survived", "killed", "untested"]
+
+
+@pytest.mark.parametrize(("killed", "fine"), [(96, True), (94, False)])
+def test_the_score_of_every_room_must_be_high(killed: int, fine: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    mutants = [Mutant("spec/units.py", nth, 0, nth, "here", f"{nth} → 0") for nth in range(100)]
+    verdicts = [Verdict(m, "killed" if nth < killed else "survived", 3, 1.0) for nth, m in enumerate(mutants)]
+    assert report(verdicts) == fine
+    out = capsys.readouterr().out
+    assert f"| spec | 100 | {killed} | 0 | 0 | {100 - killed} | {killed}.0 % |" in out
+    assert "spec/units.py: here: 99 → 0" in out
