@@ -1,7 +1,7 @@
 """The whole core."""
 
-from amaranth import Module, signed
-from amaranth.lib import wiring
+from amaranth import Module, Signal, signed
+from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.delay import delay
@@ -105,7 +105,8 @@ class Tachometer(wiring.Component):
             self.pulse_count.eq(pulse_counter.pulse_count),
             self.overflow.eq(pulse_counter.overflow),
         ]
-        taken = {"tick": self.tick, "pulse_count": self.pulse_count, "step_now": decoder.step}
+        ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
+        taken = {"tick": self.tick, "pulse_count": self.pulse_count, "step_now": decoder.step, "stamp": ticks}
         inputs = datapath.signature.members
         if "step" in inputs:
             # As late as `tick`: with it, all steps of the window have come.
@@ -114,10 +115,14 @@ class Tachometer(wiring.Component):
         if isinstance(datapath, OwnTicks):
             m.d.comb += pulse_counter.beyond.eq(datapath.beyond)
         self._rest(m)
-        self._output(m)
+        updates = self._output(m)
         if self._spec.age:
-            m.submodules.age = age = UpdateAge(self._spec.timing.max_ticks)
+            m.submodules.age = age = UpdateAge(self._spec.timing.max_ticks, self._spec.stamp_width)
             m.d.comb += [age.tick.eq(self.tick), age.update.eq(self.velocity_valid), self.age.eq(age.age)]
+            if self._spec.stamp_width:
+                before = Signal.like(ticks)
+                m.d.sync += before.eq(ticks)
+                m.d.comb += [ticks.eq(before + self.tick), age.fresh.eq(before - updates.p.stamp)]
         if self.index_capture is not None:
             m.submodules.index_capture = index = self.index_capture
             m.d.comb += [
@@ -149,8 +154,8 @@ class Tachometer(wiring.Component):
             if isinstance(self.datapath, LongTicks):
                 m.d.comb += standstill.shift.eq(self.datapath.tick_shift)
 
-    def _output(self, m: Module) -> None:
-        """From the datapath to the ports, by way of the low-pass filter and of the unit if they are there."""
+    def _output(self, m: Module) -> stream.Interface:
+        """From the datapath to the ports, by way of the low-pass filter and of the unit if they are there: updates."""
         updates = self.datapath.updates
         if self.low_pass is not None:
             m.submodules.low_pass = low_pass = self.low_pass
@@ -163,3 +168,4 @@ class Tachometer(wiring.Component):
             updates = output.shown
         m.d.comb += self.velocity_valid.eq(updates.valid)
         m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in self._spec.strobes[UPDATE]]
+        return updates

@@ -122,7 +122,8 @@ def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:
             held(
                 *(TICK, "age", spec.timing.max_ticks.bit_length()),
                 unit="ticks",
-                help="Ticks since the update; it stays at the maximum time.",
+                help="Ticks between the count or the tick that caused the update and this tick; it stays at the "
+                "maximum time.",
             ),
         ),
         *spec.bound_ports,

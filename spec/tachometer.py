@@ -180,6 +180,16 @@ class TachometerSpec(Numbers):
         return 0
 
     @property
+    def stamp_width(self) -> int:
+        """Bits of the number of ticks that may fall between the cause of an update and the update; 0 without an age."""
+        # An update may have to wait for the filter as long as this works.
+        clocks = self.tick_to_velocity + self.low_pass_latency
+        shortest = self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
+        by_tick = self.update_by != "count"
+        ticks = -(-clocks // shortest) - by_tick
+        return ticks.bit_length() if self.age else 0
+
+    @property
     def stalled_after_ticks(self) -> int:
         """Nominal ticks that ticks in a row without a count must last for `stalled` to rise."""
         return self.timing.max_ticks + 1

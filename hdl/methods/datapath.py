@@ -54,12 +54,18 @@ class OwnStandstill(Datapath, Protocol):
 
 
 def datapath_members(spec: TachometerSpec) -> dict[str, Member]:
-    """Members of every datapath: `tick`, `pulse_count` with it, and the updates."""
+    """Members of every datapath: `tick`, `pulse_count` with it, the number of ticks so far, and the updates."""
     return {
+        **{name: In(width) for name, width in stamped(spec).items()},
         "tick": In(1),
         "pulse_count": In(signed(spec.count_width)),
         "updates": Out(update_stream(update_layout(spec))),
     }
+
+
+def stamped(spec: TachometerSpec) -> dict[str, int]:
+    """What travels with an update for its age, as fields of a structure."""
+    return {"stamp": spec.stamp_width} if spec.stamp_width else {}
 
 
 def quotients(spec: TachometerSpec) -> dict[str, tuple[int, int]]:

@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.arithmetic.registers import registers
-from tachometry.hdl.methods.datapath import datapath_members, quotients
+from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
 from tachometry.spec import MTachometer
 
 
@@ -113,7 +113,7 @@ class MMethod(wiring.Component):
     def __init__(self, spec: MTachometer) -> None:
         super().__init__(datapath_members(spec))
         self._spec = spec
-        self._tag = data.StructLayout({"bounds_valid": 1} if spec.bounds else {})
+        self._tag = data.StructLayout({**stamped(spec), **({"bounds_valid": 1} if spec.bounds else {})})
         self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
         self.quotient: Quotient | None = None
         if spec.shift is None:
@@ -142,6 +142,8 @@ class MMethod(wiring.Component):
             moving_sum.m_e.eq(self.pulse_count),
             self.updates.p.interval.eq(spec.average),
         ]
+        if spec.stamp_width:
+            m.d.comb += known.stamp.eq(self.stamp)
         if spec.bounds:
             # The first tick was not seen completely.
             seen = Signal(range(spec.average + 1))

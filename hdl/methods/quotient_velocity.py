@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.arithmetic.registers import registers
 from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.methods.datapath import stamped
 from tachometry.hdl.output.update import update_layout, update_stream
 from tachometry.spec.methods.timed import TimedTachometer
 from tachometry.spec.tachometer import BOUNDS
@@ -39,6 +40,8 @@ class QuotientVelocity(wiring.Component):
         Valid with `measure` and `decay`, as `divisor`.
     free : Out(1)
         No measurement is being divided.
+    stamp : In
+        Only with an age: number of ticks so far.
     known, was_negative : In(1)
         With `spec.bounds`. `known`: there are bounds. `was_negative`: the sign of the last count.
     updates : Out(stream)
@@ -70,6 +73,7 @@ class QuotientVelocity(wiring.Component):
                 "forced_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
+                **{name: In(width) for name, width in stamped(spec).items()},
                 **({"known": In(1), "was_negative": In(1)} if spec.bounds else {}),
                 "updates": Out(update_stream(update_layout(spec))),
             }
@@ -125,6 +129,12 @@ class QuotientVelocity(wiring.Component):
             ]
             if spec.flags_range:
                 m.d.sync += new.out_of_range.eq(beyond | saturated)
+        if spec.stamp_width:
+            stamp = Signal(spec.stamp_width, reset_less=True)
+            with m.If(divider.start):
+                m.d.sync += stamp.eq(self.stamp)
+            with m.If(update):
+                m.d.sync += new.stamp.eq(stamp)
         if spec.bounds:
             self._bounds(m, new, decays, update)
         return m

@@ -85,6 +85,7 @@ class RairanMethod(wiring.Component):
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())
         new = registers(self.updates.p.shape(), "new", init={"n_dt1": 1})
         m.d.comb += self.updates.p.eq(new)
+        stamp = delay(m, self.stamp) if spec.stamp_width else ()
         # At rest no update corrects what an upset has done to the outputs.
         shown = update | at_rest
         with m.If(shown):
@@ -98,6 +99,8 @@ class RairanMethod(wiring.Component):
             ]
             if spec.adaptive:
                 m.d.sync += new.dt_shift.eq(shift)
+            if spec.stamp_width:
+                m.d.sync += new.stamp.eq(*stamp)
             if "rests" in new.shape().members:
                 m.d.sync += new.rests.eq(at_rest)
         if spec.bounds:

@@ -6,7 +6,7 @@ from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.alteration import AlterationDetector
-from tachometry.hdl.methods.datapath import datapath_members, quotients
+from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
 from tachometry.hdl.methods.interval import IntervalAccumulator
 from tachometry.spec import STachometer
 
@@ -49,7 +49,7 @@ class SMethod(wiring.Component):
             spec.reciprocal,
             quotients=quotients(spec),
             numerator_width=spec.numerator_width,
-            tag=data.StructLayout({"forced": 1, **({"bounds_valid": 1} if spec.bounds else {})}),
+            tag=data.StructLayout({"forced": 1, **stamped(spec), **({"bounds_valid": 1} if spec.bounds else {})}),
             serial=spec.serial,
             margin=spec.margin,
         )
@@ -88,6 +88,8 @@ class SMethod(wiring.Component):
             new.interval.eq(found.p.m),
             *(new[name].eq(found.p[name]) for name in found.p.shape().members if name != "m"),
         ]
+        if self._spec.stamp_width:
+            m.d.comb += quotient.tag.stamp.eq(self.stamp)
         if self._spec.bounds:
             # The first window has begun before there was anything to be seen.
             later = Signal()

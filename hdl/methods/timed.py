@@ -92,6 +92,8 @@ class TimedDatapath(wiring.Component):
             quotient.divisor.eq(time),
             quotient.forced_in.eq(~timer.count),
         ]
+        if spec.stamp_width:
+            m.d.comb += quotient.stamp.eq(self.stamp)
         if spec.bounds:
             # The first period after reset was not seen completely.
             begun = Signal()

@@ -14,9 +14,12 @@ VELOCITIES = {"velocity": 0, **BOUNDS}
 def update_layout(spec: TachometerSpec) -> data.StructLayout:
     """What a method hands on: all outputs that change only with `velocity_valid`, velocities in counts per tick.
 
-    `rests` is for the low-pass filter: no update will follow before the next count.
+    `stamp` is for the age: how many ticks there were when the update was caused, modulo a power of two. `rests` is for
+    the low-pass filter: no update will follow before the next count.
     """
     fields = {"velocity": signed(spec.native_width), "interval": spec.interval_width, "forced": 1}
+    if spec.stamp_width:
+        fields["stamp"] = spec.stamp_width
     if spec.last_at_rest and spec.lowpass is not None:
         fields["rests"] = 1
     if spec.bounds:

@@ -1,36 +1,51 @@
 """How old the velocity is."""
 
-from amaranth import Module, Mux
+from amaranth import Module, Mux, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 
 class UpdateAge(wiring.Component):
-    """Counts the ticks from the clock of the update, or from reset, on, up to `max_age`.
+    """Counts the ticks since the cause of the update, or from reset, on, up to `max_age`.
 
-    Latency: none; in the clock of an update the age is 0, and a tick counts from the clock after it.
+    Latency: none; in the clock of an update the age is `fresh`, and a tick counts from the clock after it.
 
     Parameters
     ----------
     max_age : int
         The age at which the count stops.
+    fresh_width : int
+        Bits of `fresh`; 0: it is always 0.
 
     Members
     -------
     tick, update : In(1)
+    fresh : In(fresh_width)
+        Ticks between the cause of an update and the update, valid with it; only if it has bits.
     age : Out(range(max_age + 1))
     before : Out(range(max_age + 1))
         The age without an update in this clock.
     """
 
-    def __init__(self, max_age: int) -> None:
+    def __init__(self, max_age: int, fresh_width: int = 0) -> None:
         self._max_age = max_age
+        self._fresh_width = fresh_width
         super().__init__(
-            {"tick": In(1), "update": In(1), "age": Out(range(max_age + 1)), "before": Out(range(max_age + 1))}
+            {
+                "tick": In(1),
+                "update": In(1),
+                **({"fresh": In(fresh_width)} if fresh_width else {}),
+                "age": Out(range(max_age + 1)),
+                "before": Out(range(max_age + 1)),
+            }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        m.d.comb += self.age.eq(Mux(self.update, 0, self.before))
+        fresh: Value | int = 0
+        if self._fresh_width:
+            most = self._max_age
+            fresh = self.fresh if most >> self._fresh_width else Mux(self.fresh > most, most, self.fresh)
+        m.d.comb += self.age.eq(Mux(self.update, fresh, self.before))
         m.d.sync += self.before.eq(self.age + (self.tick & (self.age != self._max_age)))
         return m

@@ -32,7 +32,9 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
         beyond, nominal = None, np.ones_like(last)
     ticks, index = count(spec, steps, last, beyond)
     ticks = with_stalled(spec, ticks, nominal)
-    updates = in_unit(spec, filtered(spec, ticks, golden.updates(ticks, steps, trace.n_clocks)))
+    measured = golden.updates(ticks, steps, trace.n_clocks)
+    measured = measured.having(cause=measured.clock - spec.datapath_latency)
+    updates = in_unit(spec, filtered(spec, ticks, measured))
     tables = {
         "tick": with_age(spec, ticks, updates),
         "velocity_valid": updates,

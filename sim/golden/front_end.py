@@ -101,10 +101,11 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     """Conditioned and decoded lines."""
     lines, returned = {}, [np.empty(0, dtype=np.int64)]
     for name in ("a", "b", "z") if spec.index else ("a", "b"):
-        lines[name] = changes(trace, name)
+        clock, level = changes(trace, name)
         if spec.filter_clocks:
-            *lines[name], gone = filter_line(*lines[name], spec.filter_clocks)
+            clock, level, gone = filter_line(clock, level, spec.filter_clocks)
             returned.append(gone)
+        lines[name] = clock, level
     (at_a, a), (at_b, b) = lines["a"], lines["b"]
     # From the first clock on from which both are known.
     clock = np.union1d(at_a, at_b)

@@ -31,9 +31,9 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
 
 
 def with_age(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
-    """Ticks with the age of the velocity: how many there were from the clock of its update, or from reset, on."""
+    """Ticks with the age of the velocity: how many there were since the cause of its update, or from reset, on."""
     if not spec.age:
         return ticks
-    begun = np.append(0, updates.clock)[np.searchsorted(updates.clock, ticks.clock, side="right")]
-    age = np.arange(len(ticks.clock)) - np.searchsorted(ticks.clock, begun, side="left")
+    cause = np.append(-1, updates.cause)[np.searchsorted(updates.clock, ticks.clock, side="right")]
+    age = np.arange(len(ticks.clock)) - np.searchsorted(ticks.clock, cause, side="right")
     return ticks.having(age=np.minimum(age, spec.timing.max_ticks))

@@ -6,15 +6,21 @@ from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.output import update_age
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import of_texts
 
 
-def check() -> None:
+def check(fresh_width: int = 0) -> None:
     rng = np.random.default_rng(1)
     rows = [{"tick": int(tick), "update": int(update)} for tick, update in rng.random((400, 2)) < (0.6, 0.15)]
-    seen = [row["age"] for row in clock_by_clock(update_age.UpdateAge(5), rows, ["age"])]
+    for row in rows:
+        row |= {"fresh": int(rng.integers(8))} if fresh_width else {}
+    seen = [row["age"] for row in clock_by_clock(update_age.UpdateAge(5, fresh_width), rows, ["age"])]
     wanted, ticks = [], 0
     for row in rows:
-        ticks = 0 if row["update"] else ticks
+        ticks = row.get("fresh", 0) if row["update"] else ticks
         wanted.append(min(ticks, 5))
         ticks += row["tick"]
     assert seen == wanted
@@ -23,11 +29,13 @@ def check() -> None:
 
 def test_counts_ticks_since_the_update() -> None:
     check()
+    check(3)
 
 
 MUTANTS = {
     "wraps": ("(self.tick & (self.age != self._max_age))", "self.tick"),
-    "goes on at an update": ("Mux(self.update, 0, self.before)", "self.before"),
+    "goes on at an update": ("Mux(self.update, fresh, self.before)", "self.before"),
+    "begins beyond its end": ("Mux(self.fresh > most, most, self.fresh)", "self.fresh"),
     "a tick with the update is lost": (
         "before.eq(self.age + (self.tick &",
         "before.eq(self.age + (self.tick & ~self.update &",
@@ -39,3 +47,41 @@ MUTANTS = {
 def test_mutants_are_caught(name: str) -> None:
     with mutant(update_age.UpdateAge, *MUTANTS[name]), caught():
         check()
+        check(3)
+
+
+def check_age(method: str, **texts: str) -> None:
+    """Ticks since the count, or the tick, that caused the update; those that fall between the two count as well."""
+    spec = of_texts(method, {"ppr": "1", "clock": "1MHz", "age": "yes", "frac-bits": "4", "max-time": "40"} | texts)
+    found = lockstep(spec, stress(spec, 1, 40), PySim())
+    assert found.n_mismatches == 0, found.first
+    run, ticks = found.actual, found.actual.ticks.clock
+    # Of an update without a filter the cause is always as long ago.
+    cause = np.append(-1, run.updates.clock - spec.tick_to_velocity)
+    last = cause[np.searchsorted(run.updates.clock, ticks, side="right")]
+    since = [np.count_nonzero((ticks > then) & (ticks < now)) for then, now in zip(last, ticks, strict=True)]
+    assert run.ticks["age"].tolist() == np.minimum(since, spec.timing.max_ticks).tolist()
+    inside = [((ticks > now - spec.tick_to_velocity) & (ticks < now)).any() for now in run.updates.clock]
+    assert any(inside)
+
+
+SHORT = [
+    ("s", {"tick": "1"}),
+    ("m", {"tick": "2", "average": "3", "velocity-width": "8"}),
+    ("t", {"tick": "4"}),
+    ("mt", {"tick": "4", "min-time": "8", "timer": "tick"}),
+    ("t", {"tick": "40", "max-time": "400"}),
+    ("rairan", {"tick": "1", "velocity-width": "8"}),
+]
+
+
+@pytest.mark.parametrize(("method", "texts"), SHORT)
+def test_a_tick_between_cause_and_update_counts(method: str, texts: dict[str, str]) -> None:
+    check_age(method, **texts)
+
+
+def test_with_a_filter_that_is_slower_than_a_tick() -> None:
+    spec = of_texts("s", {"ppr": "1", "clock": "1MHz", "tick": "4", "max-time": "40", "age": "yes", "lowpass": "1kHz"})
+    found = lockstep(spec, stress(spec, 1, 40), PySim())
+    assert found.n_mismatches == 0, found.first
+    assert found.actual.ticks["age"].max() > spec.low_pass_latency // 4

@@ -160,11 +160,18 @@ module method #(
       always @* lemma_running: assert (!core_running || core_step <= LAST);
     end
     if (AGE) begin : aged
-      localparam LAG = TICK_TO_VELOCITY / T + 1;  // ticks whose updates are on their way
       wire [I-1:0] core_age;
-      always @*
-        p8_age: assert (velocity_valid ? core_age == 0 : core_age >= since_update
-            && core_age <= since_update + LAG && core_age <= MAX_TICKS);
+      // Ticks that are not as old as the latency, and those since the cause of the update that are.
+      reg [TICK_TO_VELOCITY-2:0] line = 0;
+      reg [7:0] recent;
+      integer k;
+      always @(posedge clk) line <= rst ? 0 : {line, tick};
+      always @* begin
+        recent = 0;
+        for (k = 0; k < TICK_TO_VELOCITY - 1; k = k + 1) recent = recent + line[k];
+      end
+      wire [7:0] all = recent + (velocity_valid ? 0 : since_update + tick_);
+      always @* p8_age: assert (core_age == (all < MAX_TICKS ? all : MAX_TICKS));
     end
     if (CARRIED) begin : carried
       wire core_carried;

@@ -104,6 +104,7 @@ MUTANTS = [
         "~self.previous.any()",
     ),
     Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
+    Mutant("age", "p8_age", UpdateAge, "Mux(self.update, fresh, self.before)", "Mux(self.update, 0, self.before)"),
     Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & total.any())"),
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
