@@ -183,8 +183,9 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     )
     if rng.random() < 0.25 and getattr(spec, "adaptive", None) is None:
         spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))
-    if spec.bounds and rng.random() < 0.5:
-        spec = replace(spec, edge_error=Fraction(int(rng.integers(1, 9)), 8))
+    if spec.bounds:
+        # From a stream of its own: all else stays as it is without it.
+        spec = replace(spec, edge_error=Fraction(max(0, int(rng.spawn(1)[0].integers(-8, 9))), 8))
     if method == "mt" and rng.random() < 0.6:
         longest = int(rng.choice([2, max_ticks]))
         unit_cycles = spec.interval_unit_cycles
@@ -227,8 +228,12 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
     if rng.random() < 0.3:
         narrower = 10 if isinstance(spec, TimedTachometer) else 4
         width = max(8, spec.velocity_width - int(rng.integers(-2, narrower)))
-        with suppress(ParameterError):  # too narrow for the greatest speed
-            spec = replace(spec, velocity_width=width)
+        with suppress(ParameterError):
+            return replace(spec, velocity_width=width)
+        # Too narrow for the greatest speed: it saturates without one.
+        if not isinstance(spec, TimedTachometer) or width % 2:
+            with suppress(ParameterError):
+                return replace(spec, velocity_width=width, max_speed=None)
     return spec
 
 
