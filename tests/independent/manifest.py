@@ -172,7 +172,11 @@ class Expected:
             shown = int(self.manifest["recovery_cycles"])
             least = lines + tick + clocks + 2 + self.to_velocity
             # In other units a division is shorter than the way to the velocity, by how much is not told.
-            if not settings.native and clocks + self.to_velocity > silence and least + 10 < shown < least + self.division:
+            if (
+                not settings.native
+                and clocks + self.to_velocity > silence
+                and least + 10 < shown < least + self.division
+            ):
                 return shown
             clocks += self.division
         return lines + tick + max(clocks + int(self.to_velocity), silence) + 2
