@@ -165,16 +165,21 @@ class Expected:
             "mt": lambda: (1 << self.longest_window.bit_length()) + self.silence + self.longest_window + 2,
             "rairan": lambda: ((1 << most.bit_length()) + 2 * most + 3) << settings.greatest_shift,
         }[settings.method]()
+        silence = ((1 << most.bit_length()) + 1) * settings.longest_tick
         timed = settings.method in ("t", "mt")
         clocks = periods * (1 if timed and not settings.lattice else settings.longest_tick)
         if timed:
             shown = int(self.manifest["recovery_cycles"])
             least = lines + tick + clocks + 2 + self.to_velocity
             # In other units a division is shorter than the way to the velocity, by how much is not told.
-            if not settings.native and least + 10 < shown < least + self.division:
+            if (
+                not settings.native
+                and clocks + self.to_velocity > silence
+                and least + 10 < shown < least + self.division
+            ):
                 return shown
             clocks += self.division
-        return lines + tick + clocks + 2 + int(self.to_velocity)
+        return lines + tick + max(clocks + int(self.to_velocity), silence) + 2
 
     def entries(self) -> dict[str, Callable[[], object]]:
         """What each entry must be."""
@@ -186,6 +191,7 @@ class Expected:
             "clock_hz": lambda: settings.clock_hz,
             "tick_cycles": lambda: settings.tick,
             "max_ticks": lambda: settings.max_ticks,
+            "stalled_after_ticks": lambda: settings.max_ticks + 1,
             "counts_per_rev": lambda: settings.counts_per_turn,
             "decoding": lambda: settings.decoding,
             "velocity.width": lambda: next(p["width"] for p in manifest["ports"] if p["name"] == "velocity"),

@@ -13,7 +13,7 @@ from independent.front import Front, Tick, conditioned, external_ends, index_pos
 from independent.manifest import check_manifest
 from independent.methods import Update, m_updates, s_updates
 from independent.rairan import rairan_updates
-from independent.settings import Settings, arguments
+from independent.settings import arguments
 from independent.show import check_age, check_updates
 from independent.stimulus import Lines, external, motion
 from independent.timed import timed_updates
@@ -107,18 +107,6 @@ def check_front(
         assert seen[-1]["swallowed_edges"] == 2 * len(front.glitches) > 0
 
 
-def from_reversal(
-    settings: Settings, updates: list[Update], ticks: list[Tick], rows: list[Row], late: int
-) -> tuple[list[Update], list[Tick], list[Row]]:
-    """What comes with and after the first reversal, and the ticks that begin after it."""
-    if settings.method != "rairan" or settings.paper_exact:
-        return updates, ticks, rows
-    first = next(nth for nth, update in enumerate(updates) if not update.others["n_ep1"] and not update.forced)
-    cause = updates[first].cause
-    begun = [tick for tick in ticks if tick.last > cause][1:]
-    return updates[first:], begun, [row for row in rows if row["clock"] >= cause + late]
-
-
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_core(case: Case, generated: Generated) -> None:
     folder, manifest = made(generated, case)
@@ -130,9 +118,8 @@ def test_core(case: Case, generated: Generated) -> None:
     front = conditioned(case.settings, play, latency["pin_to_count"])
     updates, ticks, wrong = model(case, manifest, front)
     late = latency["tick_latency"] + latency["tick_to_velocity"]
-    updates, begun, shown = from_reversal(case.settings, updates, ticks, rows, late)
-    check_front(case, manifest, front, begun, rows, wrong)
-    shown = [row for row in shown if row["velocity_valid"]]
+    check_front(case, manifest, front, ticks, rows, wrong)
+    shown = [row for row in rows if row["velocity_valid"]]
     updates = [update for update in updates if update.cause + late < front.n_clocks]
     absent = check_updates(case.settings, manifest, updates, shown, ticks)
     if case.settings.flag("age"):
