@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.engines.engine import Engine
+from tachometry.sim.golden.front_end import changes, decode, filter_line
 from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
@@ -355,11 +356,20 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     ticks, updates = MIN_TICKS // (4 if spec.parameters.get("adaptive") else 1), 5 if timed else fewest
     if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
-    problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, actual)]
+    problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, trace, actual)]
     return problems, covered(spec, trace, actual)
 
 
-def _lost_counts(spec: TachometerSpec, encoding: Encoding, run: Run) -> list[str]:
+def _before_known(spec: TachometerSpec, trace: PinTrace) -> int:
+    """Counts until both lines have held a level for as long as the filter wants, which are not counted."""
+    if not spec.filter_clocks:
+        return 0
+    known = max(filter_line(*changes(trace, line), spec.filter_clocks)[0][0] for line in ("a", "b"))
+    step, _ = decode(trace.a, trace.b, spec.encoder.decoding)
+    return int(step[trace.clock[1:] <= known].sum())
+
+
+def _lost_counts(spec: TachometerSpec, encoding: Encoding, trace: PinTrace, run: Run) -> list[str]:
     """Hold the position against the shaft's angle, tick by tick, unless an illegal transition was reported.
 
     Jitter makes an edge come early or late, but never twice or not at all.
@@ -367,7 +377,7 @@ def _lost_counts(spec: TachometerSpec, encoding: Encoding, run: Run) -> list[str
     if len(run.errors) or run.ticks.get("swallowed_edges")[-1] or spec.index_reset:
         return []
     sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / CLOCK_HZ
-    turned = encoding.true_position(sampled, spec.encoder.decoding)
+    turned = encoding.true_position(sampled, spec.encoder.decoding) - _before_known(spec, trace)
     half = 1 << (spec.position_width - 1)
     difference = (run.ticks.position - turned + half) % (2 * half) - half
     wrong = np.flatnonzero(np.abs(difference) > (encoding.encoder.jitter > 0))

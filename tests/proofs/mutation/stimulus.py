@@ -55,7 +55,8 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     silent = rng.random(parts) < 0.3
     edges[silent] = rng.integers(1, 4, silent.sum())
     apart[silent] = rng.integers(1, longest * 5 // 4, silent.sum())
-    clock = np.cumsum(np.repeat(apart, edges))
+    # Some begin with a rest, as after a reset that comes when the shaft stands.
+    clock = np.cumsum(np.repeat(apart, edges)) + int(rng.choice([0, 2 * longest]))
     quarter = np.cumsum(np.repeat(rng.choice([1, 1, -1], parts), edges))
     n_clocks = int(clock[-1]) + 1
     level = quadrature(np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")])
