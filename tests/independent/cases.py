@@ -42,7 +42,7 @@ def _case(
 _ALL = "decoding=2 unit=rpm bounds=yes index=yes index-reset=yes position-width=8 filter=3 age=yes"
 
 CASES = [
-    _case("s_native", "tick=50 max-time=500"),
+    _case("s_native", "tick=50 max-time=500 frac-bits=8 velocity-width=10"),
     _case("s_rpm", f"tick=20 max-time=300 max-speed=500rpm velocity-width=18 lsb=2^-8 cancel=no {_ALL}", least=4),
     _case("s_rad", "tick=160 max-time=1600 decoding=1 unit=rad/s lowpass=1kHz external-tick=yes", 14000),
     _case("s_rev", "tick=1 max-time=2 unit=rev/s lsb=2^-4 bounds=yes", 2000),
@@ -52,7 +52,7 @@ CASES = [
     _case(
         "s_filter", "tick=30 max-time=210 filter=255 frac-bits=4 external-tick=yes max-tick-period=37", 20000, least=200
     ),
-    _case("m_native", "tick=50 max-time=500 frac-bits=24 max-speed=50rev/s bounds=yes edge-error=1 average=8"),
+    _case("m_native", "tick=50 max-time=500 velocity-width=16 max-speed=50rev/s bounds=yes edge-error=1 average=8"),
     _case(
         "m_rpm", f"tick=21 max-time=420 max-speed=40rad/s average=3 velocity-width=12 lsb=2^-2 {_ALL}", 4000, least=4
     ),
@@ -60,21 +60,21 @@ CASES = [
     _case("m_rev", "tick=1 max-time=2 unit=rev/s frac-bits=2 average=256", 1500),
     _case("t_native", "tick=50 max-time=500 bounds=yes edge-error=0.5", 9000),
     _case("t_rpm", f"tick=200 max-time=1000 max-speed=4rev/s velocity-width=14 lsb=2^-5 {_ALL}", 13500, 4, True, 80),
-    _case("t_rad", "tick=400 max-time=2000 decoding=1 unit=rad/s lowpass=1kHz external-tick=yes", 24000, 1, True, 150),
+    _case("t_rad", "tick=400 max-time=1200 decoding=1 unit=rad/s lowpass=1kHz external-tick=yes", 24000, 1, True, 150),
     _case("t_rev", "tick=256 max-time=512 unit=rev/s lsb=2^-8 bound-decay=no", 20000, 1, True, 100),
     _case("t_lattice", "tick=37 max-time=740 timer=tick bounds=yes frac-bits=9", 9000),
     _case("t_exact", "tick=2 max-time=400 paper-exact=yes frac-bits=24", 5000),
     _case("mt_native", "tick=50 max-time=500 bounds=yes edge-error=0.1 min-time=101", 9000),
     _case(
         "mt_rpm",
-        f"tick=200 max-time=1000 max-speed=500rpm velocity-width=14 lsb=2^-4 min-time=350 {_ALL}",
+        f"tick=200 max-time=1000 max-speed=125rpm velocity-width=14 lsb=2^-6 min-time=350 {_ALL}",
         13500,
         4,
         True,
         80,
     ),
     _case(
-        "mt_rad", "tick=400 max-time=2000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes", 24000, 1, True, 150
+        "mt_rad", "tick=400 max-time=1200 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes", 24000, 1, True, 150
     ),
     _case("mt_rev", "tick=256 max-time=512 unit=rev/s lsb=2^-8 bound-decay=no min-time=512", 20000, 1, True, 100),
     _case(

@@ -138,8 +138,8 @@ class Expected:
         settings, manifest = self.settings, self.manifest["velocity"]
         exact = settings.max_velocity * settings.lsb_per_count
         shown = manifest["full_scale"] * 2.0**settings.frac_bits
-        if settings.velocity_bits is not None and exact >= (limit := (1 << settings.velocity_bits - 1) - 1) + 1:
-            lsb = Fraction(limit)
+        if settings.narrow and settings.velocity_bits is not None:
+            lsb = Fraction((1 << settings.velocity_bits - 1) - 1)
         else:
             lsb = exact if settings.own or not abs(exact - Fraction(shown)) < 1 else Fraction(shown)
         in_unit = float(settings.per_count(unit) * lsb / settings.lsb_per_count)

@@ -93,7 +93,8 @@ class Settings:
     @cached_property
     def own(self) -> bool:
         """Whether the velocity is shown as it is measured, in counts per tick and with all its bits."""
-        return self.native and self.velocity_bits is None
+        every = self.max_velocity.bit_length() + 1 + self.frac_bits
+        return self.native and self.velocity_bits in (None, every)
 
     @cached_property
     def filter(self) -> int:
@@ -167,6 +168,12 @@ class Settings:
     def velocity_bits(self) -> int | None:
         """Bits that the velocity was limited to."""
         return int(self.words["velocity-width"]) if "velocity-width" in self.words else None
+
+    @cached_property
+    def narrow(self) -> bool:
+        """Whether the bits of the velocity do not hold its greatest value."""
+        limit = math.inf if self.velocity_bits is None else 1 << self.velocity_bits - 1
+        return self.max_velocity * self.lsb_per_count >= limit
 
     @cached_property
     def edge_error(self) -> Fraction:

@@ -122,9 +122,10 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
     updates = [update for update in updates if update.cause + late < front.n_clocks]
     absent = check_updates(case.settings, manifest, updates, shown, ticks)
     if case.settings.flag("age"):
-        check_age(case.settings, rows)
+        check_age(case.settings, manifest, updates, rows)
     assert absent >= ABSENT.get(case.name, set())
     assert len(updates) > 12
+    assert any(row.get("velocity_overflow") for row in shown) == case.settings.narrow
 
 
 @pytest.mark.parametrize("case", [pytest.param(case, id=case.name) for case in CASES if case not in SILENT])
