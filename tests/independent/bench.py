@@ -1,5 +1,6 @@
 """The exported core in Icarus Verilog or Verilator: what its ports show in every clock with a strobe."""
 
+import hashlib
 import importlib.util
 import os
 import shutil
@@ -183,12 +184,21 @@ def in_verilator(folder: Path, manifests: Sequence[Manifest], plays: Sequence[Pl
     files = ", ".join(f'fopen("{name}.pins", "r")' for name in names)
     program = filled(_VERILATOR, FILES=files, N=str(len(names))) + "".join(f'#include "{file}"\n' for file in made)
     (folder / "main.cc").write_text(program)
-    runtime = [home / "include" / f"{name}.cpp" for name in ("verilated", "verilated_threads")]
     compiler = found or [sys.executable, "-m", "ziglang", "c++"]
     options = ("-std=c++17", "-w", "-pthread", f"-I{home / 'include'}", "-Imade")
-    run(*compiler, *options, "-O0", "-c", *runtime)
-    objects = [f"{source.stem}.o" for source in runtime]
-    run(*compiler, *options, "-Og", "-o", "all", "main.cc", *objects)
+    runtime = "".join(f'#include "{name}.cpp"\n' for name in ("verilated", "verilated_threads"))
+    (folder / "runtime.cc").write_text(runtime)
+    # What does not depend on the cores is compiled once in a checkout.
+    source = (home / "include" / "verilated.cpp").read_bytes()
+    key = hashlib.sha256(source + " ".join([sys.platform, str(home), *compiler]).encode()).hexdigest()
+    kept = Path(os.environ["TACHOMETRY_CACHE"]) / f"independent-{key[:16]}.o"
+    if not kept.exists():
+        run(*compiler, *options, "-O0", "-c", "runtime.cc")
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        # Another process sees all of it or nothing.
+        shutil.copy(folder / "runtime.o", kept.with_suffix(f".{os.getpid()}"))
+        kept.with_suffix(f".{os.getpid()}").replace(kept)
+    run(*compiler, *options, "-Og", "-o", "all", "main.cc", kept)
     run(folder / "all")
     lengths = [sum(clocks for clocks, _ in play) for play in plays]
     tables = zip(manifests, lengths, strict=True)

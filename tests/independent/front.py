@@ -34,15 +34,20 @@ class Front:
 
 
 def believed(changes: list[tuple[int, int]], n_clocks: int, clocks: int) -> tuple[dict[int, int], list[int]]:
-    """Levels that hold for so many clocks, by the clock of their first sample; and clocks in which others went back."""
-    level, passed, gone = changes[0][1], {}, []
+    """Levels that hold for so many clocks, by the clock of their first sample; and clocks in which others went back.
+
+    The line is unknown up to the first level that holds, whatever it does.
+    """
+    passed: dict[int, int] = {}
+    gone: list[int] = []
+    level = -1
     for nth, (at, new) in enumerate(changes):
         until = changes[nth + 1][0] if nth + 1 < len(changes) else n_clocks + clocks
         if new == level:
             continue
         if until - at >= clocks:
             level = passed[at] = new
-        else:
+        elif level >= 0:
             gone.append(until)
     return passed, gone
 
@@ -71,16 +76,18 @@ def conditioned(settings: Settings, play: Play, latency: int) -> Front:
         passed, gone = believed(changes, n_clocks, filtered)
         front.glitches += gone if which < (3 if settings.flag("index") else 2) else []
         lines.append(passed)
-    a, b = play[0][1][:2]
-    for at in sorted({*lines[0], *lines[1]}):
+    both = max(min(lines[0]), min(lines[1]))  # clock from which A and B are known
+    a, b = (line[max(at for at in line if at <= both)] for line in lines[:2])
+    for at in sorted(at for at in {*lines[0], *lines[1]} if at > both):
         new = (lines[0].get(at, a), lines[1].get(at, b))
         if new[0] != a and new[1] != b:
             front.errors.append(at + latency)
         elif step := count_of(settings.decoding, (a, b), new):
             front.steps[at + latency] = step
         a, b = new
-    front.index = [at + latency for at, level in lines[2].items() if level]
-    front.rises = [at for at, level in lines[3].items() if level]
+    # The first level of a line is no rise.
+    front.index, front.rises = ([at for at in list(line)[1:] if line[at]] for line in lines[2:])
+    front.index = [at + latency for at in front.index]
     return front
 
 

@@ -18,7 +18,7 @@ _SHARED = {
     "max_ticks": "max-time",
     "unit": "unit",
     "frac_bits": "frac-bits",
-    "velocity_bits": "velocity-width",
+    "velocity_width": "velocity-width",
     "max_speed": "max-speed",
     "position_width": "position-width",
     "filter_clocks": "filter",
@@ -27,6 +27,7 @@ _SHARED = {
     "max_tick_cycles": "external-tick",
     "age": "age",
     "bounds": "bounds",
+    "edge_error": "edge-error",
     "lowpass": "lowpass",
 }
 _TIMED = {"timer": "timer", "bound_decay": "bound-decay", "paper_exact": "paper-exact"}
@@ -50,6 +51,8 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         return settings.decays if settings.method != "rairan" else settings.flag(word, True)
     if name == "cancel":
         return settings.flag(word, True)
+    if name == "min_time":
+        return shown  # see `check_manifest`
     if name in ("max_speed", "lowpass", "adaptive"):
         return _canonical_quantity(settings, name, shown)
     values: dict[str, object] = {
@@ -58,12 +61,12 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "tick_cycles": settings.tick,
         "max_ticks": settings.max_ticks,
         "frac_bits": settings.frac_bits,
-        "velocity_bits": settings.velocity_bits,
+        "velocity_width": settings.velocity_bits or shown,  # else that of the port, see `check_manifest`
+        "edge_error": settings.edge_error,
         "position_width": settings.position_bits,
         "filter_clocks": settings.filter,
         "max_tick_cycles": settings.longest_tick if settings.external else None,
         "timer": "tick" if settings.lattice else "clock",
-        "min_time": settings.min_time,
         "unit": settings.unit,
         "decoding": settings.decoding,
         "average": settings.average,
@@ -115,6 +118,33 @@ class Expected:
         least = math.ceil(self.division / self.settings.period)
         return max(self.settings.max_ticks * self.settings.tick // self.settings.period, least)
 
+    def raised(self, asked: int, shown: int, spare: int = 0) -> int:
+        """A time in clocks as it is built: no shorter than a division, less so many timer periods.
+
+        In other units a division is shorter than the way to the velocity, by how much is not told.
+        """
+        settings = self.settings
+        most = max(asked, (math.ceil(self.division / settings.period) - spare) * settings.period)
+        return shown if not settings.own and asked <= shown <= most else most
+
+    def max_time(self) -> int:
+        """Clocks of the longest measurement."""
+        settings = self.settings
+        asked = settings.max_ticks * settings.tick
+        return self.raised(asked, self.manifest["max_time_cycles"]) if settings.method in ("t", "mt") else asked
+
+    def full_scale(self, unit: str) -> object:
+        """The greatest velocity in a unit: a speed off by less than an LSB, or all that the bits can hold."""
+        settings, manifest = self.settings, self.manifest["velocity"]
+        exact = settings.max_velocity * settings.lsb_per_count
+        shown = manifest["full_scale"] * 2.0**settings.frac_bits
+        if settings.narrow and settings.velocity_bits is not None:
+            lsb = Fraction((1 << settings.velocity_bits - 1) - 1)
+        else:
+            lsb = exact if settings.own or not abs(exact - Fraction(shown)) < 1 else Fraction(shown)
+        in_unit = float(settings.per_count(unit) * lsb / settings.lsb_per_count)
+        return pytest.approx(in_unit, rel=1e-13)
+
     @property
     def longest_window(self) -> int:
         """In units of `interval`."""
@@ -137,14 +167,15 @@ class Expected:
         if settings.method in ("t", "mt"):
             on_lattice = 1 if settings.method == "t" else settings.max_count
             most = 2 * (on_lattice if settings.lattice else settings.tick) + 1
+            most += math.ceil(settings.edge_error * settings.tick / settings.period)
         else:
-            most = settings.max_count + 1
+            most = settings.max_count + math.ceil(1 + settings.edge_error)
         return 1 << most.bit_length()
 
     def none(self) -> int:
         """Magnitude of an absent bound: the greatest that its port shows."""
         settings, shown = self.settings, int(self.manifest["bounds"]["none"])
-        if settings.native and settings.velocity_bits is None:
+        if settings.own:
             return (self.greatest_bound << settings.frac_bits) - 1
         greatest = self.greatest_bound * settings.lsb_per_count
         limit = math.inf if settings.velocity_bits is None else (1 << settings.velocity_bits - 1) - 1
@@ -155,7 +186,8 @@ class Expected:
     def recovery(self) -> int:
         """docs/verification.md: all counters may have to wrap, one after the other, before all is forgotten."""
         settings = self.settings
-        lines = 2 + (1 << max(settings.filter - 1, 1).bit_length() if settings.filter else 0) + 1
+        held = 1 << max(settings.filter - 1, 1).bit_length()
+        lines = 2 + (held + settings.filter if settings.filter else 0) + 1
         tick = 1 + (1 << max(settings.longest_tick - 2, 0).bit_length())
         most = settings.max_ticks
         periods = {
@@ -186,6 +218,7 @@ class Expected:
         settings, manifest = self.settings, self.manifest
         external = manifest.get("external_tick_cycles", {})
         return {
+            "license": lambda: "BSD-2-Clause",
             "generator": lambda: manifest["generator"] if manifest["generator"].startswith("tachometry ") else None,
             "method": lambda: settings.method,
             "clock_hz": lambda: settings.clock_hz,
@@ -198,6 +231,10 @@ class Expected:
             "velocity.frac_bits": lambda: settings.frac_bits,
             "velocity.unit": lambda: settings.unit,
             "velocity.rad_per_s_per_lsb": lambda: pytest.approx(float(settings.rad_per_s_per_lsb), rel=1e-13),
+            "velocity.full_scale": lambda: self.full_scale(settings.unit),
+            "velocity.full_scale_rad_per_s": lambda: self.full_scale("rad/s"),
+            "max_time_cycles": self.max_time,
+            "min_time_cycles": lambda: self.raised(settings.min_time, manifest["min_time_cycles"], spare=1),
             "bounds.none": self.none,
             "interval_unit_cycles": lambda: settings.period if settings.method in ("t", "mt") else settings.tick,
             "latency_cycles.pin_to_count": lambda: 2 + settings.filter,
@@ -216,6 +253,7 @@ class Expected:
         settings = self.settings
         return {
             "bounds.none": settings.flag("bounds"),
+            "min_time_cycles": settings.method == "mt",
             "recovery_cycles": settings.lowpass is None and not (settings.method == "rairan" and settings.paper_exact),
             **dict.fromkeys(
                 ("latency_cycles.tick_in_to_window_end", "external_tick_cycles.min", "external_tick_cycles.max"),
@@ -241,6 +279,8 @@ def check_manifest(settings: Settings, manifest: Manifest, name: str) -> None:
     for key in WORDS[settings.method]:
         assert parameters[key] == parameter(settings, key, parameters[key]), key
     assert parameters["method"] == settings.method
+    assert parameters["velocity_width"] == manifest["velocity"]["width"]
+    assert parameters.get("min_time") == manifest.get("min_time_cycles")
     expected = Expected(settings, manifest)
     entries, optional = expected.entries(), expected.optional()
     shown = dict(_flat(rest))
@@ -254,12 +294,12 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
     """Names, directions, signs and widths, as docs/ports.md has them."""
     settings = expected.settings
     bound = signed(expected.greatest_bound - 1) + settings.frac_bits
-    own = settings.native and settings.velocity_bits is None
+    own = settings.own
     timed = settings.method in ("t", "mt")
     fast = not settings.lattice and settings.tick > settings.max_count
     beyond = timed and (fast or (settings.lattice and settings.method == "t"))
     widths: dict[str, int | None] = {
-        "velocity": settings.velocity_bits or (signed(settings.max_count) + settings.frac_bits if own else None),
+        "velocity": settings.velocity_bits or (signed(settings.max_velocity) + settings.frac_bits if own else None),
         "interval": expected.longest_window.bit_length() if own or not timed else None,
         "pulse_count": signed(expected.counts),
         "position": settings.position_bits,
@@ -291,7 +331,7 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
         wanted = widths.get(name, 1)
         if wanted is None:
             check_width(expected, name, port["width"])
-        elif name != "velocity" or not (settings.method == "t" and settings.lattice):
+        else:
             assert port["width"] == wanted, name
 
 
@@ -304,6 +344,6 @@ def check_width(expected: Expected, name: str, width: int) -> None:
     if settings.velocity_bits is not None:
         assert width == settings.velocity_bits
         return
-    greatest = expected.greatest_bound if settings.flag("bounds") else settings.max_count
+    greatest = expected.greatest_bound if settings.flag("bounds") else settings.max_velocity
     most = greatest * settings.lsb_per_count
     assert signed(most - 2) <= width <= signed(most + 2), name

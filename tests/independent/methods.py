@@ -56,7 +56,7 @@ def s_updates(settings: Settings, ticks: list[Tick]) -> list[Update]:
             total = Fraction(numbers[opened] + numbers[i], 2) + inside
         else:
             total = Fraction(inside + numbers[i])
-        speed, one = total / length, Fraction(1, length)
+        speed, one = total / length, (1 + settings.edge_error) / length
         found.append(Update(tick.last, speed, length, not altered, speed - one, speed + one, bool(found)))
         opened = i if altered else i - settings.max_ticks // 2
     return found
@@ -64,9 +64,9 @@ def s_updates(settings: Settings, ticks: list[Tick]) -> list[Update]:
 
 def m_updates(settings: Settings, ticks: list[Tick]) -> list[Update]:
     """Eq. (6): the mean pulse number of the last n ticks, those before reset being empty."""
-    found, n = [], settings.average
+    found, n, off = [], settings.average, 1 + settings.edge_error
     for i, tick in enumerate(ticks):
         total = sum(each.count for each in ticks[max(0, i - n + 1) : i + 1])
-        lower, upper = Fraction(total - 1, n), Fraction(total + 1, n)
+        lower, upper = (total - off) / n, (total + off) / n
         found.append(Update(tick.last, Fraction(total, n), n, False, lower, upper, i >= n))
     return found

@@ -80,18 +80,24 @@ class Rairan:
         self.sign, self.clock, self.c_ep, self.c_dt, self.alone, self.resting = sign, 0, 1, 0, True, False
 
     def show(self, now: int, n: tuple[int, int], *, forced: bool = False, least: Bound = None, spare: int = 0) -> None:
-        """An update; `spare` clocks more may be missing in the time of the upper bound."""
-        t, dt = self.settings.tick, self.dt
+        """An update; `spare` clocks more may be missing in the least time that the window can have taken.
+
+        `least` is 0 if nothing says that the shaft went on at all: then it may have come back by an edge's error.
+        """
+        t, dt, off = self.settings.tick, self.dt, self.settings.edge_error
         n_ep, n_dt = n
         speed = self.sign * estimate(self.settings.estimate, n_ep, n_dt) / (1 << self.k)
         if n_ep > 1:
-            low, high = Fraction((n_ep - 1) * t, dt + 1), (n_ep * t, dt - 1)
+            fewest, most, longest, shortest = n_ep - 1, n_ep, dt + 1, dt - 1
         else:
-            low, high = Fraction(t, (n_dt + 1) * dt + 1), (t, n_dt * dt - 1 - spare)
-        low = low if least is None else least
-        ends: tuple[Bound, Bound] = (low, Fraction(*high) if high[1] > 0 else None)
+            fewest, most, longest, shortest = 1, 1, (n_dt + 1) * dt + 1, n_dt * dt - 1 - spare
+        low: Bound = max(fewest - off, Fraction(0)) * t / longest
+        if least is not None:
+            low = None if shortest <= 0 and off else -off * t / max(shortest, 1)
+        ends: tuple[Bound, Bound] = (low, (most + off) * t / shortest if shortest > 0 else None)
         if self.sign < 0:
-            ends = (None if ends[1] is None else -ends[1], -low)
+            lower, upper = ends
+            ends = (None if upper is None else -upper, None if lower is None else -lower)
         others = {"n_ep1": n_ep, "n_dt1": n_dt} | ({"dt_shift": self.k} if self.settings.target else {})
         self.found.append(Update(now, speed, n_dt << self.k, forced, *ends, n_ep > 0, others))
         self.n, self.k_of_n = n, self.k

@@ -91,6 +91,12 @@ class Settings:
         return self.unit == "count/tick"
 
     @cached_property
+    def own(self) -> bool:
+        """Whether the velocity is shown as it is measured, in counts per tick and with all its bits."""
+        every = self.max_velocity.bit_length() + 1 + self.frac_bits
+        return self.native and self.velocity_bits in (None, every)
+
+    @cached_property
     def filter(self) -> int:
         return self._whole("filter", 0)
 
@@ -123,19 +129,30 @@ class Settings:
         )
 
     @cached_property
+    def max_velocity(self) -> int:
+        """The greatest speed in counts per tick; times have a count per timer period at most."""
+        return min(self.max_count, self.tick // self.period) if self.method == "t" else self.max_count
+
+    @cached_property
     def frac_bits(self) -> int:
-        """Of the velocity: 16 in counts per tick, else 10, or as many as leave a count per tick within 2^22 LSB."""
+        """Of the velocity: 16 in counts per tick, else 10, or as many as leave a count per tick within 2^22 LSB.
+
+        Given both a width and a greatest speed, there are no more than leave all velocities within the width.
+        """
         if "lsb" in self.words:
             return -int(self.words["lsb"].removeprefix("2^"))
         if "frac-bits" in self.words:
             return int(self.words["frac-bits"])
-        if self.native:
-            return 16
         count = self.per_count(self.unit)
         most = next(bits for bits in range(60, -200, -1) if count * Fraction(2) ** bits <= 1 << 22)
+        most = 16 if self.native else min(10, most)
+        if self.max_speed is not None and self.velocity_bits is not None:
+            limit = (1 << self.velocity_bits - 1) - 1
+            while count * self.max_velocity * Fraction(2) ** most > limit:
+                most -= 1
         # The greatest speed must be more than one LSB.
-        fewest = next(bits for bits in range(-200, 60) if count * self.max_count * Fraction(2) ** bits > 1)
-        return max(fewest, min(10, most))
+        fewest = next(bits for bits in range(-200, 60) if count * self.max_velocity * Fraction(2) ** bits > 1)
+        return max(4 if self.native else fewest, most)
 
     @cached_property
     def lsb_per_count(self) -> Fraction:
@@ -151,6 +168,17 @@ class Settings:
     def velocity_bits(self) -> int | None:
         """Bits that the velocity was limited to."""
         return int(self.words["velocity-width"]) if "velocity-width" in self.words else None
+
+    @cached_property
+    def narrow(self) -> bool:
+        """Whether the bits of the velocity do not hold its greatest value."""
+        limit = math.inf if self.velocity_bits is None else 1 << self.velocity_bits - 1
+        return self.max_velocity * self.lsb_per_count >= limit
+
+    @cached_property
+    def edge_error(self) -> Fraction:
+        """What the distance of two edges may be off by, in counts: whole eighths, the word or more."""
+        return Fraction(math.ceil(8 * Fraction(self.words.get("edge-error", "0"))), 8)
 
     @cached_property
     def lowpass(self) -> Fraction | None:

@@ -1,6 +1,7 @@
 """What the ports must show of measurements: rounding, units, saturation, bounds and the low-pass filter."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -89,12 +90,12 @@ def check_updates(
     return seen
 
 
-def check_age(settings: Settings, rows: Sequence[Row]) -> None:
-    """`age` is the number of ticks since the update, this one perhaps not counted yet; it stays at the maximum."""
-    ticks = 0
-    for row in rows:
-        if row["tick"]:
-            ticks += 1
-            assert row["age"] in {min(ticks - 1, settings.max_ticks), min(ticks, settings.max_ticks)}, row
-        if row["velocity_valid"]:
-            ticks = 0
+def check_age(settings: Settings, manifest: Manifest, updates: Sequence[Update], rows: Sequence[Row]) -> None:
+    """`age` is how many ticks there were after the cause of the newest update and before this one, or the maximum."""
+    latency = manifest["latency_cycles"]
+    ticks = [row["clock"] for row in rows if row["tick"]]
+    causes = [update.cause + latency["tick_latency"] for update in updates]
+    for nth, row in enumerate(row for row in rows if row["tick"]):
+        known = bisect_right(causes, row["clock"] - latency["tick_to_velocity"])
+        after = bisect_right(ticks, causes[known - 1]) if known else 0
+        assert row["age"] == min(nth - after, settings.max_ticks), row

@@ -13,7 +13,6 @@ from independent.methods import Update, s_updates
 from independent.settings import Settings, arguments
 from independent.show import check_updates
 from independent.stimulus import Lines, steady
-from independent.timed import timed_updates
 
 TICK = 1 << 20
 # A count, another after half of the longest measurement, and then none.
@@ -24,7 +23,6 @@ LINES = {
         3 * TICK + 100, 0, steady(3, 1, 40_000) + steady(TICK + 5, 2, 40_000, -1) + steady(2 * TICK + 9, 9, 5)
     ),
     "s_long_time": Lines(SECOND + TICK + 100, 3, [(FIRST, 1), (SECOND, 1)]),
-    "mt_long": Lines(3 * TICK + TICK // 2, 1, [*steady(40, TICK / 5 + 0.4, 8), *steady(2 * TICK, 977, 1200, -1)]),
 }
 
 
@@ -51,12 +49,7 @@ def test_long_ticks_and_long_measurements(generated: Callable[..., Path]) -> Non
         front = conditioned(settings, play, latency["pin_to_count"])
         ends = list(range(settings.tick - 1, front.n_clocks, settings.tick)) if settings.tick > 1 else []
         ticks = ticks_of(settings, front, ends, settings.max_count)
-        if settings.tick == 1:
-            updates = two_counts(settings)
-        elif settings.method == "s":
-            updates = s_updates(settings, ticks)
-        else:
-            updates = timed_updates(settings, front, ticks, latency["tick_to_velocity"] - 1)
+        updates = two_counts(settings) if settings.tick == 1 else s_updates(settings, ticks)
         late = latency["tick_latency"] + latency["tick_to_velocity"]
         updates = [update for update in updates if update.cause + late < front.n_clocks]
         check_updates(settings, manifest, updates, rows, ticks)

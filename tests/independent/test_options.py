@@ -60,6 +60,18 @@ def test_nothing_here_imports_what_it_tests(path: Path) -> None:
     names = [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
     names += [node.module or "." for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     assert {name.split(".")[0] for name in names} <= {
-        *("ast", "bisect", "collections", "dataclasses", "fractions", "functools", "importlib", "json", "math", "os"),
+        *(
+            "ast",
+            "bisect",
+            "collections",
+            "dataclasses",
+            "fractions",
+            "functools",
+            "hashlib",
+            "importlib",
+            "json",
+            "math",
+            "os",
+        ),
         *("pathlib", "random", "shutil", "subprocess", "sys", "typing", "pytest", "independent"),
     }

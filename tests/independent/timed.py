@@ -17,26 +17,28 @@ class Event:
     clock: int
     size: int  # counts
     ends: bool
-    empty: bool  # no count came in the tick that ends
+    empty: bool  # the tick that ends has no count; on the lattice, nor has one in which they cancel
 
 
 def events_of(settings: Settings, front: Front, ticks: list[Tick]) -> list[Event]:
     """All that can matter, in order."""
     if settings.lattice:
-        return [Event(i, tick.last, tick.count, True, tick.empty) for i, tick in enumerate(ticks)]
+        return [Event(i, tick.last, tick.count, True, not tick.count) for i, tick in enumerate(ticks)]
     ends = {tick.last: tick.empty for tick in ticks}
     clocks = sorted({*front.steps, *ends})
     return [Event(c, c, front.steps.get(c, 0), c in ends, ends.get(c, False)) for c in clocks]
 
 
-def ends_of(least: int, most: int, time: int, scale: int) -> tuple[Bound, Bound]:
-    """Speeds of which one is the truth, for distances from `least` to `most` between edges that `time` periods report.
+def ends_of(distance: int, off: Fraction, time: int, scale: int) -> tuple[Bound, Bound]:
+    """Speeds between which the truth is, for a distance, give or take `off`, between edges that `time` periods report.
 
     Each edge lies within a period before its count, so that the true time is up to one period shorter or longer.
     """
 
-    def end(distance: int, periods: int) -> Bound:
-        return Fraction(distance * scale, periods) if periods else None
+    def end(distance: Fraction, periods: int) -> Bound:
+        return distance * scale / periods if periods else None
+
+    least, most = distance - off, distance + off
 
     return end(least, time + 1 if least >= 0 else time - 1), end(most, time - 1 if most > 0 else time + 1)
 
@@ -55,7 +57,6 @@ class Timed:
     last_sign: int = 0
     quiet: int = -1  # period from which a silence is timed
     opened: int | None = None  # period in which the window was opened
-    open_sign: int = 0
     sum: int = 0  # counts since then
 
     @property
@@ -85,6 +86,10 @@ class Timed:
         others = {"out_of_range": int(beyond)}
         self.found.append(Update(clock, speed, interval, forced, *bounds, known, others))
 
+    def ends_of(self, distance: int, time: int) -> tuple[Bound, Bound]:
+        """The bounds of a measurement."""
+        return ends_of(distance, self.settings.edge_error, time, self.scale)
+
     def take(self, clock: int) -> None:
         """A measurement takes the divider; what was asked of it before is never shown."""
         if clock - self.asked < self.division and self.found and self.found[-1].cause == self.asked:
@@ -106,7 +111,7 @@ class Timed:
             if clock - self.begun < self.division and self.found:
                 self.found.pop()
             self.take(clock)
-            ends = Fraction(self.scale, self.limit)
+            ends = (1 + self.settings.edge_error) * self.scale / self.limit
             self.show(clock, Fraction(0), self.limit, (-ends, ends), forced=True, known=known)
             self.opened = None
 
@@ -129,25 +134,20 @@ class Timed:
             time = event.period - self.last
             self.take(event.clock)
             distance = sign if sign == self.last_sign or self.settings.paper_exact else 0
-            self.show(
-                event.clock, Fraction(distance * self.scale, time), time, ends_of(distance, distance, time, self.scale)
-            )
+            self.show(event.clock, Fraction(distance * self.scale, time), time, self.ends_of(distance, time))
         self.opened = event.period
 
     def _mt(self, event: Event, sign: int, fresh: bool) -> None:
-        self.sum += event.size
+        turned = self.last_sign == -sign and not self.settings.paper_exact
+        self.sum += event.size - sign * turned  # a reversal meets an edge once more
         late = self.settings.lattice and self.settings.external and event.clock - self.begun < self.division
         if not fresh and self.opened is not None:
             time = event.period - self.opened
             if time <= self.least_time or late:
                 return
-            whole = self.settings.lattice or self.settings.paper_exact
-            twice = 2 * self.sum if whole else self.open_sign + 2 * (self.sum - event.size) + sign
-            distance = twice // 2
-            bounds = ends_of(distance, distance, time, self.scale)
             self.take(event.clock)
-            self.show(event.clock, Fraction(distance * self.scale, time), time, bounds)
-        self.opened, self.open_sign, self.sum = event.period, sign, 0
+            self.show(event.clock, Fraction(self.sum * self.scale, time), time, self.ends_of(self.sum, time))
+        self.opened, self.sum = event.period, 0
 
     def decay(self, event: Event) -> None:
         """The end of a tick in which no count came: 1½ counts over the silence, if that is nearer to 0."""
@@ -159,9 +159,10 @@ class Timed:
         if self.nearest(most) >= self.nearest(abs(speed)) or self.nearest(most) > self.settings.max_count:
             return
         sign, one = (-1 if speed < 0 else 1), Fraction(self.scale, silence)
-        low = Fraction(0) if sign > 0 and self.last_sign > 0 else -one
-        high = Fraction(0) if sign < 0 and self.last_sign < 0 else one
-        self.show(event.clock, sign * most, silence, (low, high), forced=True)
+        off = self.settings.edge_error
+        back = 0 if sign > 0 and self.last_sign > 0 else 1
+        forth = 0 if sign < 0 and self.last_sign < 0 else 1
+        self.show(event.clock, sign * most, silence, (-(back + off) * one, (forth + off) * one), forced=True)
 
 
 def timed_updates(settings: Settings, front: Front, ticks: list[Tick], division: int) -> list[Update]:
