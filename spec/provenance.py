@@ -1,10 +1,12 @@
 """What every generated file says of itself: what made it, whose it is, and how it may be used."""
 
+import functools
 import importlib.metadata
 
 LICENSE = "BSD-2-Clause"
 
 
+@functools.cache
 def version() -> str:
     """The version of tachometry."""
     return importlib.metadata.version("tachometry")
