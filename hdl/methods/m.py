@@ -113,7 +113,9 @@ class MMethod(wiring.Component):
     def __init__(self, spec: MTachometer) -> None:
         super().__init__(datapath_members(spec))
         self._spec = spec
-        self._tag = data.StructLayout({**stamped(spec), **({"bounds_valid": 1} if spec.bounds else {})})
+        # Verilog has no signals of no bits.
+        tag = {**stamped(spec), **({"bounds_valid": 1} if spec.bounds else {})}
+        self._tag = data.StructLayout(tag or {"forced": 1})
         self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
         self.quotient: Quotient | None = None
         if spec.shift is None:

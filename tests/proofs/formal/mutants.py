@@ -109,7 +109,7 @@ MUTANTS = [
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
     Mutant("M of 4", "pm_stalled", Standstill, "init=self._max_ticks - 1", "init=self._max_ticks - 2"),
-    Mutant("M of 3", "pm_bounds", MMethod, "margin=1", "margin=0"),
+    Mutant("M of 3", "pm_bounds", MMethod, "margin=spec.margin", "margin=0"),
     Mutant(
         "M of 4", "pm_known", MMethod, "known.bounds_valid.eq(seen >= spec.average)", "known.bounds_valid.eq(seen != 0)"
     ),

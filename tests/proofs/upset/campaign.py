@@ -72,7 +72,7 @@ def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
         return found
 
     ticks, updates = run.ticks, run.updates
-    found = {name: held(ticks.clock, ticks[name]) for name in ("pulse_count", "overflow")}
+    found = {name: held(ticks.clock, values) for name, values in ticks.columns.items() if name not in _OF_POSITION}
     found |= {name: held(updates.clock, values) for name, values in updates.columns.items()}
     found["tick"], found["velocity_valid"] = high(ticks.clock), high(updates.clock)
     found["decode_error"] = high(run.errors)
