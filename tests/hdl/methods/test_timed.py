@@ -161,7 +161,12 @@ MUTANTS = {
         check_count_at_the_maximum_time,
     ),
     "forced in spite of a count": (gap_timer.GapTimer, " & ~self.count)", ")", check_count_at_the_maximum_time),
-    "open after a silence": (gap_timer.GapTimer, "self.opened.eq(self.count)", "self.opened.eq(1)", check_count_at_the_maximum_time),
+    "open after a silence": (
+        gap_timer.GapTimer,
+        "self.opened.eq(self.count)",
+        "self.opened.eq(1)",
+        check_count_at_the_maximum_time,
+    ),
     "no sign kept": (gap_timer.GapTimer, "was_negative.eq(self.negative)", "was_negative.eq(0)", check_reversal),
     "never nearer": (quotient_velocity.QuotientVelocity, "change[-1])", "0)", check_standstill),
     "always nearer": (
