@@ -262,6 +262,8 @@ def timed(
         "T": tick_cycles,
         "COUNT_WIDTH": spec.count_width,
         "MAX_COUNT": max_count,
+        "MAX_VELOCITY": spec.max_velocity,
+        "VELOCITY_WIDTH": spec.velocity_width,
         "MAX_TICKS": max_ticks,
         "MAX_PERIODS": spec.max_periods,
         "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,

@@ -8,6 +8,8 @@ module timed #(
     parameter T = 4,              // tick_cycles
     parameter COUNT_WIDTH = 3,
     parameter MAX_COUNT = 2,
+    parameter MAX_VELOCITY = 2,   // in counts per tick
+    parameter VELOCITY_WIDTH = 7,
     parameter MAX_TICKS = 4,
     parameter MAX_PERIODS = 16,   // timer periods in the maximum time
     parameter MIN_PERIODS = 4,    // M/T: in T_c
@@ -23,7 +25,7 @@ module timed #(
 ) (
     input clk, input rst, input a, input b
 );
-  localparam V = COUNT_WIDTH + FRAC_BITS, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS, W = 8;
+  localparam V = VELOCITY_WIDTH, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS, W = 8;
   localparam P = LATTICE ? 1 : T, B = DIVISION_CLOCKS, LONG = MAX_PERIODS * (LATTICE ? T : 1), PHASES = LATTICE ? T : 1;
   wire tick, velocity_valid, forced, stalled;
   wire signed [COUNT_WIDTH-1:0] pulse_count;
@@ -182,7 +184,7 @@ module timed #(
   // 2^f x + 1/2 = (2^f distance + times) / (2 times), rounded down, and the largest that can be shown.
   wire signed [N+I+2:0] wanted = (shown_distance <<< FRAC_BITS) + $signed({1'b0, shown_times});
   wire signed [N+I+2:0] divisor = $signed({1'b0, shown_times, 1'b0}), have = divisor * velocity;
-  localparam signed [V-1:0] LIMIT = MAX_COUNT << FRAC_BITS;
+  localparam signed [V-1:0] LIMIT = MAX_VELOCITY << FRAC_BITS;
   wire fits = !SATURATES || (wanted < divisor * (LIMIT + 1) && wanted >= -divisor * LIMIT);
   wire signed [N+1:0] shown = !SATURATES ? core_rounded : core_rounded > LIMIT ? LIMIT
       : core_rounded < -LIMIT ? -LIMIT : core_rounded;
