@@ -150,6 +150,7 @@ module method #(
     lemma_quiet: assert (quiet == 0 || (previous == 0 && (rested || (m_s == quiet && opening == 0)
         || (m_s == quiet + 1 && opening != 0) || (core_nearly && quiet == MAX_TICKS))));
     lemma_nearly: assert (!core_nearly || quiet >= MAX_TICKS);
+    lemma_counted: assert ((quiet == 0) == (previous != 0));
     lemma_since: assert ({since_update, was_forced} == {since_, after_forced_});
   end
   generate
