@@ -16,7 +16,7 @@ from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.spec import Encoder, TachometerSpec
-from tachometry.spec.units import SpeedUnit, format_time, parse_time, plural
+from tachometry.spec.units import SpeedUnit, format_time, parse_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
@@ -124,11 +124,10 @@ def compare(
 
             save_comparison(path, spec, curves, scores, instants, source.true_speed)
     _print(scores, sizes, named, spec.shown_unit)
-    if merged := source.recording.n_merged(spec.timing.clock_hz, int(duration * spec.timing.clock_hz)):
-        click.echo(
-            f"WARNING: {plural(merged, 'edge')} came within one clock of another, which no core can tell apart: "
-            "--clock must be faster than the edges"
-        )
+    from tachometry.cli.reports.run import merged_edges, print_warnings
+
+    clock_hz = spec.timing.clock_hz
+    print_warnings(merged_edges(source.recording, clock_hz, int(duration * clock_hz)))
     return 0
 
 

@@ -37,19 +37,30 @@ def print_summary(
     for mismatch in first:
         console.print(Text(f"first mismatch in {mismatch}"))
     warnings = _warnings(spec, run, recording, truth)
-    for warning in warnings:
-        console.print(Text(f"WARNING: {warning}", style="bold yellow"))
+    print_warnings(warnings)
     console.print(_verdict(run, n_mismatches, warned=bool(warnings)))
+
+
+def print_warnings(warnings: list[str]) -> None:
+    """Print what a user must not overlook, a line each, on stdout."""
+    for warning in warnings:
+        stdout_console().print(Text(f"WARNING: {warning}", style="bold yellow"))
+
+
+def merged_edges(recording: Recording, clock_hz: int, n_clocks: int) -> list[str]:
+    """A warning if the clock is too slow for the edges of its first `n_clocks`."""
+    merged = recording.n_merged(clock_hz, n_clocks)
+    if not merged:
+        return []
+    return [
+        f"{plural(merged, 'edge')} came within one clock of another, which no core can tell apart: "
+        "counts and velocity are wrong there; --clock must be faster than the edges"
+    ]
 
 
 def _warnings(spec: TachometerSpec, run: Run, recording: Recording, truth: Encoding | None) -> list[str]:
     """Why the core cannot have counted what the shaft did."""
-    found = []
-    if merged := recording.n_merged(spec.timing.clock_hz, run.n_clocks):
-        found.append(
-            f"{plural(merged, 'edge')} came within one clock of another, which no core can tell apart: "
-            "counts and velocity are wrong there; --clock must be faster than the edges"
-        )
+    found = merged_edges(recording, spec.timing.clock_hz, run.n_clocks)
     if truth is None and (together := recording.n_together):
         found.append(
             f"at {plural(together, 'instant')} of the capture both lines change: it was sampled more slowly than the "

@@ -143,11 +143,10 @@ class QuotientVelocity(wiring.Component):
         """Two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
         counted = Signal()
         # Distances in 2^−finer counts, and by how much edges may be off.
-        finer, off = (
-            self._spec.error_bits,
-            int(self._spec.edge_error * (self._spec.timer_periods << self._spec.error_bits)),
-        )
-        greatest = (self._spec.timer_periods << finer) + off
+        finer = self._spec.error_bits
+        count = self._spec.timer_periods << finer
+        off = int(self._spec.edge_error * count)
+        greatest = count + off
         m.d.comb += counted.eq(self.measure & ~self.forced_in)
         known = Signal(reset_less=True)
         with m.If(self.divider.start):
