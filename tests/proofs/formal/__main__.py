@@ -34,20 +34,19 @@ def main(words: list[str]) -> bool:
     prepare(_FOLDER)
     proofs = {proof.name: proof for proof in PROOFS if proof.name in names}
     mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs]
-    # Mutants exist one at a time, so they are exported before anything runs, and after all modules have been loaded.
-    right_texts = [_exported(proof) for proof in proofs.values()]
-    wrong_texts = [_exported(proofs[wrong.proof], wrong) for wrong in mutants]
     fine = True
     proven: set[str] = set()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
+        # The solvers run beside the exports. Mutants exist one at a time, and only after the right cores were exported.
         right = [
-            pool.submit(solve, proof, text, _FOLDER, f"proof{number}")
-            for number, (proof, text) in enumerate(zip(proofs.values(), right_texts, strict=True))
+            pool.submit(solve, proof, _exported(proof), _FOLDER, f"proof{number}")
+            for number, proof in enumerate(proofs.values())
         ]
-        refuted = [
-            pool.submit(solve, proofs[wrong.proof], text, _FOLDER, f"mutant{number}", wrong.refuted, wrong.steps)
-            for number, (wrong, text) in enumerate(zip(mutants, wrong_texts, strict=True))
-        ]
+        refuted = []
+        for number, wrong in enumerate(mutants):
+            proof = proofs[wrong.proof]
+            text = _exported(proof, wrong)
+            refuted.append(pool.submit(solve, proof, text, _FOLDER, f"mutant{number}", wrong.refuted, wrong.steps))
         row("core", "properties", "induction", "seconds", "verdict")
         row(*["---"] * 5)
         for proof, future in zip(proofs.values(), right, strict=True):
