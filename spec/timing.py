@@ -82,7 +82,7 @@ class Timing:
         unit="ticks",
         group=_GROUP,
         parse=_ticks,
-        tests=("2", "500", "3", "16384"),
+        tests=("2", "500", "3", "4096"),
         few=3,
     )
 

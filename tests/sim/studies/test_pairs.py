@@ -67,7 +67,7 @@ def test_the_extremes_are_there() -> None:
 
         return {tuple(value(spec, name) for name in names) for spec in cores[method]}
 
-    assert values("s", "tick_cycles", "max_ticks") == set(product((1, 2, 3, 960), (2, 3, 500, 16384)))
+    assert values("s", "tick_cycles", "max_ticks") == set(product((1, 2, 3, 960), (2, 3, 500, 4096)))
     assert values("s", "index", "index_reset") == {(False, False), (True, False), (True, True)}
     for method in METHODS:
         assert values(method, "tick_cycles") >= {(1,), (3,), (960,)}
