@@ -6,12 +6,17 @@ import re
 from unittest.mock import patch
 
 from amaranth.back import verilog
+from amaranth.lib import wiring
 
+from tachometry.hdl.bus_tachometer import BusTachometer
 from tachometry.hdl.kit import kit
 from tachometry.hdl.tachometer import Tachometer
 from tachometry.spec import TachometerSpec
-from tachometry.spec.manifest import manifest
+from tachometry.spec.manifest import described_port, manifest
+from tachometry.spec.option import ParameterError
 from tachometry.spec.provenance import LICENSE, generator, notice
+from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.map import RegisterMap
 
 _HEADER = """\
 // {name}: {method}-method tachometer, x{decoding} decoding, {counts_per_rev} counts per revolution,
@@ -28,7 +33,7 @@ _HEADER = """\
 _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
 
 
-def export(spec: TachometerSpec, name: str = "tachometer") -> dict[str, str]:
+def export(spec: TachometerSpec, name: str = "tachometer", bus: str = "none") -> dict[str, str]:
     """The exported core as texts by file name: `NAME.v`, `NAME.json`, and those of `tachometry.hdl.kit`.
 
     Equal specs and names give equal texts on every machine: the bundled Yosys writes the Verilog, whatever else is
@@ -39,17 +44,29 @@ def export(spec: TachometerSpec, name: str = "tachometer") -> dict[str, str]:
     spec : TachometerSpec
     name : str
         Name of the module and of the files.
+    bus : str
+        The bus for its registers, one of `spec.registers.buses.BUSES`, or `none`.
 
     Raises
     ------
     ValueError
-        If `name` cannot be the name of a Verilog module.
+        If `name` cannot be the name of a Verilog module; if there is no such bus.
     """
+    registers, on = RegisterMap(spec), bus_of(bus)
     described = {"generator": generator(), "license": LICENSE, **manifest(spec, name)}
+    top: wiring.Component
+    if on is None:
+        top = Tachometer(spec)
+    else:
+        top = BusTachometer(registers, bus)
+        described["ports"] += [described_port(port) for port in on.ports(registers)]
+        described |= {"bus": bus, "registers": registers.described()}
+        if name in {port.name for port in on.ports(registers)}:
+            raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
-        text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", verilog.convert(Tachometer(spec), name=name, emit_src=False))
+        text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", verilog.convert(top, name=name, emit_src=False))
     return {
         f"{name}.v": _HEADER.format(**described, name=name, notice=notice("//")) + text,
         f"{name}.json": json.dumps(described, indent=2) + "\n",
-        **kit(spec, name),
+        **kit(spec, name, on),
     }

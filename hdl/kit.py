@@ -1,10 +1,13 @@
 """What lies beside the Verilog to build it into a design: template, constraints, FuseSoC core file, smoke test."""
 
 import textwrap
+from collections.abc import Sequence
 
 from tachometry.spec import TachometerSpec
 from tachometry.spec.port import Port
 from tachometry.spec.provenance import notice, version
+from tachometry.spec.registers.buses import Bus
+from tachometry.spec.registers.map import RegisterMap
 
 _CORE = """\
 CAPI=2:
@@ -96,7 +99,7 @@ module NAME_tb;
 
   reg clk = 1'b0;
   reg rst = 1'b1;
-  reg @PINS@;
+  @PINS@
 
 `include "NAME_inst.v"
 
@@ -148,7 +151,7 @@ _STEPS_PER_TICK, _LONGEST_HOLD = 4, 5000
 _BOX = {"tick_in": "sampling_clock"}
 
 
-def kit(spec: TachometerSpec, name: str) -> dict[str, str]:
+def kit(spec: TachometerSpec, name: str, bus: Bus | None = None) -> dict[str, str]:
     """Texts by file name: `NAME.core`, `NAME_inst.v`, `NAME_tb.sv`, `NAME.xdc`, `NAME.sdc`.
 
     Parameters
@@ -156,7 +159,11 @@ def kit(spec: TachometerSpec, name: str) -> dict[str, str]:
     spec : TachometerSpec
     name : str
         Of the module.
+    bus : Bus or None
+        On which its registers are.
     """
+    ports = (*spec.ports, *(bus.ports(RegisterMap(spec)) if bus else ()))
+    idle = bus.idle if bus else {}
 
     def filled(text: str, **parts: object) -> str:
         marks = {"HASH": "#", "SLASHES": "//"}
@@ -178,29 +185,34 @@ def kit(spec: TachometerSpec, name: str) -> dict[str, str]:
     bench = filled(
         _BENCH,
         HOLD=hold,
-        PINS=", ".join(f"{pin} = 1'b0" for pin in asynchronous),
+        PINS="\n  ".join(
+            f"reg {_kind(port)}{port.name} = {port.width}'d{idle.get(port.name, 0)};"
+            for port in ports
+            if port.direction == "input" and port.name not in ("clk", "rst")
+        ),
         TICKS=_TICKS.replace("@TICK_CYCLES@", str(cycles)) if spec.max_tick_cycles else "",
         EXPECTED=(40 - 16) * spec.encoder.decoding // 4,
     )
     return {
         f"{name}.core": filled(_CORE),
-        f"{name}_inst.v": _instance(spec, name),
+        f"{name}_inst.v": _instance(ports, name),
         f"{name}_tb.sv": bench,
         f"{name}.xdc": constraints(_XDC, _XDC_PIN),
         f"{name}.sdc": constraints(_SDC, _SDC_PIN),
     }
 
 
-def _instance(spec: TachometerSpec, name: str) -> str:
-    inputs = [port for port in spec.ports if port.direction == "input"]
+def _instance(ports: Sequence[Port], name: str) -> str:
+    inputs = [port for port in ports if port.direction == "input"]
+    outputs = [port for port in ports if port.direction == "output"]
     lines = [f'// Instantiation template of {name}: copy it, or `include "{name}_inst.v" into a module that has']
     lines += [f"// {', '.join(port.name for port in inputs)}.", *notice("//").splitlines()]
-    for port in spec.outputs:
+    for port in outputs:
         lines += ["", *_comment(port), f"wire {_kind(port)}{port.name};"]
     lines += ["", f"{name} {name}_inst ("]
     for port in inputs:
         lines += [*(f"  {line}" for line in _comment(port)), f"  .{port.name}({port.name}),"]
-    lines += [f"  .{port.name}({port.name})," for port in spec.outputs]
+    lines += [f"  .{port.name}({port.name})," for port in outputs]
     return "\n".join(lines)[:-1] + "\n);\n"
 
 

@@ -70,6 +70,7 @@ class Tachometer(wiring.Component):
         self.standstill: Standstill | None = None
         if not isinstance(self.datapath, OwnStandstill):
             self.standstill = Standstill(spec.timing.max_ticks, spec.count_width, max_shift=spec.max_tick_shift)
+        self.update_age = UpdateAge(spec.timing.max_ticks, spec.stamp_width) if spec.age else None
         self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
         if spec.output is not None:
             box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
@@ -116,8 +117,8 @@ class Tachometer(wiring.Component):
             m.d.comb += pulse_counter.beyond.eq(datapath.beyond)
         self._rest(m)
         updates = self._output(m)
-        if self._spec.age:
-            m.submodules.age = age = UpdateAge(self._spec.timing.max_ticks, self._spec.stamp_width)
+        if self.update_age is not None:
+            m.submodules.age = age = self.update_age
             m.d.comb += [age.tick.eq(self.tick), age.update.eq(self.velocity_valid), self.age.eq(age.age)]
             if self._spec.stamp_width:
                 before = Signal.like(ticks)

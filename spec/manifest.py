@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 from tachometry.spec.option import ParameterError
+from tachometry.spec.port import Port
 from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END, TachometerSpec
 
 _OF_PORTS = ("name", "direction", "width", "signed")
@@ -34,6 +35,11 @@ def check_module_name(name: str) -> str:
     if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,63}", name) is None:
         raise ParameterError("name", f"must be a letter or _ and up to 63 letters, digits or _, not {name!r}")
     return name
+
+
+def described_port(port: Port) -> dict[str, Any]:
+    """What the manifest says of a port."""
+    return {key: getattr(port, key) for key in _OF_PORTS}
 
 
 def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
@@ -80,6 +86,6 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             if spec.max_tick_cycles
             else {}
         ),
-        "ports": [{key: getattr(port, key) for key in _OF_PORTS} for port in spec.ports],
+        "ports": [described_port(port) for port in spec.ports],
         "parameters": spec.parameters,
     }

@@ -14,6 +14,7 @@ from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
+from tachometry.spec.registers.buses import BUSES
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
@@ -51,12 +52,22 @@ Examples:
     help="Also write a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. Without a "
     "--motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the core.",
 )
+@option(
+    "Files",
+    "--bus",
+    type=click.Choice(["none", *BUSES]),
+    default="none",
+    help="Give the core registers on a bus: "
+    + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
+    + ". DIR/NAME.json describes the registers.",
+)
 @optional_motion_options
 def generate(
     spec: TachometerSpec,
     name: str,
     directory: Path,
     testbench: str | None,
+    bus: str,
     record: Callable[[TachometerSpec], Encoding] | None,
     tables: list[Path],
 ) -> int:
@@ -90,7 +101,7 @@ def generate(
             bench = cocotb_bench(spec, name, None if record is None else record(spec).recording)
         from tachometry.hdl import export
 
-        texts = export(spec, name) | bench
+        texts = export(spec, name, bus) | bench
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:

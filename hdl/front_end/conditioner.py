@@ -28,6 +28,8 @@ class InputConditioner(wiring.Component):
         Synchronised and filtered levels.
     ready_a, ready_b … : Out(1)
         High from the first clock in which the level of this line before the present one is real as well.
+    clear : In(1)
+        `swallowed_edges` is 0 in the next clock.
     swallowed_edges : Out(16)
         Edges that the filter has kept out, two for each glitch; stays at 65534.
     """
@@ -39,7 +41,7 @@ class InputConditioner(wiring.Component):
             {name: In(1) for name in lines}
             | {f"level_{name}": Out(1) for name in lines}
             | {f"ready_{name}": Out(1) for name in lines}
-            | {"swallowed_edges": Out(16)}
+            | {"clear": In(1), "swallowed_edges": Out(16)}
         )
 
     def elaborate(self, platform: object) -> Module:
@@ -69,4 +71,6 @@ class InputConditioner(wiring.Component):
             m.d.sync += glitches.eq(sum_)
             with m.If(sum_[-1]):
                 m.d.sync += glitches.eq(0x7FFF)
+            with m.If(self.clear):
+                m.d.sync += glitches.eq(0)
         return m

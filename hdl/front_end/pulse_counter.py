@@ -36,6 +36,8 @@ class PulseCounter(wiring.Component):
         m_e, held until the next tick.
     overflow : Out(1)
         m_e was saturated; held as long as m_e.
+    open_sum : Out(signed)
+        Only if not stretched: sum of the steps after the latest `tick`'s window, up to the clock before.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class PulseCounter(wiring.Component):
                 "tick": Out(1),
                 "pulse_count": Out(signed(max_count.bit_length() + 1)),
                 "overflow": Out(1),
+                **({} if stretched else {"open_sum": Out(signed(tick_cycles.bit_length() + 1))}),
             }
         )
 
@@ -68,6 +71,8 @@ class PulseCounter(wiring.Component):
         complete = Signal()
         m.d.comb += step.eq(self.step)
         m.d.sync += [complete.eq(self.last), self.tick.eq(complete), count.eq(count + step)]
+        if not self._stretched:
+            m.d.comb += self.open_sum.eq(count)
         held: Value = count
         overflow: Value = Const(0)
         if self._stretched:

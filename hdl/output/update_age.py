@@ -25,6 +25,8 @@ class UpdateAge(wiring.Component):
     age : Out(range(max_age + 1))
     before : Out(range(max_age + 1))
         The age without an update in this clock.
+    after : Out(range(max_age + 1))
+        The age with a tick in this clock.
     """
 
     def __init__(self, max_age: int, fresh_width: int = 0) -> None:
@@ -37,6 +39,7 @@ class UpdateAge(wiring.Component):
                 **({"fresh": In(fresh_width)} if fresh_width else {}),
                 "age": Out(range(max_age + 1)),
                 "before": Out(range(max_age + 1)),
+                "after": Out(range(max_age + 1)),
             }
         )
 
@@ -47,5 +50,6 @@ class UpdateAge(wiring.Component):
             most = self._max_age
             fresh = self.fresh if most >> self._fresh_width else Mux(self.fresh > most, most, self.fresh)
         m.d.comb += self.age.eq(Mux(self.update, fresh, self.before))
-        m.d.sync += self.before.eq(self.age + (self.tick & (self.age != self._max_age)))
+        m.d.comb += self.after.eq(self.age + (self.tick & (self.age != self._max_age)))
+        m.d.sync += self.before.eq(self.after)
         return m

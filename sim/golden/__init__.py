@@ -22,6 +22,11 @@ def model(spec: TachometerSpec) -> Any:
 
 def run(spec: TachometerSpec, trace: PinTrace) -> Run:
     """What the core of `spec` must show at its ports for these pins."""
+    return Run.of_ports(spec, trace.n_clocks, tables(spec, trace))
+
+
+def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
+    """The same by strobes, and with each update the clock of its cause, as the column `cause`."""
     steps = decoded(spec, trace)
     golden = model(spec)
     if spec.own_ticks:
@@ -35,12 +40,11 @@ def run(spec: TachometerSpec, trace: PinTrace) -> Run:
     measured = golden.updates(ticks, steps, trace.n_clocks)
     measured = measured.having(cause=measured.clock - spec.datapath_latency)
     updates = in_unit(spec, filtered(spec, ticks, measured))
-    tables = {
+    found = {
         "tick": with_age(spec, ticks, updates),
         "velocity_valid": updates,
         "index_valid": index,
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
     }
-    seen = {name: table.rows(table.clock < trace.n_clocks) for name, table in tables.items()}
-    return Run.of_ports(spec, trace.n_clocks, seen)
+    return {name: table.rows(table.clock < trace.n_clocks) for name, table in found.items()}

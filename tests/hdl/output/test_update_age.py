@@ -37,8 +37,8 @@ MUTANTS = {
     "goes on at an update": ("Mux(self.update, fresh, self.before)", "self.before"),
     "begins beyond its end": ("Mux(self.fresh > most, most, self.fresh)", "self.fresh"),
     "a tick with the update is lost": (
-        "before.eq(self.age + (self.tick &",
-        "before.eq(self.age + (self.tick & ~self.update &",
+        "after.eq(self.age + (self.tick &",
+        "after.eq(self.age + (self.tick & ~self.update &",
     ),
 }
 

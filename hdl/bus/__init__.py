@@ -1,0 +1,1 @@
+"""Registers of the core, and the buses on which they are read."""

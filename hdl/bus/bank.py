@@ -1,0 +1,113 @@
+"""The registers of a core."""
+
+from functools import reduce
+from operator import or_
+
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.bus.counter import SaturatingCounter
+from tachometry.hdl.bus.native import native_port
+from tachometry.spec.port import INDEX, UPDATE
+from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Register, RegisterMap
+
+_EVENTS = {"updated": UPDATE, "indexed": INDEX}  # flags that say that there was a strobe since the capture before
+
+
+class RegisterBank(wiring.Component):
+    """Registers as `RegisterMap` lists them, on a native port.
+
+    A capture takes in one clock all that the core shows in it. It is made by `capture`, and by reading the first
+    captured register, whose answer, a clock later, is what has just been captured.
+
+    Parameters
+    ----------
+    registers : RegisterMap
+
+    Members
+    -------
+    bus : In(native_port)
+    capture : In(1)
+        Captures in every clock in which it is high.
+    clear : Out(1)
+        The counters are being cleared.
+    velocity, position … : In
+        The captured ports of the core; `position` is to be that of the latest tick.
+    tick, velocity_valid, decode_error … : In(1)
+        Strobes of the core.
+    """
+
+    def __init__(self, registers: RegisterMap) -> None:
+        self._map = registers
+        super().__init__(
+            {
+                "bus": In(native_port(registers.address_width - 2)),
+                "capture": In(1),
+                "clear": Out(1),
+                **{port.name: In(signed(port.width) if port.signed else port.width) for port in registers.ports},
+                **{name: In(1) for name in registers.spec.strobes},
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        bus = self.bus
+        here = {register.name: bus.address == number for number, register in enumerate(self._map)}
+        writable = Cat(here[register.name] for register in self._map if register.writable).any()
+        m.d.sync += bus.error.eq((bus.read & (bus.address >= len(self._map.registers))) | (bus.write & ~writable))
+        hold, capture, control = Signal(), Signal(), Signal()
+        m.d.comb += [control.eq(bus.write & here["CONTROL"]), self.clear.eq(control & bus.write_data[0])]
+        with m.If(control):
+            m.d.sync += hold.eq(bus.write_data[1])
+        (captures,) = (here[register.name] for register in self._map if register.captures)
+        m.d.comb += capture.eq(self.capture | (bus.read & captures & ~hold))
+
+        taken: dict[str, Value] = {port.name: getattr(self, port.name) for port in self._map.ports}
+        waiting = {flag: Signal(name=f"{flag}_waits") for flag, strobe in _EVENTS.items() if hasattr(self, strobe)}
+        for flag, waits in waiting.items():
+            taken[flag] = waits | getattr(self, _EVENTS[flag])
+            m.d.sync += waits.eq(taken[flag] & ~capture)
+        captured = {
+            name: Signal.like(Value.cast(value), name=f"captured_{name}", reset_less=False)
+            for name, value in taken.items()
+        }
+        with m.If(capture):
+            m.d.sync += [captured[name].eq(value) for name, value in taken.items()]
+
+        counts = self._counts(m, lost=waiting["updated"] & self.velocity_valid)
+        shown = {**captured, **counts, "clear": Const(0), "hold": hold}
+        # What is kept for a clock is which register was read, not what it said; an address without a register reads 0.
+        chosen = Signal.like(bus.address, name="chosen")
+        m.d.sync += chosen.eq(Mux(bus.read, bus.address, -1))
+        answers = []
+        for number, register in enumerate(self._map):
+            answers.append(_word(m, register, shown) & (chosen == number).replicate(WORD))
+        m.d.comb += bus.read_data.eq(reduce(or_, answers))
+        return m
+
+    def _counts(self, m: Module, *, lost: Value) -> dict[str, Value]:
+        """The counters of COUNTERS by their names."""
+        events = {"decode_errors": self.decode_error, "overflows": self.tick & self.overflow, "lost_updates": lost}
+        if hasattr(self, "tick_error"):
+            events["tick_errors"] = self.tick_error
+        counts = {}
+        for name in self._map.counted:
+            m.submodules[name] = counter = SaturatingCounter(COUNTER_WIDTH)
+            m.d.comb += [counter.event.eq(events[name]), counter.clear.eq(self.clear)]
+            counts[name] = counter.count
+        return counts
+
+
+def _word(m: Module, register: Register, shown: dict[str, Value]) -> Value:
+    """What a register reads when its fields show this."""
+    word = Signal(WORD, name=register.name.lower())
+    for field in register.fields:
+        if register.constant:
+            value: Value = Const(field.reset, field.width)
+        else:
+            value = shown[field.port or field.name]
+        # The upper or only word of a value is extended by its sign.
+        part = value[field.shift : field.shift + WORD] if len(value) > field.shift + WORD else value >> field.shift
+        m.d.comb += word[field.low : field.low + field.width].eq(part)
+    return word

@@ -1,0 +1,33 @@
+"""How often something happened."""
+
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class SaturatingCounter(wiring.Component):
+    """Counts the clocks of an event, and stays at its greatest value.
+
+    Parameters
+    ----------
+    width : int
+        Bits.
+
+    Members
+    -------
+    event : In(1)
+    clear : In(1)
+        The count is 0 in the next clock, an event in this one included.
+    count : Out(width)
+        Events up to the clock before.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__({"event": In(1), "clear": In(1), "count": Out(width)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.d.sync += self.count.eq(self.count + (self.event & ~self.count.all()))
+        with m.If(self.clear):
+            m.d.sync += self.count.eq(0)
+        return m

@@ -1,0 +1,46 @@
+"""The position at the latest tick."""
+
+from amaranth import Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class TickPosition(wiring.Component):
+    """What `position` was in the clock of the latest tick, that of a tick in this clock included.
+
+    Latency: none. Where `open_sum` is the sum of all steps since, and nothing sets the position to 0, a subtraction
+    gives it without a register.
+
+    Parameters
+    ----------
+    width : int
+        Bits of the position.
+    sum_width : int
+        Bits of `open_sum`; 0 if there is none, and a register keeps the position.
+
+    Members
+    -------
+    tick : In(1)
+    position : In(signed(width))
+    next : In(signed(width))
+        The position of the next clock; only with `open_sum`.
+    open_sum : In(signed(sum_width))
+        Sum of the steps after the latest tick that are in `next`; only if it has bits.
+    latest : Out(signed(width))
+    """
+
+    def __init__(self, width: int, sum_width: int = 0) -> None:
+        self._sum_width = sum_width
+        position = signed(width)
+        inputs = {"next": In(position), "open_sum": In(signed(sum_width))} if sum_width else {}
+        super().__init__({"tick": In(1), "position": In(position), **inputs, "latest": Out(position)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        if self._sum_width:
+            m.d.comb += self.latest.eq(self.next - self.open_sum)
+        else:
+            kept = Signal.like(self.position)
+            m.d.comb += self.latest.eq(Mux(self.tick, self.position, kept))
+            m.d.sync += kept.eq(self.latest)
+        return m

@@ -1,0 +1,45 @@
+"""Wishbone."""
+
+from amaranth import Module, Signal
+from amaranth.lib import wiring
+
+from tachometry.hdl.bus.bridge import bridge_members
+from tachometry.spec.registers.map import RegisterMap
+
+
+class WishboneBridge(wiring.Component):
+    """Wishbone B4 classic, 32 bits, byte addresses: an access is answered in the clock after it, by ack or by err.
+
+    A write without byte 0 changes nothing.
+
+    Parameters
+    ----------
+    registers : RegisterMap
+
+    Members
+    -------
+    The ports of the bus, and
+
+    native : Out(native_port)
+    """
+
+    def __init__(self, registers: RegisterMap) -> None:
+        super().__init__(bridge_members("wishbone", registers))
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        native = self.native
+        access, answered = Signal(), Signal()
+        m.d.comb += [
+            access.eq(self.wb_cyc_i & self.wb_stb_i & ~answered),
+            native.address.eq(self.wb_adr_i >> 2),
+            native.read.eq(access & ~self.wb_we_i),
+            native.write.eq(access & self.wb_we_i & self.wb_sel_i[0]),
+            native.write_data.eq(self.wb_dat_i),
+            self.wb_dat_o.eq(native.read_data),
+            # A master that gives up in between is not answered.
+            self.wb_ack_o.eq(answered & self.wb_cyc_i & self.wb_stb_i & ~native.error),
+            self.wb_err_o.eq(answered & self.wb_cyc_i & self.wb_stb_i & native.error),
+        ]
+        m.d.sync += answered.eq(access)
+        return m

@@ -1,0 +1,49 @@
+"""The whole core on a bus."""
+
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.bus.bridge import NativeBridge
+from tachometry.hdl.bus.wishbone import WishboneBridge
+from tachometry.hdl.register_core import RegisterCore
+from tachometry.spec.registers.buses import BUSES
+from tachometry.spec.registers.map import RegisterMap
+
+# Bridges by the names of their buses.
+BRIDGES: dict[str, type[wiring.Component]] = {"native": NativeBridge, "wishbone": WishboneBridge}
+
+
+class BusTachometer(wiring.Component):
+    """A tachometer with its registers on a bus.
+
+    Parameters
+    ----------
+    registers : RegisterMap
+    bus : str
+        One of `spec.registers.buses.BUSES`.
+
+    Members
+    -------
+    The ports of the spec, less `clk` and `rst`, and those of the bus.
+    """
+
+    def __init__(self, registers: RegisterMap, bus: str) -> None:
+        self.core = RegisterCore(registers)
+        self.bridge = BRIDGES[bus](registers)
+        own = {name: member for name, member in self.core.signature.members.items() if name not in ("bus", "capture")}
+        flow = {"input": In, "output": Out}
+        super().__init__(
+            {**own, **{port.name: flow[port.direction](port.width) for port in BUSES[bus].ports(registers)}}
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.core = core = self.core
+        m.submodules.bridge = bridge = self.bridge
+        wiring.connect(m, bridge.native, core.bus)
+        for name, member in self.signature.members.items():
+            inner = getattr(bridge if name in bridge.signature.members else core, name)
+            own = getattr(self, name)
+            m.d.comb += inner.eq(own) if member.flow == In else own.eq(inner)
+        return m

@@ -1,0 +1,137 @@
+"""Golden registers: what a bank answers to accesses, from what the core shows."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tachometry.sim import golden
+from tachometry.sim.golden.front_end import decoded
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec.port import INDEX, TICK, UPDATE
+from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, RegisterMap
+
+
+@dataclass(frozen=True)
+class Access:
+    """One clock of the native port.
+
+    Parameters
+    ----------
+    clock : int
+    address : int
+        Of the word.
+    data : int or None
+        What is written; None: the access reads.
+    """
+
+    clock: int
+    address: int
+    data: int | None = None
+
+
+class GoldenBank:
+    """The bank of a core whose pins are driven so.
+
+    Parameters
+    ----------
+    registers : RegisterMap
+    trace : PinTrace
+    """
+
+    def __init__(self, registers: RegisterMap, trace: PinTrace) -> None:
+        self._map = registers
+        self._of_updates = {port.name for port in registers.ports if port.held_by == UPDATE and port.width > 1} - {
+            "velocity"
+        }
+        self._tables = golden.tables(registers.spec, trace)
+        ticks = self._tables[TICK]
+        strobes = {
+            "decode_errors": self._tables["decode_error"].clock,
+            "overflows": ticks.clock[ticks.overflow],
+            "tick_errors": self._tables["tick_error"].clock,
+        }
+        self._swallowed = decoded(registers.spec, trace).swallowed
+        self._events = {name: clocks for name, clocks in strobes.items() if name in registers.counted}
+
+    def answers(self, accesses: Sequence[Access], captures: Iterable[int] = ()) -> list[tuple[int | None, bool]]:
+        """Data and error of each access, in the order of their clocks; `captures` are clocks of the input `capture`.
+
+        None stands for data that are not defined: what belongs to an update, the velocity aside, before the first.
+        """
+        registers = self._map.registers
+        (capturing,) = (number for number, register in enumerate(registers) if register.captures)
+        self._captured: dict[str, int] = {}
+        self._known = False
+        self._captures: list[int] = []
+        self._cleared, hold = -1, 0
+        left = sorted(captures)
+        found: list[tuple[int | None, bool]] = []
+        for access in accesses:
+            while left and left[0] <= access.clock:
+                self._capture(left.pop(0))
+            register = registers[access.address] if access.address < len(registers) else None
+            if access.data is not None:
+                refused = register is None or register.name != "CONTROL"
+                if not refused:
+                    hold = access.data >> 1 & 1
+                    self._cleared = access.clock if access.data & 1 else self._cleared
+                found.append((0, refused))
+                continue
+            if access.address == capturing and not hold:
+                self._capture(access.clock)
+            found.append((0 if register is None else self._read(access, hold), register is None))
+        return found
+
+    def _capture(self, clock: int) -> None:
+        """Take what there is in a clock."""
+        if self._captures and self._captures[-1] == clock:
+            return
+        before = self._captures[-1] if self._captures else -1
+        taken: dict[str, int] = {}
+        for strobe in (TICK, UPDATE, INDEX):
+            table = self._tables[strobe]
+            row = int(np.searchsorted(table.clock, clock, side="right")) - 1
+            for name, column in table.columns.items():
+                taken[name] = int(column[row]) if row >= 0 else 0
+        since = {strobe: self._count(self._tables[strobe].clock, before, clock) for strobe in (UPDATE, INDEX)}
+        taken |= {"updated": int(since[UPDATE] > 0), "indexed": int(since[INDEX] > 0)}
+        ticks, updates = self._tables[TICK].clock, self._tables[UPDATE]
+        caused = updates.cause[updates.clock <= clock]
+        age = self._count(ticks, int(caused[-1]) if len(caused) else -1, clock)
+        taken["age"] = min(age, self._map.spec.timing.max_ticks)
+        # The core is cleared in the clock after.
+        glitches = self._count(self._swallowed, self._cleared + 1, clock)
+        taken["swallowed_edges"] = 2 * min(glitches, (1 << 15) - 1)
+        self._known = clock >= updates.clock[0] if len(updates) else False
+        self._captured = taken
+        self._captures.append(clock)
+
+    @staticmethod
+    def _count(clocks: np.ndarray, after: int, until: int) -> int:
+        """Clocks in (after, until]."""
+        return int(np.searchsorted(clocks, until, side="right") - np.searchsorted(clocks, after, side="right"))
+
+    def _lost(self, until: int) -> int:
+        """Updates since the counters were cleared that came when one waited for a capture."""
+        clocks = self._tables[UPDATE].clock
+        before = np.append(-1, clocks[:-1])
+        captures = np.array([-1, *self._captures])
+        latest = captures[np.searchsorted(captures, clocks) - 1]  # strictly before each
+        lost = clocks[(before > latest) & (before >= 0)]
+        return self._count(lost, self._cleared, until)
+
+    def _read(self, access: Access, hold: int) -> int | None:
+        register = self._map.registers[access.address]
+        if self._captures and not self._known and {field.port for field in register.fields} & self._of_updates:
+            return None
+        shown = {"clear": 0, "hold": hold, **self._captured}
+        if register.name == "COUNTERS":
+            shown |= {name: self._count(clocks, self._cleared, access.clock) for name, clocks in self._events.items()}
+            shown["lost_updates"] = self._lost(access.clock)
+            shown = {name: min(value, (1 << COUNTER_WIDTH) - 1) for name, value in shown.items()}
+        word = 0
+        for field in register.fields:
+            value = field.reset if register.constant else shown.get(field.port or field.name, 0)
+            word |= (value >> field.shift & (1 << field.width) - 1) << field.low
+        return word & (1 << WORD) - 1

@@ -1,0 +1,1 @@
+"""Registers of a core on a bus, and the files that describe them."""

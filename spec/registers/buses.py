@@ -1,0 +1,101 @@
+"""Buses on which the registers of a core can be read: their ports."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from tachometry.spec.option import ParameterError
+from tachometry.spec.port import Port
+from tachometry.spec.registers.map import WORD, RegisterMap
+
+
+@dataclass(frozen=True)
+class Bus:
+    """How registers are accessed.
+
+    Parameters
+    ----------
+    name : str
+    help : str
+        What it is, for --help.
+    lines : tuple of Port
+        Ports that it adds to the core; one of width 0 is an address, as wide as the registers need.
+    words : bool
+        The address is that of a word, not of a byte.
+    idle : mapping of str to int
+        Levels of inputs that are not 0 when nothing happens.
+    asynchronous : tuple of str
+        Inputs that are not of the clock domain.
+    """
+
+    name: str
+    help: str
+    lines: tuple[Port, ...]
+    words: bool = False
+    idle: Mapping[str, int] = field(default_factory=dict)
+    asynchronous: tuple[str, ...] = ()
+
+    def ports(self, registers: RegisterMap) -> tuple[Port, ...]:
+        """Ports that it adds to a core with these registers."""
+        width = registers.address_width - (WORD // 8 - 1).bit_length() * self.words
+        return tuple(
+            Port(port.name, port.direction, port.width or width, help=port.help) for port in (CAPTURE, *self.lines)
+        )
+
+
+def _into(name: str, width: int, help: str) -> Port:
+    return Port(name, "input", width, help=help)
+
+
+def _out(name: str, width: int, help: str) -> Port:
+    return Port(name, "output", width, help=help)
+
+
+_ADDRESS = 0
+CAPTURE = _into("capture", 1, "Registers capture the core in every clock in which it is high; of the clock's domain.")
+
+BUSES = {
+    bus.name: bus
+    for bus in (
+        Bus(
+            "native",
+            "a port without a protocol: an access a clock, answered in the clock after",
+            (
+                _into("reg_address", _ADDRESS, "Word of the access."),
+                _into("reg_read", 1, "Read in this clock."),
+                _into("reg_write", 1, "Write in this clock; not together with reg_read."),
+                _into("reg_write_data", WORD, "What is written."),
+                _out("reg_read_data", WORD, "What was read in the clock before; else 0."),
+                _out("reg_error", 1, "In the clock before, there was no such register, or it could not be written."),
+            ),
+            words=True,
+        ),
+        Bus(
+            "wishbone",
+            "Wishbone B4, classic cycles, 32 bits",
+            (
+                _into("wb_adr_i", _ADDRESS, "Byte address; its two lowest bits are ignored."),
+                _into("wb_dat_i", WORD, "Data to be written."),
+                _out("wb_dat_o", WORD, "Data read, valid with wb_ack_o."),
+                _into("wb_sel_i", WORD // 8, "Bytes to be written."),
+                _into("wb_we_i", 1, "Write, not read."),
+                _into("wb_cyc_i", 1, "A bus cycle is under way."),
+                _into("wb_stb_i", 1, "An access is wanted."),
+                _out("wb_ack_o", 1, "The access is done."),
+                _out("wb_err_o", 1, "The access is done, and there is no such register, or it cannot be written."),
+            ),
+        ),
+    )
+}
+
+
+def bus_of(name: str) -> Bus | None:
+    """The bus of a name; None for `none`.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of this name.
+    """
+    if name != "none" and name not in BUSES:
+        raise ParameterError("bus", f"must be one of none, {', '.join(BUSES)}, not {name!r}")
+    return BUSES.get(name)

@@ -1,0 +1,252 @@
+"""What stands in which register of a core on a bus: the one list that gates, drivers and documents read.
+
+The registers follow from the ports of the core. A port of several bits has a register of its own, extended to 32 bits
+by its sign or by zeros, or two of them if it is wider; ports of one bit are flags of STATUS. Offsets are in bytes.
+
+A capture takes all of these in one clock: the position and whatever else belongs to a tick is of the latest tick, the
+velocity and whatever belongs to an update is of the latest update, and the age says how many ticks lie between them.
+Reading the first captured register, VELOCITY, captures, and the others keep what was captured until the next capture.
+Before the first update the velocity is 0, and whatever else of several bits belongs to an update is not defined.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from tachometry.spec.manifest import manifest
+from tachometry.spec.port import INDEX, TICK, UPDATE, Port
+from tachometry.spec.tachometer import TachometerSpec
+
+WORD = 32  # bits
+IDENTIFICATION = int.from_bytes(b"TACH", "big")
+COUNTER_WIDTH = 8  # bits of each counter of COUNTERS
+
+_LIVE = (TICK, UPDATE, INDEX)  # what is captured is new with these strobes
+
+
+@dataclass(frozen=True)
+class Field:
+    """Some bits of a register.
+
+    Parameters
+    ----------
+    name : str
+    width : int
+        Bits.
+    low : int
+        The lowest of them.
+    help : str
+    writable : bool
+        A write changes it; else a write has no effect on it.
+    single : bool
+        Writing 1 has an effect in that clock, and it reads 0.
+    reset : int
+        Its value after reset; of a constant, its value.
+    signed : bool
+        The register is in two's complement.
+    unit : str
+        What one LSB is.
+    port : str
+        The port that it shows, if it shows one.
+    shift : int
+        The bit of the port that is its lowest.
+    """
+
+    name: str
+    width: int
+    low: int = 0
+    help: str = ""
+    writable: bool = False
+    single: bool = False
+    reset: int = 0
+    signed: bool = False
+    unit: str = ""
+    port: str = ""
+    shift: int = 0
+
+    @property
+    def mask(self) -> int:
+        """Its bits within the register."""
+        return ((1 << self.width) - 1) << self.low
+
+    @property
+    def access(self) -> str:
+        """`ro`, `rw`, or `wo` of a bit that acts when 1 is written."""
+        return "wo" if self.single else "rw" if self.writable else "ro"
+
+
+@dataclass(frozen=True)
+class Register:
+    """A word of 32 bits.
+
+    Parameters
+    ----------
+    name : str
+    offset : int
+        Bytes.
+    help : str
+    fields : tuple of Field
+        Bits of none of them read 0.
+    captured : bool
+        It keeps what it shows until the next capture.
+    captures : bool
+        Reading it captures first, unless CONTROL.hold is set.
+    constant : bool
+        It never changes.
+    """
+
+    name: str
+    offset: int
+    help: str
+    fields: tuple[Field, ...]
+    captured: bool = False
+    captures: bool = False
+    constant: bool = False
+
+    @property
+    def writable(self) -> bool:
+        """Whether a write is no error."""
+        return any(field.writable for field in self.fields)
+
+    @property
+    def reset(self) -> int:
+        """What is read after reset, before any capture."""
+        return sum(field.reset << field.low for field in self.fields)
+
+
+@dataclass(frozen=True)
+class RegisterMap:
+    """All registers of a core.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    """
+
+    spec: TachometerSpec
+
+    @cached_property
+    def registers(self) -> tuple[Register, ...]:
+        """In the order of their offsets, which follow each other without a gap."""
+        drafts = (*self._head(), *self._captured())
+        return tuple(
+            Register(name, number * WORD // 8, help, fields, **more)
+            for number, (name, help, fields, more) in enumerate(drafts)
+        )
+
+    def __iter__(self) -> Iterator[Register]:
+        return iter(self.registers)
+
+    def __getitem__(self, name: str) -> Register:
+        for register in self.registers:
+            if register.name == name:
+                return register
+        raise KeyError(name)
+
+    @property
+    def address_width(self) -> int:
+        """Bits of the address of a byte; at the highest address there is no register."""
+        return (len(self.registers) * WORD // 8).bit_length()
+
+    @cached_property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs of the core that are captured."""
+        return tuple(port for port in self.spec.outputs if port.held_by in _LIVE and not port.is_strobe)
+
+    @cached_property
+    def counted(self) -> dict[str, str]:
+        """Fields of COUNTERS, each with what it counts."""
+        found = {"decode_errors": "Clocks in which both lines changed at once."}
+        found["overflows"] = "Ticks whose pulse_count was saturated."
+        found["lost_updates"] = "Updates of the velocity that no capture has shown."
+        if self.spec.max_tick_cycles:
+            found["tick_errors"] = "External ticks that were missing or came too early."
+        return found
+
+    @cached_property
+    def configuration(self) -> int:
+        """A hash of all that a driver relies on: a driver that was made for one core refuses another."""
+        described = [manifest(self.spec), [(name, help) for name, help, *_ in self._captured()]]
+        return int.from_bytes(hashlib.sha256(json.dumps(described, sort_keys=True).encode()).digest()[:4], "big")
+
+    def described(self) -> dict[str, Any]:
+        """What the manifest says of the registers."""
+        return {
+            "word_bits": WORD,
+            "identification": IDENTIFICATION,
+            "configuration": self.configuration,
+            "map": [
+                {
+                    "name": register.name,
+                    "offset": register.offset,
+                    "captured": register.captured,
+                    "captures": register.captures,
+                    "fields": [
+                        {
+                            **{key: getattr(field, key) for key in ("name", "low", "width", "access", "reset")},
+                            **{key: getattr(field, key) for key in ("signed", "unit", "port", "shift")},
+                        }
+                        for field in register.fields
+                    ],
+                }
+                for register in self.registers
+            ],
+        }
+
+    def _head(self) -> Iterable[tuple[str, str, tuple[Field, ...], dict[str, bool]]]:
+        yield (
+            *("IDENTIFICATION", "Says that a tachometer answers: the letters TACH.", (_constant(IDENTIFICATION),)),
+            {"constant": True},
+        )
+        yield (
+            *("CONFIGURATION", "Says which: the configuration of the manifest, another for every other core."),
+            *((_constant(self.configuration),), {"constant": True}),
+        )
+        clear = "Writing 1 sets all counters to 0."
+        hold = "Reading VELOCITY does not capture; the input capture still does."
+        yield (
+            *("CONTROL", "What a driver may change."),
+            (
+                Field("clear", 1, 0, clear, writable=True, single=True),
+                Field("hold", 1, 1, hold, writable=True),
+            ),
+            {},
+        )
+        counters = (
+            Field(name, COUNTER_WIDTH, place * COUNTER_WIDTH, f"{help} It stays at {(1 << COUNTER_WIDTH) - 1}.")
+            for place, (name, help) in enumerate(self.counted.items())
+        )
+        yield "COUNTERS", "What went wrong since reset or CONTROL.clear; not captured.", tuple(counters), {}
+
+    def _captured(self) -> Iterable[tuple[str, str, tuple[Field, ...], dict[str, bool]]]:
+        values = [port for port in self.ports if port.width > 1]
+        for port in values:
+            more = {"captured": True}
+            words = range(0, port.width, WORD)
+            for word in words:
+                name = port.name.upper() + ("_HIGH" if word else "_LOW" if len(words) > 1 else "")
+                low = "" if len(words) == 1 else "Upper word. " if word else "Lower word. "
+                field = Field(
+                    *("value", WORD), help=port.help, signed=port.signed, unit=port.unit, port=port.name, shift=word
+                )
+                first = port is values[0] and not word
+                yield name, f"{low}{port.help}", (field,), {**more, "captures": first}
+            if port is values[0]:
+                yield "STATUS", "Flags of what was captured.", tuple(self._flags()), more
+
+    def _flags(self) -> Iterable[Field]:
+        events = {"updated": "There was an update of the velocity since the capture before."}
+        if self.spec.index:
+            events["indexed"] = "There was an index since the capture before."
+        flags = [*events.items()] + [(port.name, port.help) for port in self.ports if port.width == 1]
+        for place, (name, help) in enumerate(flags):
+            yield Field(name, 1, place, help, port="" if name in events else name)
+
+
+def _constant(value: int) -> Field:
+    return Field("value", WORD, reset=value)

@@ -1,0 +1,94 @@
+"""Registers against their golden model, on random motions with random accesses and captures."""
+
+import numpy as np
+import pytest
+from support.lockstep import random_case
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl import register_core
+from tachometry.hdl.bus import bank, tick_position
+from tachometry.sim.golden.registers import Access, GoldenBank
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec import METHODS
+from tachometry.spec.registers.map import RegisterMap
+
+CLOCKS, SEEDS = 2500, range(6)
+
+
+def random_accesses(registers: RegisterMap, seed: int, n_clocks: int) -> tuple[list[Access], list[int]]:
+    """Accesses and captures, some of them in clocks one after the other, some rare."""
+    rng = np.random.default_rng(seed)
+    clocks = np.flatnonzero(rng.random(n_clocks - 1) < rng.choice([0.03, 0.3, 1]))
+    words = (1 << registers.address_width - 2) - 1
+    accesses = []
+    for clock in clocks.tolist():
+        address = int(rng.integers(words + 1)) if rng.random() < 0.7 else registers["VELOCITY"].offset // 4
+        written = rng.random()
+        if written < 0.02:
+            address = registers["CONTROL"].offset // 4
+        data = int(rng.integers(1 << 32)) if written < 0.05 else None
+        accesses.append(Access(clock, address, data))
+    captures = np.flatnonzero(rng.random(n_clocks - 1) < rng.choice([0, 0.01, 0.3]))
+    return accesses, captures.tolist()
+
+
+def check(method: str, seed: int) -> None:
+    """One random core, its motion, accesses and captures."""
+    spec, _, trace = random_case(seed, method)
+    registers = RegisterMap(spec)
+    n_clocks = min(trace.n_clocks, CLOCKS)
+    accesses, captures = random_accesses(registers, seed, n_clocks)
+    rows: list[dict[str, int]] = [{"capture": 0, "bus.read": 0, "bus.write": 0} for _ in range(n_clocks)]
+    for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin.name] for pin in spec.pins), strict=True):
+        if clock < n_clocks:
+            rows[clock] |= {pin.name: int(level) for pin, level in zip(spec.pins, levels, strict=True)}
+    for clock in captures:
+        rows[clock]["capture"] = 1
+    for access in accesses:
+        kind = {"bus.read": 1} if access.data is None else {"bus.write": 1, "bus.write_data": access.data}
+        rows[access.clock] |= {"bus.address": access.address, **kind}
+    seen = clock_by_clock(register_core.RegisterCore(registers), rows, ["bus.read_data", "bus.error"])
+    short = PinTrace(trace.clock, trace.a, trace.b, n_clocks, trace.z, trace.tick_in)
+    answers = GoldenBank(registers, short).answers(accesses, captures)
+    for access, (data, error) in zip(accesses, answers, strict=True):
+        row = seen[access.clock + 1]
+        got = row["bus.read_data"] if data is not None else None, bool(row["bus.error"])
+        assert got == (data, error), f"{method}, seed {seed}, {access}: {got}, not {data}, {error}"
+
+
+BANK = bank.RegisterBank
+MUTANTS = {
+    "what is captured is not the latest": (
+        BANK,
+        "captured[name].eq(value) for",
+        "captured[name].eq(captured[name] ^ value) for",
+    ),
+    "hold does not hold": (BANK, "captures & ~hold", "captures"),
+    "hold keeps the input from capturing": (BANK, "self.capture | (bus", "(self.capture & ~hold) | (bus"),
+    "writing what can only be read is no error": (BANK, "(bus.write & ~writable)", "0"),
+    "an address without a register is no error": (BANK, "(bus.address >= len(self._map.registers))", "0"),
+    "hold is set by the other bit": (BANK, "hold.eq(bus.write_data[1])", "hold.eq(bus.write_data[0])"),
+    "an update waits that was captured": (BANK, "taken[flag] & ~capture", "taken[flag]"),
+    "every update is lost": (BANK, 'waiting["updated"] & self', "self"),
+    "overflow counts outside of ticks": (BANK, "self.tick & self.overflow", "self.overflow"),
+    "values are not extended by their sign": (BANK, "else value >> field", "else value.as_unsigned() >> field"),
+    "the position is that of now": (tick_position.TickPosition, "self.next - self.open_sum", "self.position"),
+    "the kept position is a tick old": (tick_position.TickPosition, "Mux(self.tick, self.position, kept)", "kept"),
+    "the age is that of the tick before": (register_core.RegisterCore, "update_age.after", "update_age.age"),
+    "glitches are not cleared": (register_core.RegisterCore, "clear.eq(bank.clear)", "clear.eq(0)"),
+}
+CATCHING = [("s", 0), ("rairan", 0), ("s", 1), ("rairan", 2), ("s", 4), ("s", 19)]  # one of these catches each
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(*MUTANTS[name]), caught():
+        for method, seed in CATCHING:
+            check(method, seed)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("method", METHODS)
+def test_registers_are_those_of_the_golden_model(method: str, seed: int) -> None:
+    check(method, seed)
