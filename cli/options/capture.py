@@ -64,12 +64,12 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
         **others: Any,
     ) -> Any:
         def read(capture: Path, spec: TachometerSpec) -> Recording:
-            from tachometry.sim.captures.read import read_capture
+            from tachometry.sim.captures.read import read_capture, with_last_tick
 
             index = "z" if z is None and spec.index else z
             tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
             rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
-            return read_capture(capture, a, b, rate, index, tick, time)
+            return with_last_tick(read_capture(capture, a, b, rate, index, tick, time), spec)
 
         if others.get("capture") is None:
             refuse_without("--replay", _OPTIONS)

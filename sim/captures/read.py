@@ -3,6 +3,7 @@
 import functools
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -11,6 +12,7 @@ from tachometry.sim.captures.sigrok import read_sr
 from tachometry.sim.captures.text import read_csv
 from tachometry.sim.captures.vcd import read_vcd
 from tachometry.sim.signals.recording import Recording
+from tachometry.spec import TachometerSpec
 
 
 class Reader(Protocol):
@@ -70,3 +72,15 @@ def read_capture(
         reader = functools.partial(read_csv, time=time)
     others = {name: channel for name, channel in (("z", z), ("tick_in", tick_in)) if channel is not None}
     return reader(path, a, b, samplerate_hz, others)
+
+
+def with_last_tick(recording: Recording, spec: TachometerSpec) -> Recording:
+    """A list of edges with the tick of its last edge: the levels after it hold until the core has shown this tick.
+
+    What ends later than with an edge ends where it says, and external ticks end with the capture.
+    """
+    if spec.max_tick_cycles or recording.duration > recording.time[-1]:
+        return recording
+    clocks = spec.pin_to_count + spec.longest_tick + spec.tick_latency + spec.tick_to_velocity
+    # One clock more for the edge, which is seen at the next one, and one for rounding.
+    return replace(recording, duration=recording.duration + (clocks + 2) / spec.timing.clock_hz)

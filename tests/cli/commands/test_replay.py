@@ -1,5 +1,7 @@
 """`tachometry replay`."""
 
+import itertools
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import Recording
 
+ROOT = Path(__file__).parents[3]
 CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
 
 
@@ -111,7 +114,7 @@ def test_what_cannot_be_is_told_in_one_line(
     write_csv(tmp_path / "c.csv", recorded())
     (tmp_path / "cut.sr").write_bytes((tmp_path / "c.sr").read_bytes()[:-40])
     (tmp_path / "cut.csv").write_text("time,a,b\n0.0,0,0\n0.1,1")
-    (tmp_path / "short.csv").write_text("time,a,b\n0.0,0,0\n0.00005,1,0\n")
+    (tmp_path / "short.csv").write_text("time,a,b\n0.0,0,0\n0.00001,1,0\n0.00005,1,0\n")
     (tmp_path / "text.sr").write_text("text")
     for empty in ("c.txt", "empty.csv"):
         (tmp_path / empty).write_text("")
@@ -130,6 +133,25 @@ def test_what_cannot_be_is_told_in_one_line(
     assert captured.err.count("\n") == 1
     assert message in captured.err
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_real_shaft_loses_no_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The command of docs/encoder.md, and the net of the edges, found from the file's rows alone."""
+    page = (ROOT / "docs" / "encoder.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"^tachometry (replay .*mouse.*)$", page, re.MULTILINE)
+    (tmp_path / "tests").symlink_to(ROOT / "tests")
+    monkeypatch.chdir(tmp_path)
+    assert run(*command.split()) == 0
+    rows = [line.split(",") for line in (ROOT / "tests/captures/wheel_turned_by_a_mouse.csv").read_text().split()[1:]]
+    quarters = ["00,10,11,01".split(",").index(a + b) for _, a, b in rows]
+    steps = [(after - before + 1) % 4 - 1 for before, after in itertools.pairwise(quarters)]
+    assert set(steps) <= {-1, 1}
+    said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert f"counts out {sum(steps)}" in said
+    assert sum(steps) == 3680
+    assert (tmp_path / "build" / "wheel.png").stat().st_size > 0
 
 
 def test_the_capture_is_an_argument(capsys: pytest.CaptureFixture[str]) -> None:
