@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from tachometry.cli.options.option import all_of, option, refuse_without
 from tachometry.spec import TachometerSpec
 from tachometry.spec.units import parse_frequency
@@ -32,6 +34,15 @@ _OPTIONS = [
         "--tick-in",
         metavar="CHANNEL",
         help="Channel of the external tick. [default: tick_in with --external-tick, else none]",
+    ),
+    option(
+        _CAPTURE,
+        "--sensor",
+        type=click.Choice(["quadrature", "pulses", "step-dir"]),
+        default="quadrature",
+        help="What was captured. pulses: only line A, as of a tooth wheel, which always turns forward; --decoding 2 "
+        "counts all edges, 1 the rising ones. step-dir: each rise of line A is a step, forward where line B is high; "
+        "four steps are one pulse of --ppr.",
     ),
     option(
         _CAPTURE,
@@ -61,15 +72,22 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
         tick_in: str | None,
         time: str | None,
         samplerate: str | None,
+        sensor: str,
         **others: Any,
     ) -> Any:
         def read(capture: Path, spec: TachometerSpec) -> Recording:
+            from tachometry.sim.captures.file import SAME, OptionError
+            from tachometry.sim.captures.other_sensors import converted
             from tachometry.sim.captures.read import read_capture, with_last_tick
 
             index = "z" if z is None and spec.index else z
             tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
             rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
-            return with_last_tick(read_capture(capture, a, b, rate, index, tick, time), spec)
+            if sensor == "pulses" and b is not None:
+                raise OptionError("b", "must not be given together with --sensor pulses")
+            line_b = SAME if sensor == "pulses" else b
+            recording = read_capture(capture, a, line_b, rate, index, tick, time)
+            return with_last_tick(converted(recording, sensor, spec), spec)
 
         if others.get("capture") is None:
             refuse_without("--replay", _OPTIONS)

@@ -10,6 +10,7 @@ from tachometry.sim.signals.recording import MAX_EDGES
 from tachometry.spec.option import ParameterError
 
 Channel = str | int
+SAME = -(1 << 16)  # as the channel of B: that of A
 NONE: Mapping[str, Channel] = {}
 
 
@@ -65,7 +66,8 @@ def choose_channels(
         Channels that the capture holds, in order; numbers count from 0, as sigrok's D0 to D7 do.
     a, b : str, int or None
         Name of the channel (in this spelling, else in any case, else without its scopes), else its number. When not
-        given: the channels named A and B if there are both, else the first two.
+        given: the channels named A and B if there are both, else the first two. With `SAME` for b there need not be
+        two.
     others : mapping of str to str or int
         Likewise, of further lines by their names.
 
@@ -75,11 +77,12 @@ def choose_channels(
         If there are fewer than two channels, if one is unknown, or if two are the same.
     """
     listed = ", ".join(f"{name} ({number})" for number, name in channels.items())
-    if len(channels) < 2:
-        raise CaptureError(f"{path} must have at least two logic channels, not {listed or 'none'}")
+    if len(channels) < (1 if b == SAME else 2):
+        needed = "one logic channel" if b == SAME else "two logic channels"
+        raise CaptureError(f"{path} must have at least {needed}, not {listed or 'none'}")
 
-    def find(wanted: Channel) -> int | None:
-        if isinstance(wanted, int):
+    def find(wanted: Channel | None) -> int | None:
+        if not isinstance(wanted, str):
             return wanted if wanted in channels else None
         exact = [number for number, name in channels.items() if name == wanted]
         alike = [number for number, name in channels.items() if name.casefold() == wanted.casefold()]
@@ -88,10 +91,12 @@ def choose_channels(
             return (exact or alike or last)[0]
         return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
 
-    default_a, default_b = find("A"), find("B")
-    if default_a is None or default_b is None:
-        default_a, default_b = list(channels)[:2]
-    wanted = {"a": default_a if a is None else a, "b": default_b if b is None else b} | dict(others)
+    one_line = b == SAME
+    defaults = [find("A"), find("A" if one_line else "B")]
+    if None in defaults:
+        defaults = [*channels, *channels][:2]
+    first, second = (default if given is None else given for default, given in zip(defaults, (a, b), strict=True))
+    wanted = {"a": first, "b": first if one_line else second, **others}
     numbers: dict[str, int] = {}
     for line, channel in wanted.items():
         number = find(channel)
@@ -99,7 +104,7 @@ def choose_channels(
             raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {channel!r}")
         numbers[line] = number
     for one, other in itertools.combinations(numbers, 2):
-        if (number := numbers[one]) == numbers[other]:
+        if (number := numbers[one]) == numbers[other] and not (one_line and other == "b"):
             raise CaptureError(
                 f"channels {one} and {other} of {path} must be two of {listed}, not both {channels[number]}"
             )

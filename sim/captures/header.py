@@ -108,9 +108,14 @@ def read_header(path: Path, file: BinaryIO, time: Channel | None, samplerate_hz:
         for number, name in zip(rest, _of_sigrok(comments, r"Channels \([0-9/]+\): (.*)").split(", "), strict=False):
             names[number] = name or names[number]
     shown = text if len(text) <= 60 else text[:60] + "..."
-    if len(rest) < 2 or "" in names or len(set(names)) < len(names) or all(map(_is_number, names)):
+    if (
+        len(rest) < (2 if column is None else 1)
+        or "" in names
+        or len(set(names)) < len(names)
+        or all(map(_is_number, names))
+    ):
         raise CaptureError(
-            f"header of {path} must name the columns, as time,a,b does: two channels at least, each name once, "
+            f"header of {path} must name the columns, as time,a,b does: one channel at least, each name once, "
             f"not {shown!r}"
         )
     in_file = parse_samplerate(path, _of_sigrok(comments, r"Samplerate: (.*)"))

@@ -157,10 +157,16 @@ def test_wrong_channels(tmp_path: Path, name: str) -> None:
     assert_error(path, "channels a and b of PATH must be two of A (0), B (1), Z (2), not both B", a="B")
 
 
-@pytest.mark.parametrize("header", ["", "time,a", "time;a", "time,a,a", "time,a,", "0,0,1", "0,1,2", "time a b"])
+@pytest.mark.parametrize("header", ["time,a", "time;a"])
+def test_csv_with_one_channel(tmp_path: Path, header: str) -> None:
+    make_csv(tmp_path / "x.csv", f"{header}\n0,0\n")
+    assert_error(tmp_path / "x.csv", "PATH must have at least two logic channels, not a (0)")
+
+
+@pytest.mark.parametrize("header", ["", "a", "time,a,a", "time,a,", "0,0,1", "0,1,2", "time a b"])
 def test_csv_header(tmp_path: Path, header: str) -> None:
     make_csv(tmp_path / "x.csv", f"{header}\n0,0,1\n")
-    wanted = "must name the columns, as time,a,b does: two channels at least, each name once"
+    wanted = "must name the columns, as time,a,b does: one channel at least, each name once"
     shown = header or "0,0,1"  # a blank line is none
     assert_error(tmp_path / "x.csv", f"header of PATH {wanted}, not {shown!r}")
 
@@ -178,7 +184,7 @@ def test_csv_header(tmp_path: Path, header: str) -> None:
         (
             "a,b\n0,0\n",
             {"time": "a"},
-            "header of PATH must name the columns, as time,a,b does: two channels at least, each name once, not 'a,b'",
+            "PATH must have at least two logic channels, not b (0)",
         ),
         (
             "Time [samples],a,b\n0,0,1\n",
