@@ -43,6 +43,7 @@ from tachometry.spec import (
     Timing,
     TTachometer,
 )
+from tachometry.spec.registers.buses import BUSES
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "size.md"
@@ -63,6 +64,8 @@ class Configuration:
     is_option : bool
         Whether the difference from the first configuration is what one option costs.
     targets : tuple of str
+    bus : str
+        On which its registers are, or `none`.
     """
 
     name: str
@@ -71,6 +74,7 @@ class Configuration:
     bars: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_option: bool = True
     targets: tuple[str, ...] = tuple(TARGETS)
+    bus: str = "none"
 
 
 # What methods are compared with: the defaults, and no max_speed.
@@ -86,6 +90,8 @@ RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
 ADAPTIVE_BARS = {"ECP5": {"COMB": 700, "MULT": 0, "Fmax": 100}}
 TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
 EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
+# The reference core, and 250 COMB and 100 FF for the bank.
+BUS_BARS = {"ECP5": {"COMB": 273 + 250, "FF": 220 + 100}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
 # The first is what the others are compared with.
@@ -107,6 +113,17 @@ CONFIGURATIONS = (
     Configuration("age", "ticks since the update", replace(REFERENCE, age=True)),
     Configuration("bounds", "bounds of the true speed", replace(REFERENCE, bounds=True)),
     Configuration("lowpass", "low-pass filter, 200 rad/s", replace(REFERENCE, lowpass=Fraction(200))),
+    *(
+        Configuration(
+            f"bus-{bus.name}",
+            f"registers on {bus.name}",
+            REFERENCE,
+            BUS_BARS if bus.name == "native" else {},
+            targets=("ECP5", "HX8K"),
+            bus=bus.name,
+        )
+        for bus in BUSES.values()
+    ),
     Configuration(
         "long",
         "at most 2^16 ticks (1.3 s)",
@@ -223,7 +240,7 @@ Results = Mapping[tuple[str, str], Measurement]
 
 def measure(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Measurement:
     """Synthesise, pack and route a core for a target."""
-    return measure_core(configuration.spec, TARGETS[target_name], verilog, tools)
+    return measure_core(configuration.spec, TARGETS[target_name], verilog, tools, configuration.bus)
 
 
 def box_name(cell: str) -> str:
@@ -352,7 +369,9 @@ def run(options: argparse.Namespace) -> int:
     tools = versions()
     chosen = [found for found in CONFIGURATIONS if options.only is None or found.name in options.only]
     work = [
-        (found, target, export(found.spec, CORE)[f"{CORE}.v"], tools) for found in chosen for target in found.targets
+        (found, target, export(found.spec, CORE, found.bus)[f"{CORE}.v"], tools)
+        for found in chosen
+        for target in found.targets
     ]
     with ThreadPoolExecutor(options.jobs) as pool:
         done = list(with_progress(pool.map(lambda item: measure(*item), work), len(work)))

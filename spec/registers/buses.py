@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import Port
 from tachometry.spec.registers.map import WORD, RegisterMap
+from tachometry.spec.tachometer import TachometerSpec
 
 
 @dataclass(frozen=True)
@@ -99,3 +100,9 @@ def bus_of(name: str) -> Bus | None:
     if name != "none" and name not in BUSES:
         raise ParameterError("bus", f"must be one of none, {', '.join(BUSES)}, not {name!r}")
     return BUSES.get(name)
+
+
+def ports_on(spec: TachometerSpec, name: str) -> tuple[Port, ...]:
+    """All ports of a core on a bus, or on `none`."""
+    bus = bus_of(name)
+    return spec.ports if bus is None else (*spec.ports, *bus.ports(RegisterMap(spec)))
