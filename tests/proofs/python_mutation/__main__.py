@@ -15,8 +15,12 @@ from support.report import row
 
 ROOT = Path(__file__).parents[3]
 LEAST = 0.95  # of the mutants that are not equivalent
-# Tests of what the mutated files decide; those of engines, pages and processes run them, too, but take long.
-TESTS = ("spec", "sim", "hdl/test_export.py", "hdl/output", "cli/options", "independent", "test_ports.py")
+# Tests of what the mutated files decide; those of engines, pages and processes run them, too, but take long. The gates
+# are what the golden models are held against.
+TESTS = (
+    *("spec", "sim", "hdl/test_export.py", "hdl/output", "hdl/methods", "hdl/bus", "cli/options", "independent"),
+    *("test_ports.py", "test_matrix.py"),
+)
 # Imported once, and shared by all forks.
 _WARM = ("numpy", "click", "rich.console", "rich.table", "amaranth.back.verilog", "amaranth.sim", "pytest", "vcd.gtkw")
 
