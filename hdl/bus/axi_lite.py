@@ -51,8 +51,8 @@ class AxiLiteBridge(wiring.Component):
             m.d.sync += [to_read.eq(self.s_axi_araddr >> 2), take_read.eq(~self.s_axi_arvalid)]
 
         # An access is made once: then its answer is there for a clock, and is kept until the master has taken it.
-        writes, written, write_done = Signal(), Signal(), Signal()
-        reads, has_read, read_done = Signal(), Signal(), Signal()
+        writes, written, write_done = (Signal(name=name) for name in ("writes", "written", "write_done"))
+        reads, has_read, read_done = (Signal(name=name) for name in ("reads", "has_read", "read_done"))
         m.d.comb += [
             writes.eq(~take_address & ~take_data & ~write_done),
             reads.eq(~take_read & ~read_done & ~writes),
