@@ -8,11 +8,12 @@ from tachometry.spec.registers.map import RegisterMap
 
 
 class AxiLiteBridge(wiring.Component):
-    """AXI4-Lite, 32 bits: a read and a write at a time, each answered two clocks after all of it was taken.
+    """AXI4-Lite, 32 bits, a read and a write at a time.
 
-    The write address and the write data are taken in any order. No output depends on an input of the same clock. An
-    access waits a clock at most for the other kind: writes go first, and the next write comes some clocks later.
-    A write without byte 0 changes nothing, and is no error.
+    The write address and the write data are taken in any order. The answer to a write is there three clocks after the
+    one in which the latter of them was taken, that to a read three or four clocks after its address. If both are to be
+    done at once, the write goes first; the next write comes some clocks later, so reads never wait for more than one.
+    No output depends on an input of the same clock. A write without byte 0 changes nothing, and is no error.
 
     Parameters
     ----------
