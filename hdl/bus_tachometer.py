@@ -4,6 +4,8 @@ from amaranth import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.bus.apb import ApbBridge
+from tachometry.hdl.bus.axi_lite import AxiLiteBridge
 from tachometry.hdl.bus.bridge import NativeBridge
 from tachometry.hdl.bus.wishbone import WishboneBridge
 from tachometry.hdl.register_core import RegisterCore
@@ -11,7 +13,12 @@ from tachometry.spec.registers.buses import BUSES
 from tachometry.spec.registers.map import RegisterMap
 
 # Bridges by the names of their buses.
-BRIDGES: dict[str, type[wiring.Component]] = {"native": NativeBridge, "wishbone": WishboneBridge}
+BRIDGES: dict[str, type[wiring.Component]] = {
+    "native": NativeBridge,
+    "wishbone": WishboneBridge,
+    "apb": ApbBridge,
+    "axi-lite": AxiLiteBridge,
+}
 
 
 class BusTachometer(wiring.Component):

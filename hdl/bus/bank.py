@@ -56,7 +56,7 @@ class RegisterBank(wiring.Component):
         here = {register.name: bus.address == number for number, register in enumerate(self._map)}
         writable = Cat(here[register.name] for register in self._map if register.writable).any()
         m.d.sync += bus.error.eq((bus.read & (bus.address >= len(self._map.registers))) | (bus.write & ~writable))
-        hold, capture, control = Signal(), Signal(), Signal()
+        hold, capture, control = (Signal(name=name) for name in ("hold", "captures", "control"))
         m.d.comb += [control.eq(bus.write & here["CONTROL"]), self.clear.eq(control & bus.write_data[0])]
         with m.If(control):
             m.d.sync += hold.eq(bus.write_data[1])
@@ -78,7 +78,7 @@ class RegisterBank(wiring.Component):
         counts = self._counts(m, lost=waiting["updated"] & self.velocity_valid)
         shown = {**captured, **counts, "clear": Const(0), "hold": hold}
         # What is kept for a clock is which register was read, not what it said; an address without a register reads 0.
-        chosen = Signal.like(bus.address, name="chosen")
+        chosen = Signal(bus.address.shape(), init=(1 << len(bus.address)) - 1)
         m.d.sync += chosen.eq(Mux(bus.read, bus.address, -1))
         answers = []
         for number, register in enumerate(self._map):

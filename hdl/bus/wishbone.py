@@ -29,7 +29,8 @@ class WishboneBridge(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         native = self.native
-        access, answered = Signal(), Signal()
+        access = Signal()
+        answered = Signal()
         m.d.comb += [
             access.eq(self.wb_cyc_i & self.wb_stb_i & ~answered),
             native.address.eq(self.wb_adr_i >> 2),

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import tachometry.hdl
+from tachometry.hdl.bus_tachometer import BRIDGES
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.sim.golden.methods import MODELS
 
@@ -35,7 +36,7 @@ def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
                 for name, value in list(vars(user).items()):
                     if value is box:
                         patch.setattr(user, name, getattr(changed, box.__name__))
-        tables: tuple[dict[str, Any], ...] = (DATAPATHS, MODELS)
+        tables: tuple[dict[str, Any], ...] = (DATAPATHS, MODELS, BRIDGES)
         for table in tables:
             for method, used in table.items():
                 if used is box:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
+from proofs.formal.buses import ON_BUSES
 from proofs.formal.prove import Proof
 
 from tachometry.spec import (
@@ -370,4 +371,5 @@ PROOFS = [
     after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_stalled"),
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
+    *ON_BUSES,
 ]

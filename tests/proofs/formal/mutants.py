@@ -8,6 +8,10 @@ from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.bus.axi_lite import AxiLiteBridge
+from tachometry.hdl.bus.bank import RegisterBank
+from tachometry.hdl.bus.tick_position import TickPosition
+from tachometry.hdl.bus.wishbone import WishboneBridge
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
@@ -187,4 +191,31 @@ MUTANTS = [
         "compared & nearer",
     ),
     Mutant("upset, M/T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant("wishbone", "pb_error", RegisterBank, "(bus.address >= len(self._map.registers))", "0"),
+    Mutant("wishbone", "pb_read", RegisterBank, "init=(1 << len(bus.address)) - 1", "init=0"),
+    Mutant("wishbone", "pb_snapshot", RegisterBank, "self.capture | (bus.read", "(bus.read"),
+    Mutant("axi-lite", "pb_snapshot", RegisterBank, "waits | getattr(self, _EVENTS[flag])", "waits | Const(0)"),
+    Mutant("axi-lite", "pb_snapshot", TickPosition, "self.next - self.open_sum", "self.position"),
+    Mutant("axi-lite", "pb_write", RegisterBank, 'bus.write & here["CONTROL"]', "bus.write"),
+    Mutant("wishbone", "pw_access", WishboneBridge, "self.wb_we_i & self.wb_sel_i[0]", "self.wb_we_i"),
+    Mutant(
+        "wishbone",
+        "pw_answer",
+        WishboneBridge,
+        "ack_o.eq(answered & self.wb_cyc_i & self.wb_stb_i",
+        "ack_o.eq(answered",
+    ),
+    Mutant("wishbone", "pw_error", RegisterBank, "(bus.write & ~writable)", "0"),
+    Mutant("wishbone", "pw_data", WishboneBridge, "eq(native.read_data)", "eq(native.read_data >> 1)"),
+    Mutant("axi-lite", "pa_ready", AxiLiteBridge, "write_done.eq(0), take_address.eq(1)", "write_done.eq(0)"),
+    Mutant("axi-lite", "pa_write", AxiLiteBridge, "writes & by_byte_0", "writes"),
+    Mutant("axi-lite", "pa_read", AxiLiteBridge, "~take_read & ~read_done", "~take_read"),
+    Mutant(
+        "axi-lite", "pa_turn", AxiLiteBridge, "& ~read_done & ~writes", "& ~read_done & ~writes & ~self.s_axi_awvalid"
+    ),
+    Mutant("axi-lite", "pa_bound", AxiLiteBridge, "m.If(has_read)", "m.If(has_read & self.s_axi_rready)"),
+    Mutant("axi-lite", "pa_only", AxiLiteBridge, "[self.s_axi_rvalid.eq(0), read_done", "[read_done"),
+    Mutant("axi-lite", "pa_stable", AxiLiteBridge, "self.s_axi_rvalid & self.s_axi_rready", "self.s_axi_rvalid"),
+    Mutant("axi-lite", "pa_written", AxiLiteBridge, "bresp.eq(slave_error)", "bresp.eq(0)"),
+    Mutant("axi-lite", "pa_data", AxiLiteBridge, "rdata.eq(native.read_data)", "rdata.eq(native.read_data >> 1)"),
 ]

@@ -70,6 +70,8 @@ class Proof:
     recovers : int
         If not 0, and instead of the induction: from any state, not that of a reset, the assertions hold for `depth`
         clocks after so many.
+    bus : str
+        The bus for the registers of the core, or `none`.
     """
 
     name: str
@@ -83,13 +85,14 @@ class Proof:
     given: str = ""
     max_table: int | None = None
     recovers: int = 0
+    bus: str = "none"
 
     def exported(self) -> str:
         """The Verilog of the core, as the mutants of this moment have it."""
         if self.max_table is None:
-            return export(self.spec)["tachometer.v"]
+            return export(self.spec, bus=self.bus)["tachometer.v"]
         with patch("tachometry.spec.methods.s.MAX_TABLE", self.max_table):
-            return export(self.spec)["tachometer.v"]
+            return export(self.spec, bus=self.bus)["tachometer.v"]
 
 
 @dataclass(frozen=True)
