@@ -74,79 +74,78 @@ class UartBridge(wiring.Component):
         part, number = Signal(2), Signal(2)
         header, address = Signal(8), Signal(UART_ADDRESS_WIDTH)
         count, word, check = Signal(COUNT_WIDTH), Signal(WORD), Signal(CRC_WIDTH)
-        bad, error, asked, more = Signal(), Signal(), Signal(), Signal()
+        bad, error, asked, more, right = Signal(), Signal(), Signal(), Signal(), Signal()
         out, bit, wrong = Signal(), Signal(), Signal()
+        in_header, in_address, in_data, in_check = ((part == one) for one in range(4))
         writing = header[TYPE_LOW]
         m.d.comb += [
+            out.eq(
+                (in_header & (header[0] | (place == FROM_CORE + 1)))
+                | (in_address & error & (place == 1))
+                | (in_data & word[0])
+                | (in_check & check[-1])
+            ),
             bit.eq(Mux(sending, out, line)),
             wrong.eq(bit ^ check[-1]),
             more.eq(~writing & count.any()),
         ]
-        with m.Switch(part):
-            with m.Case(_HEADER):
-                m.d.comb += out.eq(header[0] | (place == FROM_CORE + 1))
-            with m.Case(_ADDRESS):
-                m.d.comb += out.eq(error & (place == 1))
-            with m.Case(_DATA):
-                m.d.comb += out.eq(word[0])
-            with m.Case(_CHECK):
-                m.d.comb += out.eq(check[-1])
         with m.If(bit_there):
             m.d.sync += check.eq((check << 1) ^ (wrong.replicate(CRC_WIDTH) & CRC_POLYNOMIAL))
-            with m.Switch(part):
-                with m.Case(_HEADER):
-                    m.d.sync += header.eq(Cat(header[1:], bit))
-                    with m.If(~sending & bit & (place > TYPE_LOW + 1)):
-                        m.d.sync += bad.eq(1)
-                with m.Case(_ADDRESS):
-                    m.d.sync += address.eq(Cat(address[1:], bit))
-                with m.Case(_DATA):
-                    m.d.sync += word.eq(Cat(word[1:], bit))
-                    with m.If(~sending):
-                        m.d.sync += count.eq(Cat(count[1:], bit))
-                with m.Case(_CHECK), m.If(wrong):
-                    m.d.sync += bad.eq(1)
-        with m.If(beat & (place == 0) & (part == _HEADER)):
+            with m.If(in_header):
+                m.d.sync += header.eq(Cat(header[1:], bit))
+            with m.If(in_data):
+                m.d.sync += word.eq(Cat(word[1:], bit))
+            with m.If((in_header & ~sending & bit & (place > TYPE_LOW + 1)) | (in_check & wrong)):
+                m.d.sync += bad.eq(1)
+        with m.If(beat & (place == 0) & in_header):
             m.d.sync += check.eq(CRC_START)
 
+        # While the first byte of a word is sent, address and count go round, and are counted on and down bit by bit.
+        carry, borrow, counting = Signal(), Signal(), Signal()
+        m.d.comb += counting.eq(sending & in_data & (number == 0))
+        with m.If(bit_there & (in_address | counting)):
+            m.d.sync += [
+                address.eq(Cat(address[1:], Mux(sending, address[0] ^ carry, line))),
+                carry.eq(carry & address[0]),
+            ]
+        with m.If(bit_there & in_data & (counting | ~sending)):
+            m.d.sync += [count.eq(Cat(count[1:], Mux(sending, count[0] ^ borrow, line))), borrow.eq(borrow & ~count[0])]
         with m.If(ended):
-            m.d.sync += number.eq(0)
+            m.d.sync += [carry.eq(1), borrow.eq(1)]
+
+        word_ends = in_data & (number == 3)
+        done = in_check & number[0]
+        with m.If(ended):
+            m.d.sync += number.eq(number + 1)
+            with m.If(in_header | in_address | word_ends | (in_data & ~sending & ~writing) | done):
+                m.d.sync += number.eq(0)
+                # An answer has its words before its status, a request its address before its data.
+                m.d.sync += part.eq(
+                    Mux(
+                        sending,
+                        Mux(in_check, _HEADER, Mux(in_address, _CHECK, Mux(more, _DATA, _ADDRESS))),
+                        part + 1,
+                    )
+                )
             with m.If(~sending & ~line):
                 m.d.sync += bad.eq(1)
-            with m.Switch(part):
-                with m.Case(_HEADER):
-                    m.d.sync += part.eq(Mux(sending & more, _DATA, _ADDRESS))
-                with m.Case(_ADDRESS):
-                    m.d.sync += part.eq(Mux(sending, _CHECK, _DATA))
-                with m.Case(_DATA):
-                    with m.If((number == 3) | (~sending & ~writing)):
-                        m.d.sync += part.eq(Mux(~sending, _CHECK, Mux(more, _DATA, _ADDRESS)))
-                    with m.Else():
-                        m.d.sync += number.eq(number + 1)
-                with m.Case(_CHECK):
-                    with m.If(number[0]):
-                        m.d.sync += part.eq(_HEADER)
-                        with m.If(sending):
-                            m.d.sync += [sending.eq(0), error.eq(0)]
-                        with m.Elif(~bad & line):
-                            m.d.sync += [sending.eq(1), place.eq(0)]
-                            m.d.comb += native.write.eq(writing)
-                    with m.Else():
-                        m.d.sync += number.eq(1)
+            with m.If(done):
+                m.d.sync += [sending.eq(right), error.eq(0)]
+                with m.If(right):
+                    m.d.sync += place.eq(0)
         with m.If(beat & ~busy & (place == QUIET_BITS - 1)):
             m.d.sync += [part.eq(_HEADER), number.eq(0), bad.eq(0)]
 
         words = len(native.address)
-        next_word = (part == _HEADER) | ((part == _DATA) & (number == 3))
         m.d.comb += [
+            right.eq(~sending & ~bad & line),
             # At the highest address there is no register.
             native.address.eq(address[:words] | address[words:].any().replicate(words)),
-            native.read.eq(ended & sending & next_word & more),
+            native.read.eq(ended & sending & (in_header | word_ends) & more),
+            native.write.eq(ended & done & right & writing),
             native.write_data.eq(word),
         ]
         m.d.sync += asked.eq(native.read | native.write)
-        with m.If(native.read):
-            m.d.sync += [address.eq(address + 1), count.eq(count - 1)]
         with m.If(asked):
             m.d.sync += [word.eq(native.read_data), error.eq(error | native.error)]
 

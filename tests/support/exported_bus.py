@@ -1,5 +1,4 @@
-"""The exported Verilog of a core on serial lines, in Icarus and in Verilator, with its registers held against the golden
-ones."""
+"""The exported Verilog of a core on serial lines, in Icarus and in Verilator, held against the golden registers."""
 
 import subprocess
 from collections.abc import Callable
@@ -134,7 +133,7 @@ def motion(n_clocks: int, seed: int) -> PinTrace:
 
 
 def check(simulate: Simulate, host: Host, bus: str, output: str, folder: Path, baud: int | None = None) -> None:
-    """Let a host play on the exported core while the encoder turns; all that comes back must be the golden registers."""
+    """Let a host play on the exported core while the encoder turns; what comes back must be the golden registers."""
     n_clocks = int(host.time) + 100
     trace = motion(n_clocks, seed=len(host.accesses))
     captures = np.flatnonzero(host.rng.random(n_clocks) < 0.0005)
