@@ -3,7 +3,7 @@
 from amaranth import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
 
-from tachometry.hdl.bus.bridge import bridge_members
+from tachometry.hdl.bus.bridge import bridge_members, next_number
 from tachometry.hdl.front_end.synchronizer import Synchronizer
 from tachometry.spec.registers.frames import SPI_ADDRESS_WIDTH
 from tachometry.spec.registers.map import WORD, RegisterMap
@@ -55,17 +55,22 @@ class SpiBridge(wiring.Component):
         address, writing, word = Signal(SPI_ADDRESS_WIDTH), Signal(), Signal(WORD)
         error, asked, whole = Signal(), Signal(), Signal()
         in_word = count[5]
+        byte_ends = count[:3].all()
         with m.If(rise):
-            m.d.sync += count.eq(count + 1)
-            with m.If(~in_word & count[:3].all()):
-                m.d.sync += [count.eq(Mux(command & ~address[-1], 0, 32)), command.eq(0)]
+            m.d.sync += [
+                count.eq(next_number(count)),
+                count[3].eq(count[3] ^ (in_word & byte_ends)),
+                # From the command a write goes on with the word, and a read with status.
+                in_word.eq(Mux(in_word, ~count[:5].all(), byte_ends & (address[-1] | ~command))),
+                command.eq(command & ~byte_ends),
+            ]
             with m.If(command):
                 m.d.sync += Cat(address, writing).eq(Cat(mosi, address))
             with m.If(in_word):
                 m.d.sync += word.eq(Cat(mosi, word))
         m.d.sync += whole.eq(rise & count.all())
         with m.If(whole):
-            m.d.sync += address.eq(address + 1)
+            m.d.sync += address.eq(next_number(address))
 
         words = len(native.address)
         m.d.comb += [
@@ -79,7 +84,7 @@ class SpiBridge(wiring.Component):
         with m.If(asked):
             m.d.sync += [error.eq(native.error), word.eq(native.read_data)]
 
-        status = (count[:3] == 0) | (count[:3].all() & error)
+        status = (count[:3] == 0) | (byte_ends & error)
         with m.If(fall):
             m.d.sync += self.spi_miso.eq(~command & Mux(in_word, word[-1] & ~writing, status))
         with m.If(~selected):

@@ -3,7 +3,7 @@
 from amaranth import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
 
-from tachometry.hdl.bus.bridge import bridge_members
+from tachometry.hdl.bus.bridge import bridge_members, next_number
 from tachometry.hdl.front_end.synchronizer import Synchronizer
 from tachometry.spec.registers.frames import (
     COUNT_WIDTH,
@@ -64,7 +64,7 @@ class UartBridge(wiring.Component):
         ]
         m.d.sync += timer.eq(Mux(beat, cycles - 1, timer - 1))
         with m.If(beat):
-            m.d.sync += place.eq(Mux(sending & (place == _STOP), 0, place + 1))
+            m.d.sync += place.eq(Mux(sending & (place == _STOP), 0, next_number(place)))
         with m.If(~busy & ~line):
             m.d.sync += [receiving.eq(1), place.eq(0), timer.eq(cycles // 2 - 1)]
         with m.If(ended | (beat & (place == 0) & line)):  # the latter is no start bit
@@ -116,7 +116,7 @@ class UartBridge(wiring.Component):
         word_ends = in_data & (number == 3)
         done = in_check & number[0]
         with m.If(ended):
-            m.d.sync += number.eq(number + 1)
+            m.d.sync += number.eq(next_number(number))
             with m.If(in_header | in_address | word_ends | (in_data & ~sending & ~writing) | done):
                 m.d.sync += number.eq(0)
                 # An answer has its words before its status, a request its address before its data.
@@ -124,7 +124,7 @@ class UartBridge(wiring.Component):
                     Mux(
                         sending,
                         Mux(in_check, _HEADER, Mux(in_address, _CHECK, Mux(more, _DATA, _ADDRESS))),
-                        part + 1,
+                        next_number(part),
                     )
                 )
             with m.If(~sending & ~line):
