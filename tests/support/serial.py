@@ -5,6 +5,7 @@ sampled there or a clock later.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
@@ -20,7 +21,7 @@ Golden = Sequence[tuple[int | None, bool]]  # data and error of each access
 _MARGIN = 0.99  # clocks before sck rises in which miso is there: those of pads and board
 
 
-class Host:
+class Host(ABC):
     """What both have: levels of lines, and the accesses that they make.
 
     Parameters
@@ -62,6 +63,10 @@ class Host:
         """Note an access; its number."""
         self.accesses.append(Access(clock, min(address, self._last), data))
         return len(self.accesses) - 1
+
+    @abstractmethod
+    def check(self, output: NDArray[np.uint8], answers: Golden) -> None:
+        """What the core has sent, a level for each clock, must follow from what the accesses have answered."""
 
 
 class SpiHost(Host):
@@ -130,7 +135,7 @@ class SpiHost(Host):
         n_bits = int(rng.integers(whole)) if rng.random() < 0.15 else whole
         self.frame(sent, n_bits, low, high)
 
-    def check(self, miso: NDArray[np.uint8], answers: Golden) -> None:
+    def check(self, output: NDArray[np.uint8], answers: Golden) -> None:
         """All samples of miso must be what the accesses have answered."""
         for clock, value in self.samples:
             if isinstance(value, tuple):
@@ -140,7 +145,7 @@ class SpiHost(Host):
                 wanted = int(error) if value[1] < 0 else (data or 0) >> value[1] & 1
             else:
                 wanted = value
-            assert miso[clock] == wanted, f"clock {clock}, {value}: {miso[clock]}, not {wanted}"
+            assert output[clock] == wanted, f"clock {clock}, {value}: {output[clock]}, not {wanted}"
 
 
 class UartHost(Host):
@@ -253,9 +258,9 @@ class UartHost(Host):
         assert kind in ("gap", "stop") or not _is_request(bytes(frame)), kind
         self.dropped(bytes(frame), gap=frames.QUIET_BITS if kind == "gap" else 0, stop=kind != "stop")
 
-    def check(self, tx: NDArray[np.uint8], answers: Golden) -> None:
+    def check(self, output: NDArray[np.uint8], answers: Golden) -> None:
         """The line must be what the answers are, in every clock."""
-        wanted = np.ones_like(tx)
+        wanted = np.ones_like(output)
         for clock, request, numbers in self._sent:
             words = tuple(answers[number][0] or 0 for number in numbers) if request.type is Type.READ else ()
             answer = Answer(words, any(answers[number][1] for number in numbers))
@@ -263,7 +268,7 @@ class UartHost(Host):
                 at = clock + 10 * self.bit * place
                 levels = [0, *(byte >> bit & 1 for bit in range(8)), 1]
                 wanted[at : at + 10 * self.bit] = np.repeat(levels, self.bit)
-        wrong = np.flatnonzero(tx != wanted)
+        wrong = np.flatnonzero(output != wanted)
         assert not len(wrong), f"{len(wrong)} clocks differ, the first of them {wrong[0]}"
 
 

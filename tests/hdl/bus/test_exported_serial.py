@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.exported_bus import SPEC, START, Simulate, check, in_icarus, in_verilator
-from support.mutant import mutant
+from support.mutant import caught, mutant
 from support.serial import Host, SpiHost, UartHost
 
 from tachometry.hdl.bus.bank import RegisterBank
+from tachometry.spec.registers import frames
 from tachometry.spec.registers.map import RegisterMap
 
 REGISTERS = RegisterMap(SPEC)
@@ -22,6 +23,7 @@ SIMULATORS = [(in_verilator, 10_000), (in_icarus, 250)]
 
 
 def all_registers_are_read(host: Host) -> None:
+    """A register that the random accesses leave out fails the test."""
     assert {access.address for access in host.accesses if access.data is None} >= set(range(N_WORDS))
 
 
@@ -51,6 +53,15 @@ def test_over_spi(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("simulate", "n_accesses"), SIMULATORS)
 def test_over_uart(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
     over_uart(simulate, n_accesses, tmp_path)
+
+
+def test_a_register_that_is_not_read_is_found() -> None:
+    host = SpiHost(np.random.default_rng(0), START, WORDS)
+    host.frame(frames.spi_read(0, N_WORDS - 1), 8 + 40 * (N_WORDS - 1), 4, 4)
+    with caught():
+        all_registers_are_read(host)
+    host.frame(frames.spi_read(N_WORDS - 1), 48, 4, 4)
+    all_registers_are_read(host)
 
 
 def test_a_wrong_register_is_found(tmp_path: Path) -> None:
