@@ -65,8 +65,9 @@ Examples:
     "Files",
     "--baud",
     type=click.IntRange(min=1),
-    help="Bits a second of --bus uart, which the clock must make within 2 % with at least 8 clocks a bit "
-    f"[default: {DEFAULT_BAUD}].",
+    metavar="BITS",
+    help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
+    f"{DEFAULT_BAUD}, if it is not given.",
 )
 @optional_motion_options
 def generate(

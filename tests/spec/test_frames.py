@@ -1,6 +1,7 @@
 """Frames of the serial lines: what is made of them, and what is refused."""
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -34,6 +35,14 @@ def test_answers() -> None:
     assert frames.decode_answer(READ, frame) == answer
     written = frames.encode_answer(frames.decode_request(WRITE), Answer((), error=False))
     assert frames.decode_answer(WRITE, written) == Answer((), error=False)
+
+
+def test_the_examples_of_the_page() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "serial.md").read_text(encoding="utf-8")
+    write = frames.write_request(2, 1, 3)
+    answer = frames.encode_answer(frames.decode_request(write), Answer((), error=False))
+    for frame in (frames.read_request(4, 5, 7), write, answer, frames.spi_write(2, 1)):
+        assert f"`{frame.hex(' ')}`" in page
 
 
 def test_every_flipped_bit_is_found() -> None:
