@@ -55,7 +55,7 @@ class SpiBridge(wiring.Component):
         address, writing, word = Signal(SPI_ADDRESS_WIDTH), Signal(), Signal(WORD)
         error, asked, whole = Signal(), Signal(), Signal()
         in_word = count[5]
-        byte_ends = count[:3].all()
+        byte_begins, byte_ends = count[:3] == 0, count[:3].all()
         with m.If(rise):
             m.d.sync += [
                 count.eq(next_number(count)),
@@ -76,7 +76,7 @@ class SpiBridge(wiring.Component):
         m.d.comb += [
             # At the highest address there is no register.
             native.address.eq(address[:words] | address[words:].any().replicate(words)),
-            native.read.eq(rise & ~command & ~writing & (count == 0)),
+            native.read.eq(rise & ~command & ~writing & ~in_word & byte_begins),
             native.write.eq(whole & writing),
             native.write_data.eq(word),
         ]
@@ -84,7 +84,7 @@ class SpiBridge(wiring.Component):
         with m.If(asked):
             m.d.sync += [error.eq(native.error), word.eq(native.read_data)]
 
-        status = (count[:3] == 0) | (byte_ends & error)
+        status = byte_begins | (byte_ends & error)
         with m.If(fall):
             m.d.sync += self.spi_miso.eq(~command & Mux(in_word, word[-1] & ~writing, status))
         with m.If(~selected):
