@@ -37,11 +37,16 @@ class SpiBridge(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         native = self.native
-        sck, mosi, cs_n = Signal(), Signal(), Signal()
+        sck = Signal()
+        mosi = Signal()
+        cs_n = Signal()
         for pin, level in ((self.spi_sck, sck), (self.spi_mosi, mosi), (self.spi_cs_n, cs_n)):
             m.submodules[f"sync_{pin.name}"] = Synchronizer(pin, level)
-        before, released, selected = Signal(), Signal(), Signal()
-        rise, fall = Signal(), Signal()
+        before = Signal()
+        released = Signal()
+        selected = Signal()
+        rise = Signal()
+        fall = Signal()
         # A frame that was under way at reset is left out.
         m.d.sync += [before.eq(sck), released.eq(released | cs_n)]
         m.d.comb += [
@@ -51,9 +56,14 @@ class SpiBridge(wiring.Component):
         ]
 
         # The count of bits runs through a byte of status, from 0, and the four of a word, from 32 to 63.
-        count, command = Signal(6), Signal(init=1)
-        address, writing, word = Signal(SPI_ADDRESS_WIDTH), Signal(), Signal(WORD)
-        error, asked, whole = Signal(), Signal(), Signal()
+        count = Signal(6)
+        command = Signal(init=1)
+        address = Signal(SPI_ADDRESS_WIDTH)
+        writing = Signal()
+        word = Signal(WORD)
+        error = Signal()
+        asked = Signal()
+        whole = Signal()
         in_word = count[5]
         byte_begins, byte_ends = count[:3] == 0, count[:3].all()
         with m.If(rise):

@@ -53,9 +53,14 @@ class UartBridge(wiring.Component):
         m.submodules.sync_uart_rx = Synchronizer(self.uart_rx, line)
 
         # Characters: where a bit is to be sampled, or to begin.
-        timer, place, beat = Signal(range(cycles)), Signal(range(QUIET_BITS)), Signal()
-        receiving, sending, busy = Signal(), Signal(), Signal()
-        bit_there, ended = Signal(), Signal()
+        timer = Signal(range(cycles))
+        place = Signal(range(QUIET_BITS))
+        beat = Signal()
+        receiving = Signal()
+        sending = Signal()
+        busy = Signal()
+        bit_there = Signal()
+        ended = Signal()
         m.d.comb += [
             beat.eq(timer == 0),
             busy.eq(receiving | sending),
@@ -71,11 +76,21 @@ class UartBridge(wiring.Component):
             m.d.sync += receiving.eq(0)
 
         # Frames.
-        part, number = Signal(2), Signal(2)
-        header, address = Signal(8), Signal(UART_ADDRESS_WIDTH)
-        count, word, check = Signal(COUNT_WIDTH), Signal(WORD), Signal(CRC_WIDTH)
-        bad, error, asked, more, right = Signal(), Signal(), Signal(), Signal(), Signal()
-        out, bit, wrong = Signal(), Signal(), Signal()
+        part = Signal(2)
+        number = Signal(2)
+        header = Signal(8)
+        address = Signal(UART_ADDRESS_WIDTH)
+        count = Signal(COUNT_WIDTH)
+        word = Signal(WORD)
+        check = Signal(CRC_WIDTH)
+        bad = Signal()
+        error = Signal()
+        asked = Signal()
+        more = Signal()
+        right = Signal()
+        out = Signal()
+        bit = Signal()
+        wrong = Signal()
         in_header, in_address, in_data, in_check = ((part == one) for one in range(4))
         writing = header[TYPE_LOW]
         m.d.comb += [
@@ -101,7 +116,9 @@ class UartBridge(wiring.Component):
             m.d.sync += check.eq(CRC_START)
 
         # While the first byte of a word is sent, address and count go round, and are counted on and down bit by bit.
-        carry, borrow, counting = Signal(), Signal(), Signal()
+        carry = Signal()
+        borrow = Signal()
+        counting = Signal()
         m.d.comb += counting.eq(sending & in_data & (number == 0))
         with m.If(bit_there & (in_address | counting)):
             m.d.sync += [
