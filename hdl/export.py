@@ -33,7 +33,9 @@ _HEADER = """\
 _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
 
 
-def export(spec: TachometerSpec, name: str = "tachometer", bus: str = "none") -> dict[str, str]:
+def export(
+    spec: TachometerSpec, name: str = "tachometer", bus: str = "none", baud: int | None = None
+) -> dict[str, str]:
     """The exported core as texts by file name: `NAME.v`, `NAME.json`, and those of `tachometry.hdl.kit`.
 
     Equal specs and names give equal texts on every machine: the bundled Yosys writes the Verilog, whatever else is
@@ -46,21 +48,25 @@ def export(spec: TachometerSpec, name: str = "tachometer", bus: str = "none") ->
         Name of the module and of the files.
     bus : str
         The bus for its registers, one of `spec.registers.buses.BUSES`, or `none`.
+    baud : int or None
+        Bits a second of a bus that has them; None: its default.
 
     Raises
     ------
     ValueError
-        If `name` cannot be the name of a Verilog module; if there is no such bus.
+        If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits.
     """
-    registers, on = RegisterMap(spec), bus_of(bus)
+    registers, on = RegisterMap(spec), bus_of(bus, baud)
     described = {"generator": generator(), "license": LICENSE, **manifest(spec, name)}
     top: wiring.Component
     if on is None:
         top = Tachometer(spec)
     else:
-        top = BusTachometer(registers, bus)
+        top = BusTachometer(registers, bus, baud)
         described["ports"] += [described_port(port) for port in on.ports(registers)]
         described |= {"bus": bus, "registers": registers.described()}
+        if on.baud:
+            described |= {"baud": on.baud, "bit_cycles": on.bit_cycles(spec.timing.clock_hz)}
         if name in {port.name for port in on.ports(registers)}:
             raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):

@@ -174,12 +174,13 @@ def kit(spec: TachometerSpec, name: str, bus: Bus | None = None) -> dict[str, st
         return text.replace("NAME", name)
 
     def constraints(head: str, each: str) -> str:
-        paths = [(pin, [_BOX.get(pin, "conditioner"), f"sync_{pin}"]) for pin in asynchronous]
+        paths = [(pin, [boxes[pin], f"sync_{pin}"]) for pin in boxes]
         parts = [filled(each, PIN=pin, PATH_SLASH="/".join(path), PATH_STAR="*".join(path)) for pin, path in paths]
         # In a filter NAME is a property of Vivado.
         return filled(head) + "".join(part.replace(f"{{{name} =~", "{NAME =~") for part in parts)
 
-    asynchronous = [pin.name for pin in spec.pins]
+    boxes = {pin.name: _BOX.get(pin.name, "conditioner") for pin in spec.pins}
+    boxes |= dict.fromkeys(bus.asynchronous if bus else (), "bridge")
     cycles = spec.timing.tick_cycles
     hold = max(min(-(-cycles // _STEPS_PER_TICK), _LONGEST_HOLD), 2 * (spec.filter_clocks + 8))
     bench = filled(

@@ -14,7 +14,7 @@ from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
-from tachometry.spec.registers.buses import BUSES
+from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
@@ -61,6 +61,14 @@ Examples:
     + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
     + ". DIR/NAME.json describes the registers.",
 )
+@option(
+    "Files",
+    "--baud",
+    type=click.IntRange(min=1),
+    metavar="BITS",
+    help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
+    f"{DEFAULT_BAUD}, if it is not given.",
+)
 @optional_motion_options
 def generate(
     spec: TachometerSpec,
@@ -68,6 +76,7 @@ def generate(
     directory: Path,
     testbench: str | None,
     bus: str,
+    baud: int | None,
     record: Callable[[TachometerSpec], Encoding] | None,
     tables: list[Path],
 ) -> int:
@@ -101,7 +110,7 @@ def generate(
             bench = cocotb_bench(spec, name, None if record is None else record(spec).recording)
         from tachometry.hdl import export
 
-        texts = export(spec, name, bus) | bench
+        texts = export(spec, name, bus, baud) | bench
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:

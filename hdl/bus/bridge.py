@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from amaranth import Module
+from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -18,6 +18,11 @@ def bridge_members(bus: str, registers: RegisterMap) -> dict[str, Any]:
         port.name: flow[port.direction](port.width) for port in BUSES[bus].ports(registers) if port.name != CAPTURE.name
     }
     return {**ports, "native": Out(native_port(registers.address_width - 2))}
+
+
+def next_number(count: Signal) -> Value:
+    """The number after a count of a few bits, of which each takes a gate; a carry chain takes more."""
+    return Cat(bit ^ count[:place].all() if place else ~bit for place, bit in enumerate(count))
 
 
 class NativeBridge(wiring.Component):

@@ -88,17 +88,23 @@ class Verilator(CompiledEngine):
             # All in one text: the loop is compiled together with what it calls.
             made = ["Vcore.h", *sorted(path.name for path in (folder / "made").glob("*.cpp"))]
             model = _model(design, "\n".join(f'#include "{name}"' for name in made))
-            objects = [_runtime(source, tools) for source in _RUNTIME]
             options = [*build.precompiled(home() / "include", "verilated.h", *self.more), *self.more]
             return build.compile_library(
-                design.source(model), folder, *options, f"-I{home() / 'include'}", f"-I{folder / 'made'}", *objects
+                design.source(model), folder, *options, f"-I{home() / 'include'}", f"-I{folder / 'made'}", *runtimes()
             )
 
         return build.cached(key, ".so", make)
 
 
+def runtimes() -> list[Path]:
+    """Verilator's runtime, compiled once for all cores."""
+    compiler = build.compiler()
+    tools = (compiler, build.version(compiler), build.FLAGS, version_of("verilator"))
+    return [_runtime(source, tools) for source in _RUNTIME]
+
+
 def _runtime(source: str, tools: tuple[object, ...]) -> Path:
-    """A part of Verilator's runtime, compiled once for all cores."""
+    """A part of the runtime."""
 
     def make(folder: Path) -> Path:
         options = [*build.FLAGS, f"-I{home() / 'include'}", "-c", "-o", "runtime.o"]

@@ -1,10 +1,11 @@
 """Buses on which the registers of a core can be read: their ports."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import Port
+from tachometry.spec.registers.frames import QUIET_BITS, SPI_SCK_CYCLES
 from tachometry.spec.registers.map import WORD, RegisterMap
 from tachometry.spec.tachometer import TachometerSpec
 
@@ -26,6 +27,8 @@ class Bus:
         Levels of inputs that are not 0 when nothing happens.
     asynchronous : tuple of str
         Inputs that are not of the clock domain.
+    baud : int
+        Bits a second on a line without a clock; 0 if the bus has none.
     """
 
     name: str
@@ -34,6 +37,21 @@ class Bus:
     words: bool = False
     idle: Mapping[str, int] = field(default_factory=dict)
     asynchronous: tuple[str, ...] = ()
+    baud: int = 0
+
+    def bit_cycles(self, clock_hz: int) -> int:
+        """Clocks of a bit on a line without a clock.
+
+        Raises
+        ------
+        ParameterError
+            If no whole number of clocks is near enough, or a bit would be too short to be sampled.
+        """
+        cycles = max((2 * clock_hz + self.baud) // (2 * self.baud), _FEWEST_BIT_CYCLES)
+        if abs(clock_hz - cycles * self.baud) * _BAUD_TOLERANCE > cycles * self.baud:
+            text = f"must be within 2 % of {clock_hz} Hz over a whole number of at least {_FEWEST_BIT_CYCLES} clocks"
+            raise ParameterError("baud", f"{text}, such as {clock_hz // cycles}, not {self.baud}")
+        return cycles
 
     def ports(self, registers: RegisterMap) -> tuple[Port, ...]:
         """Ports that it adds to a core with these registers."""
@@ -52,6 +70,9 @@ def _out(name: str, width: int, help: str) -> Port:
 
 
 _ADDRESS = 0
+_FEWEST_BIT_CYCLES = 8
+_BAUD_TOLERANCE = 50  # 1 / 2 %
+DEFAULT_BAUD = 1_000_000
 CAPTURE = _into("capture", 1, "Registers capture the core in every clock in which it is high; of the clock's domain.")
 
 BUSES = {
@@ -124,21 +145,59 @@ BUSES = {
                 _into("s_axi_rready", 1, "The answer to a read is taken."),
             ),
         ),
+        Bus(
+            "spi",
+            f"SPI, mode 0, sck at most the clock over {SPI_SCK_CYCLES}",
+            (
+                _into("spi_sck", 1, f"SPI clock, asynchronous; at most that of the core over {SPI_SCK_CYCLES}."),
+                _into("spi_mosi", 1, "Data to the core, asynchronous; sampled when spi_sck rises."),
+                _into("spi_cs_n", 1, "Chip select, asynchronous, active low."),
+                _out(
+                    *("spi_miso", 1),
+                    "Data from the core; changes after spi_sck fell, 0 when not selected. Where others share the line, "
+                    "drive its pin only while the pin of spi_cs_n is low.",
+                ),
+            ),
+            idle={"spi_cs_n": 1},
+            asynchronous=("spi_sck", "spi_mosi", "spi_cs_n"),
+        ),
+        Bus(
+            "uart",
+            "UART, 8 bits, no parity, 1 stop bit, with frames and a CRC, see --baud",
+            (
+                _into(
+                    *("uart_rx", 1),
+                    f"Line to the core, asynchronous; high when idle. A frame begins after {QUIET_BITS} bits of idle.",
+                ),
+                _out("uart_tx", 1, "Line from the core; high when idle."),
+            ),
+            idle={"uart_rx": 1},
+            asynchronous=("uart_rx",),
+            baud=DEFAULT_BAUD,
+        ),
     )
 }
 
 
-def bus_of(name: str) -> Bus | None:
-    """The bus of a name; None for `none`.
+def bus_of(name: str, baud: int | None = None) -> Bus | None:
+    """The bus of a name, with these bits a second if they are given; None for `none`.
 
     Raises
     ------
     ParameterError
-        If there is none of this name.
+        If there is none of this name, or it has no bits a second of its own; if they are none.
     """
     if name != "none" and name not in BUSES:
         raise ParameterError("bus", f"must be one of none, {', '.join(BUSES)}, not {name!r}")
-    return BUSES.get(name)
+    bus = BUSES.get(name)
+    if baud is None:
+        return bus
+    if bus is None or not bus.baud:
+        with_baud = ", ".join(other.name for other in BUSES.values() if other.baud)
+        raise ParameterError("baud", f"must be given together with a bus that has it, {with_baud}, not {name}")
+    if baud < 1:
+        raise ParameterError("baud", f"must be at least 1, not {baud}")
+    return replace(bus, baud=baud)
 
 
 def ports_on(spec: TachometerSpec, name: str) -> tuple[Port, ...]:

@@ -29,8 +29,8 @@ CASES = {
 
 
 @cache
-def made(method: str) -> dict[str, str]:
-    return export(of_texts(method, BASE | CASES[method]), "spindle")
+def made(method: str, bus: str = "none") -> dict[str, str]:
+    return export(of_texts(method, BASE | CASES[method]), "spindle", bus, 100_000 if bus == "uart" else None)
 
 
 def run(folder: Path, *command: str | Path, **environment: str) -> str:
@@ -48,9 +48,9 @@ def test_every_file_names_version_and_licence() -> None:
     assert f"name: ::spindle:{version()}\n" in made("s")["spindle.core"]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_smoke_test_includes_the_template_and_passes(method: str, tmp_path: Path) -> None:
-    files = made(method)
+@pytest.mark.parametrize(("method", "bus"), [*((method, "none") for method in METHODS), ("m", "spi"), ("m", "uart")])
+def test_the_smoke_test_includes_the_template_and_passes(method: str, bus: str, tmp_path: Path) -> None:
+    files = made(method, bus)
     for file, text in files.items():
         (tmp_path / file).write_text(text)
     said = run(tmp_path, "iverilog", "-g2012", "-Wall", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
@@ -59,7 +59,8 @@ def test_the_smoke_test_includes_the_template_and_passes(method: str, tmp_path: 
     assert re.match(
         rf"PASS: position {counts}, [1-9]\d* updates, velocity -?\d+\n", run(tmp_path, "vvp", "-n", "x.vvp")
     )
-    ports = [port["name"] for port in json.loads(files["spindle.json"])["ports"]]
+    described = json.loads(files["spindle.json"])["ports"]
+    ports = [port["name"] for direction in ("input", "output") for port in described if port["direction"] == direction]
     assert re.findall(r"^  \.(\w+)\(\1\)", files["spindle_inst.v"], re.MULTILINE) == ports
 
 
@@ -90,11 +91,18 @@ def flip_flops(verilog: str) -> dict[str, str]:
     return below("spindle", "spindle_inst/")
 
 
-@pytest.mark.parametrize("method", ["s", "mt", "rairan"])
-def test_constraints_meet_every_synchroniser_once(method: str) -> None:
-    files = made(method)
+@pytest.mark.parametrize(
+    ("method", "bus", "more"),
+    [
+        *((method, "none", []) for method in ("s", "mt", "rairan")),
+        ("s", "spi", ["spi_sck", "spi_mosi", "spi_cs_n"]),
+        ("mt", "uart", ["uart_rx"]),
+    ],
+)
+def test_constraints_meet_every_synchroniser_once(method: str, bus: str, more: list[str]) -> None:
+    files = made(method, bus)
     found = flip_flops(files["spindle.v"])
-    pins = [pin.name for pin in of_texts(method, BASE | CASES[method]).pins]
+    pins = [pin.name for pin in of_texts(method, BASE | CASES[method]).pins] + more
     assert len(found) == 2 * len(pins)
     first = [path for path in found if path.endswith("stage0")]
     # As Vivado, Quartus Standard, and others name them.

@@ -93,6 +93,16 @@ def test_lsb_and_fraction_bits_are_two_words_for_one_thing(tmp_path: Path) -> No
     assert verilog[0] == verilog[1]
 
 
+@pytest.mark.parametrize(("words", "baud", "cycles"), [("", 1_000_000, 48), ("--baud 115200", 115_200, 417)])
+def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path) -> None:
+    assert run("generate", "--ppr", "500", "--bus", "uart", *words.split(), "-o", tmp_path) == 0
+    spec = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"))
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == export(spec, bus="uart", baud=baud)
+    manifest = json.loads((tmp_path / "tachometer.json").read_text())
+    assert [manifest[key] for key in ("bus", "baud", "bit_cycles")] == ["uart", baud, cycles]
+    assert {"uart_rx", "uart_tx"} < {port["name"] for port in manifest["ports"]}
+
+
 def test_equal_options_give_equal_files(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "generate", "--ppr", "100"]
     for seed in ("1", "2"):
@@ -153,6 +163,14 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
             "--max-tick-period must be a whole number of clocks, not 33ns",
         ),
         ("--ppr 9 --external-tick --tick 1", "--tick, in clocks, must be at least 2 with an external tick, not 1"),
+        (
+            "--ppr 9 --clock 5MHz --bus uart",
+            "--baud must be within 2 % of 5000000 Hz over a whole number of at least 8",
+        ),
+        ("--ppr 9 --bus uart --baud 0", "Invalid value for '--baud': 0 is not in the range x>=1."),
+        ("--ppr 9 --bus spi --baud 9600", "--baud must be given together with a bus that has it, uart, not spi"),
+        ("--ppr 9 --baud 9600", "--baud must be given together with a bus that has it, uart, not none"),
+        ("--ppr 9 --bus uart --name uart_rx", "--name must not be that of a port, which 'uart_rx' is"),
         ("--ppr 9 --qqq", "No such option '--qqq'. (see tachometry generate --help)"),
         ("--ppr 9 more", "Got unexpected extra argument (more)"),
     ],

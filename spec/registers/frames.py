@@ -1,0 +1,244 @@
+"""Frames in which registers are read and written over serial lines; docs/serial.md has pictures of them.
+
+SPI, most significant bits and bytes first. Chip select low begins a frame, and high ends it. Byte 0 has the write bit
+and the address of a word. A read goes on with 5 bytes for each word: status, then the word; a write with 5 bytes for
+each word too: the word, then its status, which may be left out at the end. The address counts on. Status is `MARK`, and
+`ERROR` if there is no such register, or it cannot be written. A word that is not complete is not written.
+
+UART, least significant bytes first, as the bits of a byte are. A request is a header with type and sequence, the
+address of a word, then the number of words to be read in a byte, or the word to be written, and the check. The answer
+is the header with `FROM_CORE` set, the words that were read, a byte of status, and the check. The other types are free.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+SPI_ADDRESS_WIDTH = 7
+SPI_SCK_CYCLES = 8  # clocks of a period of sck, at least
+SPI_WRITE = 1 << SPI_ADDRESS_WIDTH
+MARK = 1 << 7  # tells status from lines that are stuck
+ERROR = 1 << 0
+
+SEQUENCES = 16
+TYPE_LOW = 4  # lowest bit of the type in a header
+FROM_CORE = 7  # bit of a header that is set in what the core sends
+UART_ADDRESS_WIDTH = COUNT_WIDTH = 8
+QUIET_BITS = 32  # bits of a quiet line after which a request can begin, whatever was before
+
+# The check is CRC-16/MCRF4XX, as in MAVLink: polynomial and start of CCITT-FALSE, with bits in the order of the line.
+CRC_WIDTH, CRC_POLYNOMIAL, CRC_START = 16, 0x1021, 0xFFFF
+_CHECK_BYTES = CRC_WIDTH // 8
+_REFLECTED = int(f"{CRC_POLYNOMIAL:0{CRC_WIDTH}b}"[::-1], 2)
+
+_WORD_BYTES = 4
+
+
+class Type(IntEnum):
+    """What a frame of the UART is for."""
+
+    READ = 0
+    WRITE = 1
+
+
+class FrameError(ValueError):
+    """What came is no frame, or not the one that was expected."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request over the UART, as `decode_request` found it.
+
+    Parameters
+    ----------
+    type : Type
+    sequence : int
+        Repeated in the answer.
+    address : int
+        Of the first word.
+    value : int
+        Number of words to be read, or the word to be written.
+    """
+
+    type: Type
+    sequence: int
+    address: int
+    value: int
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was answered.
+
+    Parameters
+    ----------
+    words : tuple of int
+        What was read; 0 where there is no register.
+    error : bool
+        There is no register at one of the addresses, or it cannot be written.
+    """
+
+    words: tuple[int, ...]
+    error: bool
+
+
+def crc(data: bytes) -> int:
+    """The check of some bytes; over a frame with its check it is 0."""
+    value = CRC_START
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (_REFLECTED if value & 1 else 0)
+    return value
+
+
+def with_check(data: bytes) -> bytes:
+    """Bytes of a frame of the UART, with its check."""
+    return data + crc(data).to_bytes(_CHECK_BYTES, "little")
+
+
+def read_request(address: int, n_words: int = 1, sequence: int = 0) -> bytes:
+    """A request over the UART for words that follow each other.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
+    """
+    _check("n_words", n_words, 1 << COUNT_WIDTH)
+    return with_check(_head(Type.READ, sequence, address) + bytes([n_words]))
+
+
+def write_request(address: int, data: int, sequence: int = 0) -> bytes:
+    """A request over the UART to write a word.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
+    """
+    _check("data", data, 1 << 8 * _WORD_BYTES)
+    return with_check(_head(Type.WRITE, sequence, address) + data.to_bytes(_WORD_BYTES, "little"))
+
+
+def decode_request(frame: bytes) -> Request:
+    """What a request over the UART asks for.
+
+    Raises
+    ------
+    FrameError
+        If it is none, or damaged.
+    """
+    body = _checked(frame)
+    if not body or body[0] >> TYPE_LOW not in list(Type):
+        raise FrameError("a request must begin with its type")
+    kind = Type(body[0] >> TYPE_LOW)
+    if len(body) != 2 + (_WORD_BYTES if kind is Type.WRITE else 1):
+        raise FrameError(f"a request must be as long as its type says, not {len(frame)} bytes")
+    return Request(kind, body[0] % SEQUENCES, body[1], int.from_bytes(body[2:], "little"))
+
+
+def answer_length(request: bytes) -> int:
+    """Bytes of the answer to a request.
+
+    Raises
+    ------
+    FrameError
+        If the request is none.
+    """
+    asked = decode_request(request)
+    return 2 + _CHECK_BYTES + (_WORD_BYTES * asked.value if asked.type is Type.READ else 0)
+
+
+def decode_answer(request: bytes, frame: bytes) -> Answer:
+    """What the core has answered to a request.
+
+    Raises
+    ------
+    FrameError
+        If it is no answer, damaged, or that to another request.
+    """
+    body = _checked(frame)
+    length = answer_length(request)
+    if len(frame) != length:
+        raise FrameError(f"the answer must have {length} bytes, not {len(frame)}")
+    if body[0] != request[0] | 1 << FROM_CORE:
+        raise FrameError(f"the answer must be that to request {request[0]:#04x}, not begin with {body[0]:#04x}")
+    if body[-1] not in (0, ERROR):
+        raise FrameError(f"the status of an answer must be 0 or {ERROR}, not {body[-1]}")
+    return Answer(_words(body[1:-1]), body[-1] == ERROR)
+
+
+def encode_answer(request: Request, answer: Answer) -> bytes:
+    """The answer to a request, as the core sends it."""
+    header = 1 << FROM_CORE | request.type << TYPE_LOW | request.sequence
+    words = b"".join(word.to_bytes(_WORD_BYTES, "little") for word in answer.words)
+    return with_check(bytes([header]) + words + bytes([ERROR * answer.error]))
+
+
+def spi_read(address: int, n_words: int = 1) -> bytes:
+    """What to send over SPI to read words that follow each other.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
+    """
+    _check("address", address, 1 << SPI_ADDRESS_WIDTH)
+    return bytes([address]) + bytes((1 + _WORD_BYTES) * n_words)
+
+
+def spi_write(address: int, data: int) -> bytes:
+    """What to send over SPI to write a word and to learn its status.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
+    """
+    _check("address", address, 1 << SPI_ADDRESS_WIDTH)
+    _check("data", data, 1 << 8 * _WORD_BYTES)
+    return bytes([SPI_WRITE | address]) + data.to_bytes(_WORD_BYTES, "big") + bytes(1)
+
+
+def decode_spi(sent: bytes, received: bytes) -> Answer:
+    """What came back over SPI while whole words of a read or a write were sent.
+
+    Raises
+    ------
+    FrameError
+        If a byte of status is none.
+    """
+    if len(received) != len(sent):
+        raise FrameError(f"as many bytes must be received as are sent, {len(sent)}, not {len(received)}")
+    size = 1 + _WORD_BYTES
+    groups = [received[start : start + size] for start in range(1, len(received), size)]
+    writes = sent[0] & SPI_WRITE
+    states = [group[-1] if writes else group[0] for group in groups]
+    for status in states:
+        if status & ~ERROR != MARK:
+            raise FrameError(f"the status must be {MARK:#04x} or {MARK | ERROR:#04x}, not {status:#04x}")
+    words = () if writes else tuple(int.from_bytes(group[1:], "big") for group in groups)
+    return Answer(words, any(status & ERROR for status in states))
+
+
+def _check(what: str, value: int, end: int) -> None:
+    if not 0 <= value < end:
+        raise ValueError(f"{what} must be from 0 to {end - 1}, not {value}")
+
+
+def _head(kind: Type, sequence: int, address: int) -> bytes:
+    _check("sequence", sequence, SEQUENCES)
+    _check("address", address, 1 << UART_ADDRESS_WIDTH)
+    return bytes([kind << TYPE_LOW | sequence, address])
+
+
+def _checked(frame: bytes) -> bytes:
+    """A frame without its check."""
+    if crc(frame):
+        raise FrameError("the check of a frame must be right")
+    return frame[:-_CHECK_BYTES]
+
+
+def _words(data: bytes) -> tuple[int, ...]:
+    parts = range(0, len(data), _WORD_BYTES)
+    return tuple(int.from_bytes(data[part : part + _WORD_BYTES], "little") for part in parts)

@@ -1,0 +1,74 @@
+"""Registers over SPI and UART, of the exported core in Icarus and Verilator, while the encoder turns."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.exported_bus import SPEC, START, Simulate, check, in_icarus, in_verilator
+from support.mutant import caught, mutant
+from support.serial import Host, SpiHost, UartHost
+
+from tachometry.hdl.bus.bank import RegisterBank
+from tachometry.spec.registers import frames
+from tachometry.spec.registers.map import RegisterMap
+
+REGISTERS = RegisterMap(SPEC)
+WORDS = REGISTERS.address_width - 2
+N_WORDS = len(REGISTERS.registers)
+CONTROL, VELOCITY = (REGISTERS[name].offset // 4 for name in ("CONTROL", "VELOCITY"))
+ALL = (CONTROL, VELOCITY, N_WORDS, N_WORDS - VELOCITY)
+BIT_CYCLES = 8
+BAUD = SPEC.timing.clock_hz // BIT_CYCLES
+SIMULATORS = [(in_verilator, 10_000), (in_icarus, 250)]
+
+
+def all_registers_are_read(host: Host) -> None:
+    """A register that the random accesses leave out fails the test."""
+    assert {access.address for access in host.accesses if access.data is None} >= set(range(N_WORDS))
+
+
+def over_spi(simulate: Simulate, n_accesses: int, folder: Path) -> None:
+    host = SpiHost(np.random.default_rng(n_accesses), START, WORDS)
+    while len(host.accesses) < n_accesses:
+        host.random_frame(*ALL)
+    all_registers_are_read(host)
+    check(simulate, host, "spi", "spi_miso", folder)
+
+
+def over_uart(simulate: Simulate, n_accesses: int, folder: Path) -> None:
+    host = UartHost(np.random.default_rng(n_accesses), START, WORDS, BIT_CYCLES)
+    while len(host.accesses) < n_accesses:
+        host.random_exchange(*ALL)
+        if host.rng.random() < 0.3:
+            host.random_damage(*ALL)
+    all_registers_are_read(host)
+    check(simulate, host, "uart", "uart_tx", folder, BAUD)
+
+
+@pytest.mark.parametrize(("simulate", "n_accesses"), SIMULATORS)
+def test_over_spi(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
+    over_spi(simulate, n_accesses, tmp_path)
+
+
+@pytest.mark.parametrize(("simulate", "n_accesses"), SIMULATORS)
+def test_over_uart(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
+    over_uart(simulate, n_accesses, tmp_path)
+
+
+def test_a_register_that_is_not_read_is_found() -> None:
+    host = SpiHost(np.random.default_rng(0), START, WORDS)
+    host.frame(frames.spi_read(0, N_WORDS - 1), 8 + 40 * (N_WORDS - 1), 4, 4)
+    with caught():
+        all_registers_are_read(host)
+    host.frame(frames.spi_read(N_WORDS - 1), 48, 4, 4)
+    all_registers_are_read(host)
+
+
+def test_a_wrong_register_is_found(tmp_path: Path) -> None:
+    """Of those that no other test of a bus reads through to the pins of the lines."""
+    wrong = ("else value >> field", "else value.as_unsigned() >> field")
+    with (
+        mutant(RegisterBank, *wrong),
+        pytest.raises(AssertionError, match=r"^clock \d+, \(\d+, \d+\): [01], not [01]$"),
+    ):
+        over_spi(in_icarus, 250, tmp_path)
