@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-LAYERS := spec hdl sim cli
+LAYERS := spec hdl sim boards cli
 SOURCES := $(LAYERS) tests
 
 export AMARANTH_USE_YOSYS := builtin
