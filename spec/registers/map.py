@@ -208,7 +208,7 @@ class RegisterMap:
             *((_constant(self.configuration),), {"constant": True}),
         )
         clear = "Writing 1 sets all counters to 0."
-        hold = "Reading VELOCITY does not capture; the input capture still does."
+        hold = "Reading the velocity does not capture; the input capture still does."
         yield (
             *("CONTROL", "What a driver may change."),
             (
