@@ -1,5 +1,6 @@
 """The driver in C, compiled as strict C99, on the simulated core: what it says is what the golden bank says."""
 
+import re
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -8,12 +9,14 @@ import pytest
 from support.lockstep import random_case
 from support.mutant import caught
 from support.native import HEADER, NAME, check_golden, library, logged, snapshots, write_trace
+from support.script import load
 
 from tachometry.sim.engines import build
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec import TachometerSpec
+from tachometry.spec import TachometerSpec, of_texts
 from tachometry.spec.registers.files import register_files
 from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.registers.page import tables
 
 STRICT = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion")
 STEPS = 6
@@ -201,3 +204,14 @@ def test_drivers_of_all_methods_are_strict_c(tmp_path: Path) -> None:
     build.run([*build.compiler(), *STRICT, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
     plus = [*build.compiler(), "-x", "c++", "-std=c++11", *STRICT[3:]]
     build.run([*plus, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
+
+
+def test_the_example_of_the_page_is_strict_c(tmp_path: Path) -> None:
+    """Compiled for the core of the page, whose registers the page shows."""
+    page = (Path(__file__).parents[3] / "docs" / "registers.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
+    files = register_files(RegisterMap(of_texts("s", load("reference").SPEED)), "speed")
+    for file, text in {**files, "main.c": example}.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    build.run([*build.compiler(), *STRICT, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
+    assert tables(RegisterMap(of_texts("s", load("reference").SPEED))).replace("## ", "### ") in page
