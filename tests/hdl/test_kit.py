@@ -158,8 +158,8 @@ def test_fusesoc_finds_what_programs_need(tmp_path: Path) -> None:
     home_ = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
     of_flags = {"driver": ["spindle_driver.h", "spindle_regs.h"], "registers": ["spindle.rdl"]}
     for flags in ([], ["driver"], ["registers"], ["driver", "registers"]):
-        command = (BIN / "fusesoc", "--cores-root", ".", "run", "--setup", *(f"--flag={flag}" for flag in flags))
-        run(tmp_path, *command, "spindle", **home_)
+        words = [f"--flag={flag}" for flag in flags]
+        run(tmp_path, BIN / "fusesoc", "--cores-root", ".", "run", "--setup", *words, "spindle", **home_)
         (edam,) = tmp_path.glob("build/*/default/*.eda.yml")
         found = {Path(name).name for name in re.findall(r"name: (\S+)", edam.read_text())}
         for flag, names in of_flags.items():
