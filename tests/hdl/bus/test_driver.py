@@ -1,5 +1,6 @@
 """The driver in C, compiled as strict C99, on the simulated core: what it says is what the golden bank says."""
 
+import math
 import re
 import subprocess
 from functools import cache
@@ -149,7 +150,7 @@ def check(folder: Path, right: str = "", wrong: str = "") -> list[dict[str, floa
         quantities = {
             "rad_per_s": velocity * spec.rad_per_s_per_lsb,
             "in_unit": velocity * 2.0**-spec.frac_bits,
-            "rad": pytest.approx(position * 2 * 3.141592653589793 / spec.encoder.counts_per_rev, rel=1e-14),
+            "rad": pytest.approx(position * 2 * math.pi / spec.encoder.counts_per_rev, rel=1e-14),
         }
         assert one == {**values, **counters, **quantities}
     held = [one["position"] for one in shown]
@@ -215,3 +216,38 @@ def test_the_example_of_the_page_is_strict_c(tmp_path: Path) -> None:
         (tmp_path / file).write_text(text, encoding="utf-8")
     build.run([*build.compiler(), *STRICT, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
     assert tables(RegisterMap(of_texts("s", load("reference").SPEED))).replace("## ", "### ") in page
+
+
+def test_the_compiler_reads_the_numbers_of_the_map(tmp_path: Path) -> None:
+    """Every macro of the header, as C takes it."""
+    spec, _ = case()
+    registers = RegisterMap(spec)
+    expected: dict[str, float] = {
+        "REGISTERS": len(registers.registers),
+        "CLOCK_HZ": spec.timing.clock_hz,
+        "TICK_CYCLES": spec.timing.tick_cycles,
+        "MAX_TICKS": spec.timing.max_ticks,
+        "COUNTS_PER_REV": spec.encoder.counts_per_rev,
+        "INTERVAL_UNIT_CYCLES": spec.interval_unit_cycles,
+        "UNIT_PER_LSB": 2.0**-spec.frac_bits,
+        "RAD_PER_S_PER_LSB": spec.rad_per_s_per_lsb,
+        "RAD_PER_COUNT": 2 * math.pi / spec.encoder.counts_per_rev,
+    }
+    for one in registers:
+        expected |= {f"{one.name}_OFFSET": one.offset, f"{one.name}_RESET": one.reset}
+        for field in one.fields:
+            numbers = {"MASK": field.mask, "SHIFT": field.low, "RESET": field.reset}
+            expected |= {f"{one.name}_{field.name.upper()}_{kind}": value for kind, value in numbers.items()}
+    header = register_files(registers, NAME)[f"{NAME}_regs.h"]
+    names = re.findall(rf"^#define {NAME.upper()}_(\w+) ", header, re.MULTILINE)
+    shown = "\n".join(
+        f'  printf("{name} %.17g\\n", (double){NAME.upper()}_{name});' for name in names if name != "UNIT"
+    )
+    (tmp_path / f"{NAME}_regs.h").write_text(header, encoding="utf-8")
+    (tmp_path / "main.c").write_text(
+        f'#include <stdio.h>\n#include "{NAME}_regs.h"\nint main(void) {{\n{shown}\n'
+        f'  printf("UNIT_LENGTH %d\\n", (int)sizeof {NAME.upper()}_UNIT - 1);\n  return 0;\n}}\n'
+    )
+    build.run([*build.compiler(), *STRICT, "main.c", "-o", "main"], "compiler", tmp_path)
+    said = [line.split() for line in build.run([tmp_path / "main"], "program").splitlines()]
+    assert {name: float(value) for name, value in said} == expected | {"UNIT_LENGTH": len(spec.unit)}
