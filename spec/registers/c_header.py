@@ -68,7 +68,7 @@ def of_register(register: Register) -> Iterator[Macro]:
 
 def comment(text: str, indent: str = "") -> list[str]:
     """Lines of a comment."""
-    return [f"{indent}// {line}" for line in textwrap.wrap(text, 110)]
+    return [f"{indent}// {line}" for line in textwrap.wrap(text, 110, break_on_hyphens=False)]
 
 
 def _defined(macros: Iterable[Macro], name: str) -> Iterator[str]:

@@ -67,7 +67,9 @@ def _field(field: Field, told: str, constant: bool) -> list[str]:
 def _text(what: str, text: str) -> list[str]:
     """A property whose value is a string, which may go over several lines."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return textwrap.wrap(f'{what}"{escaped}";', 110, subsequent_indent="    ", break_long_words=False)
+    return textwrap.wrap(
+        f'{what}"{escaped}";', 110, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _identifier(name: str) -> str:
