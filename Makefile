@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-LAYERS := spec hdl sim cli
+LAYERS := spec hdl sim boards cli
 SOURCES := $(LAYERS) tests
 
 export AMARANTH_USE_YOSYS := builtin
@@ -84,7 +84,7 @@ compare: $(VENV)/.run ## all methods and what others use in several situations, 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
 	$(BIN)/python bench/size.py -o docs/size.md
 
-docs: $(VENV)/.run ## the tables of all options and ports, written to docs/options.md and docs/ports.md
+docs: $(VENV)/.run ## the pages of options, ports and registers, written to docs/{options,ports,registers}.md
 	$(BIN)/python bench/reference.py
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api

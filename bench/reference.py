@@ -1,5 +1,6 @@
-"""The reference pages of the documentation, docs/options.md and docs/ports.md, from what the code declares."""
+"""The reference pages of the documentation, docs/{options,ports,registers}.md, from what the code declares."""
 
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -9,11 +10,113 @@ from pages import markdown, write
 from tachometry.cli.group import cli
 from tachometry.cli.options.option import Option
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing, of_texts
+from tachometry.spec.registers.buses import BUSES
+from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.registers.page import tables
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 # Cores with all ports that the methods have.
 EVERYTHING = {"ppr": "500", "index": "yes", "filter": "4", "age": "yes", "bounds": "yes", "velocity-width": "20"}
 EXTERNAL = {"external-tick": "yes"}
+# The core whose registers are shown: that of docs/integration.md.
+SPEED = {
+    **{"ppr": "2500", "max-speed": "4000rpm", "clock": "100MHz", "tick": "50us", "max-time": "10ms"},
+    **{"external-tick": "yes", "unit": "rpm", "lsb": "2^-4", "velocity-width": "18", "age": "yes"},
+}
+_REGISTERS = """\
+# Registers
+
+Made by `make docs` from `spec/registers`.
+
+With `--bus` a core has registers: an identification, a control register, counters, and everything that its
+[ports](ports.md) show. `tachometry generate` then also writes files that describe them and programs that read them, all
+from the same map as the gates.
+
+| file | what it is for |
+| --- | --- |
+| `NAME.rdl` | SystemRDL 2.0, for PeakRDL and other tools |
+| `NAME_regs.h` | C99 and C++11: offsets, masks, resets, the configuration, and what one LSB is |
+| `NAME_driver.h` | C99 and C++11: a driver of inline functions, without memory of its own and without a library |
+| `NAME_registers.md` | The tables below for your core |
+| `NAME.json` | The same for programs, under the key `registers`; `tachometry.boards.host.client` reads it |
+
+| bus | what it is |
+| --- | --- |
+@BUSES@
+
+## Captures
+
+A capture takes in one clock all that the core shows: the position and whatever else belongs to a tick are of the latest
+tick, the velocity and whatever else belongs to an update are of the latest update, and `age` says how many ticks lie
+between them. There are two ways to capture:
+
+- Reading the first register of the velocity captures, and answers with what has just been captured. This is enough for
+  one program that polls.
+- The input `capture` captures in every clock in which it is high. Let it come from what starts a control period, and
+  set `CONTROL.hold`: then reading the velocity does not capture, and all axes show the same moment, however late the
+  program reads.
+
+Captured registers keep what they show until the next capture, so a program can take its time. Two programs that read
+at the same time, or an input that captures while a program reads, mix two captures. Before the first capture captured
+registers read 0. In a capture before the first update of the velocity, the velocity is 0, and whatever else belongs
+to an update is not defined.
+
+`STATUS.updated` and `STATUS.indexed` say whether there was something new since the capture before.
+`COUNTERS.lost_updates` counts updates of the velocity that no capture has shown. Counters stay at 255. Writing 1 to
+`CONTROL.clear` sets all of them to 0, and what the core counts for `swallowed_edges`, which later captures show.
+
+A port of several bits has a register of its own, extended to 32 bits by its sign or by zeros, or two of them,
+`NAME_LOW` and `NAME_HIGH`, if it is wider. A port of one bit is a flag of `STATUS`; `interval` and `n_ep1` can be so
+narrow, too. The core states which registers it has by its configuration, a hash of all that a driver relies on: drivers
+and clients read it first, and refuse another core.
+
+## In C
+
+The driver is given two functions that access the bus. In a microcontroller whose bus has the registers at an address:
+
+```c
+#include "speed_driver.h"
+
+static uint32_t read_word(void *base, uint32_t offset) {
+  return *(volatile uint32_t *)((char *)base + offset);
+}
+
+static void write_word(void *base, uint32_t offset, uint32_t value) {
+  *(volatile uint32_t *)((char *)base + offset) = value;
+}
+
+int measure(void *base, double *rad_per_s, int64_t *position) {
+  const struct speed_bus bus = {read_word, write_word, base};
+  struct speed_snapshot now;
+  if (speed_init(&bus) != SPEED_OK) return -1;
+  speed_read(&bus, &now);
+  *rad_per_s = speed_rad_per_s(now.velocity);
+  *position = now.position;
+  return now.stalled;
+}
+```
+
+## In Python
+
+```python
+import json
+from tachometry.boards.host.client import Client
+
+with open("rtl/speed.json") as file:
+    client = Client(read, write, json.load(file))
+now = client.snapshot()
+print(now.velocity_rad_per_s, now["position"], now.flags["stalled"], client.counters())
+```
+
+`read(offset)` and `write(offset, value)` are your own: whatever brings an access to the bus.
+
+## An example
+
+The core of [integration](integration.md#an-example-a-servo-drive), with `--age` and `--bus wishbone`. Offsets are in
+bytes, and bits that are not listed read 0. Writing a register without a field that can be written is an error, and so
+is any access where there is no register.
+
+"""
 
 
 def options() -> str:
@@ -84,6 +187,14 @@ def ports() -> str:
     )
 
 
+def registers() -> str:
+    """The page of the registers."""
+    buses = "\n".join(f"| `{bus.name}` | {bus.help[0].upper()}{bus.help[1:]} |" for bus in BUSES.values())
+    return _REGISTERS.replace("@BUSES@", buses) + re.sub(
+        "^## ", "### ", tables(RegisterMap(of_texts("s", SPEED))), flags=re.MULTILINE
+    )
+
+
 def _cores(method: str) -> list[TachometerSpec]:
     """Cores that have among them every port of a method."""
     cores = [of_texts(method, EVERYTHING)]
@@ -102,9 +213,10 @@ def _cores(method: str) -> list[TachometerSpec]:
 @click.command()
 @click.option("-o", "--output", "folder", type=click.Path(path_type=Path), default=DOCS, help="Folder of the pages.")
 def main(folder: Path) -> None:
-    """Write docs/options.md and docs/ports.md."""
+    """Write docs/options.md, docs/ports.md and docs/registers.md."""
     write(folder / "options.md", options())
     write(folder / "ports.md", ports())
+    write(folder / "registers.md", registers())
 
 
 if __name__ == "__main__":

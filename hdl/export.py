@@ -16,6 +16,7 @@ from tachometry.spec.manifest import described_port, manifest
 from tachometry.spec.option import ParameterError
 from tachometry.spec.provenance import LICENSE, generator, notice
 from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.files import register_files
 from tachometry.spec.registers.map import RegisterMap
 
 _HEADER = """\
@@ -37,6 +38,8 @@ def export(
     spec: TachometerSpec, name: str = "tachometer", bus: str = "none", baud: int | None = None
 ) -> dict[str, str]:
     """The exported core as texts by file name: `NAME.v`, `NAME.json`, and those of `tachometry.hdl.kit`.
+
+    With a bus also those of `tachometry.spec.registers.files`, which describe its registers.
 
     Equal specs and names give equal texts on every machine: the bundled Yosys writes the Verilog, whatever else is
     installed. All texts name the version of tachometry that made them, and their licence.
@@ -75,4 +78,5 @@ def export(
         f"{name}.v": _HEADER.format(**described, name=name, notice=notice("//")) + text,
         f"{name}.json": json.dumps(described, indent=2) + "\n",
         **kit(spec, name, on),
+        **(register_files(registers, name) if on else {}),
     }

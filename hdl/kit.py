@@ -35,14 +35,14 @@ filesets:
           is_include_file: true
       - NAME_tb.sv
     file_type: systemVerilogSource
-
+@REGISTERS@
 targets:
   default:
     filesets:
       - rtl
       - tool_vivado ? (vivado)
       - tool_quartus ? (quartus)
-    toplevel: NAME
+@WITH_DRIVER@    toplevel: NAME
     flow: lint
     flow_options:
       tool: verilator
@@ -62,6 +62,25 @@ targets:
     flow_options:
       tool: icarus
       iverilog_options: [-g2012, -Wall]
+"""
+
+_REGISTERS = """\
+  # A design gets these with the flags driver and registers.
+  driver:
+    files:
+      - NAME_regs.h:
+          is_include_file: true
+      - NAME_driver.h:
+          is_include_file: true
+    file_type: cSource
+  registers:
+    files:
+      - NAME.rdl
+    file_type: systemRDL
+"""
+_WITH_DRIVER = """\
+      - driver ? (driver)
+      - registers ? (registers)
 """
 
 _XDC = """\
@@ -195,7 +214,9 @@ def kit(spec: TachometerSpec, name: str, bus: Bus | None = None) -> dict[str, st
         EXPECTED=(40 - 16) * spec.encoder.decoding // 4,
     )
     return {
-        f"{name}.core": filled(_CORE),
+        f"{name}.core": filled(
+            _CORE, REGISTERS=filled(_REGISTERS) if bus else "", WITH_DRIVER=_WITH_DRIVER if bus else ""
+        ),
         f"{name}_inst.v": _instance(ports, name),
         f"{name}_tb.sv": bench,
         f"{name}.xdc": constraints(_XDC, _XDC_PIN),

@@ -10,7 +10,7 @@ from zipfile import ZipFile
 import pytest
 
 ROOT = Path(__file__).parent.parent
-LAYERS = ("spec", "hdl", "sim", "cli")
+LAYERS = ("spec", "hdl", "sim", "boards", "cli")
 # Nothing of this environment or this user; where pip finds packages, and what it has, stays.
 ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))}
 CORE = "--method s --ppr 500 --clock 1MHz --tick 1ms --max-time 10ms".split()

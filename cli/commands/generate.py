@@ -15,6 +15,7 @@ from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
+from tachometry.spec.registers.files import REGISTER_FILES
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
@@ -59,7 +60,7 @@ Examples:
     default="none",
     help="Give the core registers on a bus: "
     + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
-    + ". DIR/NAME.json describes the registers.",
+    + ". Files that describe and read the registers are written, too.",
 )
 @option(
     "Files",
@@ -92,7 +93,14 @@ def generate(
     DIR/NAME.sdc     constraints for Quartus and others
     with --testbench cocotb also DIR/test_NAME.py and DIR/NAME_vectors.json
 
-    What was built is printed: full scale, LSB, resolution, widths and latencies.
+    \b
+    with a --bus also
+    DIR/NAME.rdl           registers in SystemRDL 2.0
+    DIR/NAME_regs.h        registers as macros of C99
+    DIR/NAME_driver.h      driver in C99
+    DIR/NAME_registers.md  registers as a page of Markdown
+
+    What was built is printed: full scale, LSB, resolution, widths and latencies, and the number of registers.
 
     Equal options give equal files, byte for byte, on every machine.
     """
@@ -100,6 +108,8 @@ def generate(
     if record is not None and testbench is None:
         raise ValueError("--motion must be given together with --testbench")
     files = [name + suffix for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")]
+    if bus != "none":
+        files += [name + suffix for suffix in REGISTER_FILES]
     if testbench:
         files += [f"test_{name}.py", f"{name}_vectors.json"]
     with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
@@ -118,5 +128,5 @@ def generate(
     from tachometry.cli.reports.core import print_core
 
     click.echo()
-    print_core(spec)
+    print_core(spec, bus)
     return 0

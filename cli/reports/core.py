@@ -8,12 +8,13 @@ from tachometry.sim.studies.plan import default_range, plan_at
 from tachometry.spec import TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.map import WORD, RegisterMap
 from tachometry.spec.units import SPEED, SpeedUnit, format_time, plural
 
 
-def print_core(spec: TachometerSpec) -> None:
-    """Print the configuration of a core, and what it measures at low and at high speed."""
-    print_rows([*configuration(spec), *_resolution(spec)])
+def print_core(spec: TachometerSpec, bus: str = "none") -> None:
+    """Print the configuration of a core, what it measures at low and at high speed, and its registers on a bus."""
+    print_rows([*configuration(spec), *_resolution(spec), *([] if bus == "none" else [_registers(spec, bus)])])
 
 
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
@@ -72,6 +73,12 @@ def _resolution(spec: TachometerSpec) -> list[tuple[str, str]]:
             )
         rows.append((f"resolution, {name}", shown))
     return rows
+
+
+def _registers(spec: TachometerSpec, bus: str) -> tuple[str, str]:
+    registers = RegisterMap(spec)
+    number = len(registers.registers)
+    return "registers", f"{number} of {WORD} bits on {bus}, configuration 0x{registers.configuration:08x}"
 
 
 def _memory(kind: str, entries: int, width: int) -> str:

@@ -1,7 +1,7 @@
 """What every kind of capture shares: its error, the choice of channels, and files written whole or not at all."""
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -92,7 +92,7 @@ def choose_channels(
         return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
 
     one_line = b == SAME
-    defaults = [find("A"), find("A" if one_line else "B")]
+    defaults: Sequence[int | None] = [find("A"), find("A" if one_line else "B")]
     if None in defaults:
         defaults = [*channels, *channels][:2]
     first, second = (default if given is None else given for default, given in zip(defaults, (a, b), strict=True))

@@ -41,8 +41,9 @@ class GoldenBank:
 
     def __init__(self, registers: RegisterMap, trace: PinTrace) -> None:
         self._map = registers
-        self._of_updates = {port.name for port in registers.ports if port.held_by == UPDATE and port.width > 1} - {
-            "velocity"
+        # Flags, which have no unit, are 0 before the first update.
+        self._of_updates = {
+            port.name for port in registers.ports if port.held_by == UPDATE and port.unit and port.name != "velocity"
         }
         self._tables = golden.tables(registers.spec, trace)
         ticks = self._tables[TICK]

@@ -6,7 +6,7 @@ by its sign or by zeros, or two of them if it is wider; ports of one bit are fla
 A capture takes all of these in one clock: the position and whatever else belongs to a tick is of the latest tick, the
 velocity and whatever belongs to an update is of the latest update, and the age says how many ticks lie between them.
 Reading the first captured register, VELOCITY, captures, and the others keep what was captured until the next capture.
-Before the first update the velocity is 0, and whatever else of several bits belongs to an update is not defined.
+Before the first update the velocity is 0, and what else has a unit and belongs to an update is not defined.
 """
 
 from __future__ import annotations
@@ -208,7 +208,7 @@ class RegisterMap:
             *((_constant(self.configuration),), {"constant": True}),
         )
         clear = "Writing 1 sets all counters to 0."
-        hold = "Reading VELOCITY does not capture; the input capture still does."
+        hold = "Reading the velocity does not capture; the input capture still does."
         yield (
             *("CONTROL", "What a driver may change."),
             (

@@ -8,7 +8,7 @@ from support.script import load
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-@pytest.mark.parametrize("page", ["options", "ports"])
+@pytest.mark.parametrize("page", ["options", "ports", "registers"])
 def test_pages_are_up_to_date(page: str) -> None:
     """If this fails, run `make docs`."""
     made = getattr(load("reference"), page)()

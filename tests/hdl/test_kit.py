@@ -143,11 +143,13 @@ def test_constraints_are_tcl(quartus: bool) -> None:
     assert len(tcl.splitlist(tcl.eval("set said"))) == 8
 
 
-def test_fusesoc_runs_every_target(tmp_path: Path) -> None:
-    for file, text in made("s").items():
+@pytest.mark.parametrize("bus", ["none", "wishbone"])
+def test_fusesoc_runs_every_target(bus: str, tmp_path: Path) -> None:
+    files = made("s", bus)
+    for file, text in files.items():
         (tmp_path / file).write_text(text)
     path = f"{home() / 'bin'}{os.pathsep}{os.environ['PATH']}"
-    targets = re.findall(r"^  (\w+):\n    filesets:", made("s")["spindle.core"], re.MULTILINE)
+    targets = re.findall(r"^  (\w+):\n    filesets:", files["spindle.core"], re.MULTILINE)
     assert targets == ["default", "lint", "sim"]
     for target in targets:
         command = (BIN / "fusesoc", "--cores-root", ".", "run", "--target", target, "spindle")
@@ -155,6 +157,23 @@ def test_fusesoc_runs_every_target(tmp_path: Path) -> None:
         said = run(tmp_path, *command, PATH=path, **home_)
         assert "Warning" not in said, said
         assert ("PASS: position 24" in said) == (target == "sim")
+
+
+def test_fusesoc_finds_what_programs_need(tmp_path: Path) -> None:
+    """With the flags `driver` and `registers`, and without them not; a core without a bus has neither."""
+    for file, text in made("s", "native").items():
+        (tmp_path / file).write_text(text)
+    home_ = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
+    of_flags = {"driver": ["spindle_driver.h", "spindle_regs.h"], "registers": ["spindle.rdl"]}
+    for flags in ([], ["driver"], ["registers"], ["driver", "registers"]):
+        words = [f"--flag={flag}" for flag in flags]
+        run(tmp_path, BIN / "fusesoc", "--cores-root", ".", "run", "--setup", *words, "spindle", **home_)
+        (edam,) = tmp_path.glob("build/*/default/*.eda.yml")
+        found = {Path(name).name for name in re.findall(r"name: (\S+)", edam.read_text())}
+        for flag, names in of_flags.items():
+            assert (found & {*names} == {*names}) == (flag in flags), (flags, found)
+            assert found.isdisjoint(names) == (flag not in flags), (flags, found)
+    assert "driver" not in made("s")["spindle.core"]
 
 
 def keys(item: object, path: str = "") -> set[str]:
@@ -167,9 +186,9 @@ def keys(item: object, path: str = "") -> set[str]:
     return set()
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_every_key_of_the_manifest_is_documented(method: str) -> None:
-    found = keys(json.loads(made(method)["spindle.json"]))
+@pytest.mark.parametrize(("method", "bus"), [*((method, "none") for method in METHODS), ("s", "native")])
+def test_every_key_of_the_manifest_is_documented(method: str, bus: str) -> None:
+    found = keys(json.loads(made(method, bus)["spindle.json"]))
     told = set(re.findall(r"^\| `([\w.\[\]]+)` \|", PAGE, re.MULTILINE))
     assert {key for key in found if not key.startswith("parameters.")} <= told
     options = {f"parameters.{about.parameter}" for about in (*common_options(), *own_options(method))}

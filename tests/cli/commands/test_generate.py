@@ -35,6 +35,24 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
     ]
 
 
+def test_a_bus_adds_files_and_says_how_many_registers_there_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("generate", "--ppr", "500", "--name", "spindle", "-o", tmp_path / "without") == 0
+    assert "registers" not in capsys.readouterr().out
+    assert run("generate", "--ppr", "500", "--name", "spindle", "--bus", "native", "-o", tmp_path / "native") == 0
+    names = {folder: {path.name for path in (tmp_path / folder).iterdir()} for folder in ("without", "native")}
+    added = ["spindle.rdl", "spindle_regs.h", "spindle_driver.h", "spindle_registers.md"]
+    assert names["native"] == names["without"] | {*added}
+    told, rows = capsys.readouterr().out.split("\n\n")
+    assert [Path(line).name for line in told.splitlines()][-4:] == added
+    described = json.loads((tmp_path / "native" / "spindle.json").read_text())["registers"]
+    number, configuration = len(described["map"]), described["configuration"]
+    assert rows.split("registers")[-1].strip() == (
+        f"{number} of 32 bits on native, configuration 0x{configuration:08x}"
+    )
+
+
 def test_defaults(tmp_path: Path) -> None:
     assert run("generate", "--ppr", "500", "-o", tmp_path) == 0
     assert json.loads((tmp_path / "tachometer.json").read_text())["parameters"] == {

@@ -1,0 +1,1 @@
+"""Where it runs: programs that talk to a core."""

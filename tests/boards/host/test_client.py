@@ -1,0 +1,178 @@
+"""The client: against the golden bank, against the simulated core, and against boards that are none."""
+
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.lockstep import random_case
+from support.mutant import caught, mutant
+from support.native import NativeCore, check_golden, logged, snapshots
+
+from tachometry.boards.host import client
+from tachometry.hdl import export
+from tachometry.sim.golden.registers import Access, GoldenBank
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.map import RegisterMap
+
+CASES = [("m", 16), ("s", 4), ("rairan", 2), ("t", 3), ("mt", 1)]
+
+
+@cache
+def case(method: str, seed: int) -> tuple[TachometerSpec, PinTrace, dict[str, Any]]:
+    spec, _, trace = random_case(seed, method)
+    return spec, trace, manifest(spec, "spindle") | {"registers": RegisterMap(spec).described()}
+
+
+class GoldenBoard:
+    """A board whose registers the golden bank answers, `gap` clocks after each other."""
+
+    def __init__(self, registers: RegisterMap, trace: PinTrace, gap: int) -> None:
+        self._bank = GoldenBank(registers, trace)
+        self._gap = gap
+        self._accesses: list[Access] = []
+        self.clock = 0
+
+    def read(self, offset: int) -> int:
+        return self._access(offset, None)
+
+    def write(self, offset: int, value: int) -> None:
+        self._access(offset, value)
+
+    def _access(self, offset: int, value: int | None) -> int:
+        self.clock += self._gap
+        self._accesses.append(Access(self.clock, offset // 4, value))
+        data, error = self._bank.answers(self._accesses)[-1]
+        assert not error
+        return data or 0  # what is not defined is 0 here
+
+
+def check_bank(method: str, seed: int) -> None:
+    """Snapshots say what the core's outputs were when they were taken."""
+    spec, trace, described = case(method, seed)
+    registers = RegisterMap(spec)
+    board = GoldenBoard(registers, trace, 7)
+    bench = client.Client(board.read, board.write, described)
+    before = bench.counters()
+    assert before.keys() == registers.counted.keys()
+    for _ in range(5):
+        board.clock += trace.n_clocks // 8
+        snapshot = bench.snapshot()
+        taken = board._bank._captured
+        assert dict(snapshot) == {name: taken[name] for name in snapshot}
+        assert {port.name for port in spec.outputs if not port.is_strobe} <= snapshot.keys()
+        assert snapshot.velocity_rad_per_s == snapshot["velocity"] * spec.rad_per_s_per_lsb
+        assert snapshot.flags.keys() == {field.name for field in registers["STATUS"].fields}
+        bounds = snapshot.bounds_rad_per_s
+        assert (bounds is None) == (not taken.get("bounds_valid"))
+        if bounds is not None:
+            assert [round(bound / spec.rad_per_s_per_lsb) for bound in bounds] == [
+                taken["velocity_lower"],
+                taken["velocity_upper"],
+            ]
+    bench.hold(True)
+    first = bench.snapshot()
+    board.clock += 500
+    lost = bench.counters()["lost_updates"]
+    bench.clear()
+    assert dict(bench.snapshot()) == dict(first)
+    assert bench.counters()["lost_updates"] < lost
+    bench.hold(False)
+    board.clock += 300
+    assert dict(bench.snapshot()) != dict(first)
+
+
+@pytest.mark.parametrize(("method", "seed"), CASES)
+def test_snapshots_are_those_of_the_golden_bank(method: str, seed: int) -> None:
+    check_bank(method, seed)
+
+
+def test_on_the_simulated_core(tmp_path: Path) -> None:
+    spec, trace, _ = case("m", 16)
+    registers = RegisterMap(spec)
+    core = NativeCore(spec, trace, tmp_path)
+    bench = client.Client(core.read, core.write, json.loads(export(spec, "spindle", "native")["spindle.json"]))
+    shown = []
+    for _ in range(8):
+        core.run(400)
+        shown.append(bench.snapshot())
+    bench.hold(True)
+    core.run(100)
+    shown.append(bench.snapshot())
+    assert dict(shown[-1]) == dict(shown[-2])
+    core.capture()
+    core.run(100)
+    shown.append(bench.snapshot())
+    assert dict(shown[-1]) != dict(shown[-2])
+    counters = bench.counters()
+    bench.clear()
+    bench.hold(False)
+    assert bench.counters() != counters
+    check_golden(registers, trace, core.log)
+    assert [dict(one) for one in shown] == snapshots(registers, logged(core.log)[0])
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ('self._word("CONTROL") & self._hold | self._clear', "self._clear"),
+        ("self._hold if on else 0", "0"),
+        ('<< field["width"]\n                name', '<< field["width"] + 1\n                name'),
+        ('bits << field["shift"]', "bits"),
+        ('words[register["name"]] >> field["low"]', 'words[register["name"]]'),
+        ("self._clear)", "0)"),
+    ],
+)
+def test_mutants_are_caught(right: str, wrong: str) -> None:
+    with mutant(client.Client, right, wrong), caught():
+        for method, seed in CASES[:2]:
+            check_bank(method, seed)
+
+
+def test_a_snapshot_cannot_be_changed() -> None:
+    snapshot = client.Snapshot({"velocity": -3, "forced": 1}, frozenset({"forced"}), 0.5)
+    assert (dict(snapshot), dict(snapshot.flags), snapshot.velocity_rad_per_s, len(snapshot)) == (
+        {"velocity": -3, "forced": 1},
+        {"forced": True},
+        -1.5,
+        2,
+    )
+    assert repr(snapshot) == "Snapshot(velocity=-3, forced=1)"
+    assert snapshot.bounds_rad_per_s is None
+    for change in ("snapshot['velocity'] = 1", "snapshot.flags['forced'] = False", "snapshot.velocity_rad_per_s = 1"):
+        with pytest.raises((TypeError, AttributeError)):
+            exec(change)
+
+
+def memory(described: dict[str, Any]) -> tuple[dict[int, int], Callable[[int, int], None]]:
+    """A board that shows what its registers are after reset."""
+    words: dict[int, int] = {}
+    for register in described["registers"]["map"]:
+        words[register["offset"]] = sum(field["reset"] << field["low"] for field in register["fields"])
+    return words, words.__setitem__
+
+
+def test_another_core_is_refused() -> None:
+    described = case("m", 16)[2]
+    other = case("s", 4)[2]
+    words, write = memory(described)
+    mine, theirs = (one["registers"]["configuration"] for one in (described, other))
+    with pytest.raises(
+        client.WrongBoard,
+        match=f"^the board has configuration 0x{mine:08x}, the manifest of spindle says 0x{theirs:08x}$",
+    ):
+        client.Client(words.__getitem__, write, other)
+    with pytest.raises(
+        client.WrongBoard, match=r"^the board must answer with 0x54414348, as a tachometer does, not 0xffffffff$"
+    ):
+        client.Client(lambda offset: -1, write, described)
+
+
+def test_a_manifest_without_registers_is_refused() -> None:
+    described = manifest(of_texts("s", {"ppr": "8"}))
+    with pytest.raises(ValueError, match=r"^manifest must be that of a core on a bus, which tachometry generate --bus"):
+        client.Client(lambda offset: 0, lambda offset, value: None, described)

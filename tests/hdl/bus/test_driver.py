@@ -1,0 +1,253 @@
+"""The driver in C, compiled as strict C99, on the simulated core: what it says is what the golden bank says."""
+
+import math
+import re
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import pytest
+from support.lockstep import random_case
+from support.mutant import caught
+from support.native import HEADER, NAME, check_golden, library, logged, snapshots, write_trace
+from support.script import load
+
+from tachometry.sim.engines import build
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.registers.files import register_files
+from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.registers.page import tables
+
+STRICT = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion")
+STEPS = 6
+_PROGRAM = """
+#include <inttypes.h>
+#include <stdio.h>
+#include "spindle_driver.h"
+#include "other_driver.h"
+#include "core.h"
+static void show(const struct spindle_bus *bus) {
+  struct spindle_snapshot now;
+  struct spindle_counters counters;
+  spindle_read(bus, &now);
+SHOWN
+  printf("rad_per_s %.17g\\n", spindle_rad_per_s(now.velocity));
+  printf("in_unit %.17g\\n", spindle_in_unit(now.velocity));
+  printf("rad %.17g\\n", spindle_rad(now.position));
+  spindle_read_counters(bus, &counters);
+COUNTED
+  printf("end 0\\n");
+}
+static uint32_t nothing(void *context, uint32_t offset) {
+  (void)context;
+  return offset;
+}
+int main(int count, char **words) {
+  struct spindle_bus bus = {core_read, core_write, 0};
+  struct other_bus other = {core_read, core_write, 0};
+  const struct spindle_bus none = {nothing, core_write, 0};
+  void *core = core_open(words[1], words[count - 1]);
+  bus.context = core;
+  other.context = core;
+  printf("none %d\\n", spindle_init(&none) == SPINDLE_NOT_A_TACHOMETER);
+  printf("other %d\\n", other_init(&other) == OTHER_OTHER_CONFIGURATION);
+  printf("ok %d\\n", spindle_init(&bus) == SPINDLE_OK);
+  for (int step = 0; step < STEPS; step++) {
+    core_run(core, 600);
+    show(&bus);
+    spindle_hold(&bus, true);
+    core_run(core, 150);
+    if (step % 2) core_capture(core);
+    core_run(core, 40);
+    show(&bus);
+    if (step == 2) {
+      spindle_clear(&bus);
+      show(&bus);
+    }
+    spindle_hold(&bus, false);
+  }
+  return 0;
+}
+"""
+
+
+@cache
+def case() -> tuple[TachometerSpec, PinTrace]:
+    """A core with every option that adds a register, on a shaft that turns either way, with noise."""
+    spec, _, trace = random_case(16, "m")
+    assert spec.index
+    assert spec.bounds
+    assert spec.age
+    assert spec.filter_clocks
+    assert spec.position_width > 32
+    return spec, trace
+
+
+def program(spec: TachometerSpec) -> str:
+    registers = RegisterMap(spec)
+    names = [port.name for port in spec.outputs if not port.is_strobe] + ["updated", "indexed"]
+    shown = [f'  printf("{name} %" PRId64 "\\n", (int64_t)now.{name});' for name in names]
+    counted = [f'  printf("{name} %d\\n", counters.{name});' for name in registers.counted]
+    return (
+        _PROGRAM.replace("SHOWN", "\n".join(shown))
+        .replace("COUNTED", "\n".join(counted))
+        .replace("STEPS", str(STEPS))
+        .replace("spindle", NAME)
+    )
+
+
+def run(folder: Path, right: str = "", wrong: str = "") -> list[tuple[str, float]]:
+    """What the program prints, with the driver as it is or with `right` replaced by `wrong` in it."""
+    spec, trace = case()
+    other = RegisterMap(random_case(0, "s")[0])
+    files = {**register_files(RegisterMap(spec), NAME), **register_files(other, "other"), "core.h": HEADER}
+    driver = files[f"{NAME}_driver.h"]
+    assert not right or driver.count(right) == 1, f"{right!r} stands {driver.count(right)} times in the driver"
+    files |= {f"{NAME}_driver.h": driver.replace(right, wrong) if right else driver, "main.c": program(spec)}
+    for file, text in files.items():
+        (folder / file).write_text(text, encoding="utf-8")
+    write_trace(spec, trace, folder / "trace")
+    made = library(spec)
+    command: list[str | Path] = [
+        *build.compiler(),
+        *STRICT,
+        "main.c",
+        "-x",
+        "none",
+        made,
+        f"-Wl,-rpath,{made.parent}",
+        "-o",
+        "main",
+    ]
+    build.run(command, "compiler", folder)
+    done = subprocess.run([folder / "main", "trace", "log"], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return [(name, float(value)) for name, value in (line.split() for line in done.stdout.splitlines())]
+
+
+def check(folder: Path, right: str = "", wrong: str = "") -> list[dict[str, float]]:
+    """Hold what the program prints against the answers, and the answers against the golden bank."""
+    spec, trace = case()
+    registers = RegisterMap(spec)
+    printed = run(folder, right, wrong)
+    assert printed[:3] == [("none", 1), ("other", 1), ("ok", 1)]
+    check_golden(registers, trace, folder / "log")
+    found, captures = logged(folder / "log")
+    shown: list[dict[str, float]] = [{}]
+    for name, value in printed[3:]:
+        if name == "end":
+            shown.append({})
+        else:
+            shown[-1][name] = value
+    shown.pop()
+    counted = [one.answer for one in found if registers.registers[one.access.address].name == "COUNTERS"]
+    expected = snapshots(registers, found)
+    assert len(shown) == len(expected) == len(counted) == 2 * STEPS + 1
+    for one, values, word in zip(shown, expected, counted, strict=True):
+        velocity, position = values["velocity"], values["position"]
+        counters = {field.name: word >> field.low & 0xFF for field in registers["COUNTERS"].fields}
+        quantities = {
+            "rad_per_s": velocity * spec.rad_per_s_per_lsb,
+            "in_unit": velocity * 2.0**-spec.frac_bits,
+            "rad": pytest.approx(position * 2 * math.pi / spec.encoder.counts_per_rev, rel=1e-14),
+        }
+        assert one == {**values, **counters, **quantities}
+    held = [one["position"] for one in shown]
+    # While it is held, only the input captures; clear leaves it held.
+    assert held[0] == held[1]
+    assert held[2] != held[3]
+    assert held[4] == held[5] == held[6] != held[7]
+    assert shown[6]["lost_updates"] < shown[5]["lost_updates"]
+    assert len(captures) == STEPS // 2
+    return shown
+
+
+def test_what_the_driver_says_is_what_the_golden_bank_says(tmp_path: Path) -> None:
+    shown = check(tmp_path)
+    assert min(one["velocity"] for one in shown) < 0 < max(one["velocity"] for one in shown)
+    assert min(one["position"] for one in shown) < 0
+    for name in ("interval", "age", "velocity_lower", "velocity_upper", "updated"):
+        assert any(one[name] for one in shown), name
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("hold | SPINDLE_CONTROL_CLEAR_MASK", "(hold & 0) | SPINDLE_CONTROL_CLEAR_MASK"),
+        ("SPINDLE_CONTROL_HOLD_MASK : 0", "SPINDLE_CONTROL_CLEAR_MASK : 0"),
+        ("-(int32_t)(UINT32_MAX - word) - 1", "-(int32_t)(UINT32_MAX - word)"),
+        ("-(int64_t)(UINT64_MAX - word) - 1", "-(int64_t)(UINT64_MAX - word)"),
+        ("(uint64_t)high << 32 | low", "(uint64_t)low << 32 | high"),
+        ("now->age = age;", "now->age = age + 1;"),
+        ("now->stalled = (status & SPINDLE_STATUS_STALLED_MASK) != 0;", "now->stalled = status != 0;"),
+        ("!= SPINDLE_CONFIGURATION_RESET", "== SPINDLE_CONFIGURATION_RESET"),
+        ("!= SPINDLE_IDENTIFICATION_RESET", "== SPINDLE_IDENTIFICATION_RESET"),
+        ("(uint8_t)(word >> SPINDLE_COUNTERS_LOST_UPDATES_SHIFT)", "(uint8_t)word"),
+        ("(double)velocity * SPINDLE_RAD_PER_S_PER_LSB", "(double)velocity * SPINDLE_UNIT_PER_LSB"),
+    ],
+)
+def test_wrong_drivers_are_caught(right: str, wrong: str, tmp_path: Path) -> None:
+    with caught():
+        check(tmp_path, right, wrong)
+
+
+def test_drivers_of_all_methods_are_strict_c(tmp_path: Path) -> None:
+    """All in one program: no name of one meets that of another."""
+    lines = []
+    for method in ("s", "m", "t", "mt", "rairan"):
+        for seed in range(3):
+            name = f"{method}_{seed}"
+            for file, text in register_files(RegisterMap(random_case(seed, method)[0]), name).items():
+                (tmp_path / file).write_text(text, encoding="utf-8")
+            lines.append(f'#include "{name}_driver.h"')
+    (tmp_path / "main.c").write_text("\n".join([*lines, "int main(void) { return 0; }\n"]))
+    build.run([*build.compiler(), *STRICT, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
+    plus = [*build.compiler(), "-x", "c++", "-std=c++11", *STRICT[3:]]
+    build.run([*plus, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
+
+
+def test_the_example_of_the_page_is_strict_c(tmp_path: Path) -> None:
+    """Compiled for the core of the page, whose registers the page shows."""
+    page = (Path(__file__).parents[3] / "docs" / "registers.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
+    files = register_files(RegisterMap(of_texts("s", load("reference").SPEED)), "speed")
+    for file, text in {**files, "main.c": example}.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    build.run([*build.compiler(), *STRICT, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
+    assert tables(RegisterMap(of_texts("s", load("reference").SPEED))).replace("## ", "### ") in page
+
+
+def test_the_compiler_reads_the_numbers_of_the_map(tmp_path: Path) -> None:
+    """Every macro of the header, as C takes it."""
+    spec, _ = case()
+    registers = RegisterMap(spec)
+    expected: dict[str, float] = {
+        "REGISTERS": len(registers.registers),
+        "CLOCK_HZ": spec.timing.clock_hz,
+        "TICK_CYCLES": spec.timing.tick_cycles,
+        "MAX_TICKS": spec.timing.max_ticks,
+        "COUNTS_PER_REV": spec.encoder.counts_per_rev,
+        "INTERVAL_UNIT_CYCLES": spec.interval_unit_cycles,
+        "UNIT_PER_LSB": 2.0**-spec.frac_bits,
+        "RAD_PER_S_PER_LSB": spec.rad_per_s_per_lsb,
+        "RAD_PER_COUNT": 2 * math.pi / spec.encoder.counts_per_rev,
+    }
+    for one in registers:
+        expected |= {f"{one.name}_OFFSET": one.offset, f"{one.name}_RESET": one.reset}
+        for field in one.fields:
+            numbers = {"MASK": field.mask, "SHIFT": field.low, "RESET": field.reset}
+            expected |= {f"{one.name}_{field.name.upper()}_{kind}": value for kind, value in numbers.items()}
+    header = register_files(registers, NAME)[f"{NAME}_regs.h"]
+    names = re.findall(rf"^#define {NAME.upper()}_(\w+) ", header, re.MULTILINE)
+    shown = "\n".join(
+        f'  printf("{name} %.17g\\n", (double){NAME.upper()}_{name});' for name in names if name != "UNIT"
+    )
+    (tmp_path / f"{NAME}_regs.h").write_text(header, encoding="utf-8")
+    (tmp_path / "main.c").write_text(
+        f'#include <stdio.h>\n#include "{NAME}_regs.h"\nint main(void) {{\n{shown}\n'
+        f'  printf("UNIT_LENGTH %d\\n", (int)sizeof {NAME.upper()}_UNIT - 1);\n  return 0;\n}}\n'
+    )
+    build.run([*build.compiler(), *STRICT, "main.c", "-o", "main"], "compiler", tmp_path)
+    said = [line.split() for line in build.run([tmp_path / "main"], "program").splitlines()]
+    assert {name: float(value) for name, value in said} == expected | {"UNIT_LENGTH": len(spec.unit)}
