@@ -19,7 +19,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
 
 CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=40)
-CLOCKS = 50_000
+CLOCKS = 200_000
 
 
 def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
