@@ -50,8 +50,8 @@ A capture takes in one clock all that the core shows: the position and whatever 
 tick, the velocity and whatever else belongs to an update are of the latest update, and `age` says how many ticks lie
 between them. There are two ways to capture:
 
-- Reading the first register of the velocity captures, and answers with what has just been captured. This is enough for
-  one program that polls.
+- Reading VELOCITY, or VELOCITY_LOW where there are two words, captures, and answers with what has just been captured.
+  This is enough for one program that polls.
 - The input `capture` captures in every clock in which it is high. Let it come from what starts a control period, and
   set `CONTROL.hold`: then reading the velocity does not capture, and all axes show the same moment, however late the
   program reads.

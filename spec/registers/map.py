@@ -204,7 +204,7 @@ class RegisterMap:
             {"constant": True},
         )
         yield (
-            *("CONFIGURATION", "Says which: the configuration of the manifest, another for every other core."),
+            *("CONFIGURATION", "Says which core it is: a hash of all that a driver relies on, as the manifest has it."),
             *((_constant(self.configuration),), {"constant": True}),
         )
         clear = "Writing 1 sets all counters to 0."
