@@ -2,26 +2,22 @@
 
 from amaranth import Module
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In
 
+from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.bus.apb import ApbBridge
 from tachometry.hdl.bus.axi_lite import AxiLiteBridge
-from tachometry.hdl.bus.bridge import NativeBridge
+from tachometry.hdl.bus.bridge import Bridge, NativeBridge
 from tachometry.hdl.bus.spi import SpiBridge
 from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.bus.wishbone import WishboneBridge
 from tachometry.hdl.register_core import RegisterCore
-from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.map import RegisterMap
 
 # Bridges by the names of their buses.
-BRIDGES: dict[str, type[wiring.Component]] = {
-    "native": NativeBridge,
-    "wishbone": WishboneBridge,
-    "apb": ApbBridge,
-    "axi-lite": AxiLiteBridge,
-    "spi": SpiBridge,
-    "uart": UartBridge,
+BRIDGES: dict[str, type[Bridge]] = {
+    bridge.bus: bridge for bridge in (NativeBridge, WishboneBridge, ApbBridge, AxiLiteBridge, SpiBridge, UartBridge)
 }
 
 
@@ -31,10 +27,7 @@ class BusTachometer(wiring.Component):
     Parameters
     ----------
     registers : RegisterMap
-    bus : str
-        One of `spec.registers.buses.BUSES`.
-    baud : int or None
-        Bits a second of a bus that has them; None: its default.
+    bus : Bus
 
     Members
     -------
@@ -43,17 +36,14 @@ class BusTachometer(wiring.Component):
     Raises
     ------
     ParameterError
-        If there is no such bus, or the clock cannot make its bits.
+        If the clock cannot make the bits of the bus.
     """
 
-    def __init__(self, registers: RegisterMap, bus: str, baud: int | None = None) -> None:
+    def __init__(self, registers: RegisterMap, bus: Bus) -> None:
         self.core = RegisterCore(registers)
-        on = bus_of(bus, baud)
-        assert on is not None
-        self.bridge = BRIDGES[bus](registers, *((on.bit_cycles(registers.spec.timing.clock_hz),) if on.baud else ()))
-        own = {name: member for name, member in self.core.signature.members.items() if name not in ("bus", "capture")}
-        flow = {"input": In, "output": Out}
-        super().__init__({**own, **{port.name: flow[port.direction](port.width) for port in on.ports(registers)}})
+        cycles = (bus.bit_cycles(registers.spec.timing.clock_hz),) if bus.baud else ()
+        self.bridge = BRIDGES[bus.name](registers, *cycles)
+        super().__init__(members((*registers.spec.ports, *bus.ports(registers))))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

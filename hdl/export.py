@@ -59,24 +59,28 @@ def export(
     ValueError
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits.
     """
-    registers, on = RegisterMap(spec), bus_of(bus, baud)
+    on = bus_of(bus, baud)
     described = {"generator": generator(), "license": LICENSE, **manifest(spec, name)}
+    files: dict[str, str] = {}
     top: wiring.Component
     if on is None:
         top = Tachometer(spec)
     else:
-        top = BusTachometer(registers, bus, baud)
-        described["ports"] += [described_port(port) for port in on.ports(registers)]
+        registers = RegisterMap(spec)
+        ports = on.ports(registers)
+        if name in {port.name for port in ports}:
+            raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+        top = BusTachometer(registers, on)
+        described["ports"] += [described_port(port) for port in ports]
         described |= {"bus": bus, "registers": registers.described()}
         if on.baud:
             described |= {"baud": on.baud, "bit_cycles": on.bit_cycles(spec.timing.clock_hz)}
-        if name in {port.name for port in on.ports(registers)}:
-            raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+        files = register_files(registers, name)
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
         text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", verilog.convert(top, name=name, emit_src=False))
     return {
         f"{name}.v": _HEADER.format(**described, name=name, notice=notice("//")) + text,
         f"{name}.json": json.dumps(described, indent=2) + "\n",
         **kit(spec, name, on),
-        **(register_files(registers, name) if on else {}),
+        **files,
     }

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from tachometry.spec import TachometerSpec
 from tachometry.spec.port import Port
 from tachometry.spec.provenance import notice, version
-from tachometry.spec.registers.buses import Bus
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.registers.buses import Bus, ports_on
 
 _CORE = """\
 CAPI=2:
@@ -181,7 +180,7 @@ def kit(spec: TachometerSpec, name: str, bus: Bus | None = None) -> dict[str, st
     bus : Bus or None
         On which its registers are.
     """
-    ports = (*spec.ports, *(bus.ports(RegisterMap(spec)) if bus else ()))
+    ports = ports_on(spec, bus)
     idle = bus.idle if bus else {}
 
     def filled(text: str, **parts: object) -> str:

@@ -1,10 +1,10 @@
 """The whole core."""
 
-from amaranth import Module, Signal, signed
+from amaranth import Module, Signal
 from amaranth.lib import stream, wiring
-from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
 from tachometry.hdl.front_end.external_tick import ExternalTick
@@ -42,14 +42,7 @@ class Tachometer(wiring.Component):
 
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
-        flow = {"input": In, "output": Out}
-        super().__init__(
-            {
-                port.name: flow[port.direction](signed(port.width) if port.signed else port.width)
-                for port in spec.ports
-                if port.name not in ("clk", "rst")
-            }
-        )
+        super().__init__(members(spec.ports))
         self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
         self.pulse_counter = PulseCounter(

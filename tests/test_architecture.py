@@ -14,7 +14,7 @@ ALLOWED = {
     "hdl": {"hdl", "spec"},
     "hdl/front_end": {"hdl/arithmetic", "spec"},
     "hdl/arithmetic": {"spec"},
-    "hdl/bus": {"hdl/front_end", "spec"},
+    "hdl/bus": {"hdl/arithmetic", "hdl/front_end", "spec"},
     "hdl/output": {"hdl/arithmetic", "spec"},
     "hdl/methods": {"hdl/arithmetic", "hdl/output", "spec"},
     "sim": set[str](),

@@ -1,28 +1,14 @@
 """APB."""
 
 from amaranth import Module, Signal
-from amaranth.lib import wiring
 
-from tachometry.hdl.bus.bridge import bridge_members
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.hdl.bus.bridge import Bridge
 
 
-class ApbBridge(wiring.Component):
-    """APB3 without wait states: the registers are accessed in the setup clock and answer in the access clock.
+class ApbBridge(Bridge):
+    """APB3 without wait states: the registers are accessed in the setup clock and answer in the access clock."""
 
-    Parameters
-    ----------
-    registers : RegisterMap
-
-    Members
-    -------
-    The ports of the bus, and
-
-    native : Out(native_port)
-    """
-
-    def __init__(self, registers: RegisterMap) -> None:
-        super().__init__(bridge_members("apb", registers))
+    bus = "apb"
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

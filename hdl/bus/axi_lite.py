@@ -1,33 +1,20 @@
 """AXI4-Lite."""
 
 from amaranth import Cat, Const, Module, Mux, Signal
-from amaranth.lib import wiring
 
-from tachometry.hdl.bus.bridge import bridge_members
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.hdl.bus.bridge import Bridge
 
 
-class AxiLiteBridge(wiring.Component):
+class AxiLiteBridge(Bridge):
     """AXI4-Lite, 32 bits, a read and a write at a time.
 
     The write address and the write data are taken in any order. The answer to a write is there three clocks after the
     one in which the latter of them was taken, that to a read three or four clocks after its address. If both are to be
     done at once, the write goes first; the next write comes some clocks later, so reads never wait for more than one.
     No output depends on an input of the same clock. A write without byte 0 changes nothing, and is no error.
-
-    Parameters
-    ----------
-    registers : RegisterMap
-
-    Members
-    -------
-    The ports of the bus, and
-
-    native : Out(native_port)
     """
 
-    def __init__(self, registers: RegisterMap) -> None:
-        super().__init__(bridge_members("axi-lite", registers))
+    bus = "axi-lite"
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -1,32 +1,17 @@
 """What all bridges from a bus to the native port share."""
 
-from typing import Any
-
 from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import Out
 
+from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.bus.native import native_port
 from tachometry.spec.registers.buses import BUSES, CAPTURE
 from tachometry.spec.registers.map import RegisterMap
 
 
-def bridge_members(bus: str, registers: RegisterMap) -> dict[str, Any]:
-    """Members of a bridge: the ports that the bus adds to the core, and `native`."""
-    flow = {"input": In, "output": Out}
-    ports = {
-        port.name: flow[port.direction](port.width) for port in BUSES[bus].ports(registers) if port.name != CAPTURE.name
-    }
-    return {**ports, "native": Out(native_port(registers.address_width - 2))}
-
-
-def next_number(count: Signal) -> Value:
-    """The number after a count of a few bits, of which each takes a gate; a carry chain takes more."""
-    return Cat(bit ^ count[:place].all() if place else ~bit for place, bit in enumerate(count))
-
-
-class NativeBridge(wiring.Component):
-    """The native port as it is.
+class Bridge(wiring.Component):
+    """From a bus to the native port; `bus` is the name of the bus.
 
     Parameters
     ----------
@@ -34,13 +19,27 @@ class NativeBridge(wiring.Component):
 
     Members
     -------
-    The ports of the bus, and
+    The ports that the bus adds to the core, and
 
     native : Out(native_port)
     """
 
+    bus = ""
+
     def __init__(self, registers: RegisterMap) -> None:
-        super().__init__(bridge_members("native", registers))
+        ports = members(port for port in BUSES[self.bus].ports(registers) if port.name != CAPTURE.name)
+        super().__init__({**ports, "native": Out(native_port(registers.address_width - 2))})
+
+
+def next_number(count: Signal) -> Value:
+    """The number after a count of a few bits, of which each takes a gate; a carry chain takes more."""
+    return Cat(bit ^ count[:place].all() if place else ~bit for place, bit in enumerate(count))
+
+
+class NativeBridge(Bridge):
+    """The native port as it is."""
+
+    bus = "native"
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -1,15 +1,14 @@
 """SPI."""
 
 from amaranth import Cat, Module, Mux, Signal
-from amaranth.lib import wiring
 
-from tachometry.hdl.bus.bridge import bridge_members, next_number
+from tachometry.hdl.bus.bridge import Bridge, next_number
 from tachometry.hdl.front_end.synchronizer import Synchronizer
 from tachometry.spec.registers.frames import SPI_ADDRESS_WIDTH
-from tachometry.spec.registers.map import WORD, RegisterMap
+from tachometry.spec.registers.map import WORD
 
 
-class SpiBridge(wiring.Component):
+class SpiBridge(Bridge):
     """SPI in mode 0, most significant bit first, as `spec.registers.frames` describes it.
 
     The lines are sampled in the clock domain, so that sck may have at most an eighth of the clock's frequency, and must
@@ -19,20 +18,9 @@ class SpiBridge(wiring.Component):
 
     Latency: a read is made in the second clock after the one in which the first bit of its status byte is sampled, a
     write in the third clock after the one in which its last bit is sampled.
-
-    Parameters
-    ----------
-    registers : RegisterMap
-
-    Members
-    -------
-    The ports of the bus, and
-
-    native : Out(native_port)
     """
 
-    def __init__(self, registers: RegisterMap) -> None:
-        super().__init__(bridge_members("spi", registers))
+    bus = "spi"
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

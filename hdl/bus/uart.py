@@ -1,9 +1,8 @@
 """UART."""
 
 from amaranth import Cat, Module, Mux, Signal
-from amaranth.lib import wiring
 
-from tachometry.hdl.bus.bridge import bridge_members, next_number
+from tachometry.hdl.bus.bridge import Bridge, next_number
 from tachometry.hdl.front_end.synchronizer import Synchronizer
 from tachometry.spec.registers.frames import (
     COUNT_WIDTH,
@@ -22,7 +21,7 @@ _STOP = 9  # place of the stop bit; that of the start bit is 0
 _HEADER, _ADDRESS, _DATA, _CHECK = range(4)
 
 
-class UartBridge(wiring.Component):
+class UartBridge(Bridge):
     """UART, 8 bits without parity, with the frames that `spec.registers.frames` describes.
 
     A request that is whole and right is answered half a bit after its last stop bit; meanwhile nothing is received. Any
@@ -34,17 +33,13 @@ class UartBridge(wiring.Component):
     registers : RegisterMap
     bit_cycles : int
         Clocks of a bit, at least 8.
-
-    Members
-    -------
-    The ports of the bus, and
-
-    native : Out(native_port)
     """
+
+    bus = "uart"
 
     def __init__(self, registers: RegisterMap, bit_cycles: int) -> None:
         self._bit_cycles = bit_cycles
-        super().__init__(bridge_members("uart", registers))
+        super().__init__(registers)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

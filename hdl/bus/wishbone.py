@@ -1,30 +1,17 @@
 """Wishbone."""
 
 from amaranth import Module, Signal
-from amaranth.lib import wiring
 
-from tachometry.hdl.bus.bridge import bridge_members
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.hdl.bus.bridge import Bridge
 
 
-class WishboneBridge(wiring.Component):
+class WishboneBridge(Bridge):
     """Wishbone B4 classic, 32 bits, byte addresses: an access is answered in the clock after it, by ack or by err.
 
     A write without byte 0 changes nothing.
-
-    Parameters
-    ----------
-    registers : RegisterMap
-
-    Members
-    -------
-    The ports of the bus, and
-
-    native : Out(native_port)
     """
 
-    def __init__(self, registers: RegisterMap) -> None:
-        super().__init__(bridge_members("wishbone", registers))
+    bus = "wishbone"
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

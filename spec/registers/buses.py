@@ -200,7 +200,6 @@ def bus_of(name: str, baud: int | None = None) -> Bus | None:
     return replace(bus, baud=baud)
 
 
-def ports_on(spec: TachometerSpec, name: str) -> tuple[Port, ...]:
-    """All ports of a core on a bus, or on `none`."""
-    bus = bus_of(name)
+def ports_on(spec: TachometerSpec, bus: Bus | None) -> tuple[Port, ...]:
+    """All ports of a core, with those of the bus on which its registers are."""
     return spec.ports if bus is None else (*spec.ports, *bus.ports(RegisterMap(spec)))
