@@ -1,6 +1,6 @@
 """The whole core with registers, on a native port."""
 
-from amaranth import Module
+from amaranth import Module, ResetInserter
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
@@ -44,15 +44,16 @@ class RegisterCore(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         spec = self._map.spec
-        m.submodules.tachometer = core = self.tachometer
-        m.submodules.bank = bank = self.bank
+        core, bank = self.tachometer, self.bank
         # Long windows saturate what has been counted since the tick, and an index that resets is not in it.
         counted = not (spec.own_ticks or spec.index_reset)
         open_sum = core.pulse_counter.open_sum if counted else None
-        m.submodules.tick_position = position = TickPosition(
-            spec.position_width, 0 if open_sum is None else len(open_sum)
-        )
-        same = [port.name for port in self._map.ports if port.name not in _OTHERWISE] + [*spec.strobes]
+        position = TickPosition(spec.position_width, 0 if open_sum is None else len(open_sum))
+        restarts = ResetInserter(bank.restart) if hasattr(bank, "restart") else lambda box: box
+        m.submodules.tachometer, m.submodules.tick_position = restarts(core), restarts(position)
+        m.submodules.bank = bank
+        of_core = {port.name for port in self._map.ports} & {port.name for port in spec.outputs}
+        same = [*of_core.difference(_OTHERWISE), *spec.strobes]
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
         m.d.comb += [
             *(getattr(core, pin.name).eq(getattr(self, pin.name)) for pin in spec.pins),

@@ -3,14 +3,14 @@
 from functools import reduce
 from operator import or_
 
-from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth import Cat, Const, Module, Mux, Shape, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.counter import SaturatingCounter
 from tachometry.hdl.bus.native import native_port
 from tachometry.spec.port import INDEX, UPDATE
-from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Register, RegisterMap
+from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
 
 _EVENTS = {"updated": UPDATE, "indexed": INDEX}  # flags that say that there was a strobe since the capture before
 
@@ -36,6 +36,12 @@ class RegisterBank(wiring.Component):
         The captured ports of the core; `position` is to be that of the latest tick.
     tick, velocity_valid, decode_error … : In(1)
         Strobes of the core.
+    written : Out(1)
+        A setting is being written.
+    … : Out
+        `settings` of the map, as they were written last; those that act once are high in the clock of the write.
+    … : In
+        `live` fields of the map.
     """
 
     def __init__(self, registers: RegisterMap) -> None:
@@ -47,6 +53,9 @@ class RegisterBank(wiring.Component):
                 "clear": Out(1),
                 **{port.name: In(signed(port.width) if port.signed else port.width) for port in registers.ports},
                 **{name: In(1) for name in registers.spec.strobes},
+                "written": Out(1),
+                **{field.port: Out(_shape(field)) for field in registers.settings},
+                **{field.port: In(_shape(field)) for field in registers.live},
             }
         )
 
@@ -76,7 +85,8 @@ class RegisterBank(wiring.Component):
             m.d.sync += [captured[name].eq(value) for name, value in taken.items()]
 
         counts = self._counts(m, lost=waiting["updated"] & self.velocity_valid)
-        shown = {**captured, **counts, "clear": Const(0), "hold": hold}
+        shown = {**captured, **counts, "clear": Const(0), "hold": hold, **self._settings(m, here)}
+        shown |= {field.port: getattr(self, field.port) for field in self._map.live}
         # What is kept for a clock is which register was read, not what it said; an address without a register reads 0.
         chosen = Signal(bus.address.shape(), init=(1 << len(bus.address)) - 1)
         m.d.sync += chosen.eq(Mux(bus.read, bus.address, -1))
@@ -85,6 +95,23 @@ class RegisterBank(wiring.Component):
             answers.append(_word(m, register, shown) & (chosen == number).replicate(WORD))
         m.d.comb += bus.read_data.eq(reduce(or_, answers))
         return m
+
+    def _settings(self, m: Module, here: dict[str, Value]) -> dict[str, Value]:
+        """The settings by their names, as they are read."""
+        read: dict[str, Value] = {}
+        for register in self._map:
+            for field in register.fields:
+                if not (field.writable and field.port):
+                    continue
+                value, given = getattr(self, field.port), self.bus.write_data[field.low : field.low + field.width]
+                read[field.port] = Const(0) if field.single else value
+                with m.If(self.bus.write & here[register.name]):
+                    m.d.comb += self.written.eq(1)
+                    if field.single:
+                        m.d.comb += value.eq(given)
+                    else:
+                        m.d.sync += value.eq(given)
+        return read
 
     def _counts(self, m: Module, *, lost: Value) -> dict[str, Value]:
         """The counters of COUNTERS by their names."""
@@ -97,6 +124,10 @@ class RegisterBank(wiring.Component):
             m.d.comb += [counter.event.eq(events[name]), counter.clear.eq(self.clear)]
             counts[name] = counter.count
         return counts
+
+
+def _shape(field: Field) -> Shape:
+    return Shape(field.width, field.signed)
 
 
 def _word(m: Module, register: Register, shown: dict[str, Value]) -> Value:

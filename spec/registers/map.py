@@ -52,7 +52,7 @@ class Field:
     unit : str
         What one LSB is.
     port : str
-        The port that it shows, if it shows one.
+        The port that it shows, if it shows one. If it is writable, that which it sets.
     shift : int
         The bit of the port that is its lowest.
     """
@@ -119,6 +119,9 @@ class Register:
         return sum(field.reset << field.low for field in self.fields)
 
 
+Draft = tuple[str, str, tuple[Field, ...], dict[str, bool]]  # name, help, fields, and what is true of the register
+
+
 @dataclass(frozen=True)
 class RegisterMap:
     """All registers of a core.
@@ -133,7 +136,7 @@ class RegisterMap:
     @cached_property
     def registers(self) -> tuple[Register, ...]:
         """In the order of their offsets, which follow each other without a gap."""
-        drafts = (*self._head(), *self._captured())
+        drafts = (*self._head(), *self._captured(), *self._added())
         return tuple(
             Register(name, number * WORD // 8, help, fields, **more)
             for number, (name, help, fields, more) in enumerate(drafts)
@@ -157,6 +160,21 @@ class RegisterMap:
     def ports(self) -> tuple[Port, ...]:
         """Outputs of the core that are captured."""
         return tuple(port for port in self.spec.outputs if port.held_by in _LIVE and not port.is_strobe)
+
+    @property
+    def settings(self) -> tuple[Field, ...]:
+        """Fields whose value what is around the bank follows."""
+        return tuple(field for register in self.registers for field in register.fields if field.writable and field.port)
+
+    @property
+    def live(self) -> tuple[Field, ...]:
+        """Fields that show a port of what is around the bank as it is, without a capture."""
+        return tuple(
+            field
+            for register in self.registers
+            for field in register.fields
+            if field.port and not field.writable and not register.captured
+        )
 
     @cached_property
     def counted(self) -> dict[str, str]:
@@ -198,7 +216,7 @@ class RegisterMap:
             ],
         }
 
-    def _head(self) -> Iterable[tuple[str, str, tuple[Field, ...], dict[str, bool]]]:
+    def _head(self) -> Iterable[Draft]:
         yield (
             *("IDENTIFICATION", "Says that a tachometer answers: the letters TACH.", (_constant(IDENTIFICATION),)),
             {"constant": True},
@@ -223,7 +241,7 @@ class RegisterMap:
         )
         yield "COUNTERS", "What went wrong since reset or CONTROL.clear; not captured.", tuple(counters), {}
 
-    def _captured(self) -> Iterable[tuple[str, str, tuple[Field, ...], dict[str, bool]]]:
+    def _captured(self) -> Iterable[Draft]:
         values = [port for port in self.ports if port.width > 1]
         for port in values:
             more = {"captured": True}
@@ -238,6 +256,10 @@ class RegisterMap:
                 yield name, f"{low}{port.help}", (field,), {**more, "captures": first}
             if port is values[0]:
                 yield "STATUS", "Flags of what was captured.", tuple(self._flags()), more
+
+    def _added(self) -> Iterable[Draft]:
+        """What a design around the core adds."""
+        return ()
 
     def _flags(self) -> Iterable[Field]:
         events = {"updated": "There was an update of the velocity since the capture before."}

@@ -37,7 +37,7 @@ def captured_values(registers: RegisterMap) -> tuple[CapturedValue, ...]:
     found: dict[str, list[Register]] = {}
     for register in registers:
         for field in register.fields:
-            if field.port and field.width == WORD:
+            if register.captured and field.port and field.width == WORD:
                 found.setdefault(field.port, []).append(register)
     return tuple(CapturedValue(name, tuple(words)) for name, words in found.items())
 

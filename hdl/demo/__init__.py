@@ -1,0 +1,1 @@
+"""The demo: a tachometer with registers beside an emulated encoder, to be put on a board."""

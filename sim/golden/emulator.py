@@ -1,0 +1,180 @@
+"""Golden encoder emulator: every edge that it makes, from its settings and when they were written."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec.emulator import (
+    BOUNCE_BITS,
+    DROP_BITS,
+    DROP_WIDTH,
+    FINE_WIDTH,
+    JITTER_WIDTH,
+    PHASE_WIDTH,
+    RANDOM_TAP,
+    RANDOM_WIDTH,
+    RATE_SHIFT,
+    START,
+    EmulatorSettings,
+)
+
+_CHUNK = 1 << 18  # clocks that are worked out at once
+_TURN = 1 << FINE_WIDTH
+
+
+@dataclass(frozen=True)
+class Change:
+    """A write to the emulator's registers.
+
+    Parameters
+    ----------
+    clock : int
+        Of the write, since the restart; -1 for what was set before it.
+    settings : EmulatorSettings
+        All that holds from the next clock on.
+    jump : bool
+        The phase turns by half a period in this clock.
+    """
+
+    clock: int
+    settings: EmulatorSettings
+    jump: bool = False
+
+
+class _Random:
+    """The random bits: the newest in clock t is bit t of a sequence."""
+
+    def __init__(self) -> None:
+        self._bits = np.zeros(RANDOM_WIDTH, dtype=np.uint8)
+        self._bits[-1] = 1  # the newest bit in clock 0
+
+    def until(self, n_clocks: int) -> None:
+        """Make the bits up to this clock."""
+        while len(self._bits) < n_clocks + RANDOM_WIDTH:
+            # The recurrence holds for all lags twice as long, too: x^62 + x^56 + 1 is a square of x^31 + x^28 + 1.
+            have, scale = len(self._bits), 1
+            while 2 * scale * RANDOM_WIDTH <= have:
+                scale *= 2
+            long, short = RANDOM_WIDTH * scale, RANDOM_TAP * scale
+            self._bits = np.append(self._bits, self._bits[-long : have - long + short] ^ self._bits[-short:])
+
+    def bit(self, clock: NDArray[np.int64], place: int) -> NDArray[np.uint8]:
+        """A bit of the register in some clocks."""
+        return self._bits[clock + RANDOM_WIDTH - 1 - place]
+
+    def number(self, clock: NDArray[np.int64], low: int, width: int) -> NDArray[np.int64]:
+        """Some bits of the register as a number."""
+        return np.sum([self.bit(clock, low + k).astype(np.int64) << k for k in range(width)], axis=0)
+
+
+class _Line:
+    """One line, see `hdl.demo.line`."""
+
+    def __init__(self, k: int, random: _Random) -> None:
+        self._k, self._random = k, random
+        self._ideal = self._before = self._level = self._line = 0
+        self._until = 0  # the line bounces in all clocks before this one
+
+    def play(self, clock: NDArray[np.int64], ideal: NDArray[np.uint8], settings: EmulatorSettings) -> NDArray[np.uint8]:
+        """Levels in these clocks; `ideal` is what the flip-flop takes at their ends."""
+        seen = np.append(np.uint8(self._ideal), ideal)
+        edges = np.flatnonzero(seen[:-1] != np.append(np.uint8(self._before), seen[:-2]))
+        dropped = self._random.number(clock[edges], DROP_BITS[self._k], DROP_WIDTH) < settings.drop
+        kept = edges[~dropped]
+        # What holds in the clocks after each kept edge, the one carried over first.
+        which = np.zeros(len(clock) + 1, dtype=np.int64)
+        which[kept + 1] = 1
+        which = np.cumsum(which)
+        level = np.append(np.uint8(self._level), seen[kept])[which]
+        until = np.append(self._until, clock[kept] + 1 + settings.bounce)[which]
+        bounces = (clock < until[:-1]) & (self._random.bit(clock, BOUNCE_BITS[self._k]) == 1)
+        after = level[:-1] ^ bounces.astype(np.uint8)
+        found = np.append(np.uint8(self._line), after[:-1])
+        self._ideal, self._before = int(seen[-1]), int(seen[-2])
+        self._level, self._until, self._line = int(level[-1]), int(until[-1]), int(after[-1])
+        return found
+
+
+class GoldenEmulator:
+    """The emulator from a restart on.
+
+    Parameters
+    ----------
+    lines_per_rev : int or None
+        Periods in a revolution, for the index line; None: there is none.
+    """
+
+    def __init__(self, lines_per_rev: int | None = None) -> None:
+        self._lines_per_rev = lines_per_rev
+        self._random = _Random()
+        self._lines = [_Line(k, self._random) for k in range(2)]
+        self._clock = self._speed = self._moved = 0
+        self._total = START  # the phase, and whole periods above it
+        self._between = 1
+        self._z = [0, 0]
+
+    def trace(self, changes: Sequence[Change], n_clocks: int) -> PinTrace:
+        """The lines as a core would see them whose clock 0 is that of the restart; once for each emulator.
+
+        Parameters
+        ----------
+        changes : sequence of Change
+            In the order of their clocks.
+        n_clocks : int
+        """
+        held = [EmulatorSettings(), *(change.settings for change in changes)]
+        ends = [*(min(change.clock + 1, n_clocks) for change in changes), n_clocks]
+        jumps = [*(change.jump for change in changes), False]
+        clocks, levels = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.uint8)]
+        last = -1
+        for settings, end, jump in zip(held, ends, jumps, strict=True):
+            while self._clock < end:
+                clock = np.arange(self._clock, min(end, self._clock + _CHUNK))
+                level = self._play(clock, settings)
+                changed = np.append(level[0] != last, level[1:] != level[:-1])
+                clocks.append(clock[changed])
+                levels.append(level[changed])
+                last, self._clock = int(level[-1]), int(clock[-1]) + 1
+            self._total ^= jump << PHASE_WIDTH - 1
+        every = np.concatenate(levels)
+        z = None if self._lines_per_rev is None else every >> 2
+        return PinTrace(np.concatenate(clocks), every & 1, every >> 1 & 1, n_clocks, z)
+
+    def _play(self, clock: NDArray[np.int64], settings: EmulatorSettings) -> NDArray[np.uint8]:
+        """A + 2 B + 4 Z in these clocks."""
+        n = len(clock)
+        self._random.until(self._clock + n)
+        target = settings.speed << RATE_SHIFT
+        if settings.rate:
+            step = settings.rate if target >= self._speed else -settings.rate
+            speed = self._speed + step * np.arange(n + 1)
+            speed = np.minimum(speed, target) if step > 0 else np.maximum(speed, target)
+        else:
+            speed = np.append(self._speed, np.full(n, target))
+        total = self._total + np.append(0, np.cumsum(speed[:n] >> RATE_SHIFT))
+        self._speed, self._total = int(speed[n]), int(total[n])
+
+        fine = (total[:n] >> PHASE_WIDTH - FINE_WIDTH) % _TURN
+        between = (fine + _TURN // 8) // (_TURN // 4) % 4
+        draws = np.flatnonzero(between != np.append(self._between, between[:-1]))
+        late, early = (
+            self._random.number(clock[draws], low, JITTER_WIDTH) & settings.jitter for low in (0, JITTER_WIDTH)
+        )
+        counts = np.diff(np.append(np.append(-1, draws), n))
+        moved = np.repeat(np.append(self._moved, late - early), counts)
+        self._between, self._moved = int(between[-1]), int(moved[-1] if draws.size == 0 else (late - early)[-1])
+
+        since_a = (fine - moved[:n] - _TURN // 4) % _TURN
+        since_b = (fine - moved[:n] - _TURN // 2 - settings.phase_error) % _TURN
+        ideal = [since_a < _TURN // 2 + settings.duty_a, since_b < _TURN // 2 + settings.duty_b]
+        a, b = (line.play(clock, high.astype(np.uint8), settings) for line, high in zip(self._lines, ideal, strict=True))
+        level = a | b << np.uint8(1)
+        if self._lines_per_rev is not None:
+            index = ((total[:n] >> PHASE_WIDTH) % self._lines_per_rev == 0) & (fine < _TURN // 4)
+            z = np.append(np.array(self._z, dtype=np.uint8), index.astype(np.uint8))
+            self._z = z[-2:].tolist()
+            level |= z[:-2] << np.uint8(2)
+        return level

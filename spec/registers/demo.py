@@ -1,0 +1,69 @@
+"""Registers of the demo: those of the core, and the settings of its encoder emulator."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+from tachometry.spec.emulator import BOUNCE_WIDTH, DROP_WIDTH, ERROR_WIDTH, JITTER_WIDTH, RATE_SHIFT
+from tachometry.spec.port import TICK, Port, held
+from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
+
+PERIOD_WIDTH = 16  # bits of the telemetry's period
+
+
+@dataclass(frozen=True)
+class DemoMap(RegisterMap):
+    """All registers of a demo.
+
+    A write to one of the registers that are not the core's takes effect in the next clock, and CHANGED keeps the
+    instant of the write. So whoever knows all writes since a restart knows every edge that the emulator has made.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    """
+
+    @cached_property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs of the core that are captured, and the time."""
+        time = held(TICK, "time", WORD, unit="clocks", help="Time of the capture, since the last restart; it wraps.")
+        return (*super().ports, time)
+
+    def _added(self) -> Iterable[Draft]:
+        telemetry = "Ticks from a frame of telemetry to the next; 0: there are none."
+        yield "TELEMETRY", "What is sent unasked.", (_setting("telemetry_period", PERIOD_WIDTH, 0, telemetry),), {}
+        changed = Field("value", WORD, unit="clocks", port="changed")
+        yield "CHANGED", "Time of the last write to a setting, since the last restart.", (changed,), {}
+        fields = (
+            _setting("emulated", 1, 0, "The tachometer measures the emulator, not the pins."),
+            _strobe("restart", 1, "Writing 1 resets the tachometer and the emulator, but not the settings."),
+            _strobe("jump", 2, "Writing 1 turns the emulated encoder by half a period: both lines change at once."),
+        )
+        yield "DEMO", "What is measured, and what happens once.", fields, {}
+        unit = "2^-32 periods of a line in a clock"
+        speed = Field("value", WORD, writable=True, signed=True, unit=unit, port="speed")
+        yield "SPEED", "Speed that the emulator goes to.", (speed,), {}
+        unit = f"2^-{WORD + RATE_SHIFT} periods of a line in a clock squared"
+        rate = Field("value", WORD, writable=True, unit=unit, port="rate")
+        yield "RATE", "How fast the emulator's speed goes there; 0: at once.", (rate,), {}
+        unit = "in 2^-10 periods of a line, in two's complement."
+        errors = ("phase_error", "How late B rises,"), ("duty_a", "How late A falls,"), ("duty_b", "How late B falls,")
+        fields = tuple(
+            _setting(name, ERROR_WIDTH, 8 * k, f"{help} {unit}", signed=True) for k, (name, help) in enumerate(errors)
+        )
+        yield "ERRORS", "Where the emulated edges are wrong, in every period alike.", fields, {}
+        bits = "each set bit takes part."
+        fields = (
+            _setting("jitter", JITTER_WIDTH, 0, f"Edges move by up to this to either side, in 2^-10 periods; {bits}"),
+            _setting("bounce", BOUNCE_WIDTH, 8, "Clocks for which a line bounces after each of its edges."),
+            _setting("drop", DROP_WIDTH, 16, "So many of 256 edges of each line are left out."),
+        )
+        yield "NOISE", "Where the emulated edges are wrong, at random.", fields, {}
+
+
+def _setting(name: str, width: int, low: int, help: str, *, signed: bool = False) -> Field:
+    return Field(name, width, low, help, writable=True, signed=signed, port=name)
+
+
+def _strobe(name: str, low: int, help: str) -> Field:
+    return Field(name, 1, low, help, writable=True, single=True, port=name)
