@@ -90,9 +90,13 @@ class RegisterBank(wiring.Component):
         # What is kept for a clock is which register was read, not what it said; an address without a register reads 0.
         chosen = Signal(bus.address.shape(), init=(1 << len(bus.address)) - 1)
         m.d.sync += chosen.eq(Mux(bus.read, bus.address, -1))
-        answers = []
-        for number, register in enumerate(self._map):
-            answers.append(_word(m, register, shown) & (chosen == number).replicate(WORD))
+        # A word of all selections, and not each where it is used, which compiled simulations would repeat for each bit.
+        selected = Signal(len(self._map.registers))
+        m.d.comb += selected.eq(Cat(chosen == number for number in range(len(selected))))
+        answers = [
+            _word(m, register, shown) & selects.replicate(WORD)
+            for register, selects in zip(self._map, selected, strict=True)
+        ]
         m.d.comb += bus.read_data.eq(reduce(or_, answers))
         return m
 

@@ -16,6 +16,8 @@ class Bridge(wiring.Component):
     Parameters
     ----------
     registers : RegisterMap
+    more : flows
+        Members beyond those of the bus.
 
     Members
     -------
@@ -26,9 +28,9 @@ class Bridge(wiring.Component):
 
     bus = ""
 
-    def __init__(self, registers: RegisterMap) -> None:
+    def __init__(self, registers: RegisterMap, **more: wiring.Member) -> None:
         ports = members(port for port in BUSES[self.bus].ports(registers) if port.name != CAPTURE.name)
-        super().__init__({**ports, "native": Out(native_port(registers.address_width - 2))})
+        super().__init__({**ports, "native": Out(native_port(registers.address_width - 2)), **more})
 
 
 def next_number(count: Signal) -> Value:

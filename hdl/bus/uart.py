@@ -1,6 +1,7 @@
 """UART."""
 
 from amaranth import Cat, Module, Mux, Signal
+from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.bridge import Bridge, next_number
 from tachometry.hdl.front_end.synchronizer import Synchronizer
@@ -33,13 +34,22 @@ class UartBridge(Bridge):
     registers : RegisterMap
     bit_cycles : int
         Clocks of a bit, at least 8.
+
+    Members
+    -------
+    Those of a `Bridge`, and
+
+    wait : In(1)
+        Answers must wait: something else is sent, and uses the native port. 0 unless it is connected.
+    occupied : Out(1)
+        An answer is sent or waits; nothing else must begin.
     """
 
     bus = "uart"
 
     def __init__(self, registers: RegisterMap, bit_cycles: int) -> None:
         self._bit_cycles = bit_cycles
-        super().__init__(registers)
+        super().__init__(registers, wait=In(1), occupied=Out(1))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -65,7 +75,8 @@ class UartBridge(Bridge):
         m.d.sync += timer.eq(Mux(beat, cycles - 1, timer - 1))
         with m.If(beat):
             m.d.sync += place.eq(Mux(sending & (place == _STOP), 0, next_number(place)))
-        with m.If(~busy & ~line):
+        due = Signal()  # an answer waits
+        with m.If(~busy & ~due & ~line):
             m.d.sync += [receiving.eq(1), place.eq(0), timer.eq(cycles // 2 - 1)]
         with m.If(ended | (beat & (place == 0) & line)):  # the latter is no start bit
             m.d.sync += receiving.eq(0)
@@ -142,9 +153,18 @@ class UartBridge(Bridge):
             with m.If(~sending & ~line):
                 m.d.sync += bad.eq(1)
             with m.If(done):
-                m.d.sync += [sending.eq(right), error.eq(0)]
-                with m.If(right):
-                    m.d.sync += place.eq(0)
+                m.d.sync += sending.eq(0)
+        asks = Signal()
+        answered = Signal()
+        m.d.comb += [
+            asks.eq(ended & done & right),
+            answered.eq((asks | (beat & due)) & ~self.wait),
+            self.occupied.eq(sending | due | answered),
+        ]
+        with m.If(beat):
+            m.d.sync += due.eq((asks | due) & self.wait)
+        with m.If(answered):
+            m.d.sync += [sending.eq(1), error.eq(0), place.eq(0)]
         with m.If(beat & ~busy & (place == QUIET_BITS - 1)):
             m.d.sync += [part.eq(_HEADER), number.eq(0), bad.eq(0)]
 
@@ -154,7 +174,7 @@ class UartBridge(Bridge):
             # At the highest address there is no register.
             native.address.eq(address[:words] | address[words:].any().replicate(words)),
             native.read.eq(ended & sending & (in_header | word_ends) & more),
-            native.write.eq(ended & done & right & writing),
+            native.write.eq(answered & writing),
             native.write_data.eq(word),
         ]
         m.d.sync += asked.eq(native.read | native.write)

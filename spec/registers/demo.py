@@ -29,6 +29,12 @@ class DemoMap(RegisterMap):
         time = held(TICK, "time", WORD, unit="clocks", help="Time of the capture, since the last restart; it wraps.")
         return (*super().ports, time)
 
+    @property
+    def emulated(self) -> tuple[Field, ...]:
+        """Settings of the emulator."""
+        others = ("telemetry_period", "emulated", "restart")
+        return tuple(field for field in self.settings if field.port not in others)
+
     def _added(self) -> Iterable[Draft]:
         telemetry = "Ticks from a frame of telemetry to the next; 0: there are none."
         yield "TELEMETRY", "What is sent unasked.", (_setting("telemetry_period", PERIOD_WIDTH, 0, telemetry),), {}

@@ -7,7 +7,9 @@ each word too: the word, then its status, which may be left out at the end. The 
 
 UART, least significant bytes first, as the bits of a byte are. A request is a header with type and sequence, the
 address of a word, then the number of words to be read in a byte, or the word to be written, and the check. The answer
-is the header with `FROM_CORE` set, the words that were read, a byte of status, and the check. The other types are free.
+is the header with `FROM_CORE` set, the words that were read, a byte of status, and the check. Telemetry, which the demo
+sends unasked, is an answer to a read of all captured registers; its sequence counts on, also when a frame is left out.
+The other types are free.
 """
 
 from dataclasses import dataclass
@@ -38,6 +40,10 @@ class Type(IntEnum):
 
     READ = 0
     WRITE = 1
+    TELEMETRY = 2
+
+
+_TELEMETRY_HEADER = 1 << FROM_CORE | Type.TELEMETRY << TYPE_LOW
 
 
 class FrameError(ValueError):
@@ -129,7 +135,7 @@ def decode_request(frame: bytes) -> Request:
         If it is none, or damaged.
     """
     body = _checked(frame)
-    if not body or body[0] >> TYPE_LOW not in list(Type):
+    if not body or body[0] >> TYPE_LOW not in (Type.READ, Type.WRITE):
         raise FrameError("a request must begin with its type")
     kind = Type(body[0] >> TYPE_LOW)
     if len(body) != 2 + (_WORD_BYTES if kind is Type.WRITE else 1):
@@ -166,6 +172,27 @@ def decode_answer(request: bytes, frame: bytes) -> Answer:
     if body[-1] not in (0, ERROR):
         raise FrameError(f"the status of an answer must be 0 or {ERROR}, not {body[-1]}")
     return Answer(_words(body[1:-1]), body[-1] == ERROR)
+
+
+def telemetry_length(n_words: int) -> int:
+    """Bytes of a frame of telemetry with so many words."""
+    return 2 + _CHECK_BYTES + _WORD_BYTES * n_words
+
+
+def decode_telemetry(frame: bytes) -> tuple[int, tuple[int, ...]]:
+    """Sequence and words of a frame of telemetry.
+
+    Raises
+    ------
+    FrameError
+        If it is none, or damaged.
+    """
+    body = _checked(frame)
+    if len(body) % _WORD_BYTES != 2 or body[-1]:
+        raise FrameError("telemetry must have whole words and status 0")
+    if body[0] & ~(SEQUENCES - 1) != _TELEMETRY_HEADER:
+        raise FrameError(f"telemetry must begin with {_TELEMETRY_HEADER:#04x} and its sequence, not {body[0]:#04x}")
+    return body[0] % SEQUENCES, _words(body[1:-1])
 
 
 def encode_answer(request: Request, answer: Answer) -> bytes:

@@ -1,0 +1,132 @@
+"""What the demo puts on a board."""
+
+from amaranth import Cat, Module, Mux, ResetInserter, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.ports import members
+from tachometry.hdl.bus.telemetry import TelemetrySender
+from tachometry.hdl.bus.uart import UartBridge
+from tachometry.hdl.bus_tachometer import BRIDGES
+from tachometry.hdl.demo.emulator import EncoderEmulator
+from tachometry.hdl.register_core import RegisterCore
+from tachometry.spec.registers.buses import CAPTURE, Bus
+from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
+from tachometry.spec.registers.map import WORD
+
+_LEDS = 4
+_LINES = ("a", "b", "z")
+
+
+class Demo(wiring.Component):
+    """A tachometer on pins or on an emulated encoder, with its registers on a bus; telemetry if that is a UART.
+
+    The settings survive a restart, which resets tachometer, emulator and time.
+
+    Parameters
+    ----------
+    registers : DemoMap
+    bus : Bus
+
+    Members
+    -------
+    The inputs of the spec and the ports of the bus, less `clk`, `rst` and `capture`, and
+
+    emulated_a, emulated_b : Out(1)
+        Lines of the emulated encoder; `emulated_z`, too, if the core has an index.
+    leds : Out(4)
+        The shaft turns; it turned backward at the last update; something went wrong since reset or clear; the clock
+        runs.
+
+    Raises
+    ------
+    ParameterError
+        If the clock cannot make the bits of the bus.
+    """
+
+    def __init__(self, registers: DemoMap, bus: Bus) -> None:
+        spec = registers.spec
+        self._map = registers
+        self.core = RegisterCore(registers)
+        self._lines = [pin.name for pin in spec.pins if pin.name in _LINES]
+        self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None)
+        cycles = (bus.bit_cycles(spec.timing.clock_hz),) if bus.baud else ()
+        self.bridge = BRIDGES[bus.name](registers, *cycles)
+        self.telemetry = TelemetrySender(registers, *cycles) if isinstance(self.bridge, UartBridge) else None
+        self._bus_ports = [port for port in bus.ports(registers) if port.name != CAPTURE.name]
+        super().__init__(
+            {
+                **members((*spec.pins, *self._bus_ports)),
+                **{f"emulated_{line}": Out(1) for line in self._lines},
+                "leds": Out(_LEDS),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        core, bank, bridge = self.core, self.core.bank, self.bridge
+        m.submodules.core = core
+        m.submodules.bridge = bridge
+        m.submodules.emulator = emulator = ResetInserter(bank.restart)(self.emulator)
+        time = Signal(WORD)
+        changed = Signal(WORD)
+        ticks = Signal(PERIOD_WIDTH)  # since the last telemetry
+        sends = Signal()
+        m.d.sync += time.eq(time + 1)
+        with m.If(bank.written):
+            m.d.sync += changed.eq(time)
+        with m.If(core.tick):
+            m.d.comb += sends.eq((bank.telemetry_period != 0) & (ticks + 1 >= bank.telemetry_period))
+            m.d.sync += ticks.eq(Mux(sends, 0, ticks + 1))
+        with m.If(bank.restart):
+            m.d.sync += [time.eq(0), changed.eq(0), ticks.eq(0)]
+        m.d.comb += [
+            bank.time.eq(time),
+            bank.changed.eq(changed),
+            *(getattr(emulator, field.port).eq(getattr(bank, field.port)) for field in self._map.emulated),
+        ]
+
+        for pin in self._map.spec.pins:
+            given = getattr(self, pin.name)
+            if pin.name in self._lines:
+                line = getattr(self.emulator, pin.name)
+                given = Mux(bank.emulated, line, given)
+                m.d.comb += getattr(self, f"emulated_{pin.name}").eq(line)
+            m.d.comb += getattr(core, pin.name).eq(given)
+
+        for port in self._bus_ports:
+            mine, its = getattr(self, port.name), getattr(bridge, port.name)
+            m.d.comb += its.eq(mine) if port.direction == "input" else mine.eq(its)
+        self._native(m, sends)
+
+        wrong = Signal()
+        m.d.sync += wrong.eq((wrong | core.decode_error | (core.tick & core.overflow)) & ~bank.clear)
+        backward = Signal()
+        with m.If(core.velocity_valid):
+            m.d.sync += backward.eq(core.velocity < 0)
+        runs = Signal(range(self._map.spec.timing.clock_hz))
+        m.d.sync += runs.eq(runs + 1)
+        m.d.sync += self.leds.eq(Cat(~core.stalled, backward, wrong, runs[-1]))
+        return m
+
+    def _native(self, m: Module, sends: Signal) -> None:
+        """The bridge and the telemetry on one native port: one of them begins when the other has ended."""
+        native, bridge, telemetry = self.core.bus, self.bridge, self.telemetry
+        if telemetry is None:
+            wiring.connect(m, bridge.native, native)
+            return
+        m.submodules.telemetry = telemetry
+        of_bridge, of_telemetry = bridge.native, telemetry.native
+        m.d.comb += [
+            telemetry.send.eq(sends),
+            telemetry.wait.eq(bridge.occupied),
+            bridge.wait.eq(telemetry.busy),
+            self.uart_tx.eq(bridge.uart_tx & telemetry.line),
+            native.address.eq(Mux(of_telemetry.read, of_telemetry.address, of_bridge.address)),
+            native.read.eq(of_bridge.read | of_telemetry.read),
+            native.write.eq(of_bridge.write),
+            native.write_data.eq(of_bridge.write_data),
+            of_bridge.read_data.eq(native.read_data),
+            of_bridge.error.eq(native.error),
+            of_telemetry.read_data.eq(native.read_data),
+        ]

@@ -1,0 +1,110 @@
+"""A demo board in the compiled engine: bytes into its UART, bytes out of it, and clocks that pass."""
+
+import ctypes
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from amaranth.lib import wiring
+
+from tachometry.hdl.demo.demo import Demo
+from tachometry.sim.engines.compiled import Design
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.spec import Port
+from tachometry.spec.registers.buses import Bus
+from tachometry.spec.registers.demo import DemoMap
+
+_DRIVER = Path(__file__).with_name("board.h").read_text(encoding="utf-8")
+_ROOM = 1 << 16  # bytes that a call can give back
+
+
+@dataclass(frozen=True)
+class _BoardDesign(Design):
+    """The demo, whose last input is the line to the core."""
+
+    registers: DemoMap | None = None
+    bus: Bus | None = None
+
+    @cached_property
+    def component(self) -> wiring.Component:
+        assert self.registers is not None and self.bus is not None
+        return Demo(self.registers, self.bus)
+
+    @property
+    def outputs(self) -> list[Port]:
+        return []
+
+    @property
+    def strobes(self) -> list[str]:
+        return ["uart_tx"]
+
+    def source(self, model: str) -> str:
+        assert self.bus is not None
+        head = (
+            f"#define BIT_CYCLES {self.bus.bit_cycles(self.spec.timing.clock_hz)}\n#define RX {len(self.pins) - 1}\n"
+        )
+        return f"{head}#include <cstdint>\n{model}\n{_DRIVER}"
+
+
+class _Transfer(ctypes.Structure):
+    _fields_ = (
+        *(("clocks", ctypes.c_int64), ("in", ctypes.c_void_p), ("n_in", ctypes.c_int64), ("taken", ctypes.c_int64)),
+        *(("out", ctypes.c_void_p), ("n_out", ctypes.c_int64), ("capacity", ctypes.c_int64)),
+        *(("lines", ctypes.c_int64), ("broken", ctypes.c_int64)),
+    )
+
+
+class BoardSimulation:
+    """The demo on a UART, from its reset on.
+
+    Parameters
+    ----------
+    registers : DemoMap
+    bus : Bus
+        The UART.
+
+    Raises
+    ------
+    OSError
+        If it cannot be compiled.
+    """
+
+    def __init__(self, registers: DemoMap, bus: Bus) -> None:
+        spec = registers.spec
+        uart_rx = next(port for port in bus.ports(registers) if port.name == "uart_rx")
+        design = _BoardDesign(spec, [*spec.pins, uart_rx], None, registers, bus)
+        self._library = ctypes.CDLL(str(Cxxrtl().library(design)))
+        self._library.board_new.restype = ctypes.c_void_p
+        self._board: Any = ctypes.c_void_p(self._library.board_new())
+        self._out = np.empty(_ROOM, dtype=np.uint8)
+        self.n_clocks = 0
+        self.n_broken = 0
+
+    def close(self) -> None:
+        """Give the memory back."""
+        if self._board is not None:
+            self._library.board_delete(self._board)
+            self._board = None
+
+    def run(self, n_clocks: int, data: bytes = b"") -> tuple[bytes, bytes]:
+        """Let clocks pass while bytes are sent to the core one after the other.
+
+        Returns
+        -------
+        received : bytes
+            What the core has sent.
+        left : bytes
+            What of `data` has not begun to be sent.
+        """
+        given, found = np.frombuffer(data, dtype=np.uint8), []
+        transfer = _Transfer(clocks=n_clocks, n_in=len(data), out=self._out.ctypes.data, capacity=_ROOM)
+        setattr(transfer, "in", given.ctypes.data)
+        while transfer.clocks:
+            transfer.n_out = 0
+            self._library.board_run(self._board, ctypes.byref(transfer))
+            found.append(self._out[: transfer.n_out].tobytes())
+        self.n_clocks += n_clocks
+        self.n_broken += transfer.broken
+        return b"".join(found), data[transfer.taken :]
