@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.recording import PinTrace, merged
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 
@@ -108,7 +108,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         lines[name] = clock, level
     (at_a, a), (at_b, b) = lines["a"], lines["b"]
     # From the first clock on from which both are known.
-    clock = np.union1d(at_a, at_b)
+    clock = merged(at_a, at_b)
     clock = clock[clock >= max(at_a[0], at_b[0])]
     a, b = a[np.searchsorted(at_a, clock, side="right") - 1], b[np.searchsorted(at_b, clock, side="right") - 1]
     step, illegal = decode(a, b, spec.encoder.decoding)

@@ -39,6 +39,12 @@ def packed(lines: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     return level
 
 
+def merged(*clocks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """All clocks of ordered lists, in their order, each once; `np.union1d` would hash them, ten times as slowly."""
+    every = np.sort(np.concatenate(clocks), kind="stable")
+    return every[np.diff(every, prepend=every[:1] - 1) > 0]
+
+
 class _Lines:
     a: NDArray[np.uint8]
     b: NDArray[np.uint8]
@@ -203,7 +209,7 @@ class PinTrace(_Lines):
         They increase by at least 2; those from `n_clocks` on are left out.
         """
         rises = rises[rises < self.n_clocks]
-        clock = np.union1d(self.clock, np.stack([rises, rises + 1]))
+        clock = merged(self.clock, rises, rises + 1)
         held = np.searchsorted(self.clock, clock, side="right") - 1
         lines = {name: line[held] for name, line in self.lines.items()}
         lines["tick_in"] = np.isin(clock, rises).astype(np.uint8)

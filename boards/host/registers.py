@@ -1,0 +1,108 @@
+"""What the manifest of a core on a bus says of its registers, as a host uses it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tachometry.boards.host.snapshot import Snapshot
+
+
+class HostRegisters:
+    """Registers by their names.
+
+    Parameters
+    ----------
+    manifest : mapping
+        What `NAME.json` of a core on a bus says.
+
+    Raises
+    ------
+    ValueError
+        If it is that of a core without registers.
+    """
+
+    def __init__(self, manifest: Mapping[str, Any]) -> None:
+        if "registers" not in manifest:
+            raise ValueError("manifest must be that of a core on a bus, which tachometry generate --bus makes")
+        described = manifest["registers"]
+        self.module: str = manifest["module"]
+        self.identification: int = described["identification"]
+        self.configuration: int = described["configuration"]
+        self.word_mask = (1 << described["word_bits"]) - 1
+        self._registers: dict[str, Mapping[str, Any]] = {one["name"]: one for one in described["map"]}
+        self.captured = [one for one in self._registers.values() if one["captured"]]
+        self._rad_per_s_per_lsb: float = manifest["velocity"]["rad_per_s_per_lsb"]
+        self._flags = frozenset(field["name"] for field in self._registers["STATUS"]["fields"])
+        widths = {port["name"]: port["width"] for port in manifest["ports"]}
+        self._unused = [self._unused_of(register, widths) for register in self.captured]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._registers
+
+    def offset(self, name: str) -> int:
+        """Bytes from the first register to this one."""
+        return int(self._registers[name]["offset"])
+
+    def mask(self, name: str, field: str) -> int:
+        """Bits of a field."""
+        found = self._field(name, field)
+        return int((1 << found["width"]) - 1 << found["low"])
+
+    def fields(self, name: str, word: int) -> dict[str, int]:
+        """Fields of a register that shows this word, by their names, without a sign."""
+        return {
+            field["name"]: word >> field["low"] & (1 << field["width"]) - 1 for field in self._registers[name]["fields"]
+        }
+
+    def with_fields(self, name: str, word: int, values: Mapping[str, int]) -> int:
+        """A word of a register with other values in some of its fields.
+
+        Raises
+        ------
+        ValueError
+            If a value does not fit.
+        """
+        for field, value in values.items():
+            found = self._field(name, field)
+            width, least = found["width"], -(1 << found["width"] - 1) if found["signed"] else 0
+            if not least <= value < least + (1 << width):
+                raise ValueError(f"{field} must be from {least} to {least + (1 << width) - 1}, not {value}")
+            mask = (1 << width) - 1
+            word = word & ~(mask << found["low"]) | (value & mask) << found["low"]
+        return word
+
+    def snapshot(self, words: Sequence[int]) -> Snapshot:
+        """What the captured registers say that show these words, in the order of their offsets."""
+        values: dict[str, int] = {}
+        for register, word in zip(self.captured, words, strict=True):
+            for field in register["fields"]:
+                bits = word >> field["low"] & (1 << field["width"]) - 1
+                if field["signed"]:
+                    # Of a value of two words only the upper one has its sign; the lower one fills the bits below.
+                    bits -= (bits >> field["width"] - 1) << field["width"]
+                name, low = field["port"] or field["name"], (1 << field["shift"]) - 1
+                values[name] = values.get(name, 0) & low | bits << field["shift"]
+        return Snapshot(values, self._flags, self._rad_per_s_per_lsb)
+
+    def possible(self, words: Sequence[int]) -> bool:
+        """Whether the captured registers can show these words: bits that no port has are as they must be."""
+        for word, (unused, sign) in zip(words, self._unused, strict=True):
+            if word & unused != (unused if sign and word & sign else 0):
+                return False
+        return True
+
+    def _field(self, name: str, field: str) -> Mapping[str, Any]:
+        for one in self._registers[name]["fields"]:
+            if one["name"] == field:
+                return one
+        raise KeyError(field)
+
+    @staticmethod
+    def _unused_of(register: Mapping[str, Any], widths: Mapping[str, int]) -> tuple[int, int]:
+        """Bits of a captured register that repeat its sign bit, or are 0; and the sign bit, if there is one."""
+        used, sign, every = 0, 0, 0xFFFF_FFFF
+        for field in register["fields"]:
+            width = min(max(widths.get(field["port"], 1) - field["shift"], 0), field["width"])
+            used |= (1 << width) - 1 << field["low"]
+            if field["signed"]:
+                sign = 1 << field["low"] + width - 1
+        return every & ~used, sign

@@ -1,0 +1,58 @@
+"""What a core showed in one clock."""
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+
+_VELOCITIES = ("velocity_lower", "velocity_upper")  # ports with the LSB of velocity
+
+
+class Snapshot(Mapping[str, int]):
+    """What the core showed in one clock: integers by the names of the ports; it cannot be changed.
+
+    Ports of one bit are there as 0 or 1, and so are `updated` and `indexed`, the events since the capture before.
+
+    Parameters
+    ----------
+    values : mapping of str to int
+    flags : iterable of str
+        Names of those that are flags.
+    rad_per_s_per_lsb : float
+        What one LSB of `velocity` is.
+    """
+
+    __slots__ = ("_flags", "_rad_per_s_per_lsb", "_values")
+
+    def __init__(self, values: Mapping[str, int], flags: frozenset[str], rad_per_s_per_lsb: float) -> None:
+        self._values = MappingProxyType(dict(values))
+        self._flags = flags
+        self._rad_per_s_per_lsb = rad_per_s_per_lsb
+
+    def __getitem__(self, name: str) -> int:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        return f"Snapshot({', '.join(f'{name}={value}' for name, value in self.items())})"
+
+    @property
+    def flags(self) -> Mapping[str, bool]:
+        """The flags alone."""
+        return MappingProxyType({name: bool(self[name]) for name in self if name in self._flags})
+
+    @property
+    def velocity_rad_per_s(self) -> float:
+        """The velocity in rad/s."""
+        return self["velocity"] * self._rad_per_s_per_lsb
+
+    @property
+    def bounds_rad_per_s(self) -> tuple[float, float] | None:
+        """The bounds of the velocity in rad/s; None if the core has none, or not yet."""
+        if not self.get("bounds_valid"):
+            return None
+        lower, upper = (self[name] * self._rad_per_s_per_lsb for name in _VELOCITIES)
+        return lower, upper
