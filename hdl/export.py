@@ -12,10 +12,9 @@ from tachometry.hdl.bus_tachometer import BusTachometer
 from tachometry.hdl.kit import kit
 from tachometry.hdl.tachometer import Tachometer
 from tachometry.spec import TachometerSpec
-from tachometry.spec.manifest import described_port, manifest
-from tachometry.spec.option import ParameterError
+from tachometry.spec.manifest import manifest
 from tachometry.spec.provenance import LICENSE, generator, notice
-from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.buses import bus_of, manifest_on
 from tachometry.spec.registers.files import register_files
 from tachometry.spec.registers.map import RegisterMap
 
@@ -60,22 +59,17 @@ def export(
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits.
     """
     on = bus_of(bus, baud)
-    described = {"generator": generator(), "license": LICENSE, **manifest(spec, name)}
+    described = manifest(spec, name)
     files: dict[str, str] = {}
     top: wiring.Component
     if on is None:
         top = Tachometer(spec)
     else:
         registers = RegisterMap(spec)
-        ports = on.ports(registers)
-        if name in {port.name for port in ports}:
-            raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+        described = manifest_on(registers, on, name)
         top = BusTachometer(registers, on)
-        described["ports"] += [described_port(port) for port in ports]
-        described |= {"bus": bus, "registers": registers.described()}
-        if on.baud:
-            described |= {"baud": on.baud, "bit_cycles": on.bit_cycles(spec.timing.clock_hz)}
         files = register_files(registers, name)
+    described = {"generator": generator(), "license": LICENSE, **described}
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
         text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", verilog.convert(top, name=name, emit_src=False))
     return {

@@ -43,8 +43,7 @@ class Client:
         found = self._word("IDENTIFICATION")
         if found != registers.identification:
             raise WrongBoard(
-                f"the board must answer with 0x{registers.identification:08x}, as a tachometer does, "
-                f"not 0x{found:08x}"
+                f"the board must answer with 0x{registers.identification:08x}, as a tachometer does, not 0x{found:08x}"
             )
         found = self._word("CONFIGURATION")
         if found != registers.configuration:

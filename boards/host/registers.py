@@ -32,8 +32,7 @@ class HostRegisters:
         self.captured = [one for one in self._registers.values() if one["captured"]]
         self._rad_per_s_per_lsb: float = manifest["velocity"]["rad_per_s_per_lsb"]
         self._flags = frozenset(field["name"] for field in self._registers["STATUS"]["fields"])
-        widths = {port["name"]: port["width"] for port in manifest["ports"]}
-        self._unused = [self._unused_of(register, widths) for register in self.captured]
+        self._unused = [self._unused_of(register) for register in self.captured]
 
     def __contains__(self, name: str) -> bool:
         return name in self._registers
@@ -97,11 +96,11 @@ class HostRegisters:
         raise KeyError(field)
 
     @staticmethod
-    def _unused_of(register: Mapping[str, Any], widths: Mapping[str, int]) -> tuple[int, int]:
+    def _unused_of(register: Mapping[str, Any]) -> tuple[int, int]:
         """Bits of a captured register that repeat its sign bit, or are 0; and the sign bit, if there is one."""
         used, sign, every = 0, 0, 0xFFFF_FFFF
         for field in register["fields"]:
-            width = min(max(widths.get(field["port"], 1) - field["shift"], 0), field["width"])
+            width = min(max(field["port_width"] - field["shift"], 0), field["width"])
             used |= (1 << width) - 1 << field["low"]
             if field["signed"]:
                 sign = 1 << field["low"] + width - 1

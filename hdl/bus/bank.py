@@ -37,7 +37,7 @@ class RegisterBank(wiring.Component):
     tick, velocity_valid, decode_error … : In(1)
         Strobes of the core.
     written : Out(1)
-        A setting is being written.
+        A register is being written.
     … : Out
         `settings` of the map, as they were written last; those that act once are high in the clock of the write.
     … : In
@@ -65,6 +65,7 @@ class RegisterBank(wiring.Component):
         here = {register.name: bus.address == number for number, register in enumerate(self._map)}
         writable = Cat(here[register.name] for register in self._map if register.writable).any()
         m.d.sync += bus.error.eq((bus.read & (bus.address >= len(self._map.registers))) | (bus.write & ~writable))
+        m.d.comb += self.written.eq(bus.write & writable)
         hold, capture, control = (Signal(name=name) for name in ("hold", "captures", "control"))
         m.d.comb += [control.eq(bus.write & here["CONTROL"]), self.clear.eq(control & bus.write_data[0])]
         with m.If(control):
@@ -110,7 +111,6 @@ class RegisterBank(wiring.Component):
                 value, given = getattr(self, field.port), self.bus.write_data[field.low : field.low + field.width]
                 read[field.port] = Const(0) if field.single else value
                 with m.If(self.bus.write & here[register.name]):
-                    m.d.comb += self.written.eq(1)
                     if field.single:
                         m.d.comb += value.eq(given)
                     else:

@@ -2,7 +2,7 @@
 
 from amaranth import Cat, Module, Mux, ResetInserter, Signal
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.bus.telemetry import TelemetrySender

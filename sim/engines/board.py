@@ -29,7 +29,8 @@ class _BoardDesign(Design):
 
     @cached_property
     def component(self) -> wiring.Component:
-        assert self.registers is not None and self.bus is not None
+        assert self.registers is not None
+        assert self.bus is not None
         return Demo(self.registers, self.bus)
 
     @property
@@ -42,9 +43,7 @@ class _BoardDesign(Design):
 
     def source(self, model: str) -> str:
         assert self.bus is not None
-        head = (
-            f"#define BIT_CYCLES {self.bus.bit_cycles(self.spec.timing.clock_hz)}\n#define RX {len(self.pins) - 1}\n"
-        )
+        head = f"#define BIT_CYCLES {self.bus.bit_cycles(self.spec.timing.clock_hz)}\n#define RX {len(self.pins) - 1}\n"
         return f"{head}#include <cstdint>\n{model}\n{_DRIVER}"
 
 

@@ -170,7 +170,9 @@ class GoldenEmulator:
         since_a = (fine - moved[:n] - _TURN // 4) % _TURN
         since_b = (fine - moved[:n] - _TURN // 2 - settings.phase_error) % _TURN
         ideal = [since_a < _TURN // 2 + settings.duty_a, since_b < _TURN // 2 + settings.duty_b]
-        a, b = (line.play(clock, high.astype(np.uint8), settings) for line, high in zip(self._lines, ideal, strict=True))
+        a, b = (
+            line.play(clock, high.astype(np.uint8), settings) for line, high in zip(self._lines, ideal, strict=True)
+        )
         level = a | b << np.uint8(1)
         if self._lines_per_rev is not None:
             index = ((total[:n] >> PHASE_WIDTH) % self._lines_per_rev == 0) & (fine < _TURN // 4)

@@ -9,7 +9,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.port import INDEX, TICK, UPDATE
-from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, RegisterMap
+from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Register, RegisterMap
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Access:
 
 
 class GoldenBank:
-    """The bank of a core whose pins are driven so.
+    """The bank of a core whose pins are driven so; of a demo, from a restart on, with all settings 0.
 
     Parameters
     ----------
@@ -66,6 +66,8 @@ class GoldenBank:
         self._known = False
         self._captures: list[int] = []
         self._cleared, hold = -1, 0
+        self._settings = {field.port: 0 for field in self._map.settings}
+        self._changed = 0
         left = sorted(captures)
         found: list[tuple[int | None, bool]] = []
         for access in accesses:
@@ -73,16 +75,24 @@ class GoldenBank:
                 self._capture(left.pop(0))
             register = registers[access.address] if access.address < len(registers) else None
             if access.data is not None:
-                refused = register is None or register.name != "CONTROL"
-                if not refused:
+                if register is not None and register.name == "CONTROL":
                     hold = access.data >> 1 & 1
                     self._cleared = access.clock if access.data & 1 else self._cleared
-                found.append((0, refused))
+                elif register is not None and register.writable:
+                    self._set(register, access.data, access.clock)
+                found.append((0, register is None or not register.writable))
                 continue
             if access.address == capturing and not hold:
                 self._capture(access.clock)
             found.append((0 if register is None else self._read(access, hold), register is None))
         return found
+
+    def _set(self, register: Register, data: int, clock: int) -> None:
+        """Write settings; those that act once stay 0."""
+        self._changed = clock
+        for field in register.fields:
+            if not field.single:
+                self._settings[field.port] = data >> field.low & (1 << field.width) - 1
 
     def _capture(self, clock: int) -> None:
         """Take what there is in a clock."""
@@ -100,6 +110,7 @@ class GoldenBank:
         ticks, updates = self._tables[TICK].clock, self._tables[UPDATE]
         caused = updates.cause[updates.clock <= clock]
         age = self._count(ticks, int(caused[-1]) if len(caused) else -1, clock)
+        taken["time"] = clock % (1 << WORD)
         taken["age"] = min(age, self._map.spec.timing.max_ticks)
         # The core is cleared in the clock after.
         glitches = self._count(self._swallowed, self._cleared + 1, clock)
@@ -126,7 +137,7 @@ class GoldenBank:
         register = self._map.registers[access.address]
         if self._captures and not self._known and {field.port for field in register.fields} & self._of_updates:
             return None
-        shown = {"clear": 0, "hold": hold, **self._captured}
+        shown = {"clear": 0, "hold": hold, "changed": self._changed, **self._settings, **self._captured}
         if register.name == "COUNTERS":
             shown |= {name: self._count(clocks, self._cleared, access.clock) for name, clocks in self._events.items()}
             shown["lost_updates"] = self._lost(access.clock)

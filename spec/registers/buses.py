@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
+from tachometry.spec.manifest import described_port, manifest
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import Port
 from tachometry.spec.registers.frames import QUIET_BITS, SPI_SCK_CYCLES
@@ -203,3 +205,22 @@ def bus_of(name: str, baud: int | None = None) -> Bus | None:
 def ports_on(spec: TachometerSpec, bus: Bus | None) -> tuple[Port, ...]:
     """All ports of a core, with those of the bus on which its registers are."""
     return spec.ports if bus is None else (*spec.ports, *bus.ports(RegisterMap(spec)))
+
+
+def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
+    """The manifest of a core on a bus.
+
+    Raises
+    ------
+    ParameterError
+        If `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
+    """
+    ports = bus.ports(registers)
+    if name in {port.name for port in ports}:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    described = manifest(registers.spec, name)
+    described["ports"] += [described_port(port) for port in ports]
+    described |= {"bus": bus.name, "registers": registers.described()}
+    if bus.baud:
+        described |= {"baud": bus.baud, "bit_cycles": bus.bit_cycles(registers.spec.timing.clock_hz)}
+    return described

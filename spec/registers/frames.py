@@ -43,7 +43,7 @@ class Type(IntEnum):
     TELEMETRY = 2
 
 
-_TELEMETRY_HEADER = 1 << FROM_CORE | Type.TELEMETRY << TYPE_LOW
+TELEMETRY_HEADER = 1 << FROM_CORE | Type.TELEMETRY << TYPE_LOW
 
 
 class FrameError(ValueError):
@@ -190,8 +190,8 @@ def decode_telemetry(frame: bytes) -> tuple[int, tuple[int, ...]]:
     body = _checked(frame)
     if len(body) % _WORD_BYTES != 2 or body[-1]:
         raise FrameError("telemetry must have whole words and status 0")
-    if body[0] & ~(SEQUENCES - 1) != _TELEMETRY_HEADER:
-        raise FrameError(f"telemetry must begin with {_TELEMETRY_HEADER:#04x} and its sequence, not {body[0]:#04x}")
+    if body[0] & ~(SEQUENCES - 1) != TELEMETRY_HEADER:
+        raise FrameError(f"telemetry must begin with {TELEMETRY_HEADER:#04x} and its sequence, not {body[0]:#04x}")
     return body[0] % SEQUENCES, _words(body[1:-1])
 
 

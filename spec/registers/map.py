@@ -194,6 +194,7 @@ class RegisterMap:
 
     def described(self) -> dict[str, Any]:
         """What the manifest says of the registers."""
+        widths = {port.name: port.width for port in self.ports}
         return {
             "word_bits": WORD,
             "identification": IDENTIFICATION,
@@ -208,6 +209,7 @@ class RegisterMap:
                         {
                             **{key: getattr(field, key) for key in ("name", "low", "width", "access", "reset")},
                             **{key: getattr(field, key) for key in ("signed", "unit", "port", "shift")},
+                            "port_width": widths.get(field.port, field.width),
                         }
                         for field in register.fields
                     ],

@@ -1,0 +1,95 @@
+"""A demo board over a UART: its settings, its telemetry, and when what was written took effect."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tachometry.boards.host.client import Client
+from tachometry.boards.host.link import Link, Port
+from tachometry.boards.host.registers import HostRegisters
+from tachometry.boards.host.snapshot import Snapshot
+
+SETTINGS = ("DEMO", "SPEED", "RATE", "ERRORS", "NOISE")
+
+
+class DemoBoard:
+    """The demo on a board, or a simulated one.
+
+    Parameters
+    ----------
+    port : Port
+    manifest : mapping
+        What `NAME.json` of the demo says.
+    timeout : float
+        Seconds in which an answer must come.
+
+    Raises
+    ------
+    ValueError
+        If the manifest is not that of a demo.
+    NoAnswer
+        If nothing answers.
+    WrongBoard
+        If what answers is not the demo of the manifest.
+    """
+
+    def __init__(self, port: Port, manifest: Mapping[str, Any], timeout: float = 0.5) -> None:
+        self.registers = registers = HostRegisters(manifest)
+        if "DEMO" not in registers:
+            raise ValueError("manifest must be that of a demo, which tachometry build makes")
+        self._tick_cycles: int = manifest["tick_cycles"]
+        self.link = Link(port, registers, timeout)
+        self.client = Client(self.link.read, self.link.write, manifest)
+
+    def set(self, **values: int) -> int:
+        """Change settings of the emulator by the names of their fields; one whole register is `speed` or `rate`.
+
+        The registers are written one after the other. What acts once, such as `jump`, is done once.
+
+        Returns
+        -------
+        clock : int
+            When the last of them was written, since the restart.
+        """
+        for register in SETTINGS:
+            here = {field: values.pop(field) for field in self._fields(register) if field in values}
+            if not here:
+                continue
+            offset = self.registers.offset(register)
+            word = self.registers.with_fields(
+                register,
+                self.link.read(offset),
+                {"value" if field == register.lower() else field: value for field, value in here.items()},
+            )
+            self.link.write(offset, word)
+        if values:
+            raise ValueError(f"settings must be some of {', '.join(self.settings)}, not {', '.join(values)}")
+        return self.changed()
+
+    @property
+    def settings(self) -> list[str]:
+        """Names that `set` takes."""
+        return [field for register in SETTINGS for field in self._fields(register)]
+
+    def changed(self) -> int:
+        """When a setting was written last, in clocks since the restart."""
+        return self.link.read(self.registers.offset("CHANGED"))
+
+    def stream(self, ticks: int) -> None:
+        """Ask for telemetry every so many ticks; 0: for none."""
+        self.link.receiver.forget()
+        self.link.receiver.frame_clocks = ticks * self._tick_cycles
+        self.link.write(self.registers.offset("TELEMETRY"), ticks)
+
+    def restart(self) -> None:
+        """Reset tachometer, emulator and time; frames that came before are dropped."""
+        self.set(restart=1)
+        self.link.receiver.telemetry.clear()
+        self.link.receiver.forget()
+
+    def poll(self) -> Sequence[Snapshot]:
+        """Telemetry that has come since the last call."""
+        return [self.registers.snapshot(words) for words in self.link.poll()]
+
+    def _fields(self, register: str) -> list[str]:
+        fields = list(self.registers.fields(register, 0))
+        return [register.lower()] if fields == ["value"] else fields

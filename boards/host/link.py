@@ -1,0 +1,210 @@
+"""Frames over a UART: requests and their answers, and telemetry between them."""
+
+import binascii
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from tachometry.boards.host.registers import HostRegisters
+from tachometry.spec.registers import frames
+
+_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+_WORD_BYTES = 4
+
+
+class Port(Protocol):
+    """A serial port, such as those of pyserial."""
+
+    def read(self, size: int = 1, /) -> bytes:
+        """At most so many bytes: what is there, or what comes within the port's own time limit."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send bytes."""
+
+
+class NoAnswer(TimeoutError):
+    """Nothing that answers a request came in time."""
+
+
+@dataclass
+class Counts:
+    """What a receiver has seen.
+
+    Parameters
+    ----------
+    frames : int
+        Frames of telemetry that were right.
+    lost : int
+        Frames of telemetry that the core has sent or left out, and that were not seen.
+    bytes_dropped : int
+        Bytes that belong to no frame.
+    """
+
+    frames: int = 0
+    lost: int = 0
+    bytes_dropped: int = 0
+
+
+@dataclass
+class Receiver:
+    """Finds frames in what comes over a line, however damaged it is.
+
+    A frame is taken if its check is right and its words can be those of the registers. At a byte with which none
+    begins, the search goes on with the next.
+
+    Parameters
+    ----------
+    registers : HostRegisters
+    request : bytes
+        What is to be answered; empty: nothing is.
+    frame_clocks : int
+        Clocks from a frame of telemetry to the next, with which losses of 16 frames and more are seen; 0: not known.
+    """
+
+    registers: HostRegisters
+    request: bytes = b""
+    frame_clocks: int = 0
+    counts: Counts = field(default_factory=Counts)
+
+    def __post_init__(self) -> None:
+        self._bytes = bytearray()
+        self._last: tuple[int, int] | None = None  # sequence and time of the latest telemetry
+        names = [register["name"] for register in self.registers.captured]
+        self._time = names.index("TIME") if "TIME" in names else None
+        self._length = frames.telemetry_length(len(self.registers.captured))
+        self.telemetry: deque[tuple[int, ...]] = deque()
+        self.answer: frames.Answer | None = None
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes; `telemetry` and `answer` have what was found in them."""
+        self._bytes += data
+        at = 0
+        while at < len(self._bytes):
+            size = self._frame(at)
+            if size == 0:
+                break
+            at += size
+        del self._bytes[:at]
+
+    def reset(self) -> None:
+        """Drop what may be the beginning of a frame."""
+        self.counts.bytes_dropped += len(self._bytes)
+        self._bytes.clear()
+
+    def forget(self) -> None:
+        """The core restarts, or other telemetry is asked for: nothing is lost up to the next frame."""
+        self._last = None
+
+    def _frame(self, at: int) -> int:
+        """Bytes of what stands there: a frame, or a byte that belongs to none; 0 if more must come."""
+        found = self._bytes
+        telemetry = found[at] & ~(frames.SEQUENCES - 1) == frames.TELEMETRY_HEADER
+        answer = bool(self.request) and found[at] == self.request[0] | 1 << frames.FROM_CORE
+        if telemetry or answer:
+            size = self._length if telemetry else frames.answer_length(self.request)
+            if len(found) - at < size:
+                return 0
+            frame = bytes(found[at : at + size])
+            if _is_right(frame) and (self._take(frame) if telemetry else self._answered(frame)):
+                return size
+        self.counts.bytes_dropped += 1
+        return 1
+
+    def _take(self, frame: bytes) -> bool:
+        try:
+            sequence, words = frames.decode_telemetry(frame)
+        except frames.FrameError:
+            return False
+        if not self.registers.possible(words):
+            return False
+        now = 0 if self._time is None else words[self._time]
+        if self._last is not None:
+            self.counts.lost += self._missing((sequence - self._last[0] - 1) % frames.SEQUENCES, now - self._last[1])
+        self._last = sequence, now
+        self.counts.frames += 1
+        self.telemetry.append(words)
+        return True
+
+    def _missing(self, least: int, clocks: int) -> int:
+        """Frames between two: the sequence says `least`, or 16, 32 … more, and the time how many."""
+        if not self.frame_clocks:
+            return least
+        between = clocks % (1 << 32) / self.frame_clocks - 1
+        return least + frames.SEQUENCES * max(round((between - least) / frames.SEQUENCES), 0)
+
+    def _answered(self, frame: bytes) -> bool:
+        try:
+            self.answer = frames.decode_answer(self.request, frame)
+        except frames.FrameError:
+            return False
+        self.request = b""
+        return True
+
+
+class Link:
+    """Registers of a core over a UART.
+
+    Parameters
+    ----------
+    port : Port
+    registers : HostRegisters
+    timeout : float
+        Seconds in which an answer must come.
+    tries : int
+        Times that a request is sent.
+    """
+
+    def __init__(self, port: Port, registers: HostRegisters, timeout: float = 0.5, tries: int = 4) -> None:
+        self._port = port
+        self._timeout, self._tries = timeout, tries
+        self._sequence = 0
+        self.receiver = Receiver(registers)
+
+    def read(self, offset: int) -> int:
+        """The register at an offset in bytes.
+
+        Raises
+        ------
+        NoAnswer
+            If nothing answers.
+        ValueError
+            If there is no such register.
+        """
+        return self.words(offset, 1)[0]
+
+    def words(self, offset: int, n_words: int) -> tuple[int, ...]:
+        """Registers that follow each other."""
+        return self._ask(lambda sequence: frames.read_request(offset // _WORD_BYTES, n_words, sequence)).words
+
+    def write(self, offset: int, value: int) -> None:
+        """Write the register at an offset in bytes; after a time-out it may have been written more than once."""
+        self._ask(lambda sequence: frames.write_request(offset // _WORD_BYTES, value, sequence))
+
+    def poll(self) -> Sequence[tuple[int, ...]]:
+        """Words of the frames of telemetry that have come since the last call."""
+        self.receiver.feed(self._port.read(4096))
+        found = list(self.receiver.telemetry)
+        self.receiver.telemetry.clear()
+        return found
+
+    def _ask(self, request: Callable[[int], bytes]) -> frames.Answer:
+        for _ in range(self._tries):
+            self._sequence = (self._sequence + 1) % frames.SEQUENCES
+            self.receiver.request, self.receiver.answer = request(self._sequence), None
+            self._port.write(self.receiver.request)
+            end = time.monotonic() + self._timeout
+            while self.receiver.answer is None and time.monotonic() < end:
+                self.receiver.feed(self._port.read(4096))
+            if self.receiver.answer is not None:
+                if self.receiver.answer.error:
+                    raise ValueError("there must be a register at this address, and a written one must be writable")
+                return self.receiver.answer
+            self.receiver.reset()
+        raise NoAnswer(f"nothing has answered {self._tries} requests in {self._timeout:g} s each")
+
+
+def _is_right(frame: bytes) -> bool:
+    """Whether the check of a frame is right; the same as `frames.crc`, whose bits go the other way, but faster."""
+    return binascii.crc_hqx(frame.translate(_REVERSED), frames.CRC_START) == 0

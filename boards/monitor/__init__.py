@@ -1,0 +1,1 @@
+"""What `tachometry monitor` does with a board: self-test, view, recording."""

@@ -1,0 +1,200 @@
+"""The self-test of a demo board: the emulator moves in known ways, and golden models say what every frame must show."""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+
+from tachometry.boards.host.demo import DemoBoard
+from tachometry.boards.host.link import NoAnswer
+from tachometry.sim.golden.emulator import Change, GoldenEmulator
+from tachometry.sim.golden.registers import Access, GoldenBank
+from tachometry.spec.emulator import EmulatorSettings, fastest, rate_of, speed_of
+from tachometry.spec.registers.demo import DemoMap
+
+_EVENTS = ("updated", "indexed")  # flags that say what was between two captures
+_SILENCE = 30.0  # seconds after which no more telemetry will come
+
+
+@dataclass(frozen=True)
+class Step:
+    """A part of the self-test, from a restart on.
+
+    Parameters
+    ----------
+    name : str
+    first : EmulatorSettings
+        What holds from the restart on.
+    then : sequence of (float, dict)
+        Settings that change, each so many seconds after the change before, or the restart, at the earliest.
+    rest : float
+        Seconds after the last change.
+    """
+
+    name: str
+    first: EmulatorSettings
+    then: Sequence[tuple[float, dict[str, int]]] = ()
+    rest: float = 0.05
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a step has shown.
+
+    Parameters
+    ----------
+    name : str
+    frames : int
+        Frames of telemetry that were compared.
+    values : int
+        Words that were compared.
+    difference : str
+        The first difference; empty if there is none.
+    """
+
+    name: str
+    frames: int
+    values: int
+    difference: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether there was something to compare, and no difference."""
+        return self.frames > 0 and not self.difference
+
+
+def steps(registers: DemoMap) -> list[Step]:
+    """Speeds, reversals, standstill, illegal edges, and an encoder with all its faults."""
+    spec = registers.spec
+    highest = min(spec.max_speed.rad_per_s if spec.max_speed else math.inf, fastest(spec))
+    silence = 2.5 * spec.stalled_after_ticks * spec.timing.tick_cycles / spec.timing.clock_hz
+
+    def at(part: float) -> int:
+        return speed_of(spec, part * highest)
+
+    quick = rate_of(spec, highest / 0.02)
+    turning = EmulatorSettings(speed=at(0.3))
+    faults = replace(turning, phase_error=30, duty_a=-20, duty_b=15, jitter=15, bounce=1, drop=3)
+    return [
+        *(Step(f"speed {part:+.4g} of the highest", EmulatorSettings(speed=at(part))) for part in (1, -0.5, 0.05)),
+        Step("slow", EmulatorSettings(speed=at(0.001)), rest=0.05 + silence),
+        Step("acceleration", EmulatorSettings(speed=at(0.9), rate=quick)),
+        Step("reversals", EmulatorSettings(speed=at(0.5), rate=quick), [(0.03, {"speed": at(-0.5)})] * 2),
+        Step("standstill", turning, [(0.02, {"speed": 0})], rest=silence),
+        Step("from standstill", EmulatorSettings(), [(silence, {"speed": at(-0.2)})]),
+        Step("illegal edges", turning, [(0.02, {"jump": 1})] * 3),
+        Step("a bad encoder", faults),
+    ]
+
+
+def selftest(
+    board: DemoBoard, registers: DemoMap, period: int = 0, told: Callable[[Result], None] | None = None
+) -> list[Result]:
+    """Run all steps.
+
+    Parameters
+    ----------
+    board : DemoBoard
+    registers : DemoMap
+        Of the core on the board.
+    period : int
+        Ticks between frames; 0: about 2 ms.
+    told : callable of Result
+        Is called after each step.
+
+    Raises
+    ------
+    NoAnswer
+        If the board falls silent.
+    """
+    timing = registers.spec.timing
+    period = period or max(1, math.ceil(timing.clock_hz / timing.tick_cycles / 500))
+    results = []
+    try:
+        for step in steps(registers):
+            results.append(_run(board, registers, step, period))
+            if told is not None:
+                told(results[-1])
+    finally:
+        board.stream(0)
+        board.set(speed=0, emulated=0)
+    return results
+
+
+def _run(board: DemoBoard, registers: DemoMap, step: Step, period: int) -> Result:
+    clock_hz = registers.spec.timing.clock_hz
+    board.stream(0)
+    board.set(emulated=1, **asdict(step.first))
+    board.restart()
+    board.client.clear()
+    cleared = board.changed()
+    board.stream(period)
+    held = step.first
+    changes = [Change(-1, held)]
+    seen: list[tuple[int, ...]] = []
+    words = _Words(board, registers)
+    for wait, values in step.then:
+        seen += words.until(changes[-1].clock + 1 + round(wait * clock_hz))
+        held = replace(held, **{name: value for name, value in values.items() if name != "jump"})
+        changes.append(Change(board.set(**values), held, "jump" in values))
+    seen += words.until(changes[-1].clock + 1 + round(step.rest * clock_hz))
+    board.stream(0)
+    errors = board.client.counters()["decode_errors"]
+    return _compared(registers, step.name, changes, cleared, seen, errors)
+
+
+class _Words:
+    """Telemetry until an instant, however long that takes."""
+
+    def __init__(self, board: DemoBoard, registers: DemoMap) -> None:
+        self._board = board
+        self._time = [register.name for register in registers if register.captured].index("TIME")
+
+    def until(self, clock: int) -> Iterator[tuple[int, ...]]:
+        latest = time.monotonic()
+        while True:
+            for words in self._board.link.poll():
+                latest = time.monotonic()
+                yield words
+                if words[self._time] >= clock:
+                    return
+            if time.monotonic() - latest > _SILENCE:
+                raise NoAnswer(f"no telemetry has come for {_SILENCE:g} s")
+
+
+def _compared(
+    registers: DemoMap, name: str, changes: list[Change], cleared: int, seen: list[tuple[int, ...]], errors: int
+) -> Result:
+    spec = registers.spec
+    captured = [(number, register) for number, register in enumerate(registers) if register.captured]
+    at = [register.name for _, register in captured].index("TIME")
+    n_clocks = max(words[at] for words in seen) + 1
+    trace = GoldenEmulator(spec.encoder.pulses_per_rev if spec.index else None).trace(changes, n_clocks)
+    bank = GoldenBank(registers, trace)
+    golden = iter(
+        bank.answers(
+            [Access(cleared, registers["CONTROL"].offset // 4, 1)]
+            + [Access(words[at], number) for words in seen for number, _ in captured]
+            + [Access(n_clocks - 1, registers["COUNTERS"].offset // 4)]
+        )
+    )
+    next(golden)
+    compared = 0
+    for k, words in enumerate(seen):
+        for (_, register), word in zip(captured, words, strict=True):
+            right, _ = next(golden)
+            if right is None:
+                continue
+            wrong = right ^ word
+            if k == 0:
+                # What was before the restart may have waited for this capture.
+                wrong &= ~sum(field.mask for field in register.fields if field.name in _EVENTS)
+            compared += 1
+            if wrong:
+                told = f"{register.name} is 0x{word:08x}, not 0x{right:08x}, in clock {words[at]}"
+                return Result(name, k + 1, compared, told)
+    counters, _ = next(golden)
+    (field,) = (field for field in registers["COUNTERS"].fields if field.name == "decode_errors")
+    wanted = (counters or 0) >> field.low & (1 << field.width) - 1
+    difference = "" if errors == wanted else f"{errors} illegal transitions are counted, not {wanted}"
+    return Result(name, len(seen), compared + 1, difference)
