@@ -140,8 +140,8 @@ class GoldenEmulator:
                 last, self._clock = int(level[-1]), int(clock[-1]) + 1
             self._total ^= jump << PHASE_WIDTH - 1
         every = np.concatenate(levels)
-        z = None if self._lines_per_rev is None else every >> 2
-        return PinTrace(np.concatenate(clocks), every & 1, every >> 1 & 1, n_clocks, z)
+        a, b, z = (every >> np.uint8(bit) & np.uint8(1) for bit in range(3))
+        return PinTrace(np.concatenate(clocks), a, b, n_clocks, None if self._lines_per_rev is None else z)
 
     def _play(self, clock: NDArray[np.int64], settings: EmulatorSettings) -> NDArray[np.uint8]:
         """A + 2 B + 4 Z in these clocks."""

@@ -15,7 +15,8 @@ PERIOD_WIDTH = 16  # bits of the telemetry's period
 class DemoMap(RegisterMap):
     """All registers of a demo.
 
-    A write takes effect in the next clock, and CHANGED keeps the instant of the write. So whoever knows all writes since a restart knows every edge that the emulator has made.
+    A write takes effect in the next clock, and CHANGED keeps the instant of the write. So whoever knows all writes
+    since a restart knows every edge that the emulator has made.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ class DemoMap(RegisterMap):
         yield "TELEMETRY", "What is sent unasked.", (_setting("telemetry_period", PERIOD_WIDTH, 0, telemetry),), {}
         changed = Field("value", WORD, unit="clocks", port="changed")
         yield "CHANGED", "Time of the last write to any register, since the last restart.", (changed,), {}
-        fields = (
+        fields: tuple[Field, ...] = (
             _setting("emulated", 1, 0, "The tachometer measures the emulator, not the pins."),
             _strobe("restart", 1, "Writing 1 resets the tachometer and the emulator, but not the settings."),
             _strobe("jump", 2, "Writing 1 turns the emulated encoder by half a period: both lines change at once."),
