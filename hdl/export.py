@@ -44,7 +44,8 @@ def export(
 ) -> dict[str, str]:
     """The exported core as texts by file name: `NAME.v`, `NAME.json`, and those of `tachometry.hdl.kit`.
 
-    With a bus also those of `tachometry.spec.registers.files`, which describe its registers; with a target its own, too.
+    With a bus also those of `tachometry.spec.registers.files`, which describe its registers; with a target also those
+    of `tachometry.spec.targets`.
 
     Equal specs and names give equal texts on every machine: the bundled Yosys writes the Verilog, whatever else is
     installed. All texts name the version of tachometry that made them, and their licence.
