@@ -2,22 +2,26 @@
 
 import csv
 import re
+import shlex
 import subprocess
 import sys
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from support.command import run
 from support.mutant import caught
 
 from tachometry.hdl import export
-from tachometry.spec import METHODS, ParameterError, of_texts
+from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
 
 TESTS = Path(__file__).parents[2]
 PAGE = (TESTS.parent / "docs" / "litex.md").read_text(encoding="utf-8")
+(COMMAND,) = re.findall(r"```sh\n(tachometry .*?)```", PAGE, re.DOTALL)
+_, *WORDS, _ = shlex.split(COMMAND.replace("\\\n", ""))  # without the program and its folder
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "20us", "max-time": "400us"}
-OPTIONS = {"index": "yes", "age": "yes", "filter": "2", "position-width": "40"}
 FILE = "spindle_litex.py"
 FORWARD, BACK = 40, 57  # quarter periods
 _BENCH = """
@@ -68,8 +72,18 @@ endmodule
 
 
 @cache
-def made(method: str) -> dict[str, str]:
-    return export(of_texts(method, BASE | OPTIONS), "spindle", target="litex")
+def spec() -> TachometerSpec:
+    """The core of the page."""
+    values = {"ppr", "clock", "tick", "max-time", "filter", "position-width"}
+    given = {word[2:]: after for word, after in pairwise([*WORDS, ""]) if word.startswith("--")}
+    return of_texts(
+        "s", {name: after if name in values else "yes" for name, after in given.items() if name not in ("for", "name")}
+    )
+
+
+@cache
+def made() -> dict[str, str]:
+    return export(spec(), "spindle", target="litex")
 
 
 def in_folder(folder: Path, *command: str | Path) -> str:
@@ -82,7 +96,7 @@ def in_folder(folder: Path, *command: str | Path) -> str:
 def soc(folder: Path, module: str, clock: str = "CLOCK_HZ") -> int:
     """Build the SoC of the page with this module and clock; where its registers are."""
     (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    texts = {file: made("s")[file] for file in ("spindle.v", FILE)} | {FILE: module}
+    texts = {file: made()[file] for file in ("spindle.v", FILE)} | {FILE: module}
     texts["example.py"] = example.replace("(platform, CLOCK_HZ)", f"(platform, {clock})")
     texts["example.py"] += "\nfrom spindle_litex import PINS\n"
     for file, text in texts.items():
@@ -93,7 +107,7 @@ def soc(folder: Path, module: str, clock: str = "CLOCK_HZ") -> int:
 
 
 def check(folder: Path, module: str) -> None:
-    registers = RegisterMap(of_texts("s", BASE | OPTIONS))
+    registers = RegisterMap(spec())
     base = soc(folder, module)
     rows = list(csv.reader(line for line in (folder / "csr.csv").read_text().splitlines() if line[0] != "#"))
     assert ["memory_region", "tachometer", f"0x{base:08x}", str(1 << registers.address_width), "io"] in rows
@@ -124,8 +138,13 @@ def check(folder: Path, module: str) -> None:
     assert answers[number + 1 :] == [(control, 2, 0), (0, 0, 1)]
 
 
+def test_the_command_of_the_page_makes_this_module(tmp_path: Path) -> None:
+    assert run(*WORDS, tmp_path) == 0
+    assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == made()
+
+
 def test_litex_builds_a_soc_that_reads_the_registers(tmp_path: Path) -> None:
-    check(tmp_path, made("s")[FILE])
+    check(tmp_path, made()[FILE])
 
 
 @pytest.mark.parametrize(
@@ -138,7 +157,7 @@ def test_litex_builds_a_soc_that_reads_the_registers(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_modules_are_caught(right: str, wrong: str, tmp_path: Path) -> None:
-    text = made("s")[FILE]
+    text = made()[FILE]
     assert text.count(right) == 1
     with caught():
         check(tmp_path, text.replace(right, wrong))
@@ -146,21 +165,21 @@ def test_wrong_modules_are_caught(right: str, wrong: str, tmp_path: Path) -> Non
 
 def test_another_clock_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="ValueError: sys_clk_freq must be 1000000 Hz for spindle, not 1000001 Hz"):
-        soc(tmp_path, made("s")[FILE], "CLOCK_HZ + 1")
+        soc(tmp_path, made()[FILE], "CLOCK_HZ + 1")
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_offsets_and_ports_are_those_of_the_core(method: str) -> None:
-    spec = of_texts(method, BASE)
-    text = export(spec, "spindle", target="litex")[FILE]
+    core = of_texts(method, BASE)
+    text = export(core, "spindle", target="litex")[FILE]
     compile(text, FILE, "exec")
     tables = re.sub(r"^(from|import) .*\n", "", text, flags=re.MULTILINE).split("\n\nclass")[0]
     names: dict[str, object] = {}
     exec(tables, names)
-    assert names["REGISTERS"] == {register.name.lower(): register.offset for register in RegisterMap(spec)}
-    assert names["PINS"] == [pin.name for pin in spec.pins]
-    assert names["OUTPUTS"] == {port.name: (port.width, port.signed) for port in spec.outputs}
-    assert names["CLOCK_HZ"] == spec.timing.clock_hz
+    assert names["REGISTERS"] == {register.name.lower(): register.offset for register in RegisterMap(core)}
+    assert names["PINS"] == [pin.name for pin in core.pins]
+    assert names["OUTPUTS"] == {port.name: (port.width, port.signed) for port in core.outputs}
+    assert names["CLOCK_HZ"] == core.timing.clock_hz
 
 
 def test_another_bus_is_refused() -> None:

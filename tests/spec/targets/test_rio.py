@@ -1,6 +1,8 @@
 """The plugin for RIO, from the pins of the FPGA to those of HAL, against the golden model."""
 
+import json
 import re
+import shlex
 import subprocess
 from dataclasses import replace
 from functools import cache
@@ -8,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command import run as command_line
 from support.compiled import lint
 from support.lockstep import random_case
 from support.mutant import caught
@@ -21,6 +24,7 @@ from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.port import INDEX, TICK, UPDATE
 from tachometry.spec.targets.rio import hal_pins, rio_files
 
+PAGE = (Path(__file__).parents[3] / "docs" / "linuxcnc.md").read_text(encoding="utf-8")
 NAME = "spindle"
 PLUGIN, WRAPPER, CORE = rio_files(NAME)
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
@@ -275,6 +279,23 @@ def test_a_board_with_another_clock_is_refused() -> None:
 def test_cores_that_do_not_fit_are_refused(options: dict[str, str], bus: str | None, message: str) -> None:
     with pytest.raises(ParameterError, match=f"^{re.escape(message)}$"):
         export(of_texts("s", {"ppr": "500"} | options), NAME, bus, target="rio")
+
+
+def test_the_page_has_every_pin_and_its_command_makes_the_plugin(tmp_path: Path) -> None:
+    rows = dict(re.findall(r"^\| `([\w-]+)` \| (\w+)", PAGE, re.MULTILINE))
+    found = {
+        name: pin.kind for method in METHODS for name, pin in hal_pins(of_texts(method, BASE | EVERY[method])).items()
+    }
+    found |= {"age": "u32", "tick-errors": "u32", "swallowed-edges": "u32"}
+    assert rows == found | {"position-scale": "float", "position-offset": "float"}
+    (command,) = re.findall(r"```sh\n(tachometry .*?)```", PAGE, re.DOTALL)
+    assert command_line(*shlex.split(command.replace("\\\n", ""))[1:-1], tmp_path) == 0
+    (configuration,) = re.findall(r"```json\n(.*?)```", PAGE, re.DOTALL)
+    described = json.loads(configuration)
+    plugin = loaded((tmp_path / described["type"] / "plugin.py").read_text(encoding="utf-8"), 27_000_000)
+    assert described["type"] == plugin.NAME
+    assert described["pins"].keys() == plugin.PINDEFAULTS.keys()
+    assert described["signals"].keys() <= plugin.SIGNALS.keys()
 
 
 def test_other_targets_are_refused() -> None:
