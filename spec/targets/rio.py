@@ -130,9 +130,9 @@ class Plugin(PluginBase):
 
 _INDEX = """
     static int64_t origin = 0;
-    static uint8_t indexes_before = 0;
-    const uint8_t indexes = (uint8_t)data->$sent_indexes;
-    if (indexes != indexes_before && *data->$index_enable) {
+    static int indexes_before = -1;
+    const int indexes = (uint8_t)data->$sent_indexes;
+    if (indexes != indexes_before && indexes_before >= 0 && *data->$index_enable) {
         origin = total - ((int32_t)(((uint32_t)now - (uint32_t)data->$sent_indexed_at) << @SHIFT@) >> @SHIFT@);
         *data->$index_enable = 0;
     }
