@@ -112,7 +112,8 @@ def generate(
     DIR/NAME_registers.md  registers as a page of Markdown
 
     \b
-    with --for rio also the plugin DIR/NAME_rio/, with --for litex DIR/NAME_litex.py
+    with --for rio    also the plugin DIR/NAME_rio/
+    with --for litex  also DIR/NAME_litex.py, and what a --bus wishbone adds
 
     What was built is printed: full scale, LSB, resolution, widths and latencies, and the number of registers.
 
