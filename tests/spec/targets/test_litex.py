@@ -14,6 +14,7 @@ from support.command import run
 from support.mutant import caught
 
 from tachometry.hdl import export
+from tachometry.sim.engines import build
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
 
@@ -161,6 +162,17 @@ def test_wrong_modules_are_caught(right: str, wrong: str, tmp_path: Path) -> Non
     assert text.count(right) == 1
     with caught():
         check(tmp_path, text.replace(right, wrong))
+
+
+def test_the_c_code_of_the_page_is_strict(tmp_path: Path) -> None:
+    (code,) = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
+    (tmp_path / "generated").mkdir()
+    region = "#define TACHOMETER_BASE 0x40000000L\n"  # as LiteX writes it
+    texts = {**made(), "main.c": f"double rad_per_s(void);\n{code}", "generated/mem.h": region}
+    for file, text in texts.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    strict = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I.")
+    build.run([*build.compiler(), *strict, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
 
 
 def test_another_clock_is_refused(tmp_path: Path) -> None:
