@@ -17,6 +17,7 @@ from tachometry.spec.provenance import LICENSE, generator, notice
 from tachometry.spec.registers.buses import bus_of, manifest_on
 from tachometry.spec.registers.files import register_files
 from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.targets.target import TARGETS, bus_for
 
 _HEADER = """\
 // {name}: {method}-method tachometer, x{decoding} decoding, {counts_per_rev} counts per revolution,
@@ -34,11 +35,16 @@ _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
 
 
 def export(
-    spec: TachometerSpec, name: str = "tachometer", bus: str = "none", baud: int | None = None
+    spec: TachometerSpec,
+    name: str = "tachometer",
+    bus: str | None = None,
+    baud: int | None = None,
+    target: str = "none",
 ) -> dict[str, str]:
     """The exported core as texts by file name: `NAME.v`, `NAME.json`, and those of `tachometry.hdl.kit`.
 
-    With a bus also those of `tachometry.spec.registers.files`, which describe its registers.
+    With a bus also those of `tachometry.spec.registers.files`, which describe its registers; with a target also those
+    of `tachometry.spec.targets`.
 
     Equal specs and names give equal texts on every machine: the bundled Yosys writes the Verilog, whatever else is
     installed. All texts name the version of tachometry that made them, and their licence.
@@ -48,16 +54,21 @@ def export(
     spec : TachometerSpec
     name : str
         Name of the module and of the files.
-    bus : str
-        The bus for its registers, one of `spec.registers.buses.BUSES`, or `none`.
+    bus : str or None
+        The bus for its registers, one of `spec.registers.buses.BUSES`, or `none`; None: `none`, or what the target
+        needs.
     baud : int or None
         Bits a second of a bus that has them; None: its default.
+    target : str
+        The framework into which it goes, one of `spec.targets.target.TARGETS`, or `none`.
 
     Raises
     ------
     ValueError
-        If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits.
+        If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
+        the target needs another bus or another core.
     """
+    bus = bus_for(target, bus)
     on = bus_of(bus, baud)
     described = manifest(spec, name)
     files: dict[str, str] = {}
@@ -72,8 +83,11 @@ def export(
     described = {"generator": generator(), "license": LICENSE, **described}
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
         text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", verilog.convert(top, name=name, emit_src=False))
+    text = _HEADER.format(**described, name=name, notice=notice("//")) + text
+    if target in TARGETS:
+        files |= TARGETS[target].texts(spec, name, text)
     return {
-        f"{name}.v": _HEADER.format(**described, name=name, notice=notice("//")) + text,
+        f"{name}.v": text,
         f"{name}.json": json.dumps(described, indent=2) + "\n",
         **kit(spec, name, on),
         **files,

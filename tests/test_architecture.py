@@ -72,6 +72,7 @@ def test_every_folder_is_a_room() -> None:
         "spec/methods",
         "spec/formats",
         "spec/registers",
+        "spec/targets",
     } == {*ALLOWED}
 
 

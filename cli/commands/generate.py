@@ -16,6 +16,7 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
 from tachometry.spec.registers.files import REGISTER_FILES
+from tachometry.spec.targets.target import TARGETS, bus_for
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
@@ -57,10 +58,9 @@ Examples:
     "Files",
     "--bus",
     type=click.Choice(["none", *BUSES]),
-    default="none",
     help="Give the core registers on a bus: "
     + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
-    + ". Files that describe and read the registers are written, too.",
+    + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
 )
 @option(
     "Files",
@@ -70,14 +70,25 @@ Examples:
     help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
     f"{DEFAULT_BAUD}, if it is not given.",
 )
+@option(
+    "Files",
+    "--for",
+    "target",
+    type=click.Choice(["none", *TARGETS]),
+    default="none",
+    help="Also write what a framework needs; "
+    + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())
+    + ".",
+)
 @optional_motion_options
 def generate(
     spec: TachometerSpec,
     name: str,
     directory: Path,
     testbench: str | None,
-    bus: str,
+    bus: str | None,
     baud: int | None,
+    target: str,
     record: Callable[[TachometerSpec], Encoding] | None,
     tables: list[Path],
 ) -> int:
@@ -100,16 +111,23 @@ def generate(
     DIR/NAME_driver.h      driver in C99
     DIR/NAME_registers.md  registers as a page of Markdown
 
+    \b
+    with --for rio    also the plugin DIR/NAME_rio/
+    with --for litex  also DIR/NAME_litex.py, and what a --bus wishbone adds
+
     What was built is printed: full scale, LSB, resolution, widths and latencies, and the number of registers.
 
     Equal options give equal files, byte for byte, on every machine.
     """
     check_module_name(name)
+    bus = bus_for(target, bus)
     if record is not None and testbench is None:
         raise ValueError("--motion must be given together with --testbench")
     files = [name + suffix for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")]
     if bus != "none":
         files += [name + suffix for suffix in REGISTER_FILES]
+    if target in TARGETS:
+        files += TARGETS[target].files(name)
     if testbench:
         files += [f"test_{name}.py", f"{name}_vectors.json"]
     with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
@@ -120,7 +138,7 @@ def generate(
             bench = cocotb_bench(spec, name, None if record is None else record(spec).recording)
         from tachometry.hdl import export
 
-        texts = export(spec, name, bus, baud) | bench
+        texts = export(spec, name, bus, baud, target) | bench
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:

@@ -44,7 +44,7 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
     ("command", "options", "groups"),
     [
         ("plan", ["--speeds", "--methods", "--plot", "--csv"], ["Range", "Outputs"]),
-        ("generate", ["--name", "--output", "-o"], ["Files"]),
+        ("generate", ["--name", "--output", "-o", "--bus", "--baud", "--for"], ["Files"]),
         (
             "simulate",
             [*"--motion --vibration --seed".split(), *FAULTS, *OUTPUTS],

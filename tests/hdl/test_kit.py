@@ -15,6 +15,7 @@ from tachometry.hdl import export
 from tachometry.sim.engines.verilator import home
 from tachometry.spec import METHODS, common_options, of_texts, own_options
 from tachometry.spec.provenance import LICENSE, generator, version
+from tachometry.spec.targets.target import TARGETS
 
 BIN = Path(sys.executable).parent
 PAGE = (Path(__file__).parents[2] / "docs" / "integration.md").read_text(encoding="utf-8")
@@ -42,7 +43,8 @@ def run(folder: Path, *command: str | Path, **environment: str) -> str:
 
 
 def test_every_file_names_version_and_licence() -> None:
-    for file, text in made("s").items():
+    targets = [export(of_texts("m", BASE), "spindle", target=target) for target in TARGETS]
+    for file, text in [item for files in (made("s"), *targets) for item in files.items()]:
         assert generator() in text, file
         assert LICENSE in text, file
     assert f"name: ::spindle:{version()}\n" in made("s")["spindle.core"]

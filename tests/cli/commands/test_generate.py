@@ -53,6 +53,49 @@ def test_a_bus_adds_files_and_says_how_many_registers_there_are(
     )
 
 
+@pytest.mark.parametrize(
+    ("target", "bus", "added"),
+    [
+        ("rio", "none", ["spindle_rio/plugin.py", "spindle_rio/spindle_rio.v", "spindle_rio/spindle.v"]),
+        ("litex", "wishbone", ["spindle_litex.py"]),
+    ],
+)
+def test_a_target_adds_files_and_chooses_the_bus(
+    target: str, bus: str, added: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    core = ("generate", "--ppr", "500", "--name", "spindle")
+    assert run(*core, "--bus", bus, "-o", tmp_path / "without") == 0
+    capsys.readouterr()
+    assert run(*core, "--for", target, "-o", tmp_path / "with") == 0
+    told = capsys.readouterr().out.split("\n\n")[0].splitlines()
+    texts = [
+        {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*.*") if path.is_file()}
+        for folder in (tmp_path / "without", tmp_path / "with")
+    ]
+    assert set(texts[1]) - set(texts[0]) == {*added}
+    assert {file: texts[1][file] for file in texts[0]} == texts[0]
+    assert {Path(line).relative_to(tmp_path / "with").as_posix() for line in told} == set(texts[1])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--for litex --bus spi", "--bus must be wishbone for litex, not spi"),
+        ("--for rio --bus uart", "--bus must be none for rio, not uart"),
+        (
+            "--for rio --position-width 33",
+            "--position-width must be at most 32 for RIO, whose numbers have no more, not 33",
+        ),
+    ],
+)
+def test_a_core_that_does_not_fit_its_target_is_refused(
+    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("generate", "--ppr", "500", *options.split(), "-o", tmp_path / "new") == 2
+    assert capsys.readouterr().err == f"tachometry: error: {message}\n"
+    assert not (tmp_path / "new").exists()
+
+
 def test_defaults(tmp_path: Path) -> None:
     assert run("generate", "--ppr", "500", "-o", tmp_path) == 0
     assert json.loads((tmp_path / "tachometer.json").read_text())["parameters"] == {

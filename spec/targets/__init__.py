@@ -1,0 +1,1 @@
+"""Files for frameworks into which a core goes."""
