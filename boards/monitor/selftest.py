@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
+import numpy as np
+
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.link import NoAnswer
 from tachometry.sim.golden.emulator import Change, GoldenEmulator
@@ -88,9 +90,13 @@ def steps(registers: DemoMap) -> list[Step]:
 
 
 def selftest(
-    board: DemoBoard, registers: DemoMap, period: int = 0, told: Callable[[Result], None] | None = None
+    board: DemoBoard,
+    registers: DemoMap,
+    period: int = 0,
+    told: Callable[[Result], None] | None = None,
+    chosen: Sequence[Step] | None = None,
 ) -> list[Result]:
-    """Run all steps.
+    """Run all steps, and hold what the board says against the golden models.
 
     Parameters
     ----------
@@ -101,6 +107,8 @@ def selftest(
         Ticks between frames; 0: about 2 ms.
     told : callable of Result
         Is called after each step.
+    chosen : sequence of Step or None
+        None: those of `steps`.
 
     Raises
     ------
@@ -111,7 +119,7 @@ def selftest(
     period = period or max(1, math.ceil(timing.clock_hz / timing.tick_cycles / 500))
     results = []
     try:
-        for step in steps(registers):
+        for step in steps(registers) if chosen is None else chosen:
             results.append(_run(board, registers, step, period))
             if told is not None:
                 told(results[-1])
@@ -135,8 +143,9 @@ def _run(board: DemoBoard, registers: DemoMap, step: Step, period: int) -> Resul
     words = _Words(board, registers)
     for wait, values in step.then:
         seen += words.until(changes[-1].clock + 1 + round(wait * clock_hz))
-        held = replace(held, **{name: value for name, value in values.items() if name != "jump"})
-        changes.append(Change(board.set(**values), held, "jump" in values))
+        for name, value in values.items():
+            held = held if name == "jump" else replace(held, **{name: value})
+            changes.append(Change(board.set(**{name: value}), held, name == "jump"))
     seen += words.until(changes[-1].clock + 1 + round(step.rest * clock_hz))
     board.stream(0)
     errors = board.client.counters()["decode_errors"]
@@ -153,10 +162,11 @@ class _Words:
     def until(self, clock: int) -> Iterator[tuple[int, ...]]:
         latest = time.monotonic()
         while True:
-            for words in self._board.link.poll():
+            arrived = self._board.link.poll()
+            yield from arrived
+            if arrived:
                 latest = time.monotonic()
-                yield words
-                if words[self._time] >= clock:
+                if arrived[-1][self._time] >= clock:
                     return
             if time.monotonic() - latest > _SILENCE:
                 raise NoAnswer(f"no telemetry has come for {_SILENCE:g} s")
@@ -170,6 +180,8 @@ def _compared(
     at = [register.name for _, register in captured].index("TIME")
     n_clocks = max(words[at] for words in seen) + 1
     trace = GoldenEmulator(spec.encoder.pulses_per_rev if spec.index else None).trace(changes, n_clocks)
+    if spec.max_tick_cycles:
+        trace = trace.with_tick_in(np.arange(1, n_clocks, spec.timing.tick_cycles))
     bank = GoldenBank(registers, trace)
     golden = iter(
         bank.answers(

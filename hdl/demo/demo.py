@@ -70,16 +70,21 @@ class Demo(wiring.Component):
         m.submodules.emulator = emulator = ResetInserter(bank.restart)(self.emulator)
         time = Signal(WORD)
         changed = Signal(WORD)
-        ticks = Signal(PERIOD_WIDTH)  # since the last telemetry
+        # Nominal sampling periods: those of a core may last for ever.
+        cycles = self._map.spec.timing.tick_cycles
+        left = Signal(range(cycles))
+        period = Signal()
+        m.d.sync += [period.eq(left == 0), left.eq(Mux(left == 0, cycles - 1, left - 1))]
+        periods = Signal(PERIOD_WIDTH)  # since the last telemetry
         sends = Signal()
         m.d.sync += time.eq(time + 1)
         with m.If(bank.written):
             m.d.sync += changed.eq(time)
-        with m.If(core.tick):
-            m.d.comb += sends.eq((bank.telemetry_period != 0) & (ticks + 1 >= bank.telemetry_period))
-            m.d.sync += ticks.eq(Mux(sends, 0, ticks + 1))
+        with m.If(period):
+            m.d.comb += sends.eq((bank.telemetry_period != 0) & (periods + 1 >= bank.telemetry_period))
+            m.d.sync += periods.eq(Mux(sends, 0, periods + 1))
         with m.If(bank.restart):
-            m.d.sync += [time.eq(0), changed.eq(0), ticks.eq(0)]
+            m.d.sync += [signal.eq(0) for signal in (time, changed, left, period, periods)]
         m.d.comb += [
             bank.time.eq(time),
             bank.changed.eq(changed),
@@ -92,6 +97,8 @@ class Demo(wiring.Component):
                 line = getattr(self.emulator, pin.name)
                 given = Mux(bank.emulated, line, given)
                 m.d.comb += getattr(self, f"emulated_{pin.name}").eq(line)
+            else:
+                given = Mux(bank.emulated, period, given)  # the external tick
             m.d.comb += getattr(core, pin.name).eq(given)
 
         for port in self._bus_ports:

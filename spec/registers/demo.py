@@ -36,7 +36,7 @@ class DemoMap(RegisterMap):
         return tuple(field for field in self.settings if field.port not in others)
 
     def _added(self) -> Iterable[Draft]:
-        telemetry = "Ticks from a frame of telemetry to the next; 0: there are none."
+        telemetry = "Nominal ticks from a frame of telemetry to the next; 0: there are none."
         yield "TELEMETRY", "What is sent unasked.", (_setting("telemetry_period", PERIOD_WIDTH, 0, telemetry),), {}
         changed = Field("value", WORD, unit="clocks", port="changed")
         yield "CHANGED", "Time of the last write to any register, since the last restart.", (changed,), {}
