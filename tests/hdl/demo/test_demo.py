@@ -79,7 +79,7 @@ def test_settings_that_do_not_fit_are_refused() -> None:
     board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), UART), timeout=60)
     with pytest.raises(ValueError, match="phase_error must be from -128 to 127, not 128"):
         board.set(phase_error=128)
-    with pytest.raises(ValueError, match="settings must be some of emulated, .*, drop, not velocity"):
+    with pytest.raises(ValueError, match=r"settings must be some of emulated, .*, drop, not velocity"):
         board.set(velocity=1)
 
 

@@ -89,7 +89,7 @@ def test_lines_are_those_of_the_golden_model(seed: int) -> None:
 def edges(settings: EmulatorSettings, n_clocks: int) -> tuple[np.ndarray, np.ndarray]:
     """Clocks of the edges of A and of B."""
     trace = GoldenEmulator().trace([Change(-1, settings)], n_clocks)
-    return tuple(trace.clock[1:][np.diff(line.astype(int)) != 0] for line in (trace.a, trace.b))  # type: ignore[return-value]
+    return tuple(trace.clock[1:][np.diff(line.astype(int)) != 0] for line in (trace.a, trace.b))
 
 
 PERIOD = 4096
