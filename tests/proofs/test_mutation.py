@@ -9,7 +9,7 @@ import proofs.mutation.__main__ as command
 import proofs.mutation.equivalent
 import proofs.mutation.score
 import pytest
-from proofs.mutation.cases import CASES
+from proofs.mutation.cases import CASES, Case
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.netlist import exported, mutants
 from proofs.mutation.simulate import library, run
@@ -24,7 +24,7 @@ CLOCKS = 200_000
 
 def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
     """A reset, and then nothing."""
-    pins = np.zeros(n_clocks, dtype=np.uint8)
+    pins = np.zeros((n_clocks, 1), dtype=np.uint64)
     pins[0] = 1
     low = {name: np.zeros(1, dtype=np.uint8) for name in ("a", "b")}
     return Stimulus(pins, [PinTrace(np.zeros(1, dtype=np.int64), n_clocks=n_clocks - 1, **low)], [1])
@@ -33,6 +33,7 @@ def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     monkeypatch.setattr(command, "CASES", [CASE])
+    monkeypatch.setattr(command, "BOXES", [])
     monkeypatch.setattr(proofs.mutation.score, "CLOCKS", CLOCKS)
     return monkeypatch
 
@@ -45,7 +46,7 @@ def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pyt
 
 
 def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    small.setattr(proofs.mutation.score, "stimulus", standstill)
+    small.setattr(Case, "play", lambda case, n_clocks: standstill(case.spec, n_clocks))
     small.setattr(proofs.mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
     assert not command.main([])
     survivors = capsys.readouterr().out.partition("survivors of mt, in clocks:\n")[2].splitlines()
@@ -58,10 +59,9 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
 
 def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 2)
-    spec, played = CASE.spec, stimulus(CASE.spec, CLOCKS)
-    flat, found = mutants(exported(spec), CASE.mutants, tmp_path)
-    n_outputs = sum(port.direction == "output" for port in spec.ports)
-    clocks, _ = run(library(spec, flat, found), len(found), n_outputs, played.pins)
+    played = stimulus(CASE.spec, CLOCKS)
+    flat, found = mutants(exported(CASE.component), CASE.mutants, tmp_path)
+    clocks, _ = run(library(CASE.pins, flat, found), len(found), len(CASE.pins.outputs), played.pins)
     # Those that are the last to be noticed are the most like the core.
     latest = [found[number] for number in np.argsort(clocks)[-4:]]
     assert clocks.max() > CLOCKS // 10

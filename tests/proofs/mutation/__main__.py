@@ -1,6 +1,6 @@
 """How many wrong cores the tests' motions tell from the right one: `make mutate`.
 
-Names of methods as arguments choose those.
+Names of methods as arguments choose those, and `registers` and `demo` what is around them.
 """
 
 import os
@@ -8,24 +8,26 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+from proofs.mutation.boxes import BOXES
 from proofs.mutation.cases import CASES
 from proofs.mutation.score import Score, judge
 from support.report import chosen, row
 
 from tachometry.spec import METHODS
 
+GROUPS = (*METHODS, "registers", "demo")
 LEAST = 0.99  # of the mutants that are not equivalent
 
 
 def main(words: list[str]) -> bool:
     """Whether enough mutants of every method were killed; prints the tables."""
-    methods = chosen("method", words, METHODS)
+    groups = chosen("group", words, GROUPS)
     scores: list[Score] = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         row("core", "mutants", "killed", "equivalent", "argued by hand", "survivors", "seconds")
         row("---", *["---:"] * 6)
-        for case in CASES:
-            if case.method in methods:
+        for case in (*CASES, *BOXES):
+            if case.group in groups:
                 start = time.monotonic()
                 score = judge(case, pool)
                 scores.append(score)
@@ -35,11 +37,11 @@ def main(words: list[str]) -> bool:
                     *(score.argued, len(score.survivors), seconds),
                 )
     print()
-    row("method", "mutants", "killed", "equivalent", "argued by hand", "survivors", "score")
+    row("group", "mutants", "killed", "equivalent", "argued by hand", "survivors", "score")
     row("---", *["---:"] * 6)
     fine = True
-    for method in METHODS:
-        of_method = [score for score in scores if score.case.method == method]
+    for group in groups:
+        of_method = [score for score in scores if score.case.group == group]
         if not of_method:
             continue
         mutants, killed, equivalent, argued = (
@@ -47,7 +49,7 @@ def main(words: list[str]) -> bool:
         )
         wrong = mutants - equivalent - argued
         fine &= killed >= LEAST * wrong
-        row(method, mutants, killed, equivalent, argued, wrong - killed, f"{100 * killed / wrong:.1f} %")
+        row(group, mutants, killed, equivalent, argued, wrong - killed, f"{100 * killed / wrong:.1f} %")
     for score in scores:
         if score.survivors:
             print(f"\nsurvivors of {score.case.name}:")

@@ -4,7 +4,45 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
+from amaranth.lib import wiring
+from proofs.mutation.stimulus import Stimulus, stimulus
+
+from tachometry.hdl import Tachometer
+from tachometry.spec import METHODS, Encoder, Port, Speed, TachometerSpec, Timing
+
+
+@dataclass(frozen=True)
+class Pins:
+    """Ports of what is mutated.
+
+    Parameters
+    ----------
+    inputs : tuple of Port
+        The reset first; the clock is not among them.
+    outputs : tuple of Port
+    strobes : tuple of str
+        Outputs with which there is a row; none: in every clock.
+    """
+
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    strobes: tuple[str, ...] = ()
+
+    @property
+    def places(self) -> list[tuple[int, int]]:
+        """Word and lowest bit of each input in what is played: none goes over the end of a word."""
+        found, word, bit = [], 0, 0
+        for port in self.inputs:
+            if bit + port.width > 64:
+                word, bit = word + 1, 0
+            found.append((word, bit))
+            bit += port.width
+        return found
+
+    @property
+    def n_words(self) -> int:
+        """Words of all inputs in a clock."""
+        return self.places[-1][0] + 1
 
 
 @dataclass(frozen=True)
@@ -25,10 +63,31 @@ class Case:
     mutants: int
     max_table: int = 2048
 
+    selection = "t:*"  # what of the netlist is mutated, for Yosys
+
     @property
-    def method(self) -> str:
-        """Of the core."""
+    def group(self) -> str:
+        """The method."""
         return self.spec.method
+
+    @property
+    def component(self) -> wiring.Component:
+        """The core."""
+        return Tachometer(self.spec)
+
+    def play(self, n_clocks: int) -> Stimulus:
+        """What is played on the mutants."""
+        return stimulus(self.spec, n_clocks)
+
+    @property
+    def pins(self) -> Pins:
+        """Ports of the core."""
+        ports = [port for port in self.spec.ports if port.name != "clk"]
+        return Pins(
+            tuple(port for port in ports if port.direction == "input"),
+            tuple(port for port in ports if port.direction == "output"),
+            tuple(self.spec.strobes),
+        )
 
 
 def _case(

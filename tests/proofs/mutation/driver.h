@@ -1,5 +1,5 @@
 // All mutants of a group beside the core without any, clock by clock; one that was killed goes on no further. Behind
-// CXXRTL's text and functions of the ports: `pins` sets the inputs from a byte, `outputs` writes a number for each
+// CXXRTL's text and functions of the ports: `pins` sets the inputs from words, `outputs` writes a number for each
 // output, `strobes` says whether one of them that strobes is high.
 
 #define ENTRY extern "C" __attribute__((visibility("default")))
@@ -8,7 +8,7 @@ constexpr int64_t NEVER = -1;
 
 struct Job {
   int64_t n_clocks;
-  const uint8_t *pins;  // of each clock, a bit each, the lowest is the reset
+  const uint64_t *pins;  // of each clock, in N_WORDS words; the lowest bit is the reset
   int64_t n_mutants;  // their selectors are 1 … n_mutants
   int64_t *killed;  // clock in which an output differed, or NEVER
   int64_t *rows;  // clock and outputs of the core without a mutant, in every clock with a strobe
@@ -40,7 +40,7 @@ ENTRY void mutation_run(Job *job) {
   for (int64_t clock = 0; clock < job->n_clocks; clock++) {
     int64_t right[N_OUTPUTS], wrong[N_OUTPUTS];
     Top &core = *tops[0];
-    pins(core, job->pins[clock]);
+    pins(core, job->pins + clock * N_WORDS);
     settle(core);
     outputs(core, right);
     bool strobe = strobes(core);
@@ -53,7 +53,7 @@ ENTRY void mutation_run(Job *job) {
     size_t left = 0;
     for (int number : alive) {
       Top &top = *tops[number];
-      pins(top, job->pins[clock]);
+      pins(top, job->pins + clock * N_WORDS);
       settle(top);
       outputs(top, wrong);
       if (memcmp(right, wrong, sizeof right)) {

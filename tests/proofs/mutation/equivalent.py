@@ -21,13 +21,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from proofs.mutation.cases import Case
+from proofs.mutation.cases import Case, Pins
 from proofs.mutation.lemmas import lemmas
 from proofs.mutation.netlist import SELECTOR, Mutant, selected, yosys
 from proofs.mutation.simulate import compiled, key
 
 from tachometry.sim.engines import build
-from tachometry.spec import TachometerSpec
 
 _MAP = """\
 read_rtlil flat.il
@@ -45,13 +44,13 @@ template <size_t N> static inline void note(const value<N> &one, const value<N> 
   for (size_t k = 0; k < N; k++) row[k] |= (one.data[k / 32] ^ other.data[k / 32]) >> (k % 32) & 1;
 }}
 ENTRY void mutation_watch(
-  const uint8_t *levels, int64_t n_clocks, int64_t n_mutants, uint8_t *differ
+  const uint64_t *levels, int64_t n_clocks, int64_t n_mutants, uint8_t *differ
 ) {{
   Top top;
   std::vector<State> states(1 + n_mutants);
   for (auto &state : states) {{ {init} }}
   for (int64_t clock = 0; clock < n_clocks; clock++) {{
-    pins(top, levels[clock]);
+    pins(top, levels + clock * N_WORDS);
     for (int64_t k = 0; k <= n_mutants; k++) {{
       State &state = states[k], &core = states[0];
       select(top, k);
@@ -155,7 +154,7 @@ def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
     return Opened(head + "".join(wires) + body + "".join(connections) + "end\n" + tail, registers)
 
 
-def watched(spec: TachometerSpec, cut: Opened, n_mutants: int, pins: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def watched(ports: Pins, cut: Opened, n_mutants: int, pins: NDArray[np.uint64]) -> NDArray[np.bool_]:
     """Which bits of the registers each mutant was seen to set differently, shape (n_mutants, bits)."""
     registers = list(enumerate(cut.registers))
     place = np.cumsum([0, *(register.width for _, register in registers)])
@@ -175,9 +174,9 @@ def watched(spec: TachometerSpec, cut: Opened, n_mutants: int, pins: NDArray[np.
     def make(folder: Path) -> Path:
         (folder / "cut.il").write_text(cut.text)
         yosys("read_rtlil cut.il\nsplitnets -driver\nopt_clean\nwrite_rtlil split.il\n", folder)
-        return compiled((folder / "split.il").read_text(), spec, folder, more)
+        return compiled((folder / "split.il").read_text(), ports, folder, more)
 
-    made = build.cached(key(cut.text, more, spec.ports), ".so", make)
+    made = build.cached(key(cut.text, more, ports), ".so", make)
     differ = np.zeros((n_mutants, place[-1]), dtype=np.uint8)
     pointer, long = ctypes.c_void_p, ctypes.c_int64
     watch = ctypes.CDLL(str(made)).mutation_watch
@@ -197,11 +196,11 @@ def _lemmas(case: Case, cut: Opened) -> list[str]:
     return [lemma for lemma in named if "_q_?" not in lemma]
 
 
-def _miter(spec: TachometerSpec, cut: Opened, number: int, differ: NDArray[np.bool_], more: list[str]) -> str:
+def _miter(ports: Pins, cut: Opened, number: int, differ: NDArray[np.bool_], more: list[str]) -> str:
     """Core and mutant, with the registers that they share and those that they do not, and whether anything is wrong."""
-    pins = [port.name for port in spec.ports if port.direction == "input" and port.name != "clk"]
-    outputs = [port for port in spec.ports if port.direction == "output"]
-    inputs, lines = [f"input {name}" for name in ("clk", *pins)], ["reg begun = 0;"]
+    pins = [port.name for port in ports.inputs]
+    inputs = ["input clk", *(f"input [{port.width - 1}:0] {port.name}" for port in ports.inputs)]
+    lines = ["reg begun = 0;"]
     lines += ["always @(posedge clk) begun <= 1;"]
     links: dict[str, list[str]] = {"core": [], "mutant": []}
     equal = []
@@ -235,12 +234,12 @@ def _miter(spec: TachometerSpec, cut: Opened, number: int, differ: NDArray[np.bo
             equal.append(" == ".join(f"{{{side}}}" for side in sides))
         for side, link in links.items():
             link += [f".q_{k}({side}_q_{k})", f".d_{k}({side}_d_{k})"]
-    for port in outputs:
+    for port in ports.outputs:
         lines += [f"wire [{port.width - 1}:0] core_{port.name}, mutant_{port.name};"]
         equal.append(f"core_{port.name} == mutant_{port.name}")
     for (side, link), selector in zip(links.items(), (0, number), strict=True):
         link += [f".{name}({name})" for name in pins] + [f".{SELECTOR}({selector})"]
-        link += [f".{port.name}({side}_{port.name})" for port in outputs]
+        link += [f".{port.name}({side}_{port.name})" for port in ports.outputs]
         lines += [f"top {side} ({', '.join(link)});"]
     right = " && ".join(f"({term})" for term in [*equal, *more])
     head = f"module miter({', '.join(inputs)}, output wrong);"
@@ -255,11 +254,11 @@ def _holds(verdict: Path, left: Path) -> bool:
 
 
 def equivalent(
-    case: Case, flat: str, group: list[Mutant], pins: NDArray[np.uint8], folder: Path, pool: Executor
+    case: Case, flat: str, group: list[Mutant], pins: NDArray[np.uint64], folder: Path, pool: Executor
 ) -> list[bool]:
     """Whether each mutant is proven to show at every output in every clock what the core shows, whatever the inputs."""
     cut = opened(flat, group, folder)
-    differ = watched(case.spec, cut, len(group), pins[:_WATCHED])
+    differ = watched(case.pins, cut, len(group), pins[:_WATCHED])
     text = folder / "cut.il"
     text.write_text(cut.text)
 
@@ -270,7 +269,7 @@ def equivalent(
         shutil.copy(text, own)
         script = ["read_rtlil cut.il", "design -save all"]
         for number in numbers:
-            (own / f"miter_{number}.v").write_text(_miter(case.spec, cut, number, differ[number - 1], more))
+            (own / f"miter_{number}.v").write_text(_miter(case.pins, cut, number, differ[number - 1], more))
             script.append(_SOLVE.format(number=number, seconds=_SECONDS))
         yosys("\n".join(script), own)
         return {number for number in numbers if _holds(own / f"verdict_{number}", own / f"left_{number}.il")}

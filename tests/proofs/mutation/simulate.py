@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from proofs.mutation.cases import Pins
 from proofs.mutation.netlist import SELECTOR, WIDTH, Mutant, grouped
 
 from tachometry.sim.engines import build
 from tachometry.sim.engines.cxxrtl import headers, mangled, translate
-from tachometry.spec import TachometerSpec
 
 _OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
@@ -26,7 +26,8 @@ template <size_t N> static inline const value<N> &now(const wire<N> &port) {{ re
 template <size_t N> static inline int64_t extended(const value<N> &port) {{
   return int64_t(port.template get<uint64_t>() << (64 - N)) >> (64 - N);
 }}
-static inline void pins(Top &top, uint8_t level) {{ {pins} }}
+constexpr int N_WORDS = {n_words};
+static inline void pins(Top &top, const uint64_t *level) {{ {pins} }}
 static inline bool strobes(const Top &top) {{ return {strobes}; }}
 static inline void outputs(const Top &top, int64_t *row) {{ {outputs} }}
 static inline void select(Top &top, unsigned number) {{ top.p_{selector} = value<{width}>{{number}}; }}
@@ -40,34 +41,36 @@ def key(*parts: object) -> str:
     return build.digest("mutants", tools, _OPTIONS, _PORTS, _DRIVER, *parts)
 
 
-def compiled(netlist: str, spec: TachometerSpec, folder: Path, more: str = "") -> Path:
+def compiled(netlist: str, pins: Pins, folder: Path, more: str = "") -> Path:
     """A library of a netlist with the ports of a core, with more C++ at its end."""
-    source = translate(netlist) + _ports(spec) + _DRIVER + more
+    source = translate(netlist) + _ports(pins) + _DRIVER + more
     return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
 
 
-def library(spec: TachometerSpec, flat: str, group: list[Mutant]) -> Path:
+def library(pins: Pins, flat: str, group: list[Mutant]) -> Path:
     """The compiled group."""
     commands = [mutant.command for mutant in group]
 
     def make(folder: Path) -> Path:
-        return compiled(grouped(flat, group, folder), spec, folder)
+        return compiled(grouped(flat, group, folder), pins, folder)
 
-    return build.cached(key(flat, commands, spec.ports), ".so", make)
+    return build.cached(key(flat, commands, pins), ".so", make)
 
 
-def _ports(spec: TachometerSpec) -> str:
-    outputs = [port for port in spec.ports if port.direction == "output"]
-    pins = [port for port in spec.ports if port.direction == "input" and port.name != "clk"]
-    value = {port.name: f"now(top.{mangled(port.name)})" for port in outputs}
+def _ports(pins: Pins) -> str:
+    value = {port.name: f"now(top.{mangled(port.name)})" for port in pins.outputs}
     return _PORTS.format(
-        n_outputs=len(outputs),
-        pins=" ".join(f"top.{mangled(pin.name)} = value<1>{{level >> {bit} & 1u}};" for bit, pin in enumerate(pins)),
-        strobes=" || ".join(f"{value[name]}.get<bool>()" for name in spec.strobes),
+        n_outputs=len(pins.outputs),
+        n_words=pins.n_words,
+        pins=" ".join(
+            f"top.{mangled(pin.name)}.set<uint64_t>(level[{word}] >> {bit} & {(1 << pin.width) - 1}u);"
+            for pin, (word, bit) in zip(pins.inputs, pins.places, strict=True)
+        ),
+        strobes=" || ".join(f"{value[name]}.get<bool>()" for name in pins.strobes) or "true",
         outputs=" ".join(
             f"row[{k}] = "
             + (f"extended({value[port.name]});" if port.signed else f"{value[port.name]}.get<uint64_t>();")
-            for k, port in enumerate(outputs)
+            for k, port in enumerate(pins.outputs)
         ),
         selector=SELECTOR,
         width=WIDTH,
@@ -75,7 +78,7 @@ def _ports(spec: TachometerSpec) -> str:
 
 
 def run(
-    made: Path, n_mutants: int, n_outputs: int, pins: NDArray[np.uint8], n_rows: int = 0
+    made: Path, n_mutants: int, n_outputs: int, pins: NDArray[np.uint64], n_rows: int = 0
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Play `pins` on a compiled group.
 

@@ -20,7 +20,7 @@ class Stimulus:
 
     Parameters
     ----------
-    pins : uint8 array, shape (clocks,)
+    pins : uint64 array, shape (clocks, words)
         Bit 0 is `rst`, above it the other inputs in the order of the ports.
     traces : list of PinTrace
         One after each reset.
@@ -28,7 +28,7 @@ class Stimulus:
         Clock in which each of them begins, the first one after a reset.
     """
 
-    pins: NDArray[np.uint8]
+    pins: NDArray[np.uint64]
     traces: list[PinTrace]
     starts: list[int]
 
@@ -117,4 +117,4 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         pins += [reset, played]
         traces.append(trace)
         done += resets + trace.n_clocks
-    return Stimulus(np.concatenate(pins), traces, starts)
+    return Stimulus(np.concatenate(pins).astype(np.uint64)[:, np.newaxis], traces, starts)
