@@ -35,7 +35,10 @@ def updates_of(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> Tabl
 
 @dataclass(frozen=True)
 class Row:
-    """An update by the words of docs/timed.md, in counts per tick; `least` and `most` are the bounds, None for none."""
+    """An update by the words of docs/timed.md, in counts per tick.
+
+    `least` and `most` are the bounds, None for none; `known` says whether they are valid.
+    """
 
     clock: int
     velocity: Fraction
@@ -43,6 +46,7 @@ class Row:
     forced: bool
     least: Fraction | None
     most: Fraction | None
+    known: bool = True
 
 
 def bound(distance: Fraction, time: int, spec: TTachometer) -> Fraction | None:
@@ -54,7 +58,8 @@ def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> It
     f, off, per_tick = spec.native_frac_bits, spec.edge_error, spec.timer_periods
     scale = TICK if spec.on_lattice else 1  # clocks of a period
     longest = MAX_TICKS * TICK // scale
-    last, opened, sign, velocity = -1, False, 0, Fraction(0)
+    # Reset stands for a count in the last period before the datapath begins; it sees steps two clocks late.
+    last, opened, sign, velocity = -1 if spec.on_lattice else -3, False, 0, Fraction(0)
     for clock in range(n_clocks):
         ends = clock % TICK == TICK - 1
         if spec.on_lattice and not ends:
@@ -74,7 +79,9 @@ def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> It
             last, opened, sign = now, True, came
         elif age % longest == 0:
             velocity, opened = Fraction(0), False
-            yield Row(clock, velocity, longest, True, bound(-1 - off, longest, spec), bound(1 + off, longest, spec))
+            ends_of = (bound(-1 - off, longest, spec), bound(1 + off, longest, spec))
+            # The very first period was not seen completely, unless a count came since.
+            yield Row(clock, velocity, longest, True, *ends_of, known=bool(sign) or age > longest)
         elif ends and sign and spec.decays and not any(at in counts for at in window):
             greatest = rounded(Fraction(3 * per_tick, 2 * age) * (1 if velocity > 0 else -1), f)
             # A count that is measured takes the divider from a decay; so does a forced 0.
@@ -99,6 +106,7 @@ def random_counts(seed: int, spec: TTachometer, n_clocks: int) -> dict[int, int]
     rng = np.random.default_rng(seed)
     counts, clock, sign = {}, int(rng.integers(1, 3 * TICK)), 1
     least = TICK if spec.on_lattice else spec.division_clocks
+    clock += (0, MAX_TICKS, 2 * MAX_TICKS + 3)[seed] * TICK
     while clock < n_clocks:
         gap = least * 10 ** rng.uniform(0, 0.7)
         for _ in range(int(rng.integers(1, 6))):
@@ -131,6 +139,7 @@ def test_every_update_is_by_the_rules(timer: str, frac_bits: int, bound_decay: b
             ("interval", [row.interval for row in rows]),
             ("forced", [row.forced for row in rows]),
             ("velocity", [row.velocity * one for row in rows]),
+            ("bounds_valid", [row.known for row in rows]),
             ("velocity_lower", [-none if row.least is None else math.floor(row.least * one) for row in rows]),
             ("velocity_upper", [none if row.most is None else math.ceil(row.most * one) for row in rows]),
         ):
