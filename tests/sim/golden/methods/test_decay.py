@@ -12,7 +12,7 @@ import pytest
 
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps, count
-from tachometry.sim.golden.methods.timed import chain
+from tachometry.sim.golden.methods.timed import Counts, chain
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, Speed, Timing, TTachometer
 
@@ -169,6 +169,31 @@ def test_one_decay_alone() -> None:
     assert updates.clock.tolist() == [34, 119, 159]
     wanted = [Fraction(-40, 32), Fraction(-60, 85), Fraction(-40, 125)]
     assert updates.velocity.tolist() == [rounded(velocity, 16) * 2**16 for velocity in wanted]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_least_velocity_decays_to_0(sign: int) -> None:
+    """A count in 600 clocks is 1/15 of a count a tick, an LSB; after 1920 clocks half an LSB is left, 60/1920."""
+    timing = Timing(100 * TICK, TICK, 80)
+    spec = TTachometer(encoder=Encoder(25), timing=timing, frac_bits=4, bounds=True)
+    updates = updates_of(spec, {39: sign, 639: sign}, 70 * TICK)
+    # Half an LSB is rounded upward: backwards to 0, forwards to an LSB, which is no less than the velocity.
+    last = 639 + (1920 if sign < 0 else 1960)
+    assert updates.clock.tolist() == [639, last]
+    assert updates.velocity.tolist() == [sign, 0]
+    ends = (math.floor(0), math.ceil(Fraction(40 * 16, last - 639)))
+    assert (updates["velocity_lower"][1], updates["velocity_upper"][1]) == (ends if sign > 0 else (-ends[1], 0))
+
+
+@pytest.mark.parametrize(("n_clocks", "seen"), [(71, 1), (72, 1), (73, 2), (101, 2), (102, 3)])
+def test_counts_are_the_steps_that_come_before_the_end(n_clocks: int, seen: int) -> None:
+    """The datapath sees a step two clocks after its clock; where a line changes without a step there is no count."""
+    steps = Steps(np.array([2, 40, 70, 99]), np.array([1, 0, -1, 1]), NONE, NONE, NONE)
+    ticks = Table(NONE, {"pulse_count": NONE})
+    counts = Counts.of(make_spec(), ticks, steps, n_clocks)
+    assert counts.period.tolist() == [4, 72, 101][:seen]
+    assert counts.size.tolist() == [1, -1, 1][:seen]
+    assert counts.n_periods == n_clocks
 
 
 def test_just_the_maximum_speed_is_in_range() -> None:
