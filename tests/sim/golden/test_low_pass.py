@@ -147,7 +147,10 @@ def test_a_method_without_updates_at_rest_ends_at_0() -> None:
 def test_the_first_update_is_filtered_from_0_and_so_is_the_first_after_rest() -> None:
     """By fractions: y = u + E·(0 − u), rounded to 2^−k and then to an LSB; at rest the state is just 0."""
     rairan = RairanTachometer(
-        encoder=Encoder(100), timing=Timing(1_000_000, 100, 50), lowpass=Fraction(10_000), max_speed=Speed(Fraction(200))
+        encoder=Encoder(100),
+        timing=Timing(1_000_000, 100, 50),
+        lowpass=Fraction(10_000),
+        max_speed=Speed(Fraction(200)),
     )
     form, half = rairan.low_pass, Fraction(1, 2)
     assert form.extra_bits == 3  # E = 1/e

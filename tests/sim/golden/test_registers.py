@@ -188,7 +188,10 @@ def test_reading_the_velocity_captures_unless_it_is_held() -> None:
     assert bank.ask((50, "VELOCITY", None), (90, position, None)) == [twos(-16), twos(-4)]
     assert bank.ask((50, "CONTROL", 2), (60, "VELOCITY", None), (61, position, None)) == [0, 0, 0]
     assert bank.ask((50, "CONTROL", 2), (60, position, None), captures=(55,))[1] == twos(-5)
-    assert bank.ask((50, "CONTROL", 2), (55, "CONTROL", None), (57, "CONTROL", 0), (58, "CONTROL", None))[1::2] == [2, 0]
+    assert bank.ask((50, "CONTROL", 2), (55, "CONTROL", None), (57, "CONTROL", 0), (58, "CONTROL", None))[1::2] == [
+        2,
+        0,
+    ]
     # A capture in the clock of the access comes first; one after it is not seen.
     assert bank.ask((61, position, None), captures=(61,)) == [twos(-6)]
     assert bank.ask((61, position, None), captures=(62,)) == [0]

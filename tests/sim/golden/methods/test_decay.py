@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -123,9 +122,7 @@ def random_counts(seed: int, spec: TTachometer, n_clocks: int) -> dict[int, int]
 def test_every_update_is_by_the_rules(timer: str, frac_bits: int, bound_decay: bool, edge_error: Fraction) -> None:
     decays = 0
     for seed in range(3):
-        spec = make_spec(
-            timer=timer, frac_bits=frac_bits, bound_decay=bound_decay, bounds=True, edge_error=edge_error
-        )
+        spec = make_spec(timer=timer, frac_bits=frac_bits, bound_decay=bound_decay, bounds=True, edge_error=edge_error)
         n_clocks = 60 * MAX_TICKS * TICK
         counts = random_counts(seed, spec, n_clocks)
         updates = updates_of(spec, counts, n_clocks)
