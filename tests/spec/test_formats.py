@@ -136,7 +136,14 @@ def test_the_fastest_filter() -> None:
         filtered(fastest + 1, 1)
 
 
-RATIOS = [Fraction(1, 4), Fraction(1, 5), Fraction(math.pi) / 40, Fraction(3, 1000), Fraction(255, 1024), Fraction(1, 7**9)]
+RATIOS = [
+    Fraction(1, 4),
+    Fraction(1, 5),
+    Fraction(math.pi) / 40,
+    Fraction(3, 1000),
+    Fraction(255, 1024),
+    Fraction(1, 7**9),
+]
 
 
 @pytest.mark.parametrize("max_native", [1, 7, 1000, (1 << 20) - 1, 1 << 20])
