@@ -31,8 +31,8 @@ def line(*rises_and_falls: int, n_clocks: int) -> NDArray[np.uint8]:
 
 
 def trace_of(n_clocks: int, *, a: tuple[int, ...] = (), z: tuple[int, ...] = ()) -> PinTrace:
-    lines = (line(*changes, n_clocks=n_clocks) for changes in (a, (), z))
-    return PinTrace(np.arange(n_clocks), *(next(lines) for _ in "ab"), n_clocks, next(lines))
+    levels = [line(*changes, n_clocks=n_clocks) for changes in (a, (), z)]
+    return PinTrace(np.arange(n_clocks), levels[0], levels[1], n_clocks, levels[2])
 
 
 def test_without_an_index_its_line_is_not_looked_at() -> None:

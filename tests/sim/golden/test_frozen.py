@@ -59,4 +59,4 @@ def test_parameters_of_a_core_are_given_by_name(method: str) -> None:
     for base in METHODS[method].__mro__[:-1]:
         assert not getattr(base, "__match_args__", ()), base
     with pytest.raises(TypeError, match="positional"):
-        METHODS[method](Encoder(8))  # type: ignore[misc]
+        METHODS[method](Encoder(8))  # type: ignore[call-arg]

@@ -89,7 +89,7 @@ def test_what_is_remembered() -> None:
 
 def test_speeds_beyond_the_range() -> None:
     """Two counts can be a clock apart; T counts one in a tick of the lattice, M/T all that there are."""
-    slow = {"max_speed": Speed(Fraction(1000), "rev/s")}  # 32 counts a ms: one in 20 clocks
+    slow: dict[str, Any] = {"max_speed": Speed(Fraction(1000), "rev/s")}  # 32 counts a ms: one in 20 clocks
     assert [one.max_count for one in (t(**slow), t())] == [1, 20]
     assert [one.flags_range for one in (t(), t(**slow), mt(), mt(**slow))] == [False, True, False, True]
     assert [one.flags_range for one in (t(timer="tick"), mt(timer="tick"), mt(timer="tick", **slow))] == [
@@ -102,7 +102,7 @@ def test_speeds_beyond_the_range() -> None:
 def test_bounds_of_times() -> None:
     """Distance over a time that is one shorter: twice the quotient; a count more at reversals; and the edge error."""
     assert [one.max_bound for one in (t(), t(timer="tick"), mt(timer="tick"))] == [41, 3, 41]
-    off = {"bounds": True, "edge_error": Fraction(1, 8)}
+    off: dict[str, Any] = {"bounds": True, "edge_error": Fraction(1, 8)}
     assert [one.max_bound for one in (t(**off), t(timer="tick", **off))] == [41 + 3, 3 + 1]
     wide = t(**off)
     assert (wide.bound_width, wide.absent_bound) == (7 + 4, 2**10 - 1)

@@ -82,17 +82,15 @@ def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> It
             # The very first period was not seen completely, unless a count came since.
             yield Row(clock, velocity, longest, True, *ends_of, known=bool(sign) or age > longest)
         elif ends and sign and spec.decays and not any(at in counts for at in window):
-            greatest = rounded(Fraction(3 * per_tick, 2 * age) * (1 if velocity > 0 else -1), f)
+            way = 1 if velocity > 0 else -1
+            greatest = rounded(Fraction(3 * per_tick, 2 * age) * way, f)
             # A count that is measured takes the divider from a decay; so does a forced 0.
             taken = scale == 1 and any(clock < at < clock + spec.division_clocks for at in (*counts, last + longest))
             if abs(greatest) < abs(velocity) and not taken:
                 velocity = greatest
-                ends_of = sorted((Fraction(0), Fraction(1 if velocity > 0 else -1)))
-                yield Row(clock, velocity, age, True, *(bound(end, age, spec) for end in widened(ends_of, off)))
-
-
-def widened(ends: list[Fraction], off: Fraction) -> tuple[Fraction, Fraction]:
-    return ends[0] - off, ends[1] + off
+                # The shaft has not come back over its last edge.
+                least, most = bound(min(way, 0) - off, age, spec), bound(max(way, 0) + off, age, spec)
+                yield Row(clock, velocity, age, True, least, most)
 
 
 def rounded(value: Fraction, frac_bits: int) -> Fraction:
@@ -151,9 +149,10 @@ def test_a_stop_is_followed_by_one_decay_after_the_other() -> None:
     spec = make_spec(frac_bits=16)
     updates = updates_of(spec, {9: 1, 39: 1}, 12 * TICK)
     ages = [TICK * k for k in range(2, MAX_TICKS)]
-    wanted = [(39, 30, Fraction(40, 30)), *((39 + age, age, Fraction(60, age)) for age in ages), (39 + 320, 320, 0)]
-    found = zip(updates.clock.tolist(), updates.interval.tolist(), updates.velocity.tolist(), strict=True)
-    assert [*found] == [(clock, time, rounded(Fraction(v), 16) * 2**16) for clock, time, v in wanted]
+    velocities = [Fraction(40, 30), *(Fraction(60, age) for age in ages), Fraction(0)]
+    assert updates.clock.tolist() == [39, *(39 + age for age in ages), 39 + 320]
+    assert updates.interval.tolist() == [30, *ages, 320]
+    assert updates.velocity.tolist() == [rounded(velocity, 16) * 2**16 for velocity in velocities]
     # The first silence is that of the tick after; of just one tick, 60/40 of a count is no less than 40/30.
     assert not updates.forced[0]
     assert updates.forced[1:].all()
