@@ -35,6 +35,7 @@ def test_looked_up_reciprocal(max_m: int, max_numerator: int, frac_bits: int, ha
                 assert (numerator * entry + form.rounding(towards)) >> form.scale_bits == wanted
             assert (numerator * entry + form.rounding(1)) >> form.scale_bits == math.ceil(exact)
     assert sum(map(bool, form.table)) == max_m
+    assert form.rounding() == form.rounding(0)
     # One bit less would not satisfy 2^(g+s−max(s,1)) ≥ 2·E·max_m.
     spare = form.scale_bits - max(halvings, 1)
     assert 2**spare >= 2 * max_numerator * max_m > 2 ** (spare - 1)
@@ -89,7 +90,9 @@ def test_extra_bits_are_the_fewest_that_leave_no_dead_zone(exponent: Fraction) -
     assert form.factor_bits == 20 + form.extra_bits + 1
 
 
-@pytest.mark.parametrize(("longest", "tables"), [(1, 1), (255, 1), (1023, 1), (1024, 2), (2047, 2), (8191, 2)])
+@pytest.mark.parametrize(
+    ("longest", "tables"), [(1, 1), (255, 1), (1023, 1), (1024, 2), (2047, 2), (2048, 2), (4095, 2), (8191, 2)]
+)
 def test_factors_are_looked_up_in_one_table_or_two(longest: int, tables: int) -> None:
     """Whatever the number of ticks, the product of the entries is e^(−G·m·T), each to the last of its bits."""
     form = LowPass(Fraction(1, 300), longest, 20)

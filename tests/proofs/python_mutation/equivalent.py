@@ -75,6 +75,11 @@ _argue(
 )
 _argue(
     f"{_RAIRAN}: windows",
+    "The window from reset ends with the first count; a dt that ended before that had no count in it.",
+    "node > 0 → node >= 0",
+)
+_argue(
+    f"{_RAIRAN}: windows",
     "No window begins with the end of time, for which this entry stands.",
     *("0 → 1 #12", "0 → -1 #12"),
 )
@@ -171,3 +176,9 @@ _argue(
     "Entries have less than 40 digits; for one to change, E would have to be within 10^−60 of half a unit of its last.",
     *("70 → 71", "70 → 69"),
 )
+_argue(
+    "spec/formats/velocity_output.py: VelocityOutput.rounding",
+    "To the nearest was answered before.",
+    "towards < 0 → towards <= 0",
+)
+_argue("spec/registers/frames.py: ", "Shifted by 0 places it is 1 either way.", "1 << 0 → 1 >> 0")

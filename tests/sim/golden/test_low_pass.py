@@ -120,6 +120,20 @@ def test_takes_the_last_of_those_that_come_meanwhile_for_the_time_of_all() -> No
     assert got.clock.tolist() == [first, first + spec.low_pass.latency - 2, 500 + latency]
 
 
+def test_what_comes_when_one_is_taken_waits_for_the_next_turn() -> None:
+    """The one before is taken in clock `then`: what comes a clock earlier takes its place, what comes then does not."""
+    spec = spec_of(Fraction(2000))
+    latency = spec.low_pass.latency
+    then = 51 + latency - 2
+    came = np.array([50, 60, then - 1, then, then + 3])
+    n = np.array([100, 200, 300, 400, 500]) << 16
+    updates = Table(came, {"velocity": n, "rests": np.zeros(5, dtype=np.bool_)})
+    tick = np.array([48, 49, 58, 59, 70, 71, then - 1, then + 1, then + 2])  # 2, 2, 2, 1 and 2 for each of them
+    got = filtered(spec, Table(tick, {}), updates)
+    assert got.velocity.tolist() == through(spec, n[[0, 2, 4]], np.array([2, 4, 3])).velocity.tolist()
+    assert got.clock.tolist() == [taken + latency - 1 for taken in (51, then, then + latency - 2)]
+
+
 def test_time_is_what_has_passed_and_not_what_was_measured() -> None:
     """Windows that overlap: an update in every tick, of some ticks each, is filtered as one of a tick."""
     spec = spec_of(Fraction(50))
