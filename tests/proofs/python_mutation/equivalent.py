@@ -182,3 +182,8 @@ _argue(
     "towards < 0 → towards <= 0",
 )
 _argue("spec/registers/frames.py: ", "Shifted by 0 places it is 1 either way.", "1 << 0 → 1 >> 0")
+_argue(
+    "spec/formats/velocity_output.py: VelocityOutput._constant",
+    "In general a ratio of 1 is 2^shift, all of whose zeros are dropped: 1 and no shift. No ratio is 2 or 0.",
+    *("1 → 2", "1 → 0"),
+)
