@@ -187,3 +187,19 @@ _argue(
     "In general a ratio of 1 is 2^shift, all of whose zeros are dropped: 1 and no shift. No ratio is 2 or 0.",
     *("1 → 2", "1 → 0"),
 )
+_argue("spec/numbers.py: Numbers", "It declares no parameters of its own.", "True → False #2")
+_argue(
+    "spec/numbers.py: Numbers.min_tick_cycles",
+    "It is 2 at least anyway.",
+    *("0 → 1", "0 → 1 #2", "0 → -1", "0 → -1 #2"),
+)
+_argue(
+    "spec/methods/rairan.py: RairanTachometer._bound",
+    "It is only asked for −1 and 1.",
+    "towards < 0 → towards <= 0",
+)
+_argue(
+    "spec/methods/rairan.py: RairanTachometer.lower_table.loose",
+    "Whatever is not negative is rounded up.",
+    "1 → 0 #2",
+)

@@ -168,3 +168,21 @@ def test_windows_of_s() -> None:
     assert [s(20, ticks).standstill_ticks for ticks in (2, 3, 10, 11)] == [3, 5, 15, 17]
     assert s(20, 10).remembered_clocks == (16 + 10 + 1) * 20
     assert s(20, 10, max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30
+
+
+@pytest.mark.parametrize("made", [TTachometer, MTTachometer, STachometer])
+def test_a_unit_takes_one_adder_where_it_is_a_sum_of_more_than_two(made: Any) -> None:
+    """At 2^20 Hz, 32 clocks a tick and 32 counts a revolution, a count a tick is 1024 rev/s, or (64 − 4)·1024 rpm."""
+    seldom = Timing(1 << 20, 32, 10)
+    specs = {
+        unit: made(encoder=Encoder(8), timing=seldom, unit=unit, frac_bits=-4) for unit in ("rev/s", "rpm", "rad/s")
+    }
+    digits = {unit: len(spec.output.digits) for unit, spec in specs.items()}
+    assert (digits["rev/s"], digits["rpm"]) == (1, 2)
+    assert digits["rad/s"] > 2
+    assert {unit: spec.output_serial for unit, spec in specs.items()} == {
+        "rev/s": False,
+        "rpm": False,
+        "rad/s": specs["rad/s"].output.serial_latency <= specs["rad/s"].update_spacing,
+    }
+    assert specs["rad/s"].output_serial
