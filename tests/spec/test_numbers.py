@@ -45,6 +45,15 @@ def test_range_of_the_lsb(unit: str) -> None:
             spec_of(unit=unit, frac_bits=f)
 
 
+def test_ports_that_have_a_sign_and_those_of_16_bits() -> None:
+    spec = spec_of(index=True, filter_clocks=2, bounds=True, position_width=40)
+    signed = [port.name for port in spec.ports if port.signed]
+    assert signed == ["velocity", "pulse_count", "position", "velocity_lower", "velocity_upper", "index_position"]
+    widths = {port.name: port.width for port in spec.ports}
+    assert (widths["swallowed_edges"], widths["index_position"], widths["position"]) == (16, 40, 40)
+    assert {port.name for port in spec.ports if port.is_strobe} == set(spec.strobes)
+
+
 def test_counts_per_tick() -> None:
     spec = spec_of()
     assert spec.frac_bits_range("count/tick") == (4, 24)

@@ -203,3 +203,21 @@ _argue(
     "Whatever is not negative is rounded up.",
     "1 → 0 #2",
 )
+_argue(
+    "spec/numbers.py: Numbers.needed_velocity_width",
+    "The greatest output does not depend on the width that it is held within.",
+    *("0 → 1", "0 → -1"),
+)
+_argue(
+    "spec/units.py: ceil_log2",
+    "A numerator of i bits over a denominator of j bits is more than 2^(i−j−1), so it never comes to this.",
+    "k - 1 → k + 1 #2",
+)
+_argue(
+    "spec/registers/buses.py: Bus.ports",
+    "A byte of a word of four has an address of two bits; so have the bytes up to number 2.",
+    *("1 → 2", "8 → 9"),
+)
+_argue("spec/registers/buses.py: ", "32 // 7 is 4, as 32 // 8 is.", *("8 → 7 #2", "8 → 7 #3"))
+_argue("spec/registers/c_driver.py: _joined", "Of one word the last is the first.", "0 → -1")
+_argue("spec/registers/rdl.py: _text", "No word of a text is as long as a line.", "False → True")

@@ -47,6 +47,7 @@ def test_every_bus_is_here() -> None:
 
 
 def test_lines_that_rest_high_and_those_of_no_clock() -> None:
+    assert all(bus_of(name) is bus for name, bus in BUSES.items())
     idle = {name: dict(bus.idle) for name, bus in BUSES.items() if bus.idle}
     assert idle == {"spi": {"spi_cs_n": 1}, "uart": {"uart_rx": 1}}
     free = {name: bus.asynchronous for name, bus in BUSES.items() if bus.asynchronous}

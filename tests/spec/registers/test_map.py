@@ -3,6 +3,7 @@
 from tachometry.spec import of_texts
 from tachometry.spec.registers import frames
 from tachometry.spec.registers.map import Field, RegisterMap
+from tachometry.spec.registers.values import captured_values, in_unit
 
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"}
 
@@ -13,6 +14,24 @@ def map_of(method: str = "s", **texts: str) -> RegisterMap:
 
 def bits(registers: RegisterMap, name: str) -> list[tuple[str, int, int]]:
     return [(field.name, field.low, field.width) for field in registers[name].fields]
+
+
+def test_what_has_more_than_a_bit_has_a_register() -> None:
+    assert "INTERVAL" not in [one.name for one in map_of("m", average="1")]
+    assert ("interval", 2, 1) in bits(map_of("m", average="1", index="yes"), "STATUS")
+    assert bits(map_of("m", average="2"), "INTERVAL") == [("value", 0, 32)]
+
+
+def test_values_are_told_with_their_units() -> None:
+    registers = map_of(position_width="48")
+    position = next(value for value in captured_values(registers) if value.name == "position")
+    assert (position.bits, position.field.shift, [word.name for word in position.words]) == (
+        *(64, 0, ["POSITION_LOW", "POSITION_HIGH"]),
+    )
+    assert [*in_unit(Field("x", 1, unit="960 clocks"))] == ["One LSB is 960 clocks."]
+    assert [*in_unit(Field("x", 1, unit="2^-16 rad/s"))] == ["One LSB is 2^-16 rad/s."]
+    assert [*in_unit(Field("x", 1, unit="x2"))] == ["The unit is x2."]
+    assert [*in_unit(Field("x", 1))] == []
 
 
 def test_masks() -> None:
@@ -69,6 +88,7 @@ def test_numbers_of_the_serial_lines() -> None:
     assert (frames.SPI_SCK_CYCLES, frames.QUIET_BITS) == (8, 32)
     assert (frames.SEQUENCES, frames.TYPE_LOW, frames.FROM_CORE) == (16, 4, 7)
     assert (frames.UART_ADDRESS_WIDTH, frames.COUNT_WIDTH) == (8, 8)
+    assert frames.crc(b"") == frames.CRC_START
     assert (frames.CRC_WIDTH, frames.CRC_POLYNOMIAL, frames.CRC_START) == (16, 0x1021, 0xFFFF)
 
 
