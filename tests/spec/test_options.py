@@ -83,6 +83,7 @@ def test_what_help_shows_and_what_pairwise_tests_take() -> None:
     assert [options[name].tested for name in ("cancel", "index", "bound-decay", "timer")] == [
         *(("", "no"), ("", "yes"), ("", "no"), ("", "tick"))
     ]
+    assert Timing() == Timing.parse()
     assert [options[name].few for name in ("tick", "max-time", "decoding")] == [3, 3, 2]
 
 

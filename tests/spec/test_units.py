@@ -109,6 +109,7 @@ def test_pi_to_50_digits() -> None:
 
     exact = 4 * (4 * arctan(5) - arctan(239))
     assert 0 <= exact - PI < Fraction(1, 10**50)
+    assert SPEED["rev/s"].exact == 2 * PI
 
 
 @pytest.mark.parametrize("k", [-40, -3, -1, 0, 1, 2, 22, 90])

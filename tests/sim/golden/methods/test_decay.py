@@ -13,7 +13,7 @@ from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps, count
 from tachometry.sim.golden.methods.timed import Counts, chain
 from tachometry.sim.signals.run import Table
-from tachometry.spec import Encoder, Speed, Timing, TTachometer
+from tachometry.spec import Encoder, MTTachometer, Speed, TachometerSpec, Timing, TTachometer
 
 TICK, MAX_TICKS = 40, 8
 NONE = np.empty(0, dtype=np.int64)
@@ -23,7 +23,7 @@ def make_spec(**options: Any) -> TTachometer:
     return TTachometer(encoder=Encoder(25), timing=Timing(100 * TICK, TICK, MAX_TICKS), **options)
 
 
-def updates_of(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> Table:
+def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> Table:
     """Updates by the clocks of their causes; `counts` has the steps by their clocks."""
     at = np.array(sorted(counts), dtype=np.int64)
     steps = Steps(at, np.array([counts[clock] for clock in at.tolist()], dtype=np.int64), NONE, NONE, NONE)
@@ -200,6 +200,22 @@ def test_just_the_maximum_speed_is_in_range() -> None:
         updates = updates_of(spec, {5: sign, 45: sign, 84: sign, 125: sign}, 130)
         assert updates.velocity[:3].tolist() == [256 * sign, 256 * sign, int(rounded(Fraction(40, 41) * sign, 8) * 256)]
         assert updates["out_of_range"][:3].tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_after_a_silence_a_count_only_opens_a_window_of_mt(sign: int) -> None:
+    """A window ends with the first count that comes more than a tick after that which opened it."""
+    spec = MTTachometer(encoder=Encoder(25), timing=Timing(100 * TICK, TICK, MAX_TICKS), frac_bits=16)
+    counts = dict.fromkeys([9, 30, 49, 50, 100, 900, 950], sign)
+    updates = updates_of(spec, counts, 1000)
+    measured = updates.rows(~updates.forced)
+    assert measured.clock.tolist() == [50, 100, 950]
+    assert measured.interval.tolist() == [41, 50, 50]
+    assert measured.velocity.tolist() == [
+        int(rounded(Fraction(40 * n * sign, time), 16) * 2**16) for n, time in ((3, 41), (1, 50), (1, 50))
+    ]
+    zeros = updates.rows(updates.forced & (updates.velocity == 0))
+    assert zeros.clock.tolist() == [100 + 320, 100 + 640]
 
 
 @pytest.mark.parametrize("n", range(1, 7))
