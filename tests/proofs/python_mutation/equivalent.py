@@ -37,6 +37,11 @@ _argue(
     *("0 → 1 #2", "0 → -1 #2"),
 )
 _argue(
+    "sim/golden/methods/s.py: alterations",
+    "m_e(−1) does not change, so the greatest place so far is 0 at least.",
+    "0 → -1 #2",
+)
+_argue(
     "sim/golden/methods/t.py: Model.updates",
     "The first count only opens, so nothing is made of its sign; if it is of many, `many` makes the same of it.",
     "False → True",
