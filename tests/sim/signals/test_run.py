@@ -106,3 +106,10 @@ def test_runs_and_tables_are_compared_by_compare_alone() -> None:
     assert EMPTY == EMPTY != Run(10, EMPTY.tables)
     assert TABLE == TABLE != TABLE.having()
     assert len({EMPTY, TABLE}) == 2
+
+
+def test_runs_of_other_ports_cannot_be_compared() -> None:
+    other = Run(10, EMPTY.tables | {"tick": TABLE.having(age=np.zeros(3))})
+    for expected, actual in ((EMPTY, other), (other, EMPTY)):
+        with pytest.raises(ValueError, match=r"^runs must be of the same ports, not \{'tick': "):
+            compare(expected, actual)
