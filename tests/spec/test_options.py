@@ -70,6 +70,23 @@ def test_every_option_does_what_it_says() -> None:
     }
 
 
+def test_what_help_shows_and_what_pairwise_tests_take() -> None:
+    """The default where it is a number or a text; both values of a flag, the default left out."""
+    shown = {about.name: about.shown for method in METHODS for about in (*common_options(), *own_options(method))}
+    assert {
+        name: shown[name] for name in ("lowpass", "adaptive", "index", "decoding", "timer", "min-time", "tick")
+    } == {
+        **{"lowpass": None, "adaptive": None, "index": None, "decoding": "4", "timer": "clock"},
+        **{"min-time": "a tick", "tick": "20us"},
+    }
+    options = {about.name: about for method in METHODS for about in (*common_options(), *own_options(method))}
+    assert [options[name].tested for name in ("cancel", "index", "bound-decay", "timer")] == [
+        *(("", "no"), ("", "yes"), ("", "no"), ("", "tick"))
+    ]
+    assert Timing() == Timing.parse()
+    assert [options[name].few for name in ("tick", "max-time", "decoding")] == [3, 3, 2]
+
+
 def test_none_is_leaving_it_out() -> None:
     assert of_texts("m", PPR | {"average": None, "unit": None, "external-tick": "no"}) == of_texts("m", PPR)
 

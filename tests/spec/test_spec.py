@@ -30,6 +30,7 @@ def test_timing_in_times_or_clocks(clock: str | int, tick: str | int, max_time: 
 ERRORS = [
     (lambda: Encoder(0), "pulses_per_rev must be from 1 to 4194304 with x4 decoding, not 0"),
     (lambda: Encoder(1 << 24, 2), "pulses_per_rev must be from 1 to 8388608 with x2 decoding, not 16777216"),
+    (lambda: Encoder((1 << 24) + 1, 1), "pulses_per_rev must be from 1 to 16777216 with x1 decoding, not 16777217"),
     (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, not 3"),
     (lambda: Timing(0, 2, 2), "clock must be from 1 Hz to 100 GHz, not 0 Hz"),
     (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, not 0"),

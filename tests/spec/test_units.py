@@ -1,5 +1,6 @@
 """One grammar for all quantities: every unit is right wherever the quantity fits."""
 
+import math
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,11 +13,14 @@ from tachometry.spec import ParameterError, Speed, Timing
 from tachometry.spec.formats.velocity_output import parse_lsb
 from tachometry.spec.methods.adaptive import parse_target
 from tachometry.spec.units import (
+    ANGLE,
     BANDWIDTH,
+    FRACTION,
     FREQUENCY,
     PI,
     SPEED,
     TIME,
+    ceil_log2,
     parse_bandwidth,
     parse_time,
     ratio,
@@ -95,3 +99,46 @@ def test_on_the_command_line(words: str, status: int, tmp_path: Path, capsys: py
     assert run("simulate", "--ppr", "24", "--engine", "pysim", *words.split()) == status
     err = capsys.readouterr().err
     assert err.count("\n") == (status > 0)
+
+
+def test_pi_to_50_digits() -> None:
+    """The first 50 decimals. Machin: π/4 = 4·arctan(1/5) − arctan(1/239)."""
+
+    def arctan(n: int) -> Fraction:
+        return sum((Fraction((-1) ** k, (2 * k + 1) * n ** (2 * k + 1)) for k in range(80)), Fraction(0))
+
+    exact = 4 * (4 * arctan(5) - arctan(239))
+    assert 0 <= exact - PI < Fraction(1, 10**50)
+    assert SPEED["rev/s"].exact == 2 * PI
+
+
+@pytest.mark.parametrize("k", [-40, -3, -1, 0, 1, 2, 22, 90])
+def test_logarithms_are_rounded_up(k: int) -> None:
+    power = Fraction(2) ** k
+    for number, wanted in (
+        *((power, k), (power * Fraction(10**9 + 1, 10**9), k + 1), (power * Fraction(10**9 - 1, 10**9), k)),
+        *((power * Fraction(3, 2), k + 1), (power * Fraction(2, 3), k), (power * Fraction(4, 7), k)),
+    ):
+        assert ceil_log2(number) == wanted
+
+
+def test_the_least_and_the_greatest_number() -> None:
+    assert read_exactly("x", "1e30Hz", FREQUENCY) == 10**30
+    assert read_exactly("x", "1e-30Hz", FREQUENCY) == Fraction(1, 10**30)
+    assert read_exactly("x", "-1e30Hz", FREQUENCY) == -(10**30)
+    assert read_exactly("x", "0Hz", FREQUENCY) == 0
+    for text in ("1.01e30Hz", "0.99e-30Hz", "-1.01e30Hz", "1e31Hz", "1e-31Hz"):
+        with pytest.raises(ParameterError, match=f"^x must be of a size from 1e-30 to 1e30, not '{text}'$"):
+            read_exactly("x", text, FREQUENCY)
+
+
+def test_sizes_of_units() -> None:
+    """Of the first of each table."""
+    assert [unit.exact for unit in TIME.values()] == [1, Fraction(1, 10**3), Fraction(1, 10**6), Fraction(1, 10**9)]
+    assert [unit.exact for unit in FREQUENCY.values()] == [1, 10**3, 10**6, 10**9]
+    assert [unit.exact for unit in SPEED.values()] == [1, 2 * PI, PI / 30]
+    assert [unit.exact for unit in ANGLE.values()] == [1, Fraction(1, 1000), PI / 180]
+    assert [unit.exact for unit in BANDWIDTH.values()] == [1, *(2 * PI * 10**power for power in (0, 3, 6, 9))]
+    assert [unit.exact for unit in FRACTION.values()] == [1, Fraction(1, 100)]
+    assert [unit.nearest(Fraction(7)) for unit in TIME.values()] == [7.0, 7e-3, 7e-6, 7e-9]
+    assert SPEED["rpm"].nearest(Fraction(30)) == math.pi

@@ -32,6 +32,7 @@ def main(words: list[str]) -> bool:
     parser.add_argument("--seed", type=int, default=1, help="which ones")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--budget", type=float, default=30.0, metavar="S", help="seconds of tests for a mutant")
+    parser.add_argument("--only", default="", metavar="PATH", help="of these, those of files whose path begins so")
     parser.add_argument("tests", nargs="*", help="paths in tests/ [default: all that matter]")
     given = parser.parse_args(words)
     folder = ROOT / "build" / "python_mutation"
@@ -43,6 +44,8 @@ def main(words: list[str]) -> bool:
     found = covered(ROOT, files(ROOT), tests, folder)
     jobs = []
     for mutant in sample(ROOT, given.mutants, given.seed):
+        if not mutant.file.startswith(given.only):
+            continue
         chosen = chosen_for(found, mutant.file, mutant.line, given.budget)
         jobs.append((mutant, chosen, sum(found[test]["seconds"] for test in chosen)))
 

@@ -2,3 +2,234 @@
 
 # A name is `file: function: before → after`, as `make mutate` prints it.
 ARGUED: dict[str, str] = {}
+
+
+def _argue(where: str, argument: str, *changes: str) -> None:
+    ARGUED.update({f"{where}: {change}": argument for change in changes})
+
+
+_FRONT_END, _REGISTERS = "sim/golden/front_end.py", "sim/golden/registers.py: GoldenBank"
+_RAIRAN, _TIMED = "sim/golden/methods/rairan.py", "sim/golden/methods/timed.py"
+
+_argue(
+    f"{_FRONT_END}: count.wrapped",
+    "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.",
+    "position + half → position - half",
+)
+_argue(
+    "sim/golden/sampling.py: windows",
+    "A level is 0 or 1, so its difference from 2 is no rise either.",
+    "1 → 2 #2",
+)
+_argue(
+    "sim/golden/output.py: with_age",
+    "What stands for the cause before the first update has to be before the first tick, which is in clock 2 or later.",
+    *("-1 → 1", "1 → 2", "1 → 0"),
+)
+_argue(
+    "sim/golden/quotient.py: round_quotient",
+    "Denominators are at least 1. Fewer bits at a time give the same quotient; without denominators there is none.",
+    *("1 → 0", "1 → 2"),
+)
+_argue(
+    "sim/golden/methods/s.py: Model.updates",
+    "The sum of no number is never looked up: a window has a tick at least, so at − m_s + 1 is at least 1.",
+    *("0 → 1 #2", "0 → -1 #2"),
+)
+_argue(
+    "sim/golden/methods/s.py: alterations",
+    "m_e(−1) does not change, so the greatest place so far is 0 at least.",
+    "0 → -1 #2",
+)
+_argue(
+    "sim/golden/methods/t.py: Model.updates",
+    "The first count only opens, so nothing is made of its sign; if it is of many, `many` makes the same of it.",
+    "False → True",
+)
+_argue(
+    "sim/golden/methods/adaptive.py: adaptive_windows",
+    "For Nep1 = 1 and Ndt1 = 1 the rule is the same: N is at least 3, so neither is enough; S is compared with 2^k.",
+    *("c_ep > 1 → c_ep >= 1", "1 → 0 #7"),
+)
+
+_argue(
+    f"{_REGISTERS}._capture",
+    "No strobe is high before clock 2, so it is the same when, before it, counting begins.",
+    *("1 → 2 #3", "1 → 0 #3", "1 → 2 #6", "1 → 0 #6"),
+)
+_argue(
+    f"{_REGISTERS}._lost",
+    "No update is in clock 0; what stands for one before the first is negative, and never later than a capture.",
+    *("before >= 0 → before > 0", "0 → -1", "1 → 2"),
+)
+_argue(
+    f"{_REGISTERS}.answers",
+    "It is only read if something has been captured, and then it has been set.",
+    "False → True",
+)
+_argue(
+    f"{_REGISTERS}._read",
+    "The fields of a register lie within its bits, so there is nothing above them to be cut off.",
+    "1 << WORD → 1 >> WORD",
+)
+
+_argue(
+    f"{_RAIRAN}: windows",
+    "The window from reset is no measurement: Nep1 = 1 does not leave the low regime, and −1 is no count.",
+    *("0 → 1 #7", "0 → -1 #7"),
+)
+_argue(
+    f"{_RAIRAN}: windows",
+    "The window from reset ends with the first count; a dt that ended before that had no count in it.",
+    "node > 0 → node >= 0",
+)
+_argue(
+    f"{_RAIRAN}: windows",
+    "No window begins with the end of time, for which this entry stands.",
+    *("0 → 1 #12", "0 → -1 #12"),
+)
+_argue(
+    f"{_RAIRAN}: windows",
+    "The window from reset has Nep1 = 0, and to the letter `in_step` is not read.",
+    "node > 0 → node >= 0 #3",
+)
+_argue(
+    f"{_RAIRAN}: Model._bounds",
+    "A velocity that is not 0 has a direction, and the last direction stands for rest; so the sign is never 0.",
+    "0 → 1 #6",
+)
+_argue(
+    f"{_RAIRAN}: Model._bounds",
+    "n = 0 is never high, so the time is −1 clock or less, for which there is no bound anyway.",
+    "0 → -1 #5",
+)
+_argue(
+    f"{_RAIRAN}: Model._alternating",
+    "Where no dt has ended in a window, a count against the direction ends it, or it is that from reset: n is 0 then.",
+    "1 → 0",
+)
+_argue(
+    f"{_RAIRAN}: Model._regime",
+    "The first thing that happens sets n, and is Nep1 ≥ 2, the first count, or Ndt1, so there is no n before.",
+    "0 → -1 #3",
+)
+_argue(
+    f"{_RAIRAN}: Model._events",
+    "The last row is the end of the last window, which is beyond all clocks, and does not happen.",
+    "False → True",
+)
+_argue(
+    f"{_RAIRAN}: Model._events",
+    "Before the first measurement n is 0, and 0 is shifted.",
+    *("0 → -1 #3", "0 → 1 #3"),
+)
+
+_argue(
+    f"{_TIMED}: _decaying",
+    "A velocity of 0 does not decay, whatever its sign is taken for.",
+    "velocity < 0 → velocity <= 0",
+    "0 → 1 #5",
+)
+_argue(
+    f"{_TIMED}: _decaying",
+    "The sign is 1 or −1, and 3 // 1 = 3, 3 // −1 = −3.",
+    "3 * sign → 3 // sign",
+    "3 * sign → 3 // sign #2",
+)
+_argue(
+    f"{_TIMED}: _decaying",
+    "Before the first count the velocity is 0 and does not decay, so neither the age nor the last count matters.",
+    *("-1 → 1", "1 → 2 #2", "1 → 0 #2", "0 → 1 #7", "0 → -1 #7"),
+)
+_argue(
+    f"{_TIMED}: _decaying",
+    "The sign of a velocity that decays, and the size of a count, are never 0.",
+    *("sign > 0 → sign >= 0", "0 → -1 #8", "last_size > 0 → last_size >= 0", "0 → -1 #9"),
+    *("sign < 0 → sign <= 0", "0 → 1 #11", "last_size < 0 → last_size <= 0", "0 → 1 #12"),
+)
+_argue(
+    f"{_TIMED}: _decaying",
+    "With one count before the first tick nothing has been measured, so the velocity is 0 and does not decay. If ticks "
+    "are counted and the first is of many, it is itself a measurement, and does not compare.",
+    *("0 → 1", "0 → -1"),
+)
+_argue(
+    f"{_TIMED}: updates",
+    "The difference wraps: from the least number to any clock but 0 it is as large.",
+    "np.iinfo(np.int64).max → np.iinfo(np.int64).min",
+)
+_argue(
+    f"{_TIMED}: Counts.gap",
+    "The first count only opens, so the time before it is not read.",
+    *("-1 → 1", "1 → 2", "1 → 0"),
+)
+_argue(
+    f"{_TIMED}: with_silences",
+    "The array holds zeros, which are not more than 1 either.",
+    "0 → 1 #2",
+)
+_argue(
+    f"{_TIMED}: _among",
+    "What is looked up are clocks of ticks, and no tick is before clock 2.",
+    *("-1 → 1", "1 → 2", "1 → 0"),
+)
+_argue(f"{_TIMED}: Measurements.merged", "Both are of one class, with as many columns.", "True → False")
+_argue(f"{_TIMED}: _bounds", "There are two bounds, and two ends of the enclosure.", "True → False")
+
+_argue(
+    "spec/formats/low_pass.py: LowPass._decay",
+    "Entries have less than 40 digits; for one to change, E would have to be within 10^−60 of half a unit of its last.",
+    *("70 → 71", "70 → 69"),
+)
+_argue(
+    "spec/formats/velocity_output.py: VelocityOutput.rounding",
+    "To the nearest was answered before.",
+    "towards < 0 → towards <= 0",
+)
+_argue("spec/registers/frames.py: ", "Shifted by 0 places it is 1 either way.", "1 << 0 → 1 >> 0")
+_argue(
+    "spec/formats/velocity_output.py: VelocityOutput._constant",
+    "In general a ratio of 1 is 2^shift, all of whose zeros are dropped: 1 and no shift. No ratio is 2 or 0.",
+    *("1 → 2", "1 → 0"),
+)
+_argue("spec/numbers.py: Numbers", "It declares no parameters of its own.", "True → False #2")
+_argue(
+    "spec/numbers.py: Numbers.min_tick_cycles",
+    "It is 2 at least anyway.",
+    *("0 → 1", "0 → 1 #2", "0 → -1", "0 → -1 #2"),
+)
+_argue(
+    "spec/methods/rairan.py: RairanTachometer._bound",
+    "It is only asked for −1 and 1.",
+    "towards < 0 → towards <= 0",
+)
+_argue(
+    "spec/methods/rairan.py: RairanTachometer.lower_table.loose",
+    "Whatever is not negative is rounded up.",
+    "1 → 0 #2",
+)
+_argue(
+    "spec/numbers.py: Numbers.needed_velocity_width",
+    "The greatest output does not depend on the width that it is held within.",
+    *("0 → 1", "0 → -1"),
+)
+_argue(
+    "spec/units.py: ceil_log2",
+    "A numerator of i bits over a denominator of j bits is more than 2^(i−j−1), so it never comes to this.",
+    "k - 1 → k + 1 #2",
+)
+_argue(
+    "spec/registers/buses.py: Bus.ports",
+    "A byte of a word of four has an address of two bits; so have the bytes up to number 2.",
+    *("1 → 2", "8 → 9"),
+)
+_argue("spec/registers/buses.py: ", "32 // 7 is 4, as 32 // 8 is.", *("8 → 7 #2", "8 → 7 #3"))
+_argue("spec/registers/c_driver.py: _joined", "Of one word the last is the first.", "0 → -1")
+_argue("spec/registers/rdl.py: _text", "No word of a text is as long as a line.", "False → True")
+_argue(
+    "sim/golden/output.py: in_unit",
+    "Products of 61 and 62 bits fit 64 bits, and Python's integers give the same.",
+    "output.max_native.bit_length() + output.multiplier.bit_length() < 62 → "
+    "output.max_native.bit_length() + output.multiplier.bit_length() <= 62",
+    "62 → 61",
+)

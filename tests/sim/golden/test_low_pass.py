@@ -120,6 +120,20 @@ def test_takes_the_last_of_those_that_come_meanwhile_for_the_time_of_all() -> No
     assert got.clock.tolist() == [first, first + spec.low_pass.latency - 2, 500 + latency]
 
 
+def test_what_comes_when_one_is_taken_waits_for_the_next_turn() -> None:
+    """The one before is taken in clock `then`: what comes a clock earlier takes its place, what comes then does not."""
+    spec = spec_of(Fraction(2000))
+    latency = spec.low_pass.latency
+    then = 51 + latency - 2
+    came = np.array([50, 60, then - 1, then, then + 3])
+    n = np.array([100, 200, 300, 400, 500]) << 16
+    updates = Table(came, {"velocity": n, "rests": np.zeros(5, dtype=np.bool_)})
+    tick = np.array([48, 49, 58, 59, 70, 71, then - 1, then + 1, then + 2])  # 2, 2, 2, 1 and 2 for each of them
+    got = filtered(spec, Table(tick, {}), updates)
+    assert got.velocity.tolist() == through(spec, n[[0, 2, 4]], np.array([2, 4, 3])).velocity.tolist()
+    assert got.clock.tolist() == [taken + latency - 1 for taken in (51, then, then + latency - 2)]
+
+
 def test_time_is_what_has_passed_and_not_what_was_measured() -> None:
     """Windows that overlap: an update in every tick, of some ticks each, is filtered as one of a tick."""
     spec = spec_of(Fraction(50))
@@ -142,3 +156,30 @@ def test_a_method_without_updates_at_rest_ends_at_0() -> None:
     assert run.velocity.max() > 0
     ends = through(spec_of(Fraction(50)), np.array([1 << 16, 0]), np.array([20, 1]), rests=True).velocity
     assert ends[-1] > 0  # others go on, and so does the filter
+
+
+def test_the_first_update_is_filtered_from_0_and_so_is_the_first_after_rest() -> None:
+    """By fractions: y = u + E·(0 − u), rounded to 2^−k and then to an LSB; at rest the state is just 0."""
+    rairan = RairanTachometer(
+        encoder=Encoder(100),
+        timing=Timing(1_000_000, 100, 50),
+        lowpass=Fraction(10_000),
+        max_speed=Speed(Fraction(200)),
+    )
+    form, half = rairan.low_pass, Fraction(1, 2)
+    assert form.extra_bits == 3  # E = 1/e
+    factor = Fraction(form.tables[0][1], 2**form.factor_bits)
+    assert factor == pytest.approx(math.exp(-1))
+
+    def wanted(u: int) -> int:
+        y = u + math.floor(factor * -u * 8 + half) / Fraction(8)
+        return math.floor(y + half)
+
+    values = [*range(-100, 100), 77_777]
+    velocity = np.array([row for u in values for row in (u, 0)])
+    ticks, updates = far_apart(spec_of(Fraction(1)), velocity, np.ones_like(velocity), False)
+    updates.columns["rests"][1::2] = True
+    assert filtered(rairan, ticks, updates).velocity.tolist() == [row for u in values for row in (wanted(u), 0)]
+    for u in range(1, 10):
+        ticks, updates = far_apart(spec_of(Fraction(1)), np.array([u]), np.array([1]), False)
+        assert filtered(rairan, ticks, updates).velocity.tolist() == [wanted(u)]

@@ -1,5 +1,6 @@
 """Every register and every field of every configuration is in each of the texts, as the map and the ports say."""
 
+import math
 import re
 from collections.abc import Callable
 from functools import cache
@@ -91,11 +92,13 @@ def check_header(registers: RegisterMap, text: str, folder: Path) -> None:
             prefix = f"{register.name}_{field.name.upper()}"
             found = [number(f"{prefix}_{kind}") for kind in ("MASK", "SHIFT", "RESET")]
             assert found == [field.mask, field.low, field.reset]
+            assert len(register.fields) == 1 or field.help in " ".join(text.replace("//", " ").split())
     assert not {name for name in macros if name.endswith(("_OFFSET", "_MASK", "_SHIFT", "_RESET"))}
     described = manifest(registers.spec)
     assert int(macros["CLOCK_HZ"].removeprefix("UINT64_C(").rstrip(")")) == described["clock_hz"]
     assert macros["UNIT"] == f'"{described["velocity"]["unit"]}"'
     assert float(macros["RAD_PER_S_PER_LSB"]) == described["velocity"]["rad_per_s_per_lsb"]
+    assert float(macros["RAD_PER_COUNT"]) == pytest.approx(2 * math.pi / described["counts_per_rev"], rel=1e-15)
     assert float(macros["UNIT_PER_LSB"]) == 0.5 ** described["velocity"]["frac_bits"]
 
 

@@ -14,6 +14,7 @@ from tachometry.sim.signals.run import Table
 from tachometry.sim.theory.rairan import rairan_eq13_max_error
 from tachometry.spec import RairanTachometer, Speed
 from tachometry.spec.methods.adaptive import parse_target
+from tachometry.spec.tachometer import BOUNDS
 
 
 def held(updates: Table, name: str, n: int, first: int) -> np.ndarray:
@@ -133,6 +134,48 @@ def test_table_1_locks_just_below_the_speed_limit_and_the_default_does_not(sign:
     assert set((letter.velocity / 2**16)[10:]) == {0.5}
     default = golden_updates(make_spec(1000, estimate="n1"), step)
     assert set((default.velocity / 2**16)[10:]) == {sign * 1.0}
+
+
+@pytest.mark.parametrize("clock", [3, 38, 41, 60, 78, 81, 130])
+def test_to_the_letter_the_time_from_reset_is_a_measurement(clock: int) -> None:
+    """Table 1 takes the first count for the second of two: Ndt1 is the number of whole dt before it."""
+    step = np.zeros(400, dtype=np.int64)
+    step[clock] = 1
+    updates = golden_updates(make_spec(40, paper_exact=True), step)
+    wanted = np.array(every_ts(step.tolist(), 40))
+    assert np.array_equal(held(updates, "n_dt1", 400, 1), wanted[:, 1])
+    whole = (clock + 1) // 40
+    assert updates.clock[0] == (clock if whole else 39)
+    assert updates.velocity[0] == rounded(exact("n3", 1, max(whole, 1)) if whole else exact("n3", 1, 1), 16)
+
+
+def test_a_bound_that_would_divide_by_0_is_absent() -> None:
+    """With dt of one clock and k = 1, two counts in two clocks are high; then one count in one clock is Nep1 = 1."""
+    spec = make_spec(1, 40, adaptive=Fraction(1, 4), bounds=True, edge_error=Fraction(1, 8))
+    step = np.zeros(30, dtype=np.int64)
+    step[[0, 1, 2, 3, 7, 8, 9, 12, 14]] = 1
+    updates = golden_updates(spec, step)
+    low, high = (dict(zip(updates.clock.tolist(), updates[name].tolist(), strict=True)) for name in BOUNDS)
+    none = spec.absent_bound
+    # t − 1/T = 0 for one dt of one clock.
+    assert (low[10], high[10]) == (-none, none)
+    # −E/(1 − 1/2) and (1 + E)/(1 − 1/2) counts per dt of two clocks, which has two ticks.
+    assert (low[16], high[16]) == (-(1 << 16) // 8, (9 << 16) // 8)
+
+
+@pytest.mark.parametrize(("target", "n"), [("25%", 3), ("10%", 6)])
+def test_as_many_counts_as_the_target_takes_leave_dt_as_it_is(target: str, n: int) -> None:
+    """1/(2·Nep1 − 1), eq. (13), is at most the target for so many counts, from the very first window on."""
+    spec = make_spec(60, 40, adaptive=parse_target("adaptive", target))
+    for counts, wanted in ((n, {0}), (2 * n - 1, {0}), (n - 1, {0, 1})):
+        step = np.zeros(900, dtype=np.int64)
+        step[30::60] = 1
+        for more in range(1, counts):
+            step[30 + 60 * more // counts :: 60] = 1
+        updates = golden_updates(spec, step)
+        moving = updates.rows(~updates.forced & (updates["n_ep1"] > 0))
+        assert set(moving["dt_shift"][:3].tolist()) == wanted
+        assert moving["n_ep1"][0] == counts
 
 
 def test_a_steady_count_with_every_end_of_dt_is_the_speed_limit() -> None:

@@ -1,6 +1,7 @@
 """The golden model against the papers' words and against the definition tick by tick, not against itself."""
 
 from fractions import Fraction
+from math import ceil, floor
 
 import numpy as np
 import pytest
@@ -103,3 +104,25 @@ def test_sums_telescope_to_the_position_between_forced_updates() -> None:
         travelled += (m_e[start] if start >= 0 else 0) + m_e[tick] + 2 * sum(m_e[start + 1 : tick])
     last = rows[-1][0]
     assert travelled == 2 * sum(m_e[: last + 1]) - m_e[last]
+
+
+@pytest.mark.parametrize("eighths", [0, 1, 4, 8])
+@pytest.mark.parametrize("cancel", [True, False])
+@pytest.mark.parametrize("name", PAPER)
+def test_bounds_are_a_count_and_the_edge_error_over_the_window(name: str, cancel: bool, eighths: int) -> None:
+    """Rounded outward. The first window, which begins with reset, has none."""
+    m_e, updates = PAPER[name]
+    spec = STachometer(
+        encoder=Encoder(25),
+        timing=Timing(clock_hz=1_000_000, tick_cycles=16, max_ticks=MAX_TICKS),
+        frac_bits=7,
+        cancel=cancel,
+        bounds=True,
+        edge_error=Fraction(eighths, 8),
+    )
+    found = Model(spec).updates(as_ticks(m_e), None, 1 << 40)
+    exact = [(plain, cancelled)[cancel] for *_, plain, cancelled in updates]
+    off = [(1 + Fraction(eighths, 8)) / m_s for _, m_s, *_ in updates]
+    assert found["velocity_lower"].tolist() == [floor((x - d) * 2**7) for x, d in zip(exact, off, strict=True)]
+    assert found["velocity_upper"].tolist() == [ceil((x + d) * 2**7) for x, d in zip(exact, off, strict=True)]
+    assert found["bounds_valid"].tolist() == [k > 0 for k in range(len(updates))]

@@ -1,0 +1,232 @@
+"""The golden T method and its decay, clock by clock by the rules of docs/timed.md; and what its model is made of."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tachometry.sim.golden import model
+from tachometry.sim.golden.front_end import Steps, count
+from tachometry.sim.golden.methods.timed import Counts, chain
+from tachometry.sim.signals.run import Table
+from tachometry.spec import Encoder, MTTachometer, Speed, TachometerSpec, Timing, TTachometer
+
+TICK, MAX_TICKS = 40, 8
+NONE = np.empty(0, dtype=np.int64)
+
+
+def make_spec(**options: Any) -> TTachometer:
+    return TTachometer(encoder=Encoder(25), timing=Timing(100 * TICK, TICK, MAX_TICKS), **options)
+
+
+def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> Table:
+    """Updates by the clocks of their causes; `counts` has the steps by their clocks."""
+    at = np.array(sorted(counts), dtype=np.int64)
+    steps = Steps(at, np.array([counts[clock] for clock in at.tolist()], dtype=np.int64), NONE, NONE, NONE)
+    ticks, _ = count(spec, steps, np.arange(TICK - 1, n_clocks, TICK))
+    updates = model(spec).updates(ticks, steps, n_clocks + spec.tick_latency)
+    return updates.having(clock=updates.clock - spec.datapath_latency - spec.tick_latency)
+
+
+@dataclass(frozen=True)
+class Row:
+    """An update by the words of docs/timed.md, in counts per tick.
+
+    `least` and `most` are the bounds, None for none; `known` says whether they are valid.
+    """
+
+    clock: int
+    velocity: Fraction
+    interval: int
+    forced: bool
+    least: Fraction | None
+    most: Fraction | None
+    known: bool = True
+
+
+def bound(distance: Fraction, time: int, spec: TTachometer) -> Fraction | None:
+    return distance * spec.timer_periods / time if time else None
+
+
+def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> Iterator[Row]:
+    """Ticks are longer than a division, and counts farther apart than it takes."""
+    f, off, per_tick = spec.native_frac_bits, spec.edge_error, spec.timer_periods
+    scale = TICK if spec.on_lattice else 1  # clocks of a period
+    longest = MAX_TICKS * TICK // scale
+    # Reset stands for a count in the last period before the datapath begins; it sees steps two clocks late.
+    last, opened, sign, velocity = -1 if spec.on_lattice else -3, False, 0, Fraction(0)
+    for clock in range(n_clocks):
+        ends = clock % TICK == TICK - 1
+        if spec.on_lattice and not ends:
+            continue
+        now = clock // scale
+        window = range(clock - TICK + 1, clock + 1)
+        came = counts.get(clock, 0) if scale == 1 else sum(counts.get(at, 0) for at in window)
+        age = now - last
+        if came:
+            if opened:
+                distance = Fraction(came if came == sign else 0)
+                velocity = rounded(distance * per_tick / age, f)
+                low, high = distance - off, distance + off
+                least = bound(low, age - 1 if low < 0 else age + 1, spec)
+                most = bound(high, age - 1 if high > 0 else age + 1, spec)
+                yield Row(clock, velocity, age, False, least, most)
+            last, opened, sign = now, True, came
+        elif age % longest == 0:
+            velocity, opened = Fraction(0), False
+            ends_of = (bound(-1 - off, longest, spec), bound(1 + off, longest, spec))
+            # The very first period was not seen completely, unless a count came since.
+            yield Row(clock, velocity, longest, True, *ends_of, known=bool(sign) or age > longest)
+        elif ends and sign and spec.decays and not any(at in counts for at in window):
+            way = 1 if velocity > 0 else -1
+            greatest = rounded(Fraction(3 * per_tick, 2 * age) * way, f)
+            # A count that is measured takes the divider from a decay; so does a forced 0.
+            taken = scale == 1 and any(clock < at < clock + spec.division_clocks for at in (*counts, last + longest))
+            if abs(greatest) < abs(velocity) and not taken:
+                velocity = greatest
+                # The shaft has not come back over its last edge.
+                least, most = bound(min(way, 0) - off, age, spec), bound(max(way, 0) + off, age, spec)
+                yield Row(clock, velocity, age, True, least, most)
+
+
+def rounded(value: Fraction, frac_bits: int) -> Fraction:
+    """To the nearest multiple of 2^−f, ties upward."""
+    return Fraction(math.floor(value * 2**frac_bits + Fraction(1, 2)), 2**frac_bits)
+
+
+def random_counts(seed: int, spec: TTachometer, n_clocks: int) -> dict[int, int]:
+    """Stretches of counts in one direction at least a division apart, with silences of all lengths."""
+    rng = np.random.default_rng(seed)
+    counts, clock, sign = {}, int(rng.integers(1, 3 * TICK)), 1
+    least = TICK if spec.on_lattice else spec.division_clocks
+    clock += (0, MAX_TICKS, 2 * MAX_TICKS + 3)[seed] * TICK
+    while clock < n_clocks:
+        gap = least * 10 ** rng.uniform(0, 0.7)
+        for _ in range(int(rng.integers(1, 6))):
+            counts[clock] = sign
+            clock += int(gap * rng.uniform(1, 1.3)) + 1
+        clock += int(rng.choice([0, 3, 6, MAX_TICKS - 1, MAX_TICKS, 2 * MAX_TICKS])) * TICK + int(rng.integers(TICK))
+        sign *= int(rng.choice([1, 1, -1]))
+    return {clock: sign for clock, sign in counts.items() if clock < n_clocks}
+
+
+@pytest.mark.parametrize("edge_error", [Fraction(0), Fraction(1, 8), Fraction(1)])
+@pytest.mark.parametrize("timer", ["clock", "tick"])
+@pytest.mark.parametrize(("frac_bits", "bound_decay"), [(4, True), (12, True), (12, False)])
+def test_every_update_is_by_the_rules(timer: str, frac_bits: int, bound_decay: bool, edge_error: Fraction) -> None:
+    decays = 0
+    for seed in range(3):
+        spec = make_spec(timer=timer, frac_bits=frac_bits, bound_decay=bound_decay, bounds=True, edge_error=edge_error)
+        n_clocks = 60 * MAX_TICKS * TICK
+        counts = random_counts(seed, spec, n_clocks)
+        updates = updates_of(spec, counts, n_clocks)
+        rows = list(by_the_rules(spec, counts, n_clocks))
+        ended = updates.clock < n_clocks - TICK  # counts beyond the end may take the divider
+        rows = [row for row in rows if row.clock < n_clocks - TICK]
+        one = 2**frac_bits
+        none = spec.absent_bound
+        for name, wanted in (
+            ("clock", [row.clock for row in rows]),
+            ("interval", [row.interval for row in rows]),
+            ("forced", [row.forced for row in rows]),
+            ("velocity", [row.velocity * one for row in rows]),
+            ("bounds_valid", [row.known for row in rows]),
+            ("velocity_lower", [-none if row.least is None else math.floor(row.least * one) for row in rows]),
+            ("velocity_upper", [none if row.most is None else math.ceil(row.most * one) for row in rows]),
+        ):
+            assert updates[name][ended].tolist() == wanted, (name, seed)
+        assert not updates.get("out_of_range").any()
+        decays += sum(row.forced and row.velocity != 0 for row in rows)
+    assert (decays > 50) == bound_decay
+
+
+def test_a_stop_is_followed_by_one_decay_after_the_other() -> None:
+    """One count in 30 clocks is 1⅓ counts a tick. At ages of 40 and more, 60/age is less."""
+    spec = make_spec(frac_bits=16)
+    updates = updates_of(spec, {9: 1, 39: 1}, 12 * TICK)
+    ages = [TICK * k for k in range(2, MAX_TICKS)]
+    velocities = [Fraction(40, 30), *(Fraction(60, age) for age in ages), Fraction(0)]
+    assert updates.clock.tolist() == [39, *(39 + age for age in ages), 39 + 320]
+    assert updates.interval.tolist() == [30, *ages, 320]
+    assert updates.velocity.tolist() == [rounded(velocity, 16) * 2**16 for velocity in velocities]
+    # The first silence is that of the tick after; of just one tick, 60/40 of a count is no less than 40/30.
+    assert not updates.forced[0]
+    assert updates.forced[1:].all()
+
+
+def test_one_decay_alone() -> None:
+    """In the tick before, 60/45 of a count is no less than 40/32; the next count comes in the tick after."""
+    spec = make_spec(frac_bits=16)
+    updates = updates_of(spec, {2: -1, 34: -1, 159: -1}, 4 * TICK)
+    assert updates.clock.tolist() == [34, 119, 159]
+    wanted = [Fraction(-40, 32), Fraction(-60, 85), Fraction(-40, 125)]
+    assert updates.velocity.tolist() == [rounded(velocity, 16) * 2**16 for velocity in wanted]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_least_velocity_decays_to_0(sign: int) -> None:
+    """A count in 600 clocks is 1/15 of a count a tick, an LSB; after 1920 clocks half an LSB is left, 60/1920."""
+    timing = Timing(100 * TICK, TICK, 80)
+    spec = TTachometer(encoder=Encoder(25), timing=timing, frac_bits=4, bounds=True)
+    updates = updates_of(spec, {39: sign, 639: sign}, 70 * TICK)
+    # Half an LSB is rounded upward: backwards to 0, forwards to an LSB, which is no less than the velocity.
+    last = 639 + (1920 if sign < 0 else 1960)
+    assert updates.clock.tolist() == [639, last]
+    assert updates.velocity.tolist() == [sign, 0]
+    ends = (math.floor(0), math.ceil(Fraction(40 * 16, last - 639)))
+    assert (updates["velocity_lower"][1], updates["velocity_upper"][1]) == (ends if sign > 0 else (-ends[1], 0))
+
+
+@pytest.mark.parametrize(("n_clocks", "seen"), [(71, 1), (72, 1), (73, 2), (101, 2), (102, 3)])
+def test_counts_are_the_steps_that_come_before_the_end(n_clocks: int, seen: int) -> None:
+    """The datapath sees a step two clocks after its clock; where a line changes without a step there is no count."""
+    steps = Steps(np.array([2, 40, 70, 99]), np.array([1, 0, -1, 1]), NONE, NONE, NONE)
+    ticks = Table(NONE, {"pulse_count": NONE})
+    counts = Counts.of(make_spec(), ticks, steps, n_clocks)
+    assert counts.period.tolist() == [4, 72, 101][:seen]
+    assert counts.size.tolist() == [1, -1, 1][:seen]
+    assert counts.n_periods == n_clocks
+
+
+def test_just_the_maximum_speed_is_in_range() -> None:
+    """At most one count a tick: two counts in 40 clocks are that, in 39 clocks they are more."""
+    spec = make_spec(max_speed=Speed(Fraction(1), "rev/s"), frac_bits=8)
+    assert spec.max_count == 1
+    for sign in (1, -1):
+        updates = updates_of(spec, {5: sign, 45: sign, 84: sign, 125: sign}, 130)
+        assert updates.velocity[:3].tolist() == [256 * sign, 256 * sign, int(rounded(Fraction(40, 41) * sign, 8) * 256)]
+        assert updates["out_of_range"][:3].tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_after_a_silence_a_count_only_opens_a_window_of_mt(sign: int) -> None:
+    """A window ends with the first count that comes more than a tick after that which opened it."""
+    spec = MTTachometer(encoder=Encoder(25), timing=Timing(100 * TICK, TICK, MAX_TICKS), frac_bits=16)
+    counts = dict.fromkeys([9, 30, 49, 50, 100, 900, 950], sign)
+    updates = updates_of(spec, counts, 1000)
+    measured = updates.rows(~updates.forced)
+    assert measured.clock.tolist() == [50, 100, 950]
+    assert measured.interval.tolist() == [41, 50, 50]
+    assert measured.velocity.tolist() == [
+        int(rounded(Fraction(40 * n * sign, time), 16) * 2**16) for n, time in ((3, 41), (1, 50), (1, 50))
+    ]
+    zeros = updates.rows(updates.forced & (updates.velocity == 0))
+    assert zeros.clock.tolist() == [100 + 320, 100 + 640]
+
+
+@pytest.mark.parametrize("n", range(1, 7))
+def test_a_chain_is_what_is_met_one_after_the_other(n: int) -> None:
+    rng = np.random.default_rng(n)
+    for _ in range(100):
+        following = np.array([rng.integers(k + 1, n + 1) for k in range(n)])
+        if rng.random() < 0.5:
+            following = np.maximum.accumulate(following)
+        met, at = [False] * n, 0
+        while at < n:
+            met[at], at = True, int(following[at])
+        assert chain(following).tolist() == met
+    assert chain(NONE).tolist() == []

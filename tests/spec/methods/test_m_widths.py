@@ -1,0 +1,55 @@
+"""Widths and latencies of the M method, by small numbers."""
+
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+from tachometry.spec import Encoder, MTachometer, Timing
+
+
+def make_spec(average: int, frac_bits: int = 16, tick: int = 20, **options: Any) -> MTachometer:
+    timing = Timing(1_000_000, tick, 10)
+    return MTachometer(encoder=Encoder(8), timing=timing, average=average, frac_bits=frac_bits, **options)
+
+
+@pytest.mark.parametrize("frac_bits", [4, 8])
+@pytest.mark.parametrize("average", [1, 2, 3, 4, 5, 8, 16, 32, 64, 256])
+def test_a_mean_is_a_shift_where_it_is_a_number_of_the_format(average: int, frac_bits: int) -> None:
+    exact = 2**frac_bits % average == 0
+    spec = make_spec(average, frac_bits)
+    assert spec.shift == (frac_bits - average.bit_length() + 1 if exact else None)
+    assert spec.datapath_latency == (1 if exact else spec.numerator_width + 4)
+
+
+@pytest.mark.parametrize(("eighths", "parts"), [(0, 1), (8, 1), (4, 2), (2, 4), (6, 4), (1, 8), (3, 8)])
+@pytest.mark.parametrize("average", [3, 4, 8, 16])
+def test_bounds_take_parts_of_a_count(average: int, eighths: int, parts: int) -> None:
+    """A count more or less, and the edge error: in parts of a count that make a whole number of both."""
+    spec = make_spec(average, 5, bounds=True, edge_error=Fraction(eighths, 8))
+    margin = (1 + Fraction(eighths, 8)) * parts
+    assert 1 << spec.error_bits == parts
+    assert spec.margin == margin
+    assert spec.max_sum == 20 * average
+    assert spec.max_numerator == 20 * average * parts + margin
+    shifts = average != 3 and 2**5 % (average * parts) == 0
+    assert (spec.shift is not None) == shifts
+    # One clock for the sum, one for each bit, three more for the scaler.
+    bits = (20 * average * parts + int(margin)).bit_length() + 1
+    assert spec.numerator_width == bits
+    assert spec.datapath_latency == (1 if shifts else bits + 4)
+
+
+def test_without_bounds_there_is_no_margin() -> None:
+    spec = make_spec(3)
+    assert (spec.max_numerator, spec.numerator_width, spec.sum_width, spec.interval_width) == (60, 7, 7, 2)
+    assert (spec.standstill_ticks, spec.remembered_clocks) == (3, 4 * 20)
+
+
+def test_one_adder_is_enough_if_a_tick_is_long() -> None:
+    """The numerator of 3 ticks of 9 clocks has 6 bits, and an adder three clocks more to do."""
+    assert [make_spec(3, tick=tick).serial for tick in (8, 9, 10)] == [False, True, True]
+    assert not make_spec(4).serial
+    # Ticks from outside may come in half the time; of 20 clocks the numerator has 7 bits, of 22 it has 8.
+    external = [make_spec(3, tick=tick, max_tick_cycles=tick).serial for tick in (9, 18, 19, 20, 22)]
+    assert external == [False, False, False, True, True]

@@ -1,0 +1,188 @@
+"""Times and widths of T, M/T and S, by small numbers that can be told by hand."""
+
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+from tachometry.spec import Encoder, MTTachometer, Speed, STachometer, Timing, TTachometer
+
+
+def timing(tick: int, max_ticks: int) -> Timing:
+    return Timing(1_000_000, tick, max_ticks)
+
+
+def t(tick: int = 20, max_ticks: int = 10, **options: Any) -> TTachometer:
+    return TTachometer(encoder=Encoder(8), timing=timing(tick, max_ticks), **({"frac_bits": 4} | options))
+
+
+def mt(tick: int = 20, max_ticks: int = 10, **options: Any) -> MTTachometer:
+    return MTTachometer(encoder=Encoder(8), timing=timing(tick, max_ticks), **({"frac_bits": 4} | options))
+
+
+def s(tick: int = 20, max_ticks: int = 10, **options: Any) -> STachometer:
+    return STachometer(encoder=Encoder(8), timing=timing(tick, max_ticks), **({"frac_bits": 4} | options))
+
+
+def test_a_division_takes_a_clock_a_digit_its_sign_included_one_to_round_and_one_to_compare() -> None:
+    """By default 30 clocks, as docs/timed.md says: 960 counts a tick are 10 bits, 16 follow, and one to round with."""
+    assert [one(encoder=Encoder(500)).division_clocks for one in (TTachometer, MTTachometer)] == [30, 30]
+    # Twenty counts have 5 bits; on the lattice T has one count a tick, and M/T twenty.
+    assert [t().division_clocks, mt().division_clocks] == [5 + 4 + 1 + 3] * 2
+    assert [t(timer="tick").division_clocks, mt(timer="tick").division_clocks] == [1 + 4 + 1 + 3, 5 + 4 + 1 + 3]
+    assert t().datapath_latency == 13 + 1
+
+
+def test_updates_are_a_division_apart() -> None:
+    """On the lattice they come with ticks: a division of 13 clocks takes three ticks of 6, two of 12, one of 13."""
+    assert [t().update_spacing, mt().update_spacing] == [13, 13]
+    assert [mt(tick, timer="tick").update_spacing for tick in (16, 13, 12, 6)] == [16, 13, 12, 12]
+    assert [mt(tick, timer="tick").division_clocks for tick in (16, 13, 12, 6)] == [13, 12, 12, 11]
+    assert t(timer="tick", max_tick_cycles=40).update_spacing == 9
+
+
+def test_the_maximum_time_is_a_division_at_least() -> None:
+    assert [t(20, 10).max_periods, t(2, 2, frac_bits=4).max_periods] == [200, 2 + 4 + 1 + 3]
+    assert [mt(20, 10, timer="tick").max_periods, mt(5, 2, timer="tick").max_periods] == [10, 3]
+    assert [mt(5, 2, timer="tick").division_clocks, mt(5, 2, timer="tick").division_periods] == [11, 3]
+    short = t(3, 2)
+    assert (short.division_clocks, short.max_time_cycles, short.standstill_ticks) == (10, 10, 4)
+    assert (mt(5, 2, timer="tick").max_time_cycles, mt(5, 2, timer="tick").standstill_ticks) == (15, 3)
+    assert t(20, 10).notes == ()
+    assert short.notes == ("maximum time raised from 6 clocks to 10: a division takes 10",)
+
+
+def test_the_minimum_time() -> None:
+    """A tick by default; a measurement that is longer than B − 1 finds the divider free."""
+    assert [mt().min_periods, mt(min_time=77).min_periods, mt(min_time=3).min_periods] == [20, 77, 12]
+    assert [mt(timer="tick").min_periods, mt(timer="tick", min_time=60).min_periods] == [1, 3]
+    assert mt(3, 9, timer="tick").min_periods == 3  # ten clocks are four ticks
+    assert [mt(min_time=77).min_time_cycles, mt(timer="tick", min_time=60).min_time_cycles] == [77, 60]
+    assert mt(min_time=77).parameters["min_time"] == 77
+    assert mt().parameters["min_time"] == 20
+    assert mt(min_time=3).notes == ("minimum time raised from 3 clocks to 12: a division takes 13",)
+    for wrong, message in ((0, "from 1 to 200 clocks"), (201, "from 1 to 200 clocks")):
+        with pytest.raises(ValueError, match=f"^min_time must be {message}, the maximum time, not {wrong}$"):
+            mt(min_time=wrong)
+    assert [mt(min_time=one).min_time for one in (1, 200)] == [1, 200]
+    with pytest.raises(ValueError, match=r"^min_time must be a multiple of 20 clocks with times in ticks, not 30$"):
+        mt(timer="tick", min_time=30)
+
+
+def test_the_longest_measurement() -> None:
+    """T: a maximum time. M/T: the count that closes comes a maximum time after T_c at most; or a late division."""
+    assert [t().max_interval, t().interval_width] == [200, 8]
+    assert [mt().max_interval, mt(min_time=77).max_interval] == [220, 277]
+    assert [mt(timer="tick").max_interval, mt(timer="tick", max_tick_cycles=20).max_interval] == [1 + 10, 7 + 10]
+    assert [one.may_be_late for one in (mt(), mt(timer="tick"), mt(max_tick_cycles=40))] == [False] * 3
+    assert mt(timer="tick", max_tick_cycles=20).may_be_late
+    assert [one.interval_unit_cycles for one in (t(), t(timer="tick"))] == [1, 20]
+
+
+def test_what_is_remembered() -> None:
+    """T: the time since the last count, which may wrap, and that to the next; then a division."""
+    assert t().remembered_clocks == (256 + 200 + 1) + 13
+    assert t(timer="tick").remembered_clocks == (16 + 10 + 1) * 20 + 9
+    assert t(timer="tick", max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30 + 9
+    assert mt().remembered_clocks == (256 + 200 + 220 + 2) + 13
+
+
+def test_speeds_beyond_the_range() -> None:
+    """Two counts can be a clock apart; T counts one in a tick of the lattice, M/T all that there are."""
+    slow: dict[str, Any] = {"max_speed": Speed(Fraction(1000), "rev/s")}  # 32 counts a ms: one in 20 clocks
+    assert [one.max_count for one in (t(**slow), t())] == [1, 20]
+    assert [one.flags_range for one in (t(), t(**slow), mt(), mt(**slow))] == [False, True, False, True]
+    assert [one.flags_range for one in (t(timer="tick"), mt(timer="tick"), mt(timer="tick", **slow))] == [
+        *(True, False, False)
+    ]
+    assert [len(one.method_ports) for one in (t(), t(**slow))] == [0, 1]
+    assert [one.max_velocity for one in (t(), t(timer="tick"), mt(timer="tick"))] == [20, 1, 20]
+
+
+def test_bounds_of_times() -> None:
+    """Distance over a time that is one shorter: twice the quotient; a count more at reversals; and the edge error."""
+    assert [one.max_bound for one in (t(), t(timer="tick"), mt(timer="tick"))] == [41, 3, 41]
+    off: dict[str, Any] = {"bounds": True, "edge_error": Fraction(1, 8)}
+    assert [one.max_bound for one in (t(**off), t(timer="tick", **off))] == [41 + 3, 3 + 1]
+    wide = t(**off)
+    assert (wide.bound_width, wide.absent_bound) == (7 + 4, 2**10 - 1)
+
+
+@pytest.mark.parametrize("made", [t, mt])
+def test_the_paper_alone_neither_decays_nor_has_bounds(made: Any) -> None:
+    assert [made().decays, made(bound_decay=False).decays, made(paper_exact=True).decays] == [True, False, False]
+    assert [made(paper_exact=True).parameters["bound_decay"], made().parameters["bound_decay"]] == [False, True]
+    for wrong, message in (
+        ({"bounds": True, "paper_exact": True}, "bounds must not be given with paper_exact, which has none"),
+        ({"timer": "hour"}, "timer must be clock or tick, not 'hour'"),
+    ):
+        with pytest.raises(ValueError, match=f"^{message}$"):
+            made(**wrong)
+    assert made(bounds=True).bounds
+
+
+def test_equations() -> None:
+    assert [t().description, mt(timer="tick").description] == ["eq. (9), times in clocks", "eq. (13), times in ticks"]
+    assert [s().description[:8], s(cancel=False).description] == ["eq. (21)", "eq. (17)"]
+    assert [s().heading, s(cancel=False).heading] == ["S method, eq. (21)", "S method, eq. (17)"]
+
+
+def test_the_numerator_of_s() -> None:
+    """N = d0 + d1 of eq. (21) is of half counts, d1 of eq. (17) of counts; d is twice the greatest m_e at most."""
+    assert [s().max_numerator, s(cancel=False).max_numerator] == [80, 40]
+    # With bounds a count more or less, and the edge error: eighths of a count are needed for ⅜.
+    for eighths, parts in ((0, 2), (4, 2), (2, 4), (3, 8)):
+        spec = s(bounds=True, edge_error=Fraction(eighths, 8))
+        assert spec.numerator_per_count == parts
+        assert spec.max_numerator == 40 * parts + (8 + eighths) * parts // 8
+    plain = s(bounds=True, cancel=False, edge_error=Fraction(3, 8))
+    assert (plain.numerator_per_count, plain.max_numerator) == (8, 331)
+    assert (s(bounds=True, cancel=False).numerator_per_count, s(bounds=True, cancel=False).max_numerator) == (1, 41)
+
+
+def test_the_reciprocal_of_s() -> None:
+    """Up to 2048 ticks it is looked up; beyond, it is carried, if the table that this needs is not longer."""
+    assert [s(1, ticks).carried for ticks in (500, 2048, 2049, 5000)] == [False, False, True, True]
+    assert [s(1, 5000, frac_bits=24).carried, s(1, 4096, frac_bits=24).carried] == [True, False]
+    assert s(1, 5001).reciprocal.entry == 2501  # type: ignore[union-attr]
+    assert [s().memory[0], s(1, 5000).memory[0]] == ["table", "table and carried on"]
+    assert [s().memory[1], s(1, 5000).memory[1]] == [16, 4]
+
+
+def test_latencies_of_s() -> None:
+    """80 has 7 bits, so N has 8: one clock each, one for the table, one for its register, one to add b."""
+    assert [s(tick).serial for tick in (11, 20)] == [True, True]
+    assert [s(10).serial, s(9).serial] == [True, False]
+    assert [s(20).datapath_latency, s(1).datapath_latency, s(9).datapath_latency] == [8 + 3, 4 + 3, 7 + 3]
+    # One more for every digit of N·R/m, and one to round.
+    slow = s(40, 5000, max_speed=Speed(Fraction(1000), "rev/s"))
+    assert (slow.carried, slow.max_numerator, slow.serial) == (True, 8, True)
+    assert slow.datapath_latency == 2 * 5 + 4
+    fast = s(1, 5000)
+    assert (fast.max_numerator, fast.datapath_latency) == (4, 4 + 2 + 3)
+
+
+def test_windows_of_s() -> None:
+    """A forced update keeps the newer half. The next one does not contain the last count any more."""
+    assert [s(20, ticks).kept_ticks for ticks in (2, 3, 10, 11)] == [1, 1, 5, 5]
+    assert [s(20, ticks).standstill_ticks for ticks in (2, 3, 10, 11)] == [3, 5, 15, 17]
+    assert s(20, 10).remembered_clocks == (16 + 10 + 1) * 20
+    assert s(20, 10, max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30
+
+
+@pytest.mark.parametrize("made", [TTachometer, MTTachometer, STachometer])
+def test_a_unit_takes_one_adder_where_it_is_a_sum_of_more_than_two(made: Any) -> None:
+    """At 2^20 Hz, 32 clocks a tick and 32 counts a revolution, a count a tick is 1024 rev/s, or (64 − 4)·1024 rpm."""
+    seldom = Timing(1 << 20, 32, 10)
+    specs = {
+        unit: made(encoder=Encoder(8), timing=seldom, unit=unit, frac_bits=-4) for unit in ("rev/s", "rpm", "rad/s")
+    }
+    digits = {unit: len(spec.output.digits) for unit, spec in specs.items()}
+    assert (digits["rev/s"], digits["rpm"]) == (1, 2)
+    assert digits["rad/s"] > 2
+    assert {unit: spec.output_serial for unit, spec in specs.items()} == {
+        "rev/s": False,
+        "rpm": False,
+        "rad/s": specs["rad/s"].output.serial_latency <= specs["rad/s"].update_spacing,
+    }
+    assert specs["rad/s"].output_serial

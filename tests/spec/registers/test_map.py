@@ -1,0 +1,102 @@
+"""The map of the registers: bits of their fields, and numbers of the frames, as the pages have them."""
+
+from tachometry.spec import of_texts
+from tachometry.spec.registers import frames
+from tachometry.spec.registers.map import Field, RegisterMap
+from tachometry.spec.registers.values import captured_values, in_unit
+
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"}
+
+
+def map_of(method: str = "s", **texts: str) -> RegisterMap:
+    return RegisterMap(of_texts(method, BASE | {name.replace("_", "-"): text for name, text in texts.items()}))
+
+
+def bits(registers: RegisterMap, name: str) -> list[tuple[str, int, int]]:
+    return [(field.name, field.low, field.width) for field in registers[name].fields]
+
+
+def test_what_has_more_than_a_bit_has_a_register() -> None:
+    assert "INTERVAL" not in [one.name for one in map_of("m", average="1")]
+    assert ("interval", 2, 1) in bits(map_of("m", average="1", index="yes"), "STATUS")
+    assert bits(map_of("m", average="2"), "INTERVAL") == [("value", 0, 32)]
+
+
+def test_values_are_told_with_their_units() -> None:
+    registers = map_of(position_width="48")
+    position = next(value for value in captured_values(registers) if value.name == "position")
+    assert (position.bits, position.field.shift, [word.name for word in position.words]) == (
+        *(64, 0, ["POSITION_LOW", "POSITION_HIGH"]),
+    )
+    assert [*in_unit(Field("x", 1, unit="960 clocks"))] == ["One LSB is 960 clocks."]
+    assert [*in_unit(Field("x", 1, unit="2^-16 rad/s"))] == ["One LSB is 2^-16 rad/s."]
+    assert [*in_unit(Field("x", 1, unit="x2"))] == ["The unit is x2."]
+    assert [*in_unit(Field("x", 1))] == []
+
+
+def test_masks() -> None:
+    assert [Field("x", 1, low).mask for low in (0, 1, 7)] == [1, 2, 0x80]
+    assert [Field("x", width, 4).mask for width in (1, 4, 8)] == [0x10, 0xF0, 0xFF0]
+    assert Field("x", 32).mask == 0xFFFF_FFFF
+
+
+def test_registers_follow_each_other() -> None:
+    registers = map_of()
+    assert [one.name for one in registers] == [
+        *("IDENTIFICATION", "CONFIGURATION", "CONTROL", "COUNTERS", "VELOCITY", "STATUS"),
+        *("INTERVAL", "PULSE_COUNT", "POSITION"),
+    ]
+    assert [one.offset for one in registers] == [*range(0, 36, 4)]
+    assert registers.address_width == 6  # there is an address behind the last register, 36
+    assert [one.name for one in registers if one.captures] == ["VELOCITY"]
+    assert [one.name for one in registers if one.constant] == ["IDENTIFICATION", "CONFIGURATION"]
+    assert [one.name for one in registers if one.writable] == ["CONTROL"]
+    assert [one.captured for one in registers] == [False] * 4 + [True] * 5
+
+
+def test_bits_of_control_counters_and_status() -> None:
+    registers = map_of(external_tick="yes", index="yes")
+    assert bits(registers, "CONTROL") == [("clear", 0, 1), ("hold", 1, 1)]
+    assert [(one.access, one.reset) for one in registers["CONTROL"].fields] == [("wo", 0), ("rw", 0)]
+    assert bits(registers, "COUNTERS") == [
+        *(("decode_errors", 0, 8), ("overflows", 8, 8), ("lost_updates", 16, 8), ("tick_errors", 24, 8))
+    ]
+    assert bits(registers, "STATUS") == [
+        (name, low, 1) for low, name in enumerate(("updated", "indexed", "forced", "overflow", "stalled"))
+    ]
+    assert registers["IDENTIFICATION"].reset == 0x54414348  # TACH
+    assert [one.reset for one in registers if not one.constant] == [0] * 8
+
+
+def test_values_of_more_than_a_word_have_two() -> None:
+    registers = map_of(position_width="33", velocity_width="64")
+    for name in ("POSITION", "VELOCITY"):
+        low, high = (registers[f"{name}_{end}"] for end in ("LOW", "HIGH"))
+        assert [(one.fields[0].shift, one.fields[0].width, one.fields[0].low) for one in (low, high)] == [
+            *((0, 32, 0), (32, 32, 0))
+        ]
+        assert high.offset in (low.offset + 4, low.offset + 8)  # STATUS comes behind the first register
+        assert (low.help.split()[0], high.help.split()[0]) == ("Lower", "Upper")
+        assert [low.captures, high.captures] == [name == "VELOCITY", False]
+    assert not registers["INTERVAL"].help.startswith(("Upper", "Lower"))
+    assert map_of(position_width="32")["POSITION"].fields[0].width == 32
+
+
+def test_numbers_of_the_serial_lines() -> None:
+    """docs/serial.md: seven bits of address and the write bit; marks; a quiet line."""
+    assert (frames.SPI_ADDRESS_WIDTH, frames.SPI_WRITE, frames.MARK, frames.ERROR) == (7, 0x80, 0x80, 1)
+    assert (frames.SPI_SCK_CYCLES, frames.QUIET_BITS) == (8, 32)
+    assert (frames.SEQUENCES, frames.TYPE_LOW, frames.FROM_CORE) == (16, 4, 7)
+    assert (frames.UART_ADDRESS_WIDTH, frames.COUNT_WIDTH) == (8, 8)
+    assert frames.crc(b"") == frames.CRC_START
+    assert (frames.CRC_WIDTH, frames.CRC_POLYNOMIAL, frames.CRC_START) == (16, 0x1021, 0xFFFF)
+
+
+def test_what_is_asked_for_by_default() -> None:
+    assert frames.read_request(3) == frames.read_request(3, 1, 0) == frames.with_check(bytes([0x00, 3, 1]))
+    assert frames.write_request(3, 5) == frames.with_check(bytes([0x10, 3, 5, 0, 0, 0]))
+    assert frames.spi_read(3) == bytes([3, 0, 0, 0, 0, 0])
+    for n_words in (0, 1, 255):
+        assert frames.decode_request(frames.read_request(255, n_words, 15)).value == n_words
+    assert frames.decode_request(frames.write_request(0, (1 << 32) - 1, 15)).value == (1 << 32) - 1
+    assert frames.spi_write(127, (1 << 32) - 1) == bytes([0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0])
