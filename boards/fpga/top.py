@@ -1,0 +1,90 @@
+"""What goes on a board: the core between the pins."""
+
+from typing import Any
+
+from amaranth import Elaboratable, Module, Value
+from amaranth.build import Attrs, Pins, Resource, Subsignal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
+
+from tachometry.boards.fpga.board import Board
+from tachometry.boards.fpga.capture_pin import CapturePin
+from tachometry.hdl.bus_tachometer import BusTachometer
+from tachometry.spec import TachometerSpec
+from tachometry.spec.registers.buses import Bus
+from tachometry.spec.registers.map import RegisterMap
+
+# The lines of the UART are on the board's own bridge to USB.
+_UART = {"uart_rx": "rx", "uart_tx": "tx"}
+_LEDS = "leds"
+_SHARED = {"spi_miso": "spi_cs_n"}  # outputs that are only driven while an input is low
+
+
+def component(spec: TachometerSpec, bus: Bus) -> wiring.Component:
+    """What is put on boards."""
+    return BusTachometer(RegisterMap(spec), bus)
+
+
+class BoardTop(Elaboratable):
+    """A component on a board: what it has of the ports that the board has pins for is connected to them.
+
+    Inputs have pull-ups. Outputs without a pin are left open, and inputs without one are 0. LEDs are lit by ones.
+
+    Parameters
+    ----------
+    core : wiring.Component
+    board : Board
+    """
+
+    def __init__(self, core: wiring.Component, board: Board) -> None:
+        self._core = core
+        self._board = board
+
+    def elaborate(self, platform: Any) -> Module:
+        m = Module()
+        m.submodules.tachometer = self._core
+        platform.add_resources([self._resource()])
+        pins = platform.request("tachometer")
+        places = {name: getattr(pins, name) for name in self._on_headers()}
+        if "uart_rx" in self._core.signature.members:
+            uart = platform.request("uart")
+            places |= {port: getattr(uart, line) for port, line in _UART.items()}
+        for name, place in places.items():
+            self._connect(m, name, place, places)
+        if _LEDS in self._core.signature.members:
+            lights = Value.cast(getattr(self._core, _LEDS))
+            for number in range(min(self._board.leds, len(lights))):
+                m.d.comb += platform.request("led", number).o.eq(lights[number])
+        return m
+
+    def _connect(self, m: Module, name: str, place: Any, places: dict[str, Any]) -> None:
+        port = getattr(self._core, name)
+        if name == "capture":
+            m.submodules.capture_pin = capture = CapturePin()
+            m.d.comb += [capture.pin.eq(place.i), port.eq(capture.capture)]
+        elif self._is_input(name):
+            m.d.comb += port.eq(place.i)
+        else:
+            m.d.comb += place.o.eq(port)
+        if name in _SHARED:
+            m.d.comb += place.oe.eq(~places[_SHARED[name]].i)
+
+    def _on_headers(self) -> list[str]:
+        ports = self._core.signature.members
+        return [name for header in self._board.headers for name in header.pins if name in ports]
+
+    def _is_input(self, name: str) -> bool:
+        return bool(self._core.signature.members[name].flow == In)
+
+    def _resource(self) -> Resource:
+        """The pins that the component has, on the headers."""
+        names = self._on_headers()
+        subsignals = []
+        for header in self._board.headers:
+            for name, pin in header.pins.items():
+                if name in names:
+                    direction = "i" if self._is_input(name) else "oe" if name in _SHARED else "o"
+                    attributes = {**self._board.attributes, **(self._board.pull_up if direction == "i" else {})}
+                    place = Pins(pin, dir=direction, conn=header.connector)
+                    subsignals.append(Subsignal(name, place, Attrs(**attributes)))
+        return Resource("tachometer", 0, *subsignals)
