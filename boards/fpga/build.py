@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from amaranth.lib import wiring
 
 TOP = "top"
-SEEDS = (1, 2, 3, 4)
+SEEDS = range(1, 9)
 _PLATFORMS = ("amaranth", "amaranth-boards")
 
 
@@ -120,7 +120,7 @@ def _open(flow: Flow, clock_hz: int, folder: Path, say: Callable[[str], None]) -
 
 def _routed(flow: Flow, clock_hz: int, folder: Path, say: Callable[[str], None]) -> tuple[float, int]:
     """Place and route with one seed after the other until the timing is met: Fmax and seed."""
-    failures = []
+    failures: list[TimingError] = []
     for seed in SEEDS:
         say("placing and routing" + (f", seed {seed}" if failures else ""))
         run(flow.routing(clock_hz, seed), folder)
@@ -131,4 +131,4 @@ def _routed(flow: Flow, clock_hz: int, folder: Path, say: Callable[[str], None])
             failures.append(error)
         else:
             return fmax, seed
-    raise TimingError(f"{failures[0]} (nor with seeds {', '.join(map(str, SEEDS[1:]))})") from failures[0]
+    raise TimingError(f"{failures[0]} (nor with seeds {SEEDS[1]} to {SEEDS[-1]})") from failures[0]

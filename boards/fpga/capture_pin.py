@@ -25,7 +25,7 @@ class CapturePin(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         level = Signal()
-        past = Signal(init=1)
+        past = Signal()
         # The synchroniser begins low, whatever the pin is.
         clocks_since_reset = Signal(3)
         m.submodules.sync_capture = Synchronizer(self.pin, level)

