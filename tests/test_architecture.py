@@ -36,7 +36,7 @@ ALLOWED = {
     "boards/host": {"spec"},
     "boards/monitor": {"boards/host", "sim/golden", "spec"},
     "cli": {"cli", "boards", "sim", "hdl", "spec"},
-    "cli/options": {"sim", "spec"},
+    "cli/options": {"boards/fpga", "sim", "spec"},
     "cli/sweeping": {"cli/options", "sim", "spec"},
     "cli/reports": {"cli/options", "cli/sweeping", "sim", "spec"},
     "cli/commands": {"cli", "boards", "sim", "hdl", "spec"},

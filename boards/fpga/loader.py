@@ -40,7 +40,7 @@ def load(board: Board, file: Path, flash: bool) -> str:
         missing = done.stdout.split(_NO_LIBRARY, 1)[1].strip(": \n").split(":")[0]
         raise ToolError(f"openFPGALoader needs {missing}; on Debian and Ubuntu: apt install {_LIBRARIES}")
     if done.returncode and _NO_BOARD in done.stdout:
-        raise ToolError(f"there is no {board.title} on USB, or it is in use by another program or not permitted to you")
+        raise ToolError(f"there is no {board.title} on USB, or another program has it, or you may not use it")
     if done.returncode:
         raise ToolError(f"openFPGALoader: {told(done.stdout) or f'exit status {done.returncode}'}")
     return done.stdout
@@ -54,11 +54,11 @@ def bitstream(board: Board, place: Path) -> Path:
     ValueError
         If it is that of another board, or there is none or several.
     """
+    if not place.exists():
+        raise ValueError(f"FILE must be a bitstream that exists, not {str(place)!r}")
     if not place.is_dir():
         if place.suffix != board.suffix:
             raise ValueError(f"a bitstream for {board.name} must end in {board.suffix}, not {place.name!r}")
-        if not place.is_file():
-            raise ValueError(f"FILE must be a bitstream that exists, not {str(place)!r}")
         _check_board(board, place)
         return place
     found = [file for file in sorted(place.glob(f"*{board.suffix}")) if _board_of(file) == board.name]

@@ -16,6 +16,11 @@ class ToolError(OSError):
     """A program is missing or has failed; the message is one line."""
 
 
+def scripts() -> str:
+    """The folder of the programs that packages have brought to this Python."""
+    return sysconfig.get_path("scripts")
+
+
 def find(name: str) -> str:
     """The path of a program: beside this Python, or on the PATH.
 
@@ -24,7 +29,7 @@ def find(name: str) -> str:
     ToolError
         If there is none.
     """
-    folders = os.pathsep.join((sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)))
+    folders = os.pathsep.join((scripts(), os.environ.get("PATH", os.defpath)))
     found = shutil.which(name, path=folders)
     if found is None:
         raise ToolError(f"{name} is needed for boards and not installed: {EXTRA}")

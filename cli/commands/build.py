@@ -32,7 +32,7 @@ _SERIAL = ("uart", "spi")  # buses that leave the FPGA over a few pins
 \b
 Examples:
   tachometry build icebreaker --ppr 500
-  tachometry build tang-nano-9k --ppr 2048 --max-speed 6000rpm --filter 4 -o rig
+  tachometry build tang-nano-9k --ppr 2048 --filter 4 -o rig
   tachometry program tang-nano-9k rig""",
 )
 @board_argument
