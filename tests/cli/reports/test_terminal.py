@@ -6,6 +6,7 @@ import sys
 import threading
 
 import pytest
+from rich.progress import Progress
 from support.command import run
 
 from tachometry.cli.reports import terminal
@@ -85,14 +86,14 @@ class _Terminal(io.StringIO):
 
 def test_what_takes_long_is_shown_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     screen, begun = _Terminal(), threading.Event()
-    start = terminal.Progress.start
+    start = Progress.start
 
-    def begin(progress: terminal.Progress) -> None:
+    def begin(progress: Progress) -> None:
         start(progress)
         begun.set()
 
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(terminal.Progress, "start", begin)
+    monkeypatch.setattr(Progress, "start", begin)
     with terminal.activity() as say:
         say("synthesising")
     assert not begun.is_set()
