@@ -54,11 +54,9 @@ def page(rows: Sequence[tuple[str, ...]], tools: dict[str, str]) -> str:
     """What is below the heading."""
     words = " ".join(CORE)
     used = ", ".join(f"{name} {version}" for name, version in sorted(tools.items()))
-    return (
-        f"\nMade by `make bitstreams`: `tachometry build BOARD {words}`, on {os.cpu_count()} cores, once the tools have "
-        "compiled themselves, which takes each of them some seconds at its first start. Fmax is that of the design with "
-        f"all pins, by nextpnr.\n\n{markdown(HEADS, rows, left=(0, 1))}\nMade with {used}.\n"
-    )
+    made = f"Made by `make bitstreams` with `tachometry build BOARD {words}`, on {os.cpu_count()} cores."
+    first = "At its first start each tool compiles itself, which takes longer."
+    return f"\n{made} {first} Fmax is what nextpnr says.\n\n{markdown(HEADS, rows, left=(0, 1))}\nTools: {used}.\n"
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -66,7 +64,8 @@ def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=PAGE, help="page whose figures are replaced")
     page_of = parser.parse_args(words).output
-    rows, tools = [], {}
+    rows: list[tuple[str, ...]] = []
+    tools: dict[str, str] = {}
     try:
         for name in BUILT:
             folder = ROOT / "build" / name
