@@ -90,7 +90,7 @@ size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to doc
 
 bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/boards.md, and all checks of bitstreams
 	$(BIN)/python bench/boards.py -o docs/boards.md
-	$(BIN)/pytest -q tests/boards/fpga/bitstreams.py
+	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
 docs: $(VENV)/.run ## the pages of options, ports and registers, written to docs/{options,ports,registers}.md
 	$(BIN)/python bench/reference.py

