@@ -1,5 +1,8 @@
 """What is put on boards: ports on the pins that the boards have for them, and projects for the vendors' tools."""
 
+import os
+import subprocess
+import sys
 import zipfile
 from collections.abc import Iterator, Mapping
 from io import BytesIO
@@ -253,3 +256,27 @@ def test_projects_are_whole_and_always_the_same(name: str, files: set[str], line
     for line in lines:
         assert any(line in text for text in texts.values()), line
     assert said == ["elaborating"] * 2
+
+
+_DIGEST = """
+import hashlib, sys
+from tachometry.boards.fpga.boards import BOARDS
+from tachometry.boards.fpga.build import prepared
+from tachometry.boards.fpga.top import component
+from tachometry.spec import of_texts
+from tachometry.spec.registers.buses import bus_of
+board = BOARDS["icebreaker"]
+spec = of_texts("s", {"ppr": "9", "index": "yes", "age": "yes", "bounds": "yes", "clock": str(board.clock_hz)})
+print(hashlib.sha256(prepared(component(spec, bus_of("uart")), board).files["top.il"].encode()).hexdigest())
+"""
+
+
+def test_the_order_of_sets_makes_no_difference() -> None:
+    """Which Python chooses anew in every process, if nothing is said."""
+    said = set()
+    for seed in ("1", "2"):
+        command = [sys.executable, "-c", _DIGEST]
+        done = subprocess.run(command, env=os.environ | {"PYTHONHASHSEED": seed}, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        said.add(done.stdout)
+    assert len(said) == 1
