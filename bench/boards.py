@@ -56,7 +56,7 @@ def page(rows: Sequence[tuple[str, ...]], tools: dict[str, str]) -> str:
     used = ", ".join(f"{name} {version}" for name, version in sorted(tools.items()))
     made = f"Made by `make bitstreams` with `tachometry build BOARD {words}`, on {os.cpu_count()} cores."
     first = "At its first start each tool compiles itself, which takes longer."
-    return f"\n{made} {first} Fmax is what nextpnr says.\n\n{markdown(HEADS, rows, left=(0, 1))}\nTools: {used}.\n"
+    return f"\n{made}\n{first} Fmax is what nextpnr says.\n\n{markdown(HEADS, rows, left=(0, 1))}\nTools: {used}.\n"
 
 
 def main(words: Sequence[str] | None = None) -> int:
