@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test pytest verify formal mutate upset bench size docs api lint clean
+.PHONY: help venv demo figures compare icarus test pytest verify formal mutate upset bench size bitstreams docs api lint clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -30,6 +30,10 @@ $(VENV)/.test: $(VENV)/.run
 
 $(VENV)/.size: $(VENV)/.run
 	$(BIN)/pip install -q --disable-pip-version-check -e '.[size]'
+	@touch $@
+
+$(VENV)/.boards: $(VENV)/.test
+	$(BIN)/pip install -q --disable-pip-version-check -e '.[boards]'
 	@touch $@
 
 $(VENV)/.formal: $(VENV)/.test
@@ -83,6 +87,10 @@ compare: $(VENV)/.run ## all methods and what others use in several situations, 
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
 	$(BIN)/python bench/size.py -o docs/size.md
+
+bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/boards.md, and all checks of bitstreams
+	$(BIN)/python bench/boards.py -o docs/boards.md
+	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
 docs: $(VENV)/.run ## the pages of options, ports and registers, written to docs/{options,ports,registers}.md
 	$(BIN)/python bench/reference.py

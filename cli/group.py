@@ -4,10 +4,12 @@ from collections.abc import Sequence
 
 import click
 
+from tachometry.cli.commands.build import build
 from tachometry.cli.commands.compare import compare
 from tachometry.cli.commands.figures import figures
 from tachometry.cli.commands.generate import generate
 from tachometry.cli.commands.plan import plan
+from tachometry.cli.commands.program import program
 from tachometry.cli.commands.replay import replay
 from tachometry.cli.commands.simulate import simulate
 from tachometry.cli.commands.sweep import sweep
@@ -55,6 +57,8 @@ cli.add_command(compare)
 cli.add_command(sweep)
 cli.add_command(figures)
 cli.add_command(verify)
+cli.add_command(build)
+cli.add_command(program)
 
 
 def run(args: Sequence[str]) -> int:

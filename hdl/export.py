@@ -3,6 +3,8 @@
 import json
 import os
 import re
+from collections.abc import Mapping
+from typing import Any
 from unittest.mock import patch
 
 from amaranth.back import verilog
@@ -81,9 +83,7 @@ def export(
         top = BusTachometer(registers, on)
         files = register_files(registers, name)
     described = {"generator": generator(), "license": LICENSE, **described}
-    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
-        text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", verilog.convert(top, name=name, emit_src=False))
-    text = _HEADER.format(**described, name=name, notice=notice("//")) + text
+    text = verilog_of(top, described)
     if target in TARGETS:
         files |= TARGETS[target].texts(spec, name, text)
     return {
@@ -92,3 +92,11 @@ def export(
         **kit(spec, name, on),
         **files,
     }
+
+
+def verilog_of(top: wiring.Component, described: Mapping[str, Any]) -> str:
+    """A module as Verilog-2001; the manifest says its name, and what is said above it."""
+    name = described["module"]
+    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+        text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", verilog.convert(top, name=name, emit_src=False))
+    return _HEADER.format(**described, name=name, notice=notice("//")) + text

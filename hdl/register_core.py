@@ -52,8 +52,8 @@ class RegisterCore(wiring.Component):
         restarts = ResetInserter(bank.restart) if hasattr(bank, "restart") else lambda box: box
         m.submodules.tachometer, m.submodules.tick_position = restarts(core), restarts(position)
         m.submodules.bank = bank
-        of_core = {port.name for port in self._map.ports} & {port.name for port in spec.outputs}
-        same = [*of_core.difference(_OTHERWISE), *spec.strobes]
+        outputs = {port.name for port in spec.outputs} - {*_OTHERWISE}
+        same = [*(port.name for port in self._map.ports if port.name in outputs), *spec.strobes]
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
         m.d.comb += [
             *(getattr(core, pin.name).eq(getattr(self, pin.name)) for pin in spec.pins),

@@ -2,16 +2,27 @@
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import click
 
 from tachometry.cli.options.option import Option, all_of, later, option
-from tachometry.spec import METHODS, TachometerSpec, common_options, methods_with, of_texts, own_options
+from tachometry.spec import (
+    METHODS,
+    ParameterError,
+    TachometerSpec,
+    common_options,
+    methods_with,
+    of_texts,
+    own_options,
+)
 from tachometry.spec import option as declaration
+from tachometry.spec.units import parse_frequency
 
 _PREFIX = "core_"
+_CLOCK = "clock"
 
 Texts = dict[str, str]  # of options, by their names without dashes
 Make = Callable[[str, Mapping[str, str]], TachometerSpec]
@@ -145,6 +156,32 @@ def core_and_make_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     options = [later("core-options", _common), _METHOD, later("method-options", own_click_options)]
     return all_of(options, build)
+
+
+def board_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: as `core_options`, of a command that is given a `board`, whose clock is that of the core."""
+
+    @functools.wraps(command)
+    def build(*, method: str, board: Any, **given: Any) -> Any:
+        texts = _taken(given)
+        text = texts.pop(_CLOCK, None)
+        if text is not None and parse_frequency(_CLOCK, text) != board.clock_hz:
+            raise ParameterError(_CLOCK, f"must be that of the board, {board.clock_hz} Hz, not {text}: there is no PLL")
+        spec = of_texts(method, {**texts, _CLOCK: str(board.clock_hz)})
+        return command(spec=spec, board=board, **given)
+
+    options = [later("core-options", _common_of_board), _METHOD, later("method-options", own_click_options)]
+    return all_of(options, build)
+
+
+def _common_of_board() -> tuple[click.Option, ...]:
+    declared = common_options()
+    return _made_common(
+        tuple(
+            replace(about, shown="that of the board, and it cannot be another") if about.name == _CLOCK else about
+            for about in declared
+        )
+    )
 
 
 def core_click_options() -> dict[str, click.Option]:

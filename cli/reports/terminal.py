@@ -1,13 +1,24 @@
 """What goes to the terminal: tables on stdout, and progress on stderr."""
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
@@ -46,6 +57,24 @@ def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[
             bar.update(task, completed=done)
 
         yield update
+
+
+@contextmanager
+def activity() -> Iterator[Callable[[str], None]]:
+    """A function to be told what is being done; after two seconds it is shown on stderr, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda what: None
+        return
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with ExitStack() as stack:
+        shown = Progress(*columns, console=Console(stderr=True), transient=True)
+        task = shown.add_task("")
+        timer = threading.Timer(_PATIENCE, shown.start)
+        stack.callback(shown.stop)
+        stack.callback(timer.join)
+        stack.callback(timer.cancel)
+        timer.start()
+        yield lambda what: shown.update(task, description=what)
 
 
 def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:

@@ -26,7 +26,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("flag", ["--help", "-h"])
 def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, flag)
-    for command in ("plan", "generate", "simulate", "replay", "compare", "sweep", "figures"):
+    for command in ("plan", "generate", "simulate", "replay", "compare", "sweep", "figures", "build", "program"):
         assert f"\n  {command} " in text
     assert max(map(len, text.splitlines())) <= 80
 
@@ -50,6 +50,7 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
             [*"--motion --vibration --seed".split(), *FAULTS, *OUTPUTS],
             ["Motion", "Encoder faults", "Outputs"],
         ),
+        ("build", ["BOARD", "--name", "--output", "-o", "--bus", "--baud"], ["Files"]),
         (
             "sweep",
             [*"FILE --vary --methods --engine --jobs --scheduler --results --axes --metric --seed".split(), *FAULTS],
@@ -71,7 +72,7 @@ def test_every_option_is_explained(
         assert option in words
     for group in ["Encoder", "Timing", "Core", *groups, "Examples"]:
         assert f"{group}:\n" in text
-    for default in DEFAULTS:
+    for default in DEFAULTS[1:] if command == "build" else DEFAULTS:
         assert f"[default: {default}]" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 80
 
@@ -90,15 +91,16 @@ def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture
     assert text.count("[default: bound-decay]") == 1
 
 
-def test_help_loads_nothing_heavy() -> None:
+@pytest.mark.parametrize("command", ["simulate", "build", "program"])
+def test_help_loads_nothing_heavy(command: str) -> None:
     code = """
 import sys
 from tachometry.cli.main import main
 try:
-    main(["simulate", "--help"])
+    main([sys.argv[1], "--help"])
 finally:
-    heavy = {"numpy", "amaranth", "matplotlib", "rich", "distributed", "pyarrow"} & set(sys.modules)
+    heavy = {"numpy", "amaranth", "matplotlib", "rich", "distributed", "pyarrow", "amaranth_boards"} & set(sys.modules)
     assert not heavy, heavy
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code, command], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

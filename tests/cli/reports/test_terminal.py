@@ -1,8 +1,12 @@
 """Tables on terminals of any width, and in pipes."""
 
+import io
 import itertools
+import sys
+import threading
 
 import pytest
+from rich.progress import Progress
 from support.command import run
 
 from tachometry.cli.reports import terminal
@@ -73,3 +77,39 @@ def test_commands_never_truncate(
     assert "…" not in narrow
     for word in numbers:
         assert word in narrow
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_what_takes_long_is_shown_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen, begun = _Terminal(), threading.Event()
+    start = Progress.start
+
+    def begin(progress: Progress) -> None:
+        start(progress)
+        begun.set()
+
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(Progress, "start", begin)
+    with terminal.activity() as say:
+        say("synthesising")
+    assert not begun.is_set()
+    assert screen.getvalue() == ""
+    monkeypatch.setattr(terminal, "_PATIENCE", 0)
+    with terminal.activity() as say:
+        say("placing and routing")
+        assert begun.wait(60)
+    assert "placing and routing" in screen.getvalue()
+
+
+def test_nothing_is_shown_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", pipe)
+    before = threading.active_count()
+    with terminal.activity() as say:
+        say("packing")
+        assert threading.active_count() == before
+    assert pipe.getvalue() == ""

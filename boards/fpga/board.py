@@ -1,0 +1,78 @@
+"""What a board is: its clock, its pins, and what builds and loads it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tachometry.boards.fpga.flow import Flow
+
+
+@dataclass(frozen=True)
+class Header:
+    """A connector of a board.
+
+    Parameters
+    ----------
+    label : str
+        What people call it.
+    pins : mapping of str to str
+        Its pins by the ports that are on them.
+    connector : tuple of str and int, or None
+        Its name and number in amaranth-boards; None: the pins are those of the FPGA.
+    """
+
+    label: str
+    pins: Mapping[str, str]
+    connector: tuple[str, int] | None = None
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board on which a core can run.
+
+    Parameters
+    ----------
+    name : str
+        On the command line.
+    title : str
+        The board and its FPGA, for people.
+    clock_hz : int
+        Frequency of its oscillator, at which the core runs: there is no PLL.
+    platform : callable
+        Makes the platform of amaranth-boards, which is of the extra `boards`, and imported only here.
+    headers : tuple of Header
+    attributes : mapping of str to object
+        Of every pin of a header: its voltage.
+    pull_up : mapping of str to object
+        Also of inputs.
+    leds : int
+        LEDs that are used, at most.
+    flow : Flow or None
+        What makes a bitstream; None: the vendor's tools, from an archive.
+    loader : tuple of str
+        What openFPGALoader must be told of the board.
+    bitstream : str
+        Suffix of the bitstream that the vendor's tools make.
+    """
+
+    name: str
+    title: str
+    clock_hz: int
+    platform: Callable[[], Any]
+    headers: tuple[Header, ...]
+    attributes: Mapping[str, object]
+    pull_up: Mapping[str, object]
+    leds: int
+    flow: Flow | None
+    loader: tuple[str, ...]
+    bitstream: str = ""
+
+    @property
+    def suffix(self) -> str:
+        """Of a file with which the board can be programmed."""
+        return self.bitstream if self.flow is None else self.flow.suffix
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """Where ports are, for people, such as `PMOD1A 1`."""
+        return {port: f"{header.label} {pin}" for header in self.headers for port, pin in header.pins.items()}

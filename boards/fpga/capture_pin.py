@@ -1,0 +1,34 @@
+"""The pin that captures the registers."""
+
+from amaranth import Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.front_end.synchronizer import Synchronizer
+
+
+class CapturePin(wiring.Component):
+    """Captures once when the pin rises; a pin that nothing is connected to stays high, and captures nothing.
+
+    Latency: a rise that is sampled at clock edge c captures in clock c + 2.
+
+    Members
+    -------
+    pin : In(1)
+        Asynchronous; each level must hold for a clock.
+    capture : Out(1)
+    """
+
+    def __init__(self) -> None:
+        super().__init__({"pin": In(1), "capture": Out(1)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        level = Signal()
+        past = Signal()
+        # The synchroniser begins low, whatever the pin is.
+        clocks_since_reset = Signal(3)
+        m.submodules.sync_capture = Synchronizer(self.pin, level)
+        m.d.sync += [past.eq(level), clocks_since_reset.eq((clocks_since_reset << 1) | 1)]
+        m.d.comb += self.capture.eq(level & ~past & clocks_since_reset[-1])
+        return m

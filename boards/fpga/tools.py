@@ -1,0 +1,78 @@
+"""Programs of the extra `boards`: where they are, what they say, and of which version they are."""
+
+import importlib.metadata
+import os
+import shutil
+import subprocess
+import sysconfig
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+EXTRA = "pip install 'tachometry[boards]'"
+_LONGEST = 300  # characters of a line that a program said
+
+
+class ToolError(OSError):
+    """A program is missing or has failed; the message is one line."""
+
+
+def scripts() -> str:
+    """The folder of the programs that packages have brought to this Python."""
+    return sysconfig.get_path("scripts")
+
+
+def find(name: str) -> str:
+    """The path of a program: beside this Python, or on the PATH.
+
+    Raises
+    ------
+    ToolError
+        If there is none.
+    """
+    folders = os.pathsep.join((scripts(), os.environ.get("PATH", os.defpath)))
+    found = shutil.which(name, path=folders)
+    if found is None:
+        raise ToolError(f"{name} is needed for boards and not installed: {EXTRA}")
+    return found
+
+
+def run(command: Sequence[str], folder: Path) -> None:
+    """Run a program in a folder; it sees nothing above it (YoWASP).
+
+    Raises
+    ------
+    ToolError
+        If it is missing or fails, with the first line that tells of an error, or the last one.
+    """
+    done = subprocess.run(
+        [find(command[0]), *command[1:]],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
+    )
+    if done.returncode:
+        raise ToolError(f"{command[0]}: {told(done.stdout) or f'exit status {done.returncode}'}")
+
+
+def told(output: str) -> str:
+    """The line of an output that says what is wrong."""
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
+    of_error = [line for line in lines if "error" in line.lower()]
+    return (of_error or lines[-1:] or [""])[0][:_LONGEST]
+
+
+def versions(packages: Iterable[str]) -> dict[str, str]:
+    """Versions of packages.
+
+    Raises
+    ------
+    ToolError
+        If one is not installed.
+    """
+    try:
+        return {package: importlib.metadata.version(package) for package in packages}
+    except importlib.metadata.PackageNotFoundError as error:
+        raise ToolError(f"{error.name} is needed for boards and not installed: {EXTRA}") from error

@@ -1,0 +1,142 @@
+"""`tachometry build`: a core on a board, as a bitstream or as a project for the vendor's tools."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tachometry.boards.fpga.board import Board
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.board import board_argument, boards_help, default_folder
+from tachometry.cli.options.core import board_core_options
+from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.spec import TachometerSpec
+from tachometry.spec.manifest import check_module_name
+from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
+
+if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
+    from tachometry.boards.fpga.build import Built
+
+_SERIAL = ("uart", "spi")  # buses that leave the FPGA over a few pins
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Build a core for a board: a bitstream, or a project for the vendor's tools.",
+    epilog=f"""{boards_help()}
+
+\b
+Examples:
+  tachometry build icebreaker --ppr 500
+  tachometry build tang-nano-9k --ppr 2048 --filter 4 -o rig
+  tachometry program tang-nano-9k rig""",
+)
+@board_argument
+@board_core_options
+@option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
+@option(
+    "Files",
+    "--output",
+    "-o",
+    "directory",
+    type=FilePath(file_okay=False),
+    metavar="DIR",
+    help="Directory to write to; it is made if it does not exist, and files in it are overwritten. "
+    "[default: build/BOARD]",
+)
+@option(
+    "Files",
+    "--bus",
+    type=click.Choice(_SERIAL),
+    default=_SERIAL[0],
+    help="How the registers are read; "
+    + "; ".join(f"{name}: {BUSES[name].help}" for name in _SERIAL)
+    + ". A UART is on the USB of the board, where the board has one.",
+)
+@option(
+    "Files",
+    "--baud",
+    type=click.IntRange(min=1),
+    metavar="BITS",
+    help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
+    f"{DEFAULT_BAUD}, if it is not given.",
+)
+def build(
+    board: Board,
+    spec: TachometerSpec,
+    name: str,
+    directory: Path | None,
+    bus: str,
+    baud: int | None,
+) -> int:
+    """Build a core for a board: with its registers on a UART or on SPI, and an emulated encoder beside it.
+
+    \b
+    DIR/NAME.bin, .bit or .fs  bitstream, where open tools make one
+    DIR/NAME.zip               else a project for Vivado or Quartus
+    DIR/NAME.v                 the same design as Verilog
+    DIR/NAME.json              manifest: registers, pins, tools, every option
+
+    The tools are Python packages: pip install 'tachometry[boards]'. A design that is too slow for the clock of the
+    board is refused. What was built is printed: cells, memories, and the greatest frequency.
+
+    Pins and wiring of every board are in docs/boards.md.
+    """
+    begun = time.monotonic()
+    check_module_name(name)
+    on = bus_of(bus, baud)
+    assert on is not None
+    if on.baud:
+        on.bit_cycles(spec.timing.clock_hz)
+    from tachometry.boards.fpga import build as builder
+
+    builder.check_tools(board)
+    suffix = ".zip" if board.flow is None else board.flow.suffix
+    suffixes = (suffix, ".json", ".v")
+    folder = default_folder(board) if directory is None else directory
+    with Outputs({kind: folder / f"{name}{kind}" for kind in suffixes}) as outputs:
+        from tachometry.boards.fpga.top import component, described
+        from tachometry.cli.reports.terminal import activity
+        from tachometry.hdl.export import verilog_of
+
+        core = component(spec, on)
+        manifest = described(core, spec, on, board, name)
+        with activity() as say:
+            built = builder.build(core, board, say)
+            say("writing Verilog")
+            verilog = verilog_of(component(spec, on), manifest)
+        manifest["board"] |= _made(board, name, built)
+        outputs[suffix].write_bytes(built.content)
+        outputs[".json"].write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8", newline="\n")
+        outputs[".v"].write_text(verilog, encoding="utf-8", newline="\n")
+    for kind in suffixes:
+        click.echo(click.format_filename(folder / f"{name}{kind}"))
+    click.echo()
+    _print(board, built, time.monotonic() - begun)
+    return 0
+
+
+def _made(board: Board, name: str, built: Built) -> dict[str, Any]:
+    """What the manifest says of how the bitstream or the project was made."""
+    return {
+        "archive" if board.flow is None else "bitstream": f"{name}{built.suffix}",
+        "tools": dict(built.tools),
+        **({} if built.seed is None else {"seed": built.seed}),
+    }
+
+
+def _print(board: Board, built: Built, seconds: float) -> None:
+    from tachometry.cli.reports.terminal import print_rows
+
+    rows = [("board", board.title)]
+    rows += [(kind, f"{used:,} of {there:,}") for kind, (used, there) in built.cells.items() if there]
+    if built.fmax is not None:
+        rows.append(("Fmax", f"{built.fmax:.1f} MHz, the clock has {board.clock_hz / 1e6:g} MHz"))
+    else:
+        rows.append(("project", "unpack it and run build_top.sh or build_top.bat, with the vendor's tools on the PATH"))
+    rows.append(("time", f"{seconds:.1f} s"))
+    print_rows(rows)
