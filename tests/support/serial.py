@@ -200,6 +200,7 @@ class UartHost(Host):
         self._sent.append((answered, request, numbers))
         length = frames.answer_length(frame)
         if talk:
+            self.quiet(float(self.rng.uniform(0, 9)))
             self.send(self.rng.bytes(min(2, length - 2)))
         self.time = answered + 10 * self.bit * length - self.bit / 2
 
@@ -234,7 +235,7 @@ class UartHost(Host):
         """A request of which something is wrong, and that must have no effect."""
         rng = self.rng
         frame = bytearray(self.random_request(control, velocity, n_words, longest))
-        kind = rng.choice(["bits", "byte", "short", "gap", "stop", "type", "noise", "more", "break"])
+        kind = rng.choice(["bits", "byte", "short", "gap", "stop", "type", "noise", "more", "break", "within"])
         if kind == "bits":
             for bit in rng.choice(8 * len(frame), int(rng.integers(1, 4)), replace=False).tolist():
                 frame[bit // 8] ^= 1 << bit % 8
@@ -254,6 +255,12 @@ class UartHost(Host):
         elif kind == "break":
             self.pulse(int(rng.integers(10, 40)) * self.bit)
             self.quiet(frames.QUIET_BITS)
+            return
+        if kind == "within":
+            place = int(rng.integers(1, len(frame)))
+            self.send(bytes(frame[:place]), stop=0)
+            self.quiet(2)
+            self.dropped(bytes(frame[place:]))
             return
         assert kind in ("gap", "stop") or not _is_request(bytes(frame)), kind
         self.dropped(bytes(frame), gap=frames.QUIET_BITS if kind == "gap" else 0, stop=kind != "stop")

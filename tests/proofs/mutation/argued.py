@@ -28,6 +28,13 @@ ARGUED = {
     ("mt, in clocks", "change = Signal(signed(max(len(shown), spec.native_width) + 1))", "change[6] const0"): (
         "it is read to decide whether the velocity decays: the change is at most 48, from −48 to 0, and less than 64"
     ),
+    ("uart", "with m.If(beat & (place == 0) & in_header):", "A[0] inv"): (
+        "the check is set in all clocks of the start bit but the last, instead of in the last: it is not read before"
+    ),
+    ("uart", "place = Signal(range(QUIET_BITS))", "Y[2] inv"): (
+        "the place that a reset gives: it counts bits of quiet, after which the parts of a frame are what they are after "
+        "a reset, and a start bit sets it to 0"
+    ),
 }
 
 
