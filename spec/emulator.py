@@ -33,7 +33,7 @@ class EmulatorSettings:
     speed : int
         Phase a clock that it goes to, signed, 32 bits.
     rate : int
-        Change of the speed a clock, in 2^-16; 0: at once.
+        Change of the speed in two clocks, in 2^-16; 0: at once.
     phase_error, duty_a, duty_b : int
         How late B rises, A falls and B falls, in 2^-10 periods, signed, 8 bits.
     jitter : int
@@ -65,8 +65,8 @@ def rad_per_s(spec: TachometerSpec, speed: int) -> float:
 
 
 def rate_of(spec: TachometerSpec, rad_per_s2: float) -> int:
-    """Change of the phase a clock in a clock at an acceleration of the shaft."""
-    return round(_periods(spec, rad_per_s2) / spec.timing.clock_hz**2 * 2 ** (PHASE_WIDTH + RATE_SHIFT))
+    """Change of the phase a clock in two clocks at an acceleration of the shaft."""
+    return round(2 * _periods(spec, rad_per_s2) / spec.timing.clock_hz**2 * 2 ** (PHASE_WIDTH + RATE_SHIFT))
 
 
 def fastest(spec: TachometerSpec) -> float:

@@ -74,7 +74,7 @@ def steps(registers: DemoMap) -> list[Step]:
     def at(part: float) -> int:
         return speed_of(spec, part * highest)
 
-    quick = rate_of(spec, highest / 0.02)
+    quick = min(rate_of(spec, highest / 0.02), (1 << 32) - 1)
     turning = EmulatorSettings(speed=at(0.3))
     faults = replace(turning, phase_error=30, duty_a=-20, duty_b=15, jitter=15, bounce=1, drop=3)
     return [

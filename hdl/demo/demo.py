@@ -30,7 +30,7 @@ class Demo(wiring.Component):
 
     Members
     -------
-    The inputs of the spec and the ports of the bus, less `clk`, `rst` and `capture`, and
+    The inputs of the spec and the ports of the bus, less `clk` and `rst`, and
 
     emulated_a, emulated_b : Out(1)
         Lines of the emulated encoder; `emulated_z`, too, if the core has an index.
@@ -56,7 +56,7 @@ class Demo(wiring.Component):
         self._bus_ports = [port for port in bus.ports(registers) if port.name != CAPTURE.name]
         super().__init__(
             {
-                **members((*spec.pins, *self._bus_ports)),
+                **members((*spec.pins, CAPTURE, *self._bus_ports)),
                 **{f"emulated_{line}": Out(1) for line in self._lines},
                 "leds": Out(_LEDS),
             }
@@ -104,6 +104,7 @@ class Demo(wiring.Component):
         for port in self._bus_ports:
             mine, its = getattr(self, port.name), getattr(bridge, port.name)
             m.d.comb += its.eq(mine) if port.direction == "input" else mine.eq(its)
+        m.d.comb += core.capture.eq(self.capture)
         self._native(m, sends)
 
         wrong = Signal()

@@ -41,7 +41,7 @@ class EncoderEmulator(wiring.Component):
     speed : In(signed(32))
         Phase a clock that it goes to.
     rate : In(32)
-        Change of the speed in a clock, in 2^-16; 0: at once.
+        Change of the speed in two clocks, in 2^-16; 0: at once.
     phase_error, duty_a, duty_b : In(signed(8))
         How late B rises, A falls and B falls, in 2^-10 periods.
     jitter : In(6)
@@ -78,15 +78,18 @@ class EncoderEmulator(wiring.Component):
         m = Module()
         speed = Signal(signed(PHASE_WIDTH + RATE_SHIFT))
         target = Signal.like(speed)
+        # In two clocks: the sum and its comparison are long carry chains.
+        second = Signal()
         down = Signal()
         turned = Signal(signed(len(speed) + 1))
-        m.d.comb += [
-            target.eq(self.speed << RATE_SHIFT),
-            down.eq(target < speed),
-            turned.eq(speed + Mux(down, -self.rate, self.rate)),
-        ]
+        goes_down = Signal()
+        m.d.comb += [target.eq(self.speed << RATE_SHIFT), goes_down.eq(target < speed)]
         passed = Mux(down, turned <= target, turned >= target)
-        m.d.sync += speed.eq(Mux((self.rate == 0) | passed, target, turned))
+        m.d.sync += second.eq(~second)
+        with m.If(second):
+            m.d.sync += speed.eq(Mux((self.rate == 0) | passed, target, turned))
+        with m.Else():
+            m.d.sync += [down.eq(goes_down), turned.eq(speed + Mux(goes_down, -self.rate, self.rate))]
 
         phase = Signal(PHASE_WIDTH, init=START)
         after = Signal(signed(PHASE_WIDTH + 2))

@@ -111,7 +111,8 @@ class GoldenEmulator:
         self._lines_per_rev = lines_per_rev
         self._random = _Random()
         self._lines = [_Line(k, self._random) for k in range(2)]
-        self._clock = self._speed = self._moved = 0
+        self._clock = self._speed = self._moved = self._turned = 0
+        self._down = False
         self._total = START  # the phase, and whole periods above it
         self._between = 1
         self._z = [0, 0]
@@ -143,17 +144,30 @@ class GoldenEmulator:
         a, b, z = (every >> np.uint8(bit) & np.uint8(1) for bit in range(3))
         return PinTrace(np.concatenate(clocks), a, b, n_clocks, None if self._lines_per_rev is None else z)
 
+    def _speeds(self, n: int, target: int, rate: int) -> NDArray[np.int64]:
+        """Speeds in n clocks and in the one after; they change in every second clock, by what the one before found."""
+        first = np.full(self._clock % 2, self._speed, dtype=np.int64)  # the second clock of a change that has begun
+        speed = self._speed
+        if len(first):
+            passed = self._turned <= target if self._down else self._turned >= target
+            speed = target if passed or not rate else self._turned
+        step = -rate if target < speed else rate
+        ramp = speed + step * np.arange(n // 2 + 2, dtype=np.int64)
+        if rate == 0:
+            ramp[1:] = target
+        ramp = np.maximum(ramp, min(target, speed)) if step < 0 else np.minimum(ramp, max(target, speed))
+        found = np.append(first, np.repeat(ramp, 2))[: n + 1]
+        if (self._clock + n) % 2:
+            self._down = target < int(found[n])
+            self._turned = int(found[n]) + (-rate if self._down else rate)
+        return found
+
     def _play(self, clock: NDArray[np.int64], settings: EmulatorSettings) -> NDArray[np.uint8]:
         """A + 2 B + 4 Z in these clocks."""
         n = len(clock)
         self._random.until(self._clock + n)
         target = settings.speed << RATE_SHIFT
-        if settings.rate:
-            step = settings.rate if target >= self._speed else -settings.rate
-            speed = self._speed + step * np.arange(n + 1)
-            speed = np.minimum(speed, target) if step > 0 else np.maximum(speed, target)
-        else:
-            speed = np.append(self._speed, np.full(n, target))
+        speed = self._speeds(n, target, settings.rate)
         total = self._total + np.append(0, np.cumsum(speed[:n] >> RATE_SHIFT))
         self._speed, self._total = int(speed[n]), int(total[n])
 

@@ -49,7 +49,7 @@ class DemoMap(RegisterMap):
         unit = "2^-32 periods of a line in a clock"
         speed = Field("value", WORD, writable=True, signed=True, unit=unit, port="speed")
         yield "SPEED", "Speed that the emulator goes to.", (speed,), {}
-        unit = f"2^-{WORD + RATE_SHIFT} periods of a line in a clock squared"
+        unit = f"2^-{WORD + RATE_SHIFT + 1} periods of a line in a clock squared"
         rate = Field("value", WORD, writable=True, unit=unit, port="rate")
         yield "RATE", "How fast the emulator's speed goes there; 0: at once.", (rate,), {}
         unit = "in 2^-10 periods of a line, in two's complement."

@@ -29,7 +29,7 @@ def random_steps(registers: DemoMap, seed: int) -> list[Step]:
     def settings() -> EmulatorSettings:
         return EmulatorSettings(
             speed=speed_of(spec, float(rng.uniform(-1, 1) * rng.choice([0.01, 0.2, 0.9])) * fastest(spec)),
-            rate=int(rng.choice([0, rate_of(spec, fastest(spec) / 0.002)])),
+            rate=int(rng.choice([0, rate_of(spec, fastest(spec) / 0.005)])),
             **{name: int(rng.integers(-40, 40)) for name in ("phase_error", "duty_a", "duty_b")},
             jitter=int(rng.choice([0, 7, 15])),
             bounce=int(rng.choice([0, 1, 9])),

@@ -57,7 +57,11 @@ def check(seed: int) -> None:
 
 EMULATOR, LINE = emulator.EncoderEmulator, line.EmulatedLine
 MUTANTS = {
-    "the speed turns away": (EMULATOR, "Mux(down, -self.rate, self.rate)", "Mux(down, self.rate, -self.rate)"),
+    "the speed turns away": (
+        EMULATOR,
+        "Mux(goes_down, -self.rate, self.rate)",
+        "Mux(goes_down, self.rate, -self.rate)",
+    ),
     "the speed never arrives": (EMULATOR, "| passed, target", "& passed, target"),
     "the speed overshoots": (EMULATOR, "turned <= target, turned >= target", "turned >= target, turned <= target"),
     "a jump turns by a quarter": (EMULATOR, "self.jump << PHASE_WIDTH - 1", "self.jump << PHASE_WIDTH - 2"),
@@ -140,7 +144,7 @@ def test_lines_bounce_for_as_long_as_asked() -> None:
 
 
 def test_the_speed_changes_at_the_rate() -> None:
-    rate = 1 << 20  # reaches 2^20 phase a clock in 2^16 clocks
+    rate = 1 << 21  # in two clocks: reaches 2^20 phase a clock in 2^16 clocks
     a, _ = edges(EmulatorSettings(speed=1 << 20, rate=rate), 1 << 19)
     periods = (a[-1] - 2**16 / 2) * 2**20 / 2**32  # half of the ramp is missing
     assert abs(len(a) / 2 - periods) <= 1

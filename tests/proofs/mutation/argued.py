@@ -32,8 +32,8 @@ ARGUED = {
         "the check is set in all clocks of the start bit but the last, instead of in the last: it is not read before"
     ),
     ("uart", "place = Signal(range(QUIET_BITS))", "Y[2] inv"): (
-        "the place that a reset gives: it counts bits of quiet, after which the parts of a frame are what they are after "
-        "a reset, and a start bit sets it to 0"
+        "the place that a reset gives: it counts bits of quiet, after which the parts of a frame are what they are "
+        "after a reset, and a start bit sets it to 0"
     ),
 }
 
