@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from amaranth import Elaboratable, Module, Shape, Value
+from amaranth import Elaboratable, Module, Value
 from amaranth.build import Attrs, Pins, Resource, Subsignal
 from amaranth.lib import io, wiring
 from amaranth.lib.wiring import In
@@ -10,11 +10,10 @@ from amaranth.lib.wiring import In
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.capture_pin import CapturePin
 from tachometry.hdl.demo.demo import Demo
-from tachometry.spec import ParameterError, Port, TachometerSpec
-from tachometry.spec.manifest import described_port
+from tachometry.spec import TachometerSpec
 from tachometry.spec.provenance import LICENSE, generator
-from tachometry.spec.registers.buses import Bus, manifest_on
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.buses import Bus
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
 # The lines of the UART are on the board's own bridge to USB.
 _UART = {"uart_rx": "rx", "uart_tx": "tx"}
@@ -27,28 +26,19 @@ def component(spec: TachometerSpec, bus: Bus) -> wiring.Component:
     return Demo(DemoMap(spec), bus)
 
 
-def described(core: wiring.Component, spec: TachometerSpec, bus: Bus, board: Board, name: str) -> dict[str, Any]:
-    """The manifest of what `component` has made for a board; its ports are those of the Verilog.
+def described(spec: TachometerSpec, bus: Bus, board: Board, name: str) -> dict[str, Any]:
+    """The manifest of what `component` makes for a board.
 
     Raises
     ------
     ParameterError
         If `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
     """
-    ports = core.signature.members
-    if name in ports:
-        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
-    found = {"generator": generator(), "license": LICENSE, **manifest_on(DemoMap(spec), bus, name)}
-    clocked = [port for port in found["ports"] if port["name"] in ("clk", "rst")]
-    found["ports"] = clocked + [described_port(_port(port, member)) for port, member in ports.items()]
+    found = {"generator": generator(), "license": LICENSE, **demo_manifest(DemoMap(spec), bus, name)}
+    ports = {port["name"] for port in found["ports"]}
     return found | {
         "board": {"name": board.name, "pins": {name: at for name, at in board.pins.items() if name in ports}}
     }
-
-
-def _port(name: str, member: Any) -> Port:
-    shape = Shape.cast(member.shape)
-    return Port(name, "input" if member.flow == In else "output", shape.width, shape.signed)
 
 
 class BoardTop(Elaboratable):

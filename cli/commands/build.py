@@ -104,7 +104,7 @@ def build(
         from tachometry.hdl.export import verilog_of
 
         core = component(spec, on)
-        manifest = described(core, spec, on, board, name)
+        manifest = described(spec, on, board, name)
         with activity() as say:
             built = builder.build(core, board, say)
             say("writing Verilog")

@@ -2,7 +2,6 @@
 
 from amaranth import Cat, Module, Mux, ResetInserter, Signal
 from amaranth.lib import wiring
-from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.bus.telemetry import TelemetrySender
@@ -11,11 +10,8 @@ from tachometry.hdl.bus_tachometer import BRIDGES
 from tachometry.hdl.demo.emulator import EncoderEmulator
 from tachometry.hdl.register_core import RegisterCore
 from tachometry.spec.registers.buses import CAPTURE, Bus
-from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
+from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports
 from tachometry.spec.registers.map import WORD
-
-_LEDS = 4
-_LINES = ("a", "b", "z")
 
 
 class Demo(wiring.Component):
@@ -30,13 +26,7 @@ class Demo(wiring.Component):
 
     Members
     -------
-    The inputs of the spec and the ports of the bus, less `clk` and `rst`, and
-
-    emulated_a, emulated_b : Out(1)
-        Lines of the emulated encoder; `emulated_z`, too, if the core has an index.
-    leds : Out(4)
-        The shaft turns; it turned backward at the last update; something went wrong since reset or clear; the clock
-        runs.
+    `demo_ports` of the spec, less `clk` and `rst`.
 
     Raises
     ------
@@ -48,19 +38,13 @@ class Demo(wiring.Component):
         spec = registers.spec
         self._map = registers
         self.core = RegisterCore(registers)
-        self._lines = [pin.name for pin in spec.pins if pin.name in _LINES]
+        self._lines = [pin.name for pin in spec.pins if pin.name in ENCODER_LINES]
         self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None)
         cycles = (bus.bit_cycles(spec.timing.clock_hz),) if bus.baud else ()
         self.bridge = BRIDGES[bus.name](registers, *cycles)
         self.telemetry = TelemetrySender(registers, *cycles) if isinstance(self.bridge, UartBridge) else None
         self._bus_ports = [port for port in bus.ports(registers) if port.name != CAPTURE.name]
-        super().__init__(
-            {
-                **members((*spec.pins, CAPTURE, *self._bus_ports)),
-                **{f"emulated_{line}": Out(1) for line in self._lines},
-                "leds": Out(_LEDS),
-            }
-        )
+        super().__init__(members(demo_ports(registers, bus)))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

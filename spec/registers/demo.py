@@ -3,11 +3,17 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from tachometry.spec.emulator import BOUNCE_WIDTH, DROP_WIDTH, ERROR_WIDTH, JITTER_WIDTH, RATE_SHIFT
+from tachometry.spec.manifest import described_port
+from tachometry.spec.option import ParameterError
 from tachometry.spec.port import TICK, Port, held
+from tachometry.spec.registers.buses import Bus, manifest_on
 from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
 
+ENCODER_LINES = ("a", "b", "z")
+LEDS = 4
 PERIOD_WIDTH = 16  # bits of the telemetry's period
 
 
@@ -65,6 +71,32 @@ class DemoMap(RegisterMap):
             _setting("drop", DROP_WIDTH, 16, "So many of 256 edges of each line are left out."),
         )
         yield "NOISE", "Where the emulated edges are wrong, at random.", fields, {}
+
+
+def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
+    """All ports of a demo on a bus."""
+    inputs = [port for port in registers.spec.ports if port.direction == "input"]
+    emulated = [
+        Port(f"emulated_{pin.name}", "output", help=f"Line {pin.name.upper()} of the emulated encoder.")
+        for pin in inputs
+        if pin.name in ENCODER_LINES
+    ]
+    lights = "The shaft turns; it turned backward at the last update; something went wrong; the clock runs."
+    return (*inputs, *bus.ports(registers), *emulated, Port("leds", "output", LEDS, help=lights))
+
+
+def demo_manifest(registers: DemoMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
+    """The manifest of a demo on a bus.
+
+    Raises
+    ------
+    ParameterError
+        If `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
+    """
+    ports = demo_ports(registers, bus)
+    if name in {port.name for port in ports}:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    return {**manifest_on(registers, bus, name), "ports": [described_port(port) for port in ports]}
 
 
 def _setting(name: str, width: int, low: int, help: str, *, signed: bool = False) -> Field:

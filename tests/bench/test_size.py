@@ -133,7 +133,7 @@ def test_boxes_are_counted_and_sorted() -> None:
 
 
 def test_wrapper_connects_every_port_to_bits_of_its_own() -> None:
-    text = synthesis.wrapper(SPEC)
+    text = synthesis.wrapper(SPEC.ports)
     found = re.findall(r"\.(\w+)\((\w+)(?:\[(\d+) \+: (\d+)\])?\)", text)
     assert [name for name, *_ in found] == [port.name for port in SPEC.ports]
     assert [int(width or 1) for *_, width in found] == [port.width for port in SPEC.ports]
@@ -152,7 +152,7 @@ def test_wrapper_connects_every_port_to_bits_of_its_own() -> None:
 
 def test_wrapper_elaborates(tmp_path: Path) -> None:
     (tmp_path / "core.v").write_text(export(SPEC, synthesis.CORE)[f"{synthesis.CORE}.v"])
-    (tmp_path / "wrapper.v").write_text(synthesis.wrapper(SPEC))
+    (tmp_path / "wrapper.v").write_text(synthesis.wrapper(SPEC.ports))
     lint(["wrapper.v", "core.v"], "wrapper", tmp_path)
 
 
@@ -213,7 +213,7 @@ def test_target_table_has_units_and_a_row_per_configuration() -> None:
 )
 def test_bars(changed: dict[str, float], missed: list[str]) -> None:
     rows = size.bar_table(results(**changed)).rows
-    assert len(rows) == sum(len(bars) for bars in size.BARS.values())
+    assert len(rows) == sum(len(bars) for bars in size.CONFIGURATIONS[0].bars.values())
     assert [row[2] for row in rows if row[-1] == "missed"] == missed
 
 

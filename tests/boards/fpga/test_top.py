@@ -185,7 +185,7 @@ PULL_UP = {
 def test_every_board_has_pins_for_every_port(name: str, bus: str) -> None:
     board = BOARDS[name]
     design = core(board, bus)
-    wanted = {"a", "b", "z", "tick_in", "emulated_a", "emulated_b", "emulated_z"}
+    wanted = {"a", "b", "z", "tick_in", "capture", "emulated_a", "emulated_b", "emulated_z"}
     wanted |= {line.name for line in BUSES[bus].lines} if bus == "spi" else set()
     assert wanted == board.pins.keys() & design.signature.members.keys()
     plan = prepared(design, board)

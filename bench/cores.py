@@ -1,0 +1,164 @@
+"""The cores that `make size` measures, and the bars that they must reach."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from tachometry.hdl import export
+from tachometry.hdl.demo.demo import Demo
+from tachometry.hdl.export import verilog_of
+from tachometry.sim.studies.size import CORE, TARGETS
+from tachometry.spec import (
+    Encoder,
+    MTachometer,
+    MTTachometer,
+    Port,
+    RairanTachometer,
+    Speed,
+    STachometer,
+    TachometerSpec,
+    Timing,
+    TTachometer,
+)
+from tachometry.spec.registers.buses import BUSES, bus_of, manifest_on, ports_on
+from tachometry.spec.registers.demo import DemoMap, demo_ports
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A core to be measured.
+
+    Parameters
+    ----------
+    name, what : str
+        Its name, and what distinguishes it, for the tables.
+    spec : TachometerSpec
+    bars : dict
+        Limits by target and figure: Fmax must reach its bar, everything else must not exceed it.
+    is_option : bool
+        Whether the difference from the first configuration is what one option costs.
+    targets : tuple of str
+    bus : str
+        On which its registers are, or `none`.
+    demo : bool
+        With emulator and telemetry.
+    """
+
+    name: str
+    what: str
+    spec: TachometerSpec
+    bars: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    is_option: bool = True
+    targets: tuple[str, ...] = tuple(TARGETS)
+    bus: str = "none"
+    demo: bool = False
+
+    @property
+    def hardware(self) -> tuple[str, tuple[Port, ...]]:
+        """Verilog and ports."""
+        bus = bus_of(self.bus)
+        if self.demo and bus is not None:
+            registers = DemoMap(self.spec)
+            described = {"generator": "", "license": "", **manifest_on(registers, bus, CORE)}
+            return verilog_of(Demo(registers, bus), described), demo_ports(registers, bus)
+        return export(self.spec, CORE, self.bus)[f"{CORE}.v"], ports_on(self.spec, bus)
+
+
+# What methods are compared with: the defaults, and no max_speed.
+COMMON: Any = {"encoder": Encoder(500, 4), "timing": Timing.parse("48MHz", "20us", "10ms")}
+REFERENCE = STachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), frac_bits=16)
+BARS = {
+    "ECP5": {"COMB": 330, "FF": 300, "DP16KD": 1, "MULT": 0, "Fmax": 130, "latency": 12},
+    "HX8K": {"LC": 400, "RAM": 4, "Fmax": 115},
+    "UP5K": {"Fmax": 48},
+}
+M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
+RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
+ADAPTIVE_BARS = {"ECP5": {"COMB": 700, "MULT": 0, "Fmax": 100}}
+TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
+EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
+# The reference core, and 250 COMB and 100 FF for the bank.
+BUS_BARS = {"ECP5": {"COMB": 273 + 250, "FF": 220 + 100}}
+PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
+
+# The first is what the others are compared with.
+CONFIGURATIONS = (
+    Configuration("reference", "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits", REFERENCE, BARS, False),
+    Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None)),
+    Configuration("no-cancel", "eq. (17) instead of eq. (21)", replace(REFERENCE, cancel=False)),
+    Configuration("frac-bits-8", "8 fraction bits", replace(REFERENCE, frac_bits=8)),
+    Configuration("frac-bits-24", "24 fraction bits", replace(REFERENCE, frac_bits=24)),
+    Configuration("x1", "x1 decoding", replace(REFERENCE, encoder=Encoder(500, 1))),
+    Configuration("position-16", "16-bit position", replace(REFERENCE, position_width=16)),
+    Configuration("filter-4", "glitch filter, 4 clocks", replace(REFERENCE, filter_clocks=4)),
+    Configuration("index", "index captures the position", replace(REFERENCE, index=True)),
+    Configuration("index-reset", "and resets it", replace(REFERENCE, index=True, index_reset=True)),
+    Configuration("external-tick", "external tick, up to 40 us", replace(REFERENCE, max_tick_cycles=1920)),
+    Configuration("rad-per-s", "velocity in 2^-10 rad/s", replace(REFERENCE, unit="rad/s", frac_bits=10)),
+    Configuration("rpm", "velocity in 2^-6 rpm", replace(REFERENCE, unit="rpm", frac_bits=6)),
+    Configuration("velocity-16", "16-bit velocity, saturating", replace(REFERENCE, max_speed=None, velocity_width=16)),
+    Configuration("age", "ticks since the update", replace(REFERENCE, age=True)),
+    Configuration("bounds", "bounds of the true speed", replace(REFERENCE, bounds=True)),
+    Configuration("lowpass", "low-pass filter, 200 rad/s", replace(REFERENCE, lowpass=Fraction(200))),
+    *(
+        Configuration(
+            f"bus-{bus.name}",
+            f"registers on {bus.name}",
+            REFERENCE,
+            BUS_BARS if bus.name == "native" else {},
+            targets=("ECP5", "HX8K"),
+            bus=bus.name,
+        )
+        for bus in BUSES.values()
+    ),
+    Configuration("demo", "demo with emulator and telemetry", REFERENCE, is_option=False, bus="uart", demo=True),
+    Configuration(
+        "long",
+        "at most 2^16 ticks (1.3 s)",
+        replace(REFERENCE, timing=Timing(48_000_000, 960, 1 << 16)),
+    ),
+    Configuration(
+        "every-clock",
+        "a tick per clock, up to 2^16 ticks",
+        STachometer(encoder=Encoder(500, 4), timing=Timing(48_000_000, 1, 1 << 16)),
+        EVERY_CLOCK_BARS,
+        False,
+    ),
+    Configuration(
+        "every-clock-rad",
+        "and velocity in 2^10 rad/s",
+        STachometer(encoder=Encoder(500, 4), timing=Timing(48_000_000, 1, 1 << 16), unit="rad/s", frac_bits=-10),
+        is_option=False,
+    ),
+    Configuration("m", "M method", MTachometer(**COMMON), M_BARS, is_option=False),
+    Configuration("m-10", "M method, mean of 10 ticks", MTachometer(**COMMON, average=10), M_BARS, is_option=False),
+    Configuration("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS, is_option=False),
+    Configuration(
+        "rairan-adaptive",
+        "adaptive dt, 1 %, 1000 rad/s",
+        RairanTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), adaptive=Fraction(1, 100)),
+        ADAPTIVE_BARS,
+        is_option=False,
+    ),
+    Configuration(
+        "rairan-exact",
+        "Table 1 to the letter, n3",
+        RairanTachometer(**COMMON, paper_exact=True),
+        is_option=False,
+    ),
+    Configuration("t", "T method", TTachometer(**COMMON), TIMED_BARS, is_option=False),
+    Configuration("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS, is_option=False),
+    Configuration("t-tick", "T method, times in ticks", TTachometer(**COMMON, timer="tick"), is_option=False),
+    Configuration("mt-tick", "M/T method, times in ticks", MTTachometer(**COMMON, timer="tick"), is_option=False),
+    *(
+        Configuration(f"{name}-bounds", f"{what}, with bounds", method(**COMMON, bounds=True), {}, False, ("ECP5",))
+        for name, what, method in (
+            ("m", "M method", MTachometer),
+            ("rairan", "Rairán's method", RairanTachometer),
+            ("t", "T method", TTachometer),
+            ("mt", "M/T method", MTTachometer),
+        )
+    ),
+    Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
+)
