@@ -78,10 +78,13 @@ class Receiver:
         self.answer: frames.Answer | None = None
 
     def feed(self, data: bytes) -> None:
-        """Take bytes; `telemetry` and `answer` have what was found in them."""
+        """Take bytes; `telemetry` and `answer` have what was found in them.
+
+        What stands behind an answer is left for the next call: it may be of other telemetry than what was before.
+        """
         self._bytes += data
-        at = 0
-        while at < len(self._bytes):
+        asked, at = self.request, 0
+        while at < len(self._bytes) and self.request == asked:
             size = self._frame(at)
             if size == 0:
                 break

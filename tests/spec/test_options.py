@@ -130,12 +130,12 @@ def test_parameters_say_which_core_it_is(method: str) -> None:
 def test_parameters_of_another_version_are_refused() -> None:
     parameters = of_texts("s", {"ppr": "8"}).parameters
     with pytest.raises(
-        ParameterError, match="^parameters must be those that this version of tachometry writes: later is none"
+        ParameterError, match=r"^parameters must be those that this version of tachometry writes: later is none"
     ):
         of_parameters(parameters | {"later": 1})
-    with pytest.raises(ParameterError, match=": max_ticks is missing$"):
+    with pytest.raises(ParameterError, match=r": max_ticks is missing$"):
         of_parameters({name: value for name, value in parameters.items() if name != "max_ticks"})
-    with pytest.raises(ParameterError, match="^method must be one of s, m, t, mt, rairan, not 'x'$"):
+    with pytest.raises(ParameterError, match=r"^method must be one of s, m, t, mt, rairan, not 'x'$"):
         of_parameters(parameters | {"method": "x"})
     with pytest.raises(ParameterError, match="must be"):
         of_parameters(parameters | {"tick_cycles": 0})
