@@ -7,6 +7,7 @@ import click
 from tachometry.cli.commands.compare import compare
 from tachometry.cli.commands.figures import figures
 from tachometry.cli.commands.generate import generate
+from tachometry.cli.commands.monitor import monitor
 from tachometry.cli.commands.plan import plan
 from tachometry.cli.commands.replay import replay
 from tachometry.cli.commands.simulate import simulate
@@ -55,6 +56,7 @@ cli.add_command(compare)
 cli.add_command(sweep)
 cli.add_command(figures)
 cli.add_command(verify)
+cli.add_command(monitor)
 
 
 def run(args: Sequence[str]) -> int:

@@ -25,7 +25,18 @@ class Port(Protocol):
 
 
 class NoAnswer(TimeoutError):
-    """Nothing that answers a request came in time."""
+    """Nothing that answers a request came in time.
+
+    Parameters
+    ----------
+    text : str
+    foreign : int
+        Bytes that came instead and belong to no frame.
+    """
+
+    def __init__(self, text: str, foreign: int = 0) -> None:
+        super().__init__(text)
+        self.foreign = foreign
 
 
 @dataclass
@@ -193,6 +204,8 @@ class Link:
         return found
 
     def _ask(self, request: Callable[[int], bytes]) -> frames.Answer:
+        counts = self.receiver.counts
+        frames_before, dropped_before = counts.frames, counts.bytes_dropped
         for _ in range(self._tries):
             self._sequence = (self._sequence + 1) % frames.SEQUENCES
             self.receiver.request, self.receiver.answer = request(self._sequence), None
@@ -205,7 +218,8 @@ class Link:
                     raise ValueError("there must be a register at this address, and a written one must be writable")
                 return self.receiver.answer
             self.receiver.reset()
-        raise NoAnswer(f"nothing has answered {self._tries} requests in {self._timeout:g} s each")
+        text = f"nothing has answered {self._tries} requests in {self._timeout:g} s each"
+        raise NoAnswer(text, counts.bytes_dropped - dropped_before if counts.frames == frames_before else 0)
 
 
 def _is_right(frame: bytes) -> bool:

@@ -10,10 +10,22 @@ from typing import Any, Self
 _WAIT = 0.02  # seconds for the first byte
 # What the system says of a port that is not there, for now.
 _ABSENT = frozenset((errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO))
+_BUSY = frozenset((errno.EAGAIN, errno.EBUSY))
 
 
 class Unplugged(OSError):
-    """The port is not there, for now."""
+    """The port is not there, for now.
+
+    Parameters
+    ----------
+    name : str
+        Of the port.
+    why : str
+    """
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(f"{name}: {why}")
+        self.why = why
 
 
 class SerialPort:
@@ -78,13 +90,15 @@ def _told(name: str, *, opens: bool = False) -> Iterator[None]:
     try:
         yield
     except serial.SerialTimeoutException as error:
-        raise Unplugged(f"{name} takes no bytes") from error
+        raise Unplugged(name, "it takes no bytes") from error
     except (ValueError, AttributeError, TypeError):
         raise
     except Exception as error:
         number = _number(error)
-        absent = number in _ABSENT or "FileNotFoundError" in str(error) or (number is None and not opens)
-        raise (Unplugged if absent else OSError)(_said(name, number, error)) from error
+        why = str(error) if number is None else os.strerror(number)
+        if number in _ABSENT or "FileNotFoundError" in why or (number is None and not opens):
+            raise Unplugged(name, why) from error
+        raise OSError(f"{name} is used by another program" if number in _BUSY else f"{name}: {why}") from error
 
 
 def _number(error: BaseException) -> int | None:
@@ -97,9 +111,3 @@ def _number(error: BaseException) -> int | None:
                 return number
         wrapped = wrapped.__context__
     return None
-
-
-def _said(name: str, number: int | None, error: Exception) -> str:
-    if number in (errno.EAGAIN, errno.EBUSY):
-        return f"{name} is used by another program"
-    return f"{name}: {error if number is None else os.strerror(number)}"
