@@ -106,7 +106,8 @@ class Session:
         self._before = Counts()  # of connections that have ended
         self._clocks = 0  # since the first frame
         self._latest: int | None = None  # time of the latest frame of this connection
-        self._heard = time.monotonic()
+        self._heard = time.monotonic()  # when the latest frame came,
+        self._patient_since = self._heard  # or the connection was made
         self._waits_for = ""
         self.connections = 0
 
@@ -142,13 +143,12 @@ class Session:
             self._disconnect(error.why)
             return []
         now = time.monotonic()
-        if not found and now - self._heard > self._silence:
+        if not found and now - self._patient_since > self._silence:
             self._disconnect("it is silent")
-        elif found:
-            frames = [Frame(self._time(snapshot["time"], now), snapshot) for snapshot in found]
-            self._heard = now
-            return frames
-        return []
+        frames = [Frame(self._time(snapshot["time"], now), snapshot) for snapshot in found]
+        if frames:
+            self._heard = self._patient_since = now
+        return frames
 
     def counters(self) -> dict[str, int]:
         """What the core has counted; empty if it cannot be asked now."""
@@ -193,8 +193,7 @@ class Session:
             if self.connections == 1 or self._waits_for:
                 self._told(f"connected to {self._name}")
             self._waits_for = ""
-            if self.connections == 1:
-                self._heard = time.monotonic()
+            self._patient_since = time.monotonic()
             return True
         self._give_back()
         return False

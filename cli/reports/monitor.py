@@ -217,7 +217,7 @@ def plot(state: State, width: int, height: int) -> Text:
         points = [(now, row[column]) for now, row in zip(times, state.history, strict=True) if row[column] is not None]
         if points:
             figure.plot(*zip(*points, strict=True), marker="braille", color=colour)
-    speeds = [speed for _, speed, *_ in state.history] or [0.0]
+    speeds = [float(value) for _, *values in state.history for value in values if value is not None] or [0.0]
     room = max(0.05 * (max(speeds) - min(speeds)), 0.02 * max(map(abs, speeds)), 1e-6)
     figure.ylim(min(speeds) - room, max(speeds) + room)
     last = times[-1] if times else 0.0
