@@ -73,6 +73,7 @@ class ToldBoard:
     def run(self, n_clocks: int, data: bytes = b"") -> tuple[bytes, bytes]:
         self.n_clocks += n_clocks
         if self.silent or self.noise:
+            self._next = self.n_clocks
             return b"" if self.silent else self.noise, b""
         sent = b""
         while len(data) >= 5:

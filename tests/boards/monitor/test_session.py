@@ -1,5 +1,6 @@
 """A board that is unplugged, silent, or another one."""
 
+import time
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -72,7 +73,8 @@ def session_of(cable: Cable, told: list[str] | None = None, **more: Any) -> sess
 def until(watched: session.Session, fine: Callable[[list[Frame]], bool]) -> list[Frame]:
     """Frames up to what is waited for; a board that never does it fails the test."""
     found: list[Frame] = []
-    for _ in range(5000):
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
         found += watched.poll()
         if fine(found):
             return found
@@ -155,7 +157,7 @@ def test_an_unplugged_board_is_waited_for() -> None:
             "        if why != self._waits_for:\n            self._told",
             "        if why:\n            self._told",
         ),
-        (check_unplugged, '            self._waits_for = ""\n            if', "            if"),
+        (check_unplugged, '            self._waits_for = ""\n', "            pass\n"),
     ],
 )
 def test_mutants_are_caught(check: Callable[[], None], right: str, wrong: str) -> None:
