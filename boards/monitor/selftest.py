@@ -79,7 +79,11 @@ def steps(registers: DemoMap) -> list[Step]:
         *(Step(f"speed {part:+.4g} of the highest", EmulatorSettings(speed=at(part))) for part in (1, -0.5, 0.05)),
         Step("slow", EmulatorSettings(speed=at(0.001)), rest=0.05 + silence),
         Step("acceleration", EmulatorSettings(speed=at(0.9), rate=quick)),
-        Step("reversals", EmulatorSettings(speed=at(0.5), rate=quick), [(0.03, {"speed": at(-0.5)})] * 2),
+        Step(
+            "reversals",
+            EmulatorSettings(speed=at(0.5), rate=quick),
+            [(0.03, {"speed": at(-0.5)}), (0.03, {"speed": at(0.5)})],
+        ),
         Step("standstill", turning, [(0.02, {"speed": 0})], rest=silence),
         Step("from standstill", EmulatorSettings(), [(silence, {"speed": at(-0.2)})]),
         Step("illegal edges", turning, [(0.02, {"jump": 1})] * 3),
