@@ -117,7 +117,9 @@ def monitor(
     if selftest:
         _refuse("--selftest", {"--record": record, "--set": words, "--duration": duration, "--serve": serve})
     if serve is not None:
-        _refuse("--serve", {"--record": record, "--set": words, "--manifest": manifest})
+        if not port.startswith(SIMULATED):
+            raise ValueError("--serve must be given with a simulated board")
+        _refuse("--serve", {"--record": record, "--set": words})
     seconds = None if duration is None else parse_time("duration", duration)
     if seconds is not None and seconds <= 0:
         raise ValueError(f"--duration must be longer than 0, not {duration}")

@@ -119,15 +119,7 @@ def selftest(target: Target) -> int:
 
 
 def serve(target: Target, path: Path, seconds: Fraction | None) -> int:
-    """Run a simulated board until it is stopped, for other programs.
-
-    Raises
-    ------
-    ValueError
-        If the board is not simulated.
-    """
-    if not target.simulated:
-        raise ValueError("--serve must be given with a simulated board")
+    """Run a simulated board until it is stopped, for other programs."""
     with interrupts() as stop, target.running() as name:
         with Outputs({"--serve": path}) as outputs:
             outputs["--serve"].write_text(json.dumps(target.manifest, indent=2) + "\n", encoding="utf-8", newline="\n")
