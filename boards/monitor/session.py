@@ -150,6 +150,17 @@ class Session:
             self._heard = self._patient_since = now
         return frames
 
+    def set(self, settings: Mapping[str, int]) -> None:
+        """Change settings of the emulator, now and after each connection from now on."""
+        self._settings |= settings
+        if self._board is not None:
+            try:
+                self._board.set(**settings)
+            except NoAnswer:
+                self._disconnect("nothing answers")
+            except Unplugged as error:
+                self._disconnect(error.why)
+
     def counters(self) -> dict[str, int]:
         """What the core has counted; empty if it cannot be asked now."""
         if self._board is None:

@@ -188,6 +188,23 @@ def test_a_silent_board_is_waited_for() -> None:
     watched.close()
 
 
+@pytest.mark.usefixtures("quick")
+def test_settings_that_change_hold_after_a_reconnection() -> None:
+    board = ToldBoard(demo_map())
+    cable = Cable(board)
+    watched = session_of(cable, settings={"speed": 7, "drop": 1})
+    until(watched, lambda found: len(found) > 3)
+    watched.set({"speed": 8})
+    assert (board.word("SPEED"), board.word("NOISE")) == (8, 1 << 16)
+    cable.plugged = False
+    watched.set({"speed": 9})
+    assert watched.waits_for == "it is out"
+    cable.plugged = True
+    until(watched, lambda found: len(found) > 3)
+    assert (board.word("SPEED"), board.word("NOISE")) == (9, 1 << 16)
+    watched.close()
+
+
 @pytest.mark.parametrize("noise", [b"Hello, world!\r\n", b"\xa5" * 40, bytes(range(128, 256))])
 def test_what_speaks_otherwise_is_refused(noise: bytes) -> None:
     board = ToldBoard(demo_map())
