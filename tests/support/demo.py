@@ -12,8 +12,8 @@ from tachometry.spec.registers.demo import DemoMap
 
 BOARD = "icebreaker"
 CLOCK_HZ = 12_000_000
-# Small, so that it is compiled soon, and with a short maximum time, so that silences are short.
-TEXTS = {"ppr": "500", "tick": "20us", "max-time": "5ms", "max-speed": "1000rad/s", "filter": "4"}
+# The core of docs/monitor.md.
+TEXTS = {"ppr": "500", "max-speed": "1000rad/s", "filter": "4"}
 WORDS = [word for name, text in TEXTS.items() for word in (f"--{name}", text)]
 
 

@@ -57,17 +57,17 @@ def damaged(registers: HostRegisters, n_frames: int, seed: int) -> Sent:
     random = np.random.default_rng([seed, 1])
     length = frames.shape[1]
     kinds = random.choice(6, n_frames, p=[0.8, 0.05, 0.05, 0.04, 0.03, 0.03])
-    for start in random.integers(0, n_frames, n_frames // 3000 + 1):  # the line is cut for a while
-        kinds[start : start + random.integers(1, 100)] = 6
+    for start in random.integers(0, n_frames, n_frames // 3000 + 1).tolist():  # the line is cut for a while
+        kinds[start : start + int(random.integers(1, 100))] = 6
     kinds[0] = kinds[-1] = 0
     parts, begun = [], 0
-    for number in np.flatnonzero(kinds):
+    for number in np.flatnonzero(kinds).tolist():
         parts.append(frames[begun:number].tobytes())
         begun = number + 1
         frame = bytearray(frames[number].tobytes())
         kind = kinds[number]
         if kind == 1:  # a few bits
-            for bit in random.choice(8 * length, random.integers(1, 4), replace=False):
+            for bit in random.choice(8 * length, int(random.integers(1, 4)), replace=False):
                 frame[bit >> 3] ^= 1 << (bit & 7)
         elif kind == 2:  # many bits
             at = int(random.integers(0, length - 4))
@@ -93,10 +93,10 @@ def damaged(registers: HostRegisters, n_frames: int, seed: int) -> Sent:
 def _checks(frames: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """CRC-16/MCRF4XX of each row, bit by bit."""
     reflected = int(f"{CRC_POLYNOMIAL:016b}"[::-1], 2)
-    table = np.arange(256, dtype=np.uint16)
+    table: NDArray[np.uint16] = np.arange(256, dtype=np.uint16)
     for _ in range(8):
-        table = (table >> 1) ^ np.where(table & 1, reflected, 0).astype(np.uint16)
-    check = np.full(len(frames), CRC_START, dtype=np.uint16)
+        table = ((table >> 1) ^ np.where(table & 1, reflected, 0)).astype(np.uint16)
+    check: NDArray[np.uint16] = np.full(len(frames), CRC_START, dtype=np.uint16)
     for column in frames.T:
         check = (check >> 8) ^ table[(check ^ column) & 0xFF]
     return check

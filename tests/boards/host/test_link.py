@@ -12,6 +12,7 @@ from tachometry.boards.host.registers import HostRegisters
 from tachometry.spec import of_texts
 from tachometry.spec.registers.buses import bus_of, manifest_on
 from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.frames import with_check
 
 MANY, FEW = 10_000_000, 300_000  # bytes
 CHUNK = 997
@@ -94,7 +95,7 @@ def test_words_that_no_register_can_show_are_no_frame() -> None:
         changed = bytearray(frames[0, :-2].tobytes())
         changed[bit >> 3] ^= 1 << (bit & 7)
         receiver = link.Receiver(registers())
-        receiver.feed(link.frames.with_check(bytes(changed)))
+        receiver.feed(with_check(bytes(changed)))
         found = list(receiver.telemetry)
         assert not found or registers().possible(found[0])
     impossible = words.copy()
@@ -102,11 +103,11 @@ def test_words_that_no_register_can_show_are_no_frame() -> None:
     impossible[0, status] |= 1 << 31
     head = frames[0, :1].tobytes()
     receiver = link.Receiver(registers())
-    receiver.feed(link.frames.with_check(head + impossible.astype("<u4").tobytes() + b"\0"))
+    receiver.feed(with_check(head + impossible.astype("<u4").tobytes() + b"\0"))
     assert not receiver.telemetry
     with mutant(link.Receiver, "if not self.registers.possible(words):", "if not words:"), caught():
         receiver = link.Receiver(registers())
-        receiver.feed(link.frames.with_check(head + impossible.astype("<u4").tobytes() + b"\0"))
+        receiver.feed(with_check(head + impossible.astype("<u4").tobytes() + b"\0"))
         assert not receiver.telemetry
 
 

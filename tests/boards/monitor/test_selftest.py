@@ -113,13 +113,14 @@ def test_mutants_are_caught(check: Callable[[], None], right: str, wrong: str) -
 def test_a_board_that_shows_another_speed_fails() -> None:
     """The words of one step are not those of another."""
     fast, slow = seen()["speed +1 of the highest"], seen()["speed -0.5 of the highest"]
-    assert not selftest._compared(*fast[:4], slow[4], *fast[5:]).passed
+    registers, name, changes, cleared, _, errors, period = fast
+    assert not selftest._compared(registers, name, changes, cleared, slow[4], errors, period).passed
 
 
 def test_frames_that_are_lost_are_no_difference() -> None:
-    for given in seen().values():
-        kept = [words for number, words in enumerate(given[4]) if number % 5]
-        assert selftest._compared(*given[:4], kept, *given[5:]).passed
+    for registers, name, changes, cleared, words, errors, period in seen().values():
+        kept = [one for number, one in enumerate(words) if number % 5]
+        assert selftest._compared(registers, name, changes, cleared, kept, errors, period).passed
 
 
 def test_damaged_telemetry_is_no_difference() -> None:

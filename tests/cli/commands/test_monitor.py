@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -26,6 +27,7 @@ from tachometry.cli.reports.monitor import LiveView, State, view
 from tachometry.spec import METHODS
 
 SIM = f"sim:{BOARD}"
+PAGE = Path(__file__).parents[3] / "docs" / "monitor.md"
 
 LINE = re.compile(r"\d+\.\d{3} s, speed -?[\d.e+-]+ rad/s, position -?\d+ counts, ")
 
@@ -296,3 +298,39 @@ def test_the_view_fits(width: int) -> None:
         assert "bounds" in text
     state.waits_for = "it is out"
     assert "waiting" in shown(state, width, 24)
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_commands_of_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are short here, and the package is installed already; those that need hardware are marked as text."""
+    monkeypatch.chdir(tmp_path)
+    commands = [shlex.split(line) for block in blocks("sh") for line in block.replace("\\\n", "").splitlines()]
+    assert len(commands) >= 4
+    for program, *words in commands:
+        if program == "pip":
+            assert words == ["install", "tachometry[host]"]
+            continue
+        short = [] if "--selftest" in words else ["--duration", "20ms"]
+        assert (program, run(*words, *short)) == ("tachometry", 0), words
+    assert "speed " in capsys.readouterr().out
+    assert (tmp_path / "run.csv").exists()
+
+
+def test_the_program_of_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (program,) = blocks("python")
+    (tmp_path / "sim.json").write_text(json.dumps(manifest_of(demo_map())))
+    told = ToldBoard(demo_map())
+    with SimulatedBoard(told, CLOCK_HZ) as board:
+        shorter = program.replace("/dev/pts/5", board.path).replace("while True:", "for _ in range(100):")
+        assert shorter.count("range(100)") == shorter.count(board.path) == 1
+        exec(compile(shorter, "<docs/monitor.md>", "exec"), {})
+    assert told.word("SPEED") == 14_240_943
+    assert capsys.readouterr().out
