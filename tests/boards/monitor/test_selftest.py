@@ -64,11 +64,10 @@ CAPTURED = [register.name for register in demo_map() if register.captured]
 
 def check_wrong_bits() -> None:
     """In any frame, of any register but the time."""
-    for step in ("standstill", "a bad encoder"):
-        for frame in (1, 2, len(seen()[step][4]) - 1):
-            for word, name in enumerate(CAPTURED):
-                if name != "TIME":
-                    assert not changed(step, frame, word, frame % 3).passed, (step, frame, name)
+    for frame in (1, 2, 3):
+        for word, name in enumerate(CAPTURED):
+            if name != "TIME":
+                assert not changed("a bad encoder", frame, word, frame % 3).passed, (frame, name)
 
 
 def check_errors() -> None:
