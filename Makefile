@@ -78,6 +78,7 @@ bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps
 	$(BIN)/python bench/golden.py -o docs/bench.md
 	$(BIN)/python bench/engines.py -o docs/bench.md
 	$(BIN)/python bench/sweep.py -o docs/bench.md
+	$(BIN)/python bench/monitor.py -o docs/monitor.svg
 
 verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks
 	$(BIN)/tachometry verify --clocks 1000000000 -o build/verify

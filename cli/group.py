@@ -8,6 +8,7 @@ from tachometry.cli.commands.build import build
 from tachometry.cli.commands.compare import compare
 from tachometry.cli.commands.figures import figures
 from tachometry.cli.commands.generate import generate
+from tachometry.cli.commands.monitor import monitor
 from tachometry.cli.commands.plan import plan
 from tachometry.cli.commands.program import program
 from tachometry.cli.commands.replay import replay
@@ -59,6 +60,7 @@ cli.add_command(figures)
 cli.add_command(verify)
 cli.add_command(build)
 cli.add_command(program)
+cli.add_command(monitor)
 
 
 def run(args: Sequence[str]) -> int:

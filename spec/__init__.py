@@ -1,6 +1,8 @@
 """What is to be built: frozen objects that hardware, golden models, manifest and documents all read."""
 
 from collections.abc import Mapping
+from itertools import chain, combinations
+from typing import Any
 
 from tachometry.spec.encoder import Encoder
 from tachometry.spec.methods.m import MTachometer
@@ -8,7 +10,7 @@ from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.t import TTachometer
-from tachometry.spec.option import Option, ParameterError, options_of, read_options
+from tachometry.spec.option import Option, ParameterError, is_derived, options_of, read_options
 from tachometry.spec.parameters import TWO_TICKS
 from tachometry.spec.port import Port
 from tachometry.spec.tachometer import TachometerSpec
@@ -76,6 +78,39 @@ def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
     return spec(encoder=encoder, timing=timing, **read_options(spec, given))
 
 
+def of_parameters(parameters: Mapping[str, Any]) -> TachometerSpec:
+    """The core whose `parameters` a manifest has.
+
+    Raises
+    ------
+    ParameterError
+        If they are not those of a core, or not of this version.
+    """
+    spec = spec_class(parameters.get("method", ""))
+    expected = {about.field for part in (Encoder, Timing, spec) for about in options_of(part)}
+    for name in sorted(expected ^ (parameters.keys() - {"method"})):
+        what = "is missing" if name in expected else "is none of them"
+        raise ParameterError("parameters", f"must be those that this version of tachometry writes: {name} {what}")
+
+    def values(part: type[Any]) -> dict[str, Any]:
+        return {about.field: about.of_canonical(parameters[about.field]) for about in options_of(part)}
+
+    encoder, timing, own = Encoder(**values(Encoder)), Timing(**values(Timing)), values(spec)
+    # What follows from the rest may be what must not be given, such as a width of 5 bits.
+    optional = [about.field for about in options_of(spec) if about.default is None or is_derived(about.default)]
+    refused: ParameterError | None = None
+    for omitted in chain.from_iterable(combinations(optional, number) for number in range(len(optional) + 1)):
+        given = {name: value for name, value in own.items() if name not in omitted}
+        try:
+            found = spec(encoder=encoder, timing=timing, **given)
+        except ParameterError as error:
+            refused = refused or error
+            continue
+        if found.parameters == parameters:
+            return found
+    raise refused or ParameterError("parameters", "must be those of a core that this version of tachometry makes")
+
+
 __all__ = [
     "METHODS",
     "TWO_TICKS",
@@ -93,6 +128,7 @@ __all__ = [
     "Timing",
     "common_options",
     "methods_with",
+    "of_parameters",
     "of_texts",
     "own_options",
     "spec_class",

@@ -180,6 +180,12 @@ class Option:
             return int(value)
         return value if isinstance(value, bool | int | str | None) else str(value)
 
+    def of_canonical(self, value: Any) -> Any:
+        """The value of the field that a manifest has."""
+        if isinstance(value, float):
+            return Fraction(repr(value))
+        return self.parse(self.parameter, value) if isinstance(value, str) else value
+
 
 def option(default: Any, help: str, *, text: str | None = None, also: tuple[Option, ...] = (), **about: Any) -> Any:
     """A field that is an option.

@@ -54,13 +54,7 @@ class DemoBoard:
             here = {field: values.pop(field) for field in self._fields(register) if field in values}
             if not here:
                 continue
-            offset = self.registers.offset(register)
-            word = self.registers.with_fields(
-                register,
-                self.link.read(offset),
-                {"value" if field == register.lower() else field: value for field, value in here.items()},
-            )
-            self.link.write(offset, word)
+            self._write(register, here)
         if values:
             raise ValueError(f"settings must be some of {', '.join(self.settings)}, not {', '.join(values)}")
         return self.changed()
@@ -76,19 +70,27 @@ class DemoBoard:
 
     def stream(self, ticks: int) -> None:
         """Ask for telemetry every so many ticks; 0: for none."""
-        self.link.receiver.forget()
-        self.link.receiver.frame_clocks = ticks * self._tick_cycles
+        receiver = self.link.receiver
+        # Up to the answer there may be frames of what was asked for before.
+        receiver.frame_clocks = 0
         self.link.write(self.registers.offset("TELEMETRY"), ticks)
+        receiver.frame_clocks = ticks * self._tick_cycles
+        receiver.forget()
 
     def restart(self) -> None:
-        """Reset tachometer, emulator and time; frames that came before are dropped."""
-        self.set(restart=1)
+        """Reset tachometer, emulator and time; frames that were sent before are dropped, and none that came after."""
+        self._write("DEMO", {"restart": 1})
         self.link.receiver.telemetry.clear()
         self.link.receiver.forget()
 
     def poll(self) -> Sequence[Snapshot]:
         """Telemetry that has come since the last call."""
         return [self.registers.snapshot(words) for words in self.link.poll()]
+
+    def _write(self, register: str, values: Mapping[str, int]) -> None:
+        offset = self.registers.offset(register)
+        named = {"value" if field == register.lower() else field: value for field, value in values.items()}
+        self.link.write(offset, self.registers.with_fields(register, self.link.read(offset), named))
 
     def _fields(self, register: str) -> list[str]:
         fields = list(self.registers.fields(register, 0))

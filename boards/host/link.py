@@ -1,6 +1,5 @@
 """Frames over a UART: requests and their answers, and telemetry between them."""
 
-import binascii
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -10,7 +9,6 @@ from typing import Protocol
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.spec.registers import frames
 
-_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 _WORD_BYTES = 4
 
 
@@ -25,7 +23,18 @@ class Port(Protocol):
 
 
 class NoAnswer(TimeoutError):
-    """Nothing that answers a request came in time."""
+    """Nothing that answers a request came in time.
+
+    Parameters
+    ----------
+    text : str
+    foreign : int
+        Bytes that came instead and belong to no frame.
+    """
+
+    def __init__(self, text: str, foreign: int = 0) -> None:
+        super().__init__(text)
+        self.foreign = foreign
 
 
 @dataclass
@@ -78,10 +87,13 @@ class Receiver:
         self.answer: frames.Answer | None = None
 
     def feed(self, data: bytes) -> None:
-        """Take bytes; `telemetry` and `answer` have what was found in them."""
+        """Take bytes; `telemetry` and `answer` have what was found in them.
+
+        What stands behind an answer is left for the next call: it may be of other telemetry than what was before.
+        """
         self._bytes += data
-        at = 0
-        while at < len(self._bytes):
+        asked, at = self.request, 0
+        while at < len(self._bytes) and self.request == asked:
             size = self._frame(at)
             if size == 0:
                 break
@@ -107,7 +119,7 @@ class Receiver:
             if len(found) - at < size:
                 return 0
             frame = bytes(found[at : at + size])
-            if _is_right(frame) and (self._take(frame) if telemetry else self._answered(frame)):
+            if self._take(frame) if telemetry else self._answered(frame):
                 return size
         self.counts.bytes_dropped += 1
         return 1
@@ -190,6 +202,8 @@ class Link:
         return found
 
     def _ask(self, request: Callable[[int], bytes]) -> frames.Answer:
+        counts = self.receiver.counts
+        frames_before, dropped_before = counts.frames, counts.bytes_dropped
         for _ in range(self._tries):
             self._sequence = (self._sequence + 1) % frames.SEQUENCES
             self.receiver.request, self.receiver.answer = request(self._sequence), None
@@ -202,9 +216,5 @@ class Link:
                     raise ValueError("there must be a register at this address, and a written one must be writable")
                 return self.receiver.answer
             self.receiver.reset()
-        raise NoAnswer(f"nothing has answered {self._tries} requests in {self._timeout:g} s each")
-
-
-def _is_right(frame: bytes) -> bool:
-    """Whether the check of a frame is right; the same as `frames.crc`, whose bits go the other way, but faster."""
-    return binascii.crc_hqx(frame.translate(_REVERSED), frames.CRC_START) == 0
+        text = f"nothing has answered {self._tries} requests in {self._timeout:g} s each"
+        raise NoAnswer(text, counts.bytes_dropped - dropped_before if counts.frames == frames_before else 0)

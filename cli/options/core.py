@@ -2,11 +2,13 @@
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from tachometry.cli.options.option import Option, all_of, later, option
 from tachometry.spec import (
@@ -182,6 +184,62 @@ def _common_of_board() -> tuple[click.Option, ...]:
             for about in declared
         )
     )
+
+
+@dataclass(frozen=True)
+class CoreTexts:
+    """Options of a core that may have been given.
+
+    Parameters
+    ----------
+    method : str
+    texts : mapping of str to str
+        By the names of the options without dashes.
+    given : bool
+        Whether there is any.
+    """
+
+    method: str
+    texts: Texts
+    given: bool
+
+    def at(self, clock_hz: int) -> TachometerSpec:
+        """The core, with this clock if none is given.
+
+        Raises
+        ------
+        ParameterError
+            If an option is wrong, or missing.
+        """
+        return of_texts(self.method, {"clock": str(clock_hz), **self.texts})
+
+
+def optional_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: as `core_options`, but none must be given; handed to the command as `core`, of `CoreTexts`."""
+
+    @functools.wraps(command)
+    def build(*, method: str, **given: Any) -> Any:
+        texts = _taken(given)
+        source = click.get_current_context().get_parameter_source("method")
+        return command(core=CoreTexts(method, texts, bool(texts) or source is ParameterSource.COMMANDLINE), **given)
+
+    options = [later("core-options", _common_optional), _METHOD, later("method-options", own_click_options)]
+    return all_of(options, build)
+
+
+def _common_optional() -> tuple[click.Option, ...]:
+    found = _made_common(
+        tuple(
+            replace(about, shown="that of the board") if about.name == "clock" else about for about in common_options()
+        )
+    )
+    return tuple(_not_required(option) for option in found)
+
+
+def _not_required(option: click.Option) -> click.Option:
+    option = copy(option)
+    option.required = False
+    return option
 
 
 def core_click_options() -> dict[str, click.Option]:

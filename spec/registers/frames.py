@@ -12,6 +12,7 @@ sends unasked, is an answer to a read of all captured registers; its sequence co
 The other types are free.
 """
 
+import binascii
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -30,7 +31,7 @@ QUIET_BITS = 32  # bits of a quiet line after which a request can begin, whateve
 # The check is CRC-16/MCRF4XX, as in MAVLink: polynomial and start of CCITT-FALSE, with bits in the order of the line.
 CRC_WIDTH, CRC_POLYNOMIAL, CRC_START = 16, 0x1021, 0xFFFF
 _CHECK_BYTES = CRC_WIDTH // 8
-_REFLECTED = int(f"{CRC_POLYNOMIAL:0{CRC_WIDTH}b}"[::-1], 2)
+_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 _WORD_BYTES = 4
 
@@ -89,12 +90,9 @@ class Answer:
 
 def crc(data: bytes) -> int:
     """The check of some bytes; over a frame with its check it is 0."""
-    value = CRC_START
-    for byte in data:
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (_REFLECTED if value & 1 else 0)
-    return value
+    # That of the library has the same polynomial, but the bits the other way round.
+    high, low = divmod(binascii.crc_hqx(data.translate(_REVERSED), CRC_START), 256)
+    return _REVERSED[low] << 8 | _REVERSED[high]
 
 
 def with_check(data: bytes) -> bytes:

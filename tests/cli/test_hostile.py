@@ -34,7 +34,7 @@ BEFORE = {
     "compare": f"compare {CORE} --motion stop:1ms",
     "sweep": f"sweep {CORE} --motion stop:1ms --methods s",
 }
-COMMANDS = (*BEFORE, "figures", "verify", "build", "program")
+COMMANDS = (*BEFORE, "figures", "verify", "build", "program", "monitor")
 
 _MEMORY = 1 << 30  # bytes beyond those of a process that has everything imported
 _PROCESSOR = 300  # seconds for a group

@@ -1,11 +1,13 @@
 """Options are declared once, and every way to a core reads them alike."""
 
+import json
 import pickle
 import re
 from fractions import Fraction
 
 import pytest
 
+from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import (
     METHODS,
     TWO_TICKS,
@@ -14,9 +16,11 @@ from tachometry.spec import (
     STachometer,
     Timing,
     common_options,
+    of_parameters,
     of_texts,
     own_options,
 )
+from tachometry.spec.manifest import manifest
 from tachometry.spec.units import Speed
 
 PPR = {"ppr": "500"}
@@ -130,3 +134,25 @@ def test_parameters_name_every_field() -> None:
         spec = of_texts(method, PPR)
         fields = {about.field for about in (*common_options(), *own_options(method))}
         assert set(spec.parameters) == fields | {"method"}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_parameters_say_which_core_it_is(method: str) -> None:
+    for words in configurations(method):
+        spec = spec_of(words)
+        described = manifest(spec)
+        assert manifest(of_parameters(json.loads(json.dumps(described["parameters"])))) == described, words
+
+
+def test_parameters_of_another_version_are_refused() -> None:
+    parameters = of_texts("s", {"ppr": "8"}).parameters
+    with pytest.raises(
+        ParameterError, match=r"^parameters must be those that this version of tachometry writes: later is none"
+    ):
+        of_parameters(parameters | {"later": 1})
+    with pytest.raises(ParameterError, match=r": max_ticks is missing$"):
+        of_parameters({name: value for name, value in parameters.items() if name != "max_ticks"})
+    with pytest.raises(ParameterError, match=r"^method must be one of s, m, t, mt, rairan, not 'x'$"):
+        of_parameters(parameters | {"method": "x"})
+    with pytest.raises(ParameterError, match="must be"):
+        of_parameters(parameters | {"tick_cycles": 0})

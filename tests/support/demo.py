@@ -1,15 +1,110 @@
-"""The compiled demo as a serial port, without a pseudo-terminal: clocks pass when somebody reads."""
+"""Demos for tests of hosts: compiled, or told what to do."""
 
+from functools import cache
+from typing import Any
+
+from tachometry.boards.host.registers import HostRegisters
 from tachometry.sim.engines.board import BoardSimulation
-from tachometry.spec import TachometerSpec
-from tachometry.spec.registers.buses import BUSES
+from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.registers import frames
+from tachometry.spec.registers.buses import Bus, bus_of, manifest_on
 from tachometry.spec.registers.demo import DemoMap
 
-UART = BUSES["uart"]
+BOARD = "icebreaker"
+CLOCK_HZ = 12_000_000
+# The core of docs/monitor.md.
+TEXTS = {"ppr": "500", "max-speed": "1000rad/s", "filter": "4"}
+WORDS = [word for name, text in TEXTS.items() for word in (f"--{name}", text)]
+
+
+def uart() -> Bus:
+    bus = bus_of("uart")
+    assert bus is not None
+    return bus
+
+
+@cache
+def demo_map(method: str = "m", **more: str) -> DemoMap:
+    return DemoMap(of_texts(method, {"clock": str(CLOCK_HZ), **TEXTS, **more}))
+
+
+def manifest_of(registers: DemoMap) -> dict[str, Any]:
+    return manifest_on(registers, uart())
+
+
+@cache
+def compiled(method: str = "m") -> BoardSimulation:
+    """It is shared: whoever uses it leaves it without telemetry."""
+    return BoardSimulation(demo_map(method), uart())
+
+
+class ToldBoard:
+    """A board whose registers keep what is written, and whose telemetry shows what `shown` says.
+
+    Parameters
+    ----------
+    registers : DemoMap
+
+    Members
+    -------
+    silent : bool
+        Nothing is answered, and nothing sent.
+    noise : bytes
+        Is sent in place of anything else.
+    n_clocks : int
+        That have passed since the restart.
+    shown : dict
+        Words of captured registers by their names; others are 0.
+    """
+
+    def __init__(self, registers: DemoMap) -> None:
+        self.host = HostRegisters(manifest_of(registers))
+        self.words = [register.reset for register in registers]
+        self._registers = registers
+        self._captured = [register.name for register in registers if register.captured]
+        self._tick = registers.spec.timing.tick_cycles
+        self.n_clocks = self._next = self._sequence = 0
+        self.silent, self.noise = False, b""
+        self.shown: dict[str, int] = {}
+
+    def word(self, name: str) -> int:
+        return self.words[self.host.offset(name) // 4]
+
+    def run(self, n_clocks: int, data: bytes = b"") -> tuple[bytes, bytes]:
+        self.n_clocks += n_clocks
+        if self.silent or self.noise:
+            self._next = self.n_clocks
+            return b"" if self.silent else self.noise, b""
+        sent = b""
+        while len(data) >= 5:
+            size = 5 if data[0] >> frames.TYPE_LOW == frames.Type.READ else 8
+            request, data = frames.decode_request(data[:size]), data[size:]
+            sent += frames.encode_answer(request, self._answer(request))
+        if period := self.word("TELEMETRY") * self._tick:
+            self._next = min(self._next, self.n_clocks + period)
+            while self._next <= self.n_clocks:
+                sent += self._telemetry()
+                self._next += period
+        return sent, data
+
+    def _answer(self, request: frames.Request) -> frames.Answer:
+        if request.type is frames.Type.READ:
+            return frames.Answer(tuple(self.words[request.address : request.address + request.value]), error=False)
+        self.words[request.address] = request.value
+        if self.word("DEMO") & self.host.mask("DEMO", "restart"):
+            self.words[self.host.offset("DEMO") // 4] &= ~self.host.mask("DEMO", "restart")
+            self.n_clocks = self._next = 0
+        return frames.Answer((), error=False)
+
+    def _telemetry(self) -> bytes:
+        words = [self.shown.get(name, 0) if name != "TIME" else self._next % (1 << 32) for name in self._captured]
+        self._sequence = (self._sequence + 1) % frames.SEQUENCES
+        body = b"".join(word.to_bytes(4, "little") for word in words)
+        return frames.with_check(bytes([frames.TELEMETRY_HEADER | self._sequence]) + body + b"\0")
 
 
 class DemoPort:
-    """A board that runs some clocks in each read.
+    """A board that runs some clocks in each read, without a pseudo-terminal.
 
     Parameters
     ----------
@@ -19,7 +114,7 @@ class DemoPort:
     """
 
     def __init__(self, spec: TachometerSpec, n_clocks: int = 4000) -> None:
-        self.board = BoardSimulation(DemoMap(spec), UART)
+        self.board = BoardSimulation(DemoMap(spec), uart())
         self._n_clocks = n_clocks
         self._waiting = b""
 

@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from support.demo import UART, DemoPort
+from support.demo import DemoPort, uart
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.monitor.selftest import Step, selftest
@@ -52,7 +52,7 @@ def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
     spec = CORES[name]
     registers = DemoMap(spec)
     port = DemoPort(spec)
-    board = DemoBoard(port, manifest_on(registers, UART), timeout=60)
+    board = DemoBoard(port, manifest_on(registers, uart()), timeout=60)
     results = selftest(board, registers, period=40, chosen=random_steps(registers, len(name)))
     assert [result.difference for result in results if not result.passed] == []
     assert min(result.frames for result in results) > 5
@@ -63,7 +63,7 @@ def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
 def test_pins_and_settings_survive_a_restart() -> None:
     spec = CORES["index, filter, age"]
     registers = DemoMap(spec)
-    board = DemoBoard(DemoPort(spec), manifest_on(registers, UART), timeout=60)
+    board = DemoBoard(DemoPort(spec), manifest_on(registers, uart()), timeout=60)
     board.set(speed=-123456, rate=7, phase_error=-5, duty_b=3, jitter=31, bounce=9, drop=200)
     board.restart()
     words = board.link.words(registers["SPEED"].offset, 4)
@@ -76,7 +76,7 @@ def test_pins_and_settings_survive_a_restart() -> None:
 
 def test_settings_that_do_not_fit_are_refused() -> None:
     spec = CORES["index, filter, age"]
-    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), UART), timeout=60)
+    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), uart()), timeout=60)
     with pytest.raises(ValueError, match="phase_error must be from -128 to 127, not 128"):
         board.set(phase_error=128)
     with pytest.raises(ValueError, match=r"settings must be some of emulated, .*, drop, not velocity"):
@@ -86,7 +86,7 @@ def test_settings_that_do_not_fit_are_refused() -> None:
 def test_the_index_is_high_in_a_quarter_of_each_revolution() -> None:
     """Found by the core, which captures its position."""
     spec = replace(CORES["index, filter, age"], index=True)
-    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), UART), timeout=60)
+    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), uart()), timeout=60)
     board.set(emulated=1, speed=speed_of(spec, 0.1 * fastest(spec)))
     seen = set()
     for _ in range(12):

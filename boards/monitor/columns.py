@@ -1,0 +1,66 @@
+"""What a recording and a view show of a frame: columns by the names of the ports, each with its unit."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tachometry.boards.host.snapshot import Snapshot
+from tachometry.spec.port import Port
+from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.tachometer import BOUNDS
+
+Value = float | int | bool | None
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a recording.
+
+    Parameters
+    ----------
+    name : str
+        Of the port.
+    unit : str
+        Empty: it has none.
+    kind : type
+        float, int or bool.
+    value : callable of Snapshot
+        None: there is no such value in this frame.
+    """
+
+    name: str
+    unit: str
+    kind: type
+    value: Callable[[Snapshot], Value]
+
+    @property
+    def head(self) -> str:
+        """Name with unit, such as `velocity [rad/s]`."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def columns(registers: DemoMap) -> list[Column]:
+    """Every captured port but the time; what is in the LSB of the velocity is in the unit in which speeds are shown."""
+    spec = registers.spec
+    lsb = spec.rad_per_s_per_lsb
+    (speeds,) = (port.unit for port in registers.ports if port.name == "velocity")
+
+    def of(port: Port) -> Column:
+        name = port.name
+        if name in BOUNDS:
+            return Column(name, spec.shown_unit.name, float, bound(name))
+        if port.unit == speeds:
+            return Column(name, spec.shown_unit.name, float, lambda now: float(spec.shown_unit.of(now[name] * lsb)))
+        if port.width == 1 and not port.unit:
+            return Column(name, "", bool, lambda now: bool(now[name]))
+        return Column(name, port.unit, int, lambda now: now[name])
+
+    def bound(name: str) -> Callable[[Snapshot], Value]:
+        absent = BOUNDS[name] * spec.shown_absent_bound
+
+        def value(now: Snapshot) -> Value:
+            there = now["bounds_valid"] and now[name] != absent
+            return float(spec.shown_unit.of(now[name] * lsb)) if there else None
+
+        return value
+
+    return [of(port) for port in registers.ports if port.name != "time"]

@@ -1,0 +1,121 @@
+"""Settings of the emulator as people write them."""
+
+import math
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+
+from tachometry.spec import ParameterError, TachometerSpec
+from tachometry.spec.emulator import (
+    BOUNCE_WIDTH,
+    DROP_WIDTH,
+    ERROR_WIDTH,
+    FINE_WIDTH,
+    JITTER_WIDTH,
+    fastest,
+    rate_of,
+    speed_of,
+)
+from tachometry.spec.registers.map import WORD
+from tachometry.spec.units import FRACTION, SPEED, TIME, Unit, read_exactly, read_nearest
+
+_ACCELERATION = {name: SPEED[speed] for name, speed in {"rad/s/s": "rad/s", "rev/s/s": "rev/s", "rpm/s": "rpm"}.items()}
+_OF_PERIOD = {"": Unit(), "%": Unit(Fraction(1, 100)), "deg": Unit(Fraction(1, 360))}
+_SOURCES = {"pins": 0, "emulator": 1}
+
+Fields = dict[str, int]
+
+
+def emulator_settings(spec: TachometerSpec, words: Iterable[str]) -> Fields:
+    """Fields of the demo's registers from words such as `speed=100rad/s`.
+
+    Raises
+    ------
+    ValueError
+        If a word is none of these, or its value cannot be set.
+    """
+    found: Fields = {}
+    for word in words:
+        name, sign, text = word.partition("=")
+        if not sign or name not in _READERS:
+            raise ValueError(f"--set must be NAME=VALUE with a NAME of {', '.join(_READERS)}, not {word!r}")
+        try:
+            found |= _READERS[name](spec, text.strip())
+        except ParameterError as error:  # options of other commands have these names, too
+            raise ValueError(f"--set {name} {error.rest}") from error
+    if "speed" in found:
+        found = {"emulated": 1} | found
+    return found
+
+
+def _speed(spec: TachometerSpec, text: str) -> Fields:
+    speed, most = read_nearest("speed", text, SPEED, "rad/s"), fastest(spec)
+    if abs(speed) > most:
+        raise ParameterError("speed", f"must be from -{most:.6g} to {most:.6g} rad/s with this clock, not {text}")
+    return {"speed": min(speed_of(spec, speed), (1 << WORD - 1) - 1)}
+
+
+def _acceleration(spec: TachometerSpec, text: str) -> Fields:
+    plain = text.replace("s2", "s/s").replace("s^2", "s/s")
+    rate = rate_of(spec, read_nearest("acceleration", plain, _ACCELERATION, "rad/s/s"))
+    if not 1 <= rate < 1 << WORD:
+        least = 1e9 / rate_of(spec, 1e9)
+        most = least * ((1 << WORD) - 1)
+        raise ParameterError("acceleration", f"must be from {least:.4g} to {most:.4g} rad/s/s here, not {text}")
+    return {"rate": rate}
+
+
+def _source(spec: TachometerSpec, text: str) -> Fields:
+    if text not in _SOURCES:
+        raise ParameterError("source", f"must be pins or emulator, not {text!r}")
+    return {"emulated": _SOURCES[text]}
+
+
+def _error(name: str) -> Callable[[TachometerSpec, str], Fields]:
+    """How late an edge is, as a part of a period of the line."""
+    field = name.replace("-", "_")
+
+    def read(spec: TachometerSpec, text: str) -> Fields:
+        steps = _steps(name, text, 1 << FINE_WIDTH, -(1 << ERROR_WIDTH - 1), (1 << ERROR_WIDTH - 1) - 1)
+        return {field: steps}
+
+    return read
+
+
+def _jitter(spec: TachometerSpec, text: str) -> Fields:
+    # Each set bit takes part: the greatest movement of all is 2^k - 1.
+    steps = _steps("jitter", text, 1 << FINE_WIDTH, 0, (1 << JITTER_WIDTH) - 1)
+    return {"jitter": min(((1 << bits) - 1 for bits in range(JITTER_WIDTH + 1)), key=lambda most: abs(most - steps))}
+
+
+def _bounce(spec: TachometerSpec, text: str) -> Fields:
+    hertz = spec.timing.clock_hz
+    seconds = read_exactly("bounce", text, {"": Unit(Fraction(1, hertz)), **TIME})
+    clocks, most = math.floor(seconds * hertz + Fraction(1, 2)), (1 << BOUNCE_WIDTH) - 1
+    if not 0 <= clocks <= most:
+        raise ParameterError("bounce", f"must be from 0 to {most} clocks, {most / hertz * 1e6:.4g}us, not {text}")
+    return {"bounce": clocks}
+
+
+def _drop(spec: TachometerSpec, text: str) -> Fields:
+    return {"drop": _steps("drop", text, 1 << DROP_WIDTH, 0, (1 << DROP_WIDTH) - 1)}
+
+
+def _steps(name: str, text: str, per_one: int, least: int, most: int) -> int:
+    units = FRACTION if name == "drop" else _OF_PERIOD
+    steps = math.floor(read_exactly(name, text, units) * per_one + Fraction(1, 2))
+    if not least <= steps <= most:
+        raise ParameterError(
+            name, f"must be from {100 * least / per_one:.4g}% to {100 * most / per_one:.4g}%, not {text}"
+        )
+    return steps
+
+
+_READERS: dict[str, Callable[[TachometerSpec, str], Fields]] = {
+    "speed": _speed,
+    "acceleration": _acceleration,
+    **{name: _error(name) for name in ("phase-error", "duty-a", "duty-b")},
+    "jitter": _jitter,
+    "bounce": _bounce,
+    "drop": _drop,
+    "source": _source,
+}

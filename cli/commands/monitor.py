@@ -1,0 +1,182 @@
+"""`tachometry monitor`: what a board measures, live."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from fractions import Fraction
+from pathlib import Path
+
+import click
+
+from tachometry.boards.fpga.boards import BOARDS
+from tachometry.cli.commands.monitored import SIMULATED, attached, simulated
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.core import CoreTexts, optional_core_options
+from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
+from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
+from tachometry.spec.units import parse_time
+
+_GROUP = "Monitor"
+
+
+@click.command(
+    cls=GroupedCommand,
+    short_help="Show, record and test what a board measures, also a simulated one.",
+    epilog="""\b
+PORT is one of:
+  /dev/ttyUSB1, COM5, ...  the serial port of a board, with its --manifest
+"""
+    + "".join(f"  {SIMULATED + name:<25}a simulated board, with options of the core\n" for name in BOARDS)
+    + """
+\b
+Settings of the emulated encoder, for --set:
+  speed=100rad/s         also rpm and rev/s
+  acceleration=500rad/s2 how fast the speed changes; without it: at once
+  phase-error=5%         how late B rises, as a part of a period
+  duty-a=5% duty-b=5%    how late A and B fall
+  jitter=1%              edges move at random by up to this
+  bounce=5us             lines bounce after each edge
+  drop=1%                so many edges are left out
+  source=pins            what is measured: pins or emulator
+
+\b
+Examples:
+  tachometry monitor sim:icebreaker --ppr 500 --set speed=100rad/s
+  tachometry monitor /dev/ttyUSB1 --manifest build/icebreaker/tachometer.json
+  tachometry monitor sim:icebreaker --ppr 500 --selftest""",
+)
+@click.argument("port", metavar="PORT")
+@option(
+    _GROUP,
+    "--manifest",
+    type=FilePath(dir_okay=False),
+    metavar="FILE",
+    help="What `tachometry build` has written for the board at a serial port: the options of its core.",
+)
+@option(
+    _GROUP,
+    "--set",
+    "words",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Set the emulated encoder, which the board measures from then on if its speed is set; can be given several "
+    "times. All names are listed below.",
+)
+@option(
+    _GROUP,
+    "--every",
+    default="10ms",
+    metavar="TIME",
+    help="Time from a frame of telemetry to the next, rounded to whole ticks; what the line cannot carry is lost.",
+)
+@option(_GROUP, "--duration", metavar="TIME", help="End after this time of the board. [default: at Ctrl-C]")
+@option(
+    _GROUP, "--plain", is_flag=True, help="Print a line a second, as without a terminal, in place of the live view."
+)
+@option(
+    _GROUP,
+    "--selftest",
+    is_flag=True,
+    help="Let the emulated encoder go fast and slow, to and fro, stop, and make errors, and compare every frame with "
+    "the golden model.",
+)
+@option(
+    _GROUP,
+    "--serve",
+    type=FilePath(dir_okay=False),
+    metavar="FILE",
+    help="Only run a simulated board for other programs: print its serial port, and write its manifest to FILE.",
+)
+@output(
+    "--record",
+    suffixes=(".csv", ".parquet"),
+    help="Table with a row for each frame: time, and everything that the core shows; .csv or .parquet.",
+)
+@optional_core_options
+def monitor(
+    port: str,
+    core: CoreTexts,
+    manifest: Path | None,
+    words: tuple[str, ...],
+    every: str,
+    duration: str | None,
+    plain: bool,
+    selftest: bool,
+    serve: Path | None,
+    record: Path | None,
+) -> int:
+    """Show what a board measures: speed, position, errors, and a running plot of the speed.
+
+    The board is one that `tachometry build` has made a bitstream for, or a simulated one: the same gates, compiled, in
+    real time.
+
+    A board that is unplugged or silent is waited for. Ctrl-C ends the monitor, and a recording is complete then.
+
+    Exit status 1 if the self-test fails; 2 if something else answers than the board of the manifest.
+    """
+    if selftest:
+        _refuse("--selftest", {"--record": record, "--set": words, "--duration": duration, "--serve": serve})
+    if serve is not None:
+        if not port.startswith(SIMULATED):
+            raise ValueError("--serve must be given with a simulated board")
+        _refuse("--serve", {"--record": record, "--set": words})
+    seconds = None if duration is None else parse_time("duration", duration)
+    if seconds is not None and seconds <= 0:
+        raise ValueError(f"--duration must be longer than 0, not {duration}")
+    if port.startswith(SIMULATED):
+        _refuse("a simulated board, but options of the core", {"--manifest": manifest})
+        target = simulated(port, core)
+    else:
+        target = attached(port, core, manifest)
+
+    from tachometry.boards.monitor.columns import columns
+    from tachometry.boards.monitor.recorder import Recorder
+    from tachometry.boards.monitor.session import Session
+    from tachometry.boards.monitor.settings import emulator_settings
+    from tachometry.cli.commands import monitoring
+    from tachometry.cli.reports.monitor import State, display
+
+    if serve is not None:
+        return monitoring.serve(target, serve, seconds)
+    if selftest:
+        return monitoring.selftest(target)
+    settings = emulator_settings(target.registers.spec, words)
+    period = _ticks(target.registers, every)
+    outputs = Outputs({} if record is None else {"--record": record}, inputs=[] if manifest is None else [manifest])
+    shown = {column.name: column for column in columns(target.registers)}
+    state = State(target.title, target.registers.spec, shown, recorded="" if record is None else str(record))
+    screen = display(plain)
+    failure: Exception | None = None
+    with monitoring.interrupts() as stop, outputs, ExitStack() as stack:
+        where, recorder = outputs.get("--record"), None
+        if where is not None and record is not None:
+            recorder = stack.enter_context(Recorder(where, record.suffix.lower(), list(shown.values())))
+        try:
+            name = stack.enter_context(target.running())
+            label, described = target.label(name), target.manifest
+            session = Session(label, lambda: target.opened(name), described, period, settings, screen.told)
+            with screen:
+                monitoring.watch(session, state, screen, recorder, seconds, stop)
+        except Exception as error:
+            if recorder is None or not recorder.rows:
+                raise
+            failure = error  # what was recorded before is kept
+    if failure is not None:
+        raise failure
+    return 0
+
+
+def _refuse(other: str, others: dict[str, object]) -> None:
+    for name, value in others.items():
+        if value not in (None, ()):
+            raise ValueError(f"{name} must not be given together with {other}")
+
+
+def _ticks(registers: DemoMap, text: str) -> int:
+    """Ticks from a frame to the next."""
+    timing = registers.spec.timing
+    ticks = int(parse_time("every", text) / timing.tick_seconds + Fraction(1, 2))
+    most = (1 << PERIOD_WIDTH) - 1
+    if not 1 <= ticks <= most:
+        raise ValueError(f"--every must be from 1 to {most} ticks of {float(timing.tick_seconds):g} s, not {text}")
+    return ticks

@@ -1,0 +1,138 @@
+"""The board that `monitor` is for: at a serial port, or simulated."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tachometry.boards.fpga.boards import BOARDS
+from tachometry.cli.options.core import CoreTexts
+from tachometry.spec import of_parameters
+from tachometry.spec.registers.buses import Bus, bus_of, manifest_on
+from tachometry.spec.registers.demo import DemoMap
+
+if TYPE_CHECKING:
+    from tachometry.boards.monitor.serial_port import SerialPort
+
+SIMULATED = "sim:"
+_BUS = "uart"
+_LARGEST = 1 << 22  # bytes of a manifest
+
+
+@dataclass(frozen=True)
+class Target:
+    """The board that is meant.
+
+    Parameters
+    ----------
+    port : str
+    title : str
+        What the view is headed with.
+    registers : DemoMap
+    bus : Bus
+    module : str
+    """
+
+    port: str
+    title: str
+    registers: DemoMap
+    bus: Bus
+    module: str = "tachometer"
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """What the manifest says of it."""
+        return manifest_on(self.registers, self.bus, self.module)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether there is no hardware."""
+        return self.port.startswith(SIMULATED)
+
+    @contextmanager
+    def running(self) -> Iterator[str]:
+        """The name of the serial port, while there is a board at it."""
+        if not self.simulated:
+            yield self.port
+            return
+        from tachometry.boards.simulated.simulated_board import SimulatedBoard
+        from tachometry.sim.engines.board import BoardSimulation
+
+        simulation = BoardSimulation(self.registers, self.bus)
+        try:
+            with SimulatedBoard(simulation, self.registers.spec.timing.clock_hz) as board:
+                yield board.path
+        finally:
+            simulation.close()
+
+    def label(self, name: str) -> str:
+        """What messages call the port of this name."""
+        return f"{self.port} at {name}" if self.simulated else name
+
+    def opened(self, name: str) -> SerialPort:
+        """The port, opened."""
+        from tachometry.boards.monitor.serial_port import SerialPort
+
+        return SerialPort(name, self.bus.baud)
+
+
+def simulated(port: str, core: CoreTexts) -> Target:
+    """The board that `sim:NAME` names, with this core.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or the core cannot be.
+    """
+    board = port.removeprefix(SIMULATED)
+    if board not in BOARDS:
+        names = ", ".join(SIMULATED + name for name in BOARDS)
+        raise ValueError(f"PORT must be a serial port or one of {names}, not {port!r}")
+    bus, spec = bus_of(_BUS), core.at(BOARDS[board].clock_hz)
+    assert bus is not None
+    bus.bit_cycles(spec.timing.clock_hz)
+    return Target(port, f"{board}, simulated: {spec.heading}", DemoMap(spec), bus)
+
+
+def attached(port: str, core: CoreTexts, path: Path | None) -> Target:
+    """The board at a serial port, whose manifest is in a file.
+
+    Raises
+    ------
+    ValueError
+        If it is not that of a demo on a UART.
+    """
+    if path is None:
+        raise ValueError("--manifest must be given with a serial port: the file NAME.json that tachometry build writes")
+    if core.given:
+        raise ValueError("options of the core must not be given with a serial port: --manifest has them")
+    with path.open("rb") as file:
+        content = file.read(_LARGEST)
+    try:
+        described = json.loads(content)
+        parameters, registers = dict(described["parameters"]), described["registers"]
+        bus, baud, module = described["bus"], described.get("baud"), described["module"]
+        configuration = registers["configuration"]
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ValueError(
+            f"--manifest must be a file NAME.json that tachometry build writes, which {path} is not"
+        ) from error
+    if bus != _BUS:
+        raise ValueError(f"--manifest must be that of a board with --bus {_BUS}, not {bus}")
+    try:
+        found = DemoMap(of_parameters(parameters))
+        line = bus_of(_BUS, baud)
+        assert line is not None
+        manifest_on(found, line, module)
+    except (ValueError, TypeError, AttributeError) as error:
+        raise ValueError(f"--manifest {path}: {error}") from error
+    if configuration != found.configuration:
+        raise ValueError(
+            f"--manifest {path} must be that of a demo which this version of tachometry makes: its configuration would "
+            f"be 0x{found.configuration:08x}, not {configuration!r}"
+        )
+    return Target(port, f"{port}: {found.spec.heading}", found, line, module)

@@ -1,0 +1,274 @@
+"""What `monitor` shows of a board: a live view, or plain lines."""
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import click
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from tachometry.boards.host.link import Counts
+from tachometry.boards.monitor.columns import Column, Value
+from tachometry.boards.monitor.session import Frame
+from tachometry.cli.reports.streams import printable
+from tachometry.spec import TachometerSpec
+from tachometry.spec.tachometer import BOUNDS
+
+_SHOWN = 10.0  # seconds of the plot
+_LINE = 1.0  # seconds of board from a plain line to the next
+_REFRESH = 0.1  # seconds from a picture to the next
+_SIDE = 46  # columns beside the plot
+_LEAST = 24  # columns of a plot
+_ERRORS = {"decode_errors": "illegal transitions", "overflows": "overflows", "tick_errors": "tick errors"}
+_SATURATED = 255
+
+
+@dataclass
+class State:
+    """What is known of a board.
+
+    Parameters
+    ----------
+    title : str
+    spec : TachometerSpec
+    columns : sequence of Column
+    waits_for : str
+        Why there is no telemetry; empty: there is.
+    """
+
+    title: str
+    spec: TachometerSpec
+    columns: Mapping[str, Column]
+    counts: Counts = field(default_factory=Counts)
+    counters: Mapping[str, int] = field(default_factory=dict)
+    waits_for: str = ""
+    recorded: str = ""
+    frame: Frame | None = None
+    history: deque[tuple[float, float, Value, Value]] = field(default_factory=deque)
+
+    def take(self, frames: Iterable[Frame]) -> None:
+        """Frames that have come."""
+        for frame in frames:
+            self.frame = frame
+            lower, upper = (self.value(name) for name in BOUNDS)
+            speed = self.value("velocity")
+            assert speed is not None
+            self.history.append((frame.time, speed, lower, upper))
+        while self.history and self.history[-1][0] - self.history[0][0] > _SHOWN:
+            self.history.popleft()
+
+    def value(self, name: str) -> Value:
+        """A value of the latest frame, None if there is none."""
+        return self.columns[name].value(self.frame.snapshot) if self.frame and name in self.columns else None
+
+
+class Display(Protocol):
+    """Where a state is shown; a context manager."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None: ...
+
+    def told(self, text: str) -> None:
+        """Show that something has changed."""
+
+    def show(self, state: State) -> None:
+        """Show the state, if it is time to."""
+
+    def end(self, state: State) -> None:
+        """Show the state for the last time."""
+
+
+class PlainLines:
+    """A line on stdout for every second of the board, and on stderr what has changed."""
+
+    def __init__(self) -> None:
+        self._shown: float | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        pass
+
+    def told(self, text: str) -> None:
+        """Show that something has changed."""
+        click.echo(f"tachometry: {printable(text)}", err=True)
+
+    def show(self, state: State) -> None:
+        """Show the state, if it is time to."""
+        if state.frame and (self._shown is None or state.frame.time >= self._shown + _LINE):
+            self._print(state)
+
+    def end(self, state: State) -> None:
+        """Show the state for the last time."""
+        if state.frame and state.frame.time != self._shown:
+            self._print(state)
+
+    def _print(self, state: State) -> None:
+        assert state.frame is not None
+        self._shown = state.frame.time
+        click.echo(line(state))
+
+
+class LiveView:
+    """A view of the whole terminal, drawn anew ten times a second.
+
+    Raises
+    ------
+    OSError
+        If plotext is not installed.
+    """
+
+    def __init__(self) -> None:
+        plotext()  # missing: it is said before anything is opened
+        self._console = Console(highlight=False)
+        self._live = Live(console=self._console, screen=True, auto_refresh=False)
+        self._drawn = -_REFRESH
+        self._texts: list[str] = []
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._live.stop()
+        for text in self._texts:
+            click.echo(f"tachometry: {printable(text)}", err=True)
+
+    def told(self, text: str) -> None:
+        """Show that something has changed: below the view, when it has ended."""
+        self._texts.append(text)
+
+    def show(self, state: State) -> None:
+        """Show the state, if it is time to."""
+        if time.monotonic() - self._drawn >= _REFRESH:
+            self._drawn = time.monotonic()
+            self._live.update(view(state, *self._console.size), refresh=True)
+
+    def end(self, state: State) -> None:
+        """Show the state for the last time, where the shell goes on."""
+        self._live.stop()
+        if state.frame:
+            click.echo(line(state))
+
+
+def display(plain: bool) -> Display:
+    """The live view if stdout is a terminal, and plain lines otherwise."""
+    return PlainLines() if plain or not sys.stdout.isatty() else LiveView()
+
+
+def line(state: State) -> str:
+    """The state in a line."""
+    assert state.frame is not None
+    parts = [f"{state.frame.time:.3f} s", *(f"{name} {text}" for name, text in _measured(state))]
+    parts += [f"{name} {text}" for name, text in [*_wrong(state), *_received(state)]]
+    return ", ".join(parts)
+
+
+def view(state: State, width: int, height: int) -> RenderableType:
+    """A picture of the state, so many columns wide and lines high."""
+    head = Text(printable(state.title), style="bold", no_wrap=True, overflow="ellipsis")
+    foot = Text(no_wrap=True, overflow="ellipsis")
+    if state.waits_for:
+        foot.append(f"waiting: {printable(state.waits_for)}", style="bold yellow")
+    else:
+        foot.append("Ctrl-C ends it", style="dim")
+    if state.recorded:
+        foot.append(f", recording {printable(state.recorded)}", style="dim")
+    side = Table.grid(padding=(0, 2))
+    side.add_column(no_wrap=True)
+    side.add_column(no_wrap=True)
+    measured = _measured(state)
+    for number, (name, text) in enumerate([*measured, *_wrong(state), *_received(state)]):
+        wrong = len(measured) <= number < len(measured) + len(_ERRORS) and text not in ("0", "-")
+        side.add_row(Text(name, style="dim"), Text(text, style="bold red" if wrong else "bold" if not number else ""))
+    rows = max(height - 3, 8)
+    if width >= _SIDE + _LEAST:
+        body = Table.grid()
+        body.add_column(width=_SIDE)
+        body.add_column()
+        body.add_row(side, plot(state, width - _SIDE, rows))
+        return Group(head, body, foot)
+    return Group(head, side, foot)
+
+
+def plot(state: State, width: int, height: int) -> Text:
+    """Speed, and its bounds, over the last seconds."""
+    figure = plotext()
+    figure.clear_figure()
+    figure.theme("clear")
+    figure.plotsize(width, height)
+    times = [now for now, *_ in state.history]
+    for column, colour in ((2, "gray"), (3, "gray"), (1, "cyan")):
+        points = [(now, row[column]) for now, row in zip(times, state.history, strict=True) if row[column] is not None]
+        if points:
+            figure.plot(*zip(*points, strict=True), marker="braille", color=colour)
+    speeds = [float(value) for _, *values in state.history for value in values if value is not None] or [0.0]
+    room = max(0.05 * (max(speeds) - min(speeds)), 0.02 * max(map(abs, speeds)), 1e-6)
+    figure.ylim(min(speeds) - room, max(speeds) + room)
+    last = times[-1] if times else 0.0
+    figure.xlim(max(last - _SHOWN, 0.0), max(last, _SHOWN))
+    figure.title(f"{state.spec.shown_unit.name} over s")
+    return Text.from_ansi(figure.build())
+
+
+def plotext() -> Any:
+    """The module that draws in text.
+
+    Raises
+    ------
+    OSError
+        If it is not installed.
+    """
+    try:
+        import plotext as module
+    except ImportError as error:
+        raise OSError("the live view needs plotext: pip install 'tachometry[host]', or take --plain") from error
+    return module
+
+
+def _measured(state: State) -> list[tuple[str, str]]:
+    def shown(name: str, style: Callable[[Any], str] = str, absent: str = "-") -> str:
+        value = state.value(name)
+        return absent if value is None else style(value)
+
+    unit = state.spec.shown_unit.name
+    rows = [("speed", f"{shown('velocity', '{:.6g}'.format)} {unit}")]
+    if state.spec.bounds:
+        lower, upper = (shown(name, "{:.6g}".format, "none") for name in BOUNDS)
+        rows.append(("bounds", f"{lower} .. {upper} {unit}"))
+    rows.append(("position", f"{shown('position')} counts"))
+    if "age" in state.columns:
+        rows.append(("age", f"{shown('age')} ticks"))
+    return [*rows, ("stalled", shown("stalled", lambda stalled: "yes" if stalled else "no"))]
+
+
+def _wrong(state: State) -> list[tuple[str, str]]:
+    rows = []
+    for name, text in _ERRORS.items():
+        if name in state.counters or name != "tick_errors":
+            number = state.counters.get(name)
+            rows.append((text, "-" if number is None else f"{number}{' or more' * (number == _SATURATED)}"))
+    if "swallowed_edges" in state.columns:
+        edges = state.value("swallowed_edges")
+        rows.append(("swallowed edges", "-" if edges is None else str(edges)))
+    return rows
+
+
+def _received(state: State) -> list[tuple[str, str]]:
+    counts = state.counts
+    return [("frames", str(counts.frames)), ("lost", str(counts.lost)), ("bytes dropped", str(counts.bytes_dropped))]

@@ -1,0 +1,147 @@
+"""What comes over a bad line: every damaged frame is rejected, every loss is counted, and no other is shown."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.telemetry import FRAME_CLOCKS, Sent, damaged, frames_of
+
+from tachometry.boards.host import link
+from tachometry.boards.host.registers import HostRegisters
+from tachometry.spec import of_texts
+from tachometry.spec.registers.buses import bus_of, manifest_on
+from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.frames import with_check
+
+MANY, FEW = 10_000_000, 300_000  # bytes
+CHUNK = 997
+
+
+@cache
+def registers() -> HostRegisters:
+    bus = bus_of("uart")
+    assert bus is not None
+    texts = {"ppr": "500", "clock": "12MHz", "bounds": "yes", "age": "yes", "filter": "4"}
+    return HostRegisters(manifest_on(DemoMap(of_texts("s", texts)), bus))
+
+
+@cache
+def sent(n_bytes: int, seed: int) -> Sent:
+    length = frames_of(registers(), 1, 0)[1].shape[1]
+    return damaged(registers(), n_bytes // length + 1, seed)
+
+
+def check_line(n_bytes: int, seed: int) -> None:
+    """What the receiver makes of what arrives, in pieces that begin and end anywhere."""
+    line = sent(n_bytes, seed)
+    receiver = link.Receiver(registers(), frame_clocks=FRAME_CLOCKS)
+    for start in range(0, len(line.data), CHUNK):
+        receiver.feed(line.data[start : start + CHUNK])
+    beginning = frames_of(registers(), 1, 0)[1].tobytes()[:10]
+    receiver.feed(beginning)
+    receiver.reset()
+    assert len(receiver.telemetry) == receiver.counts.frames == len(line.words)
+    assert np.array_equal(np.array(receiver.telemetry, dtype=np.uint32), line.words)
+    assert receiver.counts.lost == line.lost
+    length = frames_of(registers(), 1, 0)[1].shape[1]
+    assert receiver.counts.bytes_dropped == len(line.data) + len(beginning) - length * len(line.words)
+
+
+def test_ten_million_bytes_of_a_bad_line() -> None:
+    line = sent(MANY, 1)
+    assert len(line.data) > 0.95 * MANY
+    assert line.lost > 0.15 * len(line.words)
+    check_line(MANY, 1)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("self.counts.frames += 1", "self.counts.frames += 2"),
+        ("self.counts.lost += self._missing", "self.counts.lost = self._missing"),
+        ("(sequence - self._last[0] - 1)", "(sequence - self._last[0])"),
+        ("if not self.frame_clocks:", "if self.frame_clocks:"),
+        ("least + frames.SEQUENCES * max", "frames.SEQUENCES * max"),
+        ("/ self.frame_clocks - 1", "/ self.frame_clocks + 15"),
+        (
+            "        self.counts.bytes_dropped += 1\n        return 1",
+            "        self.counts.bytes_dropped += 1\n        return 2",
+        ),
+        ("        self.counts.bytes_dropped += 1\n        return 1", "        return 1"),
+        ("        del self._bytes[:at]", "        self._bytes.clear()"),
+        ("        self.counts.bytes_dropped += len(self._bytes)\n", ""),
+        ("            return False\n        if not", "            return True\n        if not"),
+        ("        self._last = sequence, now\n", "        self._last = self._last or (sequence, now)\n"),
+        ("telemetry = found[at] & ~(frames.SEQUENCES - 1) ==", "telemetry = found[at] =="),
+    ],
+)
+def test_mutants_are_caught(right: str, wrong: str) -> None:
+    with mutant(link.Receiver, right, wrong), caught():
+        check_line(FEW, 2)
+
+
+def test_what_mutants_are_held_against_is_right() -> None:
+    check_line(FEW, 2)
+
+
+def test_words_that_no_register_can_show_are_no_frame() -> None:
+    """The check of some random bytes is right by chance."""
+    words, frames = frames_of(registers(), 1, 3)
+    receiver = link.Receiver(registers())
+    receiver.feed(frames[0].tobytes())
+    assert list(receiver.telemetry) == [tuple(words[0])]
+    for bit in range(8 * (frames.shape[1] - 2)):
+        changed = bytearray(frames[0, :-2].tobytes())
+        changed[bit >> 3] ^= 1 << (bit & 7)
+        receiver = link.Receiver(registers())
+        receiver.feed(with_check(bytes(changed)))
+        found = list(receiver.telemetry)
+        assert not found or registers().possible(found[0])
+    impossible = words.copy()
+    status = [register["name"] for register in registers().captured].index("STATUS")
+    impossible[0, status] |= 1 << 31
+    head = frames[0, :1].tobytes()
+    receiver = link.Receiver(registers())
+    receiver.feed(with_check(head + impossible.astype("<u4").tobytes() + b"\0"))
+    assert not receiver.telemetry
+    with mutant(link.Receiver, "if not self.registers.possible(words):", "if not words:"), caught():
+        receiver = link.Receiver(registers())
+        receiver.feed(with_check(head + impossible.astype("<u4").tobytes() + b"\0"))
+        assert not receiver.telemetry
+
+
+def check_wrap() -> None:
+    """Frames are lost while the time wraps."""
+    n_frames = (1 << 32) // FRAME_CLOCKS + 100
+    names = [register["name"] for register in registers().captured]
+    words, frames = frames_of(registers(), n_frames, 5)
+    wraps = int(np.flatnonzero(np.diff(words[:, names.index("TIME")].astype(np.int64)) < 0)[0])
+    receiver = link.Receiver(registers(), frame_clocks=FRAME_CLOCKS)
+    receiver.feed(frames[wraps - 20].tobytes())
+    receiver.feed(frames[wraps + 20].tobytes())
+    assert receiver.counts.lost == 39
+
+
+def test_many_losses_while_the_time_wraps() -> None:
+    check_wrap()
+    with mutant(link.Receiver, "clocks % (1 << 32)", "clocks"), caught():
+        check_wrap()
+
+
+def check_bytes() -> None:
+    """A frame is there with its last byte."""
+    words, frames = frames_of(registers(), 20, 4)
+    receiver = link.Receiver(registers(), frame_clocks=FRAME_CLOCKS)
+    for number, frame in enumerate(frames):
+        for byte in frame.tobytes():
+            assert len(receiver.telemetry) == number
+            receiver.feed(bytes([byte]))
+    assert np.array_equal(np.array(receiver.telemetry, dtype=np.uint32), words)
+    assert (receiver.counts.lost, receiver.counts.bytes_dropped) == (0, 0)
+
+
+def test_frames_may_come_byte_by_byte() -> None:
+    check_bytes()
+    with mutant(link.Receiver, "if len(found) - at < size:", "if len(found) - at <= size:"), caught():
+        check_bytes()
