@@ -3,6 +3,7 @@
 import ast
 import importlib.machinery
 import os
+import resource
 import signal
 import sys
 import time
@@ -16,6 +17,7 @@ import pytest
 from proofs.python_mutation.mutants import Mutant, mutated
 
 _STARTED = 30.0  # seconds that a fork may take before its first test
+_MEMORY = 8 << 30  # bytes that a mutant may ask for
 _SLOWER = 20.0  # times as long as the tests took without a mutant
 
 
@@ -102,6 +104,7 @@ def judge_all(
             if not child:
                 status = 1
                 try:
+                    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
                     status = _child(root, mutant, tests, folder / f"tmp-{nth}")
                 finally:
                     os._exit(status)
