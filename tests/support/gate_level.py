@@ -23,11 +23,11 @@ module bench;
   reg [2:0] levels [0:{n_clocks} - 1];
   reg a = 1, b = 1, rx = 1;
   wire tx;
-  wire pin_clk = clk, pin_a = a, pin_b = b, pin_rx = rx;
+  wire pin_clk = clk, pin_a = a, pin_b = b, pin_rx = rx, pin_capture = 1;
   integer clock, file;
   top top(
     .clk12_0__io(pin_clk), .tachometer_0__a__io(pin_a), .tachometer_0__b__io(pin_b),
-    .uart_0__rx__io(pin_rx), .uart_0__tx__io(tx));
+    .tachometer_0__capture__io(pin_capture), .uart_0__rx__io(pin_rx), .uart_0__tx__io(tx));
   initial begin
     $readmemb("levels.txt", levels);
     file = $fopen("sent.txt", "w");
