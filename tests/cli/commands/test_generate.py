@@ -251,7 +251,7 @@ def test_impossible_options(options: str, message: str, tmp_path: Path, capsys: 
     [
         (["generate", "--ppr", "9"], "Missing option '--output' / '-o'. (see tachometry generate --help)"),
         ([], "Missing command. (see tachometry --help)"),
-        (["build"], "No such command 'build'. (see tachometry --help)"),
+        (["make"], "No such command 'make'. (see tachometry --help)"),
     ],
 )
 def test_incomplete_commands(args: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
