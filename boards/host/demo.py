@@ -7,8 +7,10 @@ from tachometry.boards.host.client import Client
 from tachometry.boards.host.link import Link, Port
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.boards.host.snapshot import Snapshot
+from tachometry.spec.registers.demo import PERIOD_WIDTH
 
-SETTINGS = ("DEMO", "SPEED", "RATE", "ERRORS", "NOISE")
+# In the order in which they are written: what is measured, and what happens once, after all that it depends on.
+SETTINGS = ("RATE", "ERRORS", "NOISE", "SPEED", "DEMO")
 
 
 class DemoBoard:
@@ -50,13 +52,13 @@ class DemoBoard:
         clock : int
             When the last of them was written, since the restart.
         """
+        if unknown := values.keys() - set(self.settings):
+            raise ValueError(f"settings must be some of {', '.join(self.settings)}, not {', '.join(sorted(unknown))}")
         for register in SETTINGS:
             here = {field: values.pop(field) for field in self._fields(register) if field in values}
             if not here:
                 continue
             self._write(register, here)
-        if values:
-            raise ValueError(f"settings must be some of {', '.join(self.settings)}, not {', '.join(values)}")
         return self.changed()
 
     @property
@@ -69,7 +71,15 @@ class DemoBoard:
         return self.link.read(self.registers.offset("CHANGED"))
 
     def stream(self, ticks: int) -> None:
-        """Ask for telemetry every so many ticks; 0: for none."""
+        """Ask for telemetry every so many ticks; 0: for none.
+
+        Raises
+        ------
+        ValueError
+            If there are more of them than the register holds.
+        """
+        if not 0 <= ticks < 1 << PERIOD_WIDTH:
+            raise ValueError(f"ticks must be from 0 to {(1 << PERIOD_WIDTH) - 1}, not {ticks}")
         receiver = self.link.receiver
         # Up to the answer there may be frames of what was asked for before.
         receiver.frame_clocks = 0

@@ -1,7 +1,9 @@
 """Recordings of telemetry: a row for each frame."""
 
 import csv
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
@@ -38,7 +40,7 @@ class Recorder:
     """
 
     def __init__(self, path: Path, suffix: str, columns: Sequence[Column]) -> None:
-        self._columns = columns
+        self._columns, self._path = columns, path
         self._table: _Table = (_Csv if suffix == ".csv" else _Parquet)(path, columns)
         self.rows = 0
 
@@ -48,11 +50,22 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._table.close()
+        with self._named():
+            self._table.close()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """A write that fails does not say of which file."""
+        try:
+            yield
+        except OSError as error:
+            error.filename = error.filename or str(self._path)
+            raise
 
     def write(self, frame: Frame) -> None:
         """Write a row."""
-        self._table.write([frame.time, *(column.value(frame.snapshot) for column in self._columns)])
+        with self._named():
+            self._table.write([frame.time, *(column.value(frame.snapshot) for column in self._columns)])
         self.rows += 1
 
 
@@ -60,6 +73,7 @@ class _Csv:
     """Numbers are the shortest that read back as the same, flags 0 or 1, and what is not there is empty."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
+        self._path = path
         self._file = path.open("w", encoding="utf-8", newline="")
         self._writer = csv.writer(self._file, lineterminator="\n")
         self._writer.writerow([TIME, *(column.head for column in columns)])
@@ -68,7 +82,11 @@ class _Csv:
         self._writer.writerow([int(value) if isinstance(value, bool) else value for value in row])
 
     def close(self) -> None:
-        self._file.close()
+        try:
+            self._file.close()
+        except OSError:  # the disk is full: all whole rows stay
+            os.truncate(self._path, self._path.read_bytes().rfind(b"\n") + 1)
+            raise
 
 
 class _Parquet:

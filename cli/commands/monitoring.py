@@ -23,24 +23,31 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.reports.monitor import Display, State
 from tachometry.spec.units import plural
 
+# A terminal that is closed, too, where there is this signal.
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_ORDERLY = 3.0  # seconds that an end may take before it can be interrupted
 _COUNTERS = 0.5  # seconds from a look at the counters to the next
 _PATIENCE = 5.0  # seconds without telemetry after which a duration can be over
 
 
 @contextmanager
 def interrupts() -> Iterator[threading.Event]:
-    """An event that Ctrl-C and SIGTERM set; the second time they interrupt."""
+    """An event that Ctrl-C, SIGTERM and SIGHUP set; later on they interrupt, but not while all is put in order."""
     stop = threading.Event()
+    begun = 0.0
 
     def hear(number: int, frame: FrameType | None) -> None:
-        if stop.is_set():
+        nonlocal begun
+        if not stop.is_set():
+            begun = time.monotonic()
+            stop.set()
+        elif time.monotonic() - begun > _ORDERLY:
             raise KeyboardInterrupt
-        stop.set()
 
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = {number: signal.signal(number, hear) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, hear) for number in _SIGNALS}
     try:
         yield stop
     finally:

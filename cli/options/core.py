@@ -204,14 +204,17 @@ class CoreTexts:
     given: bool
 
     def at(self, clock_hz: int) -> TachometerSpec:
-        """The core, with this clock if none is given.
+        """The core, at the clock of a board.
 
         Raises
         ------
         ParameterError
             If an option is wrong, or missing.
         """
-        return of_texts(self.method, {"clock": str(clock_hz), **self.texts})
+        text = self.texts.get(_CLOCK)
+        if text is not None and parse_frequency(_CLOCK, text) != clock_hz:
+            raise ParameterError(_CLOCK, f"must be that of the board, {clock_hz} Hz, not {text}")
+        return of_texts(self.method, {**self.texts, _CLOCK: str(clock_hz)})
 
 
 def optional_core_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,6 +1,7 @@
 """A demo board in the compiled engine: bytes into its UART, bytes out of it, and clocks that pass."""
 
 import ctypes
+import threading
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -78,14 +79,16 @@ class BoardSimulation:
         self._library.board_new.restype = ctypes.c_void_p
         self._board: Any = ctypes.c_void_p(self._library.board_new())
         self._out = np.empty(_ROOM, dtype=np.uint8)
+        self._busy = threading.Lock()  # an interrupted program may close it while a thread still runs it
         self.n_clocks = 0
         self.n_broken = 0
 
     def close(self) -> None:
-        """Give the memory back."""
-        if self._board is not None:
-            self._library.board_delete(self._board)
-            self._board = None
+        """Give the memory back; nothing happens in later runs."""
+        with self._busy:
+            if self._board is not None:
+                self._library.board_delete(self._board)
+                self._board = None
 
     def run(self, n_clocks: int, data: bytes = b"") -> tuple[bytes, bytes]:
         """Let clocks pass while bytes are sent to the core one after the other.
@@ -100,10 +103,11 @@ class BoardSimulation:
         given, found = np.frombuffer(data, dtype=np.uint8), []
         transfer = _Transfer(clocks=n_clocks, n_in=len(data), out=self._out.ctypes.data, capacity=_ROOM)
         setattr(transfer, "in", given.ctypes.data)
-        while transfer.clocks:
-            transfer.n_out = 0
-            self._library.board_run(self._board, ctypes.byref(transfer))
-            found.append(self._out[: transfer.n_out].tobytes())
+        with self._busy:
+            while transfer.clocks and self._board is not None:
+                transfer.n_out = 0
+                self._library.board_run(self._board, ctypes.byref(transfer))
+                found.append(self._out[: transfer.n_out].tobytes())
         self.n_clocks += n_clocks
         self.n_broken += transfer.broken
         return b"".join(found), data[transfer.taken :]

@@ -79,8 +79,20 @@ def test_settings_that_do_not_fit_are_refused() -> None:
     board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), uart()), timeout=60)
     with pytest.raises(ValueError, match="phase_error must be from -128 to 127, not 128"):
         board.set(phase_error=128)
-    with pytest.raises(ValueError, match=r"settings must be some of emulated, .*, drop, not velocity"):
-        board.set(velocity=1)
+    with pytest.raises(ValueError, match=r"settings must be some of rate, .*, jump, not nope"):
+        board.set(speed=5, nope=1)
+    assert board.link.read(DemoMap(spec)["SPEED"].offset) == 0
+    with pytest.raises(ValueError, match="ticks must be from 0 to 65535, not 65536"):
+        board.stream(65536)
+
+
+def test_the_speed_goes_where_it_shall_at_the_rate_that_is_set_with_it() -> None:
+    spec = CORES["index, filter, age"]
+    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), uart()), timeout=60)
+    speed = speed_of(spec, 0.5 * fastest(spec))
+    board.set(emulated=1, speed=speed, rate=1 << 10)
+    # 2^16 times as slowly as at once: in so many clocks it has hardly begun to turn.
+    assert board.client.snapshot()["position"] < 100
 
 
 def test_the_index_is_high_in_a_quarter_of_each_revolution() -> None:

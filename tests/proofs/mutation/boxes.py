@@ -18,7 +18,7 @@ from tachometry.hdl.bus_tachometer import BusTachometer
 from tachometry.hdl.demo.demo import Demo
 from tachometry.spec import Port, of_texts
 from tachometry.spec.registers import frames
-from tachometry.spec.registers.buses import bus_of, ports_on
+from tachometry.spec.registers.buses import BUSES, Bus, ports_on
 from tachometry.spec.registers.demo import DemoMap
 from tachometry.spec.registers.map import RegisterMap
 
@@ -26,10 +26,19 @@ Lines = dict[str, NDArray[np.uint64]]
 
 _SPEC = of_texts(
     "s",
-    {"ppr": "4", "clock": "8MHz", "tick": "1us", "max-time": "8us", "position-width": "8", "filter": "2", "index": "1"}
+    {
+        "ppr": "4",
+        "clock": "80kHz",
+        "tick": "100us",
+        "max-time": "800us",
+        "position-width": "8",
+        "filter": "2",
+        "index": "1",
+    }
     | {"age": "yes", "velocity-width": "12", "frac-bits": "4"},
 )
-_BIT_CYCLES = 8  # of a UART with a clock of 8 MHz
+_BIT_CYCLES = 8  # of a UART
+_LONGER = 10  # times as many clocks for a demo: what its settings do is slow
 _SERIAL = {"spi_sck", "spi_mosi", "spi_cs_n", "uart_rx"}
 
 
@@ -63,6 +72,11 @@ class Box(Case):
         return "demo" if self.demo else "registers"
 
     @property
+    def on(self) -> Bus:
+        """The bus; a UART has 8 clocks in a bit."""
+        return replace(BUSES[self.bus], baud=self.spec.timing.clock_hz // _BIT_CYCLES if BUSES[self.bus].baud else 0)
+
+    @property
     def registers(self) -> RegisterMap:
         """Of the core."""
         return DemoMap(self.spec) if self.demo else RegisterMap(self.spec)
@@ -70,16 +84,13 @@ class Box(Case):
     @property
     def component(self) -> wiring.Component:
         """The hardware."""
-        bus, registers = bus_of(self.bus), self.registers
-        assert bus is not None
+        bus, registers = self.on, self.registers
         return Demo(registers, bus) if isinstance(registers, DemoMap) else BusTachometer(registers, bus)
 
     @property
     def pins(self) -> Pins:
         """Ports; the outputs are those of the bus and of the demo."""
-        bus = bus_of(self.bus)
-        assert bus is not None
-        lines = bus.ports(self.registers)
+        lines = self.on.ports(self.registers)
         inputs = [port for port in ports_on(self.spec, None) if port.direction == "input" and port.name != "clk"]
         inputs += [port for port in lines if port.direction == "input" and not (self.demo and port.name == "capture")]
         outputs = [port for port in lines if port.direction == "output"]
@@ -91,6 +102,7 @@ class Box(Case):
     def play(self, n_clocks: int) -> Stimulus:
         """The encoder turns, with resets in the middle, and the bus is used all the time."""
         rng = np.random.default_rng(1)
+        n_clocks *= _LONGER if self.demo else 1
         of_core = stimulus(self.spec, n_clocks).pins[:n_clocks, 0]
         assert self.lines is not None
         levels = self.lines(rng, self.registers, n_clocks)
@@ -242,7 +254,7 @@ def _settings(rng: np.random.Generator, registers: RegisterMap, n_clocks: int) -
             register = writable[int(rng.integers(len(writable)))]
             data = int(rng.integers(1 << 32)) >> int(rng.integers(32))
             if register.name == "TELEMETRY":
-                data = int(rng.choice([0, 0, 90, 600, 700]))
+                data = int(rng.choice([0, 90, 600, 700, 2100, 4200]))
             elif register.name == "SPEED":
                 data = (int(rng.integers(-1 << 31, 1 << 31)) >> int(rng.integers(1, 12))) % (1 << 32)
             elif register.name == "DEMO":

@@ -48,7 +48,7 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
 
     def group(first: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         some = found[first : first + GROUP]
-        rows = 0 if first else len(played.pins)
+        rows = 0 if first or not played.traces else len(played.pins)
         return run(library(case.pins, flat, some), len(some), n_outputs, played.pins, rows)
 
     groups = list(pool.map(group, range(0, len(found), GROUP)))

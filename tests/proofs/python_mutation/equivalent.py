@@ -233,3 +233,35 @@ _argue(
     "output.max_native.bit_length() + output.multiplier.bit_length() <= 62",
     "62 → 61",
 )
+
+_argue(
+    f"{_RAIRAN}: windows",
+    "A count in the clock after the last one causes updates in later clocks only, and these are left out.",
+    "steps.clock < n_clocks → steps.clock <= n_clocks",
+)
+_argue(
+    f"{_RAIRAN}: windows",
+    "The first window, from the reset to the first count, makes no update: if its first dt ends before the first count "
+    "there is no count in it; its Ndt1 of 0 is taken as 1 anyhow; and its count is no measurement.",
+    *("node > 0 → node >= 0", "0 → -1 #5", "0 → -1 #9"),
+)
+_argue(
+    f"{_RAIRAN}: windows",
+    "A window ends after it begins, so the number is never negative.",
+    "0 → -1 #8",
+)
+_argue(
+    f"{_RAIRAN}: windows",
+    "The direction of no count at all belongs to the velocity 0 at rest, which is said to be forward.",
+    "0 → 1 #11",
+)
+_argue(
+    f"{_RAIRAN}: Model._alternating",
+    "An Ndt1 beyond the maximum time is no measurement, and more than 1 either way.",
+    "spec.timing.max_ticks >> found.shift → spec.timing.max_ticks << found.shift",
+)
+_argue(
+    f"{_RAIRAN}: Model._regime",
+    "It is only asked whether it is 1.",
+    "0 → -1",
+)
