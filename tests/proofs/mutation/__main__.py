@@ -1,6 +1,6 @@
 """How many wrong cores the tests' motions tell from the right one: `make mutate`.
 
-Names of methods as arguments choose those, and `registers` and `demo` what is around them.
+Names of methods as arguments choose those, and `registers` what is around a core.
 """
 
 import os
@@ -15,7 +15,7 @@ from support.report import chosen, row
 
 from tachometry.spec import METHODS
 
-GROUPS = (*METHODS, "registers", "demo")
+GROUPS = (*METHODS, "registers")
 LEAST = 0.99  # of the mutants that are not equivalent
 
 

@@ -69,7 +69,7 @@ class Box(Case):
     @property
     def group(self) -> str:
         """Which row of the last table."""
-        return "demo" if self.demo else "registers"
+        return "registers"
 
     @property
     def on(self) -> Bus:
