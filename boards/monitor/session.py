@@ -184,7 +184,9 @@ class Session:
         try:
             self._port = self._opened()
             board = connected(self._name, self._port, self._manifest, self._timeout)
-            board.set(**self._settings)
+            if self._settings:
+                board.set(**self._settings)
+                board.client.clear()  # both lines of another source may differ, which is no error of the encoder
             board.stream(self._period)
         except Unplugged as error:
             self._wait(error.why)
