@@ -21,8 +21,8 @@ from tachometry.spec import (
     Timing,
     TTachometer,
 )
-from tachometry.spec.registers.buses import BUSES, bus_of, manifest_on, ports_on
-from tachometry.spec.registers.demo import DemoMap, demo_ports
+from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
+from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Configuration:
         bus = bus_of(self.bus)
         if self.demo and bus is not None:
             registers = DemoMap(self.spec)
-            described = {"generator": "", "license": "", **manifest_on(registers, bus, CORE)}
+            described = {"generator": "", "license": "", **demo_manifest(registers, bus, CORE)}
             return verilog_of(Demo(registers, bus), described), demo_ports(registers, bus)
         return export(self.spec, CORE, self.bus)[f"{CORE}.v"], ports_on(self.spec, bus)
 

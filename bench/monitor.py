@@ -14,8 +14,8 @@ from tachometry.cli.reports.monitor import State, view
 from tachometry.sim.engines.board import BoardSimulation
 from tachometry.sim.signals.files import replacing
 from tachometry.spec import of_texts
-from tachometry.spec.registers.buses import bus_of, manifest_on
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
 PICTURE = Path(__file__).resolve().parent.parent / "docs" / "monitor.svg"
 CORE = {"ppr": "500", "clock": "12MHz", "max-speed": "1000rad/s", "filter": "4", "age": "yes"}
@@ -53,7 +53,7 @@ def main(output: Path) -> None:
     """Write the picture."""
     registers, bus = DemoMap(of_texts("s", CORE)), bus_of("uart")
     assert bus is not None
-    line, manifest = Line(BoardSimulation(registers, bus)), manifest_on(registers, bus)
+    line, manifest = Line(BoardSimulation(registers, bus)), demo_manifest(registers, bus)
     state = State(
         "icebreaker, simulated: S method, eq. (21)", registers.spec, {one.name: one for one in columns(registers)}
     )

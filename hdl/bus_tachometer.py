@@ -21,6 +21,18 @@ BRIDGES: dict[str, type[Bridge]] = {
 }
 
 
+def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
+    """The bridge from a bus to these registers.
+
+    Raises
+    ------
+    ParameterError
+        If the clock cannot make the bits of the bus.
+    """
+    cycles = (bus.bit_cycles(registers.spec.timing.clock_hz),) if bus.baud else ()
+    return BRIDGES[bus.name](registers, *cycles)
+
+
 class BusTachometer(wiring.Component):
     """A tachometer with its registers on a bus.
 
@@ -41,8 +53,7 @@ class BusTachometer(wiring.Component):
 
     def __init__(self, registers: RegisterMap, bus: Bus) -> None:
         self.core = RegisterCore(registers)
-        cycles = (bus.bit_cycles(registers.spec.timing.clock_hz),) if bus.baud else ()
-        self.bridge = BRIDGES[bus.name](registers, *cycles)
+        self.bridge = bridge_on(registers, bus)
         super().__init__(members((*registers.spec.ports, *bus.ports(registers))))
 
     def elaborate(self, platform: object) -> Module:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.cli.options.core import CoreTexts
 from tachometry.spec import of_parameters
-from tachometry.spec.registers.buses import Bus, bus_of, manifest_on
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.buses import Bus, bus_of
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
 if TYPE_CHECKING:
     from tachometry.boards.monitor.serial_port import SerialPort
@@ -46,7 +46,7 @@ class Target:
     @property
     def manifest(self) -> dict[str, Any]:
         """What the manifest says of it."""
-        return manifest_on(self.registers, self.bus, self.module)
+        return demo_manifest(self.registers, self.bus, self.module)
 
     @property
     def simulated(self) -> bool:
@@ -127,7 +127,7 @@ def attached(port: str, core: CoreTexts, path: Path | None) -> Target:
         found = DemoMap(of_parameters(parameters))
         line = bus_of(_BUS, baud)
         assert line is not None
-        manifest_on(found, line, module)
+        demo_manifest(found, line, module)
     except (ValueError, TypeError, AttributeError) as error:
         raise ValueError(f"--manifest {path}: {error}") from error
     if configuration != found.configuration:

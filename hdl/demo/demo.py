@@ -6,7 +6,7 @@ from amaranth.lib import wiring
 from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.bus.telemetry import TelemetrySender
 from tachometry.hdl.bus.uart import UartBridge
-from tachometry.hdl.bus_tachometer import BRIDGES
+from tachometry.hdl.bus_tachometer import bridge_on
 from tachometry.hdl.demo.emulator import EncoderEmulator
 from tachometry.hdl.register_core import RegisterCore
 from tachometry.spec.registers.buses import CAPTURE, Bus
@@ -40,9 +40,10 @@ class Demo(wiring.Component):
         self.core = RegisterCore(registers)
         self._lines = [pin.name for pin in spec.pins if pin.name in ENCODER_LINES]
         self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None)
-        cycles = (bus.bit_cycles(spec.timing.clock_hz),) if bus.baud else ()
-        self.bridge = BRIDGES[bus.name](registers, *cycles)
-        self.telemetry = TelemetrySender(registers, *cycles) if isinstance(self.bridge, UartBridge) else None
+        self.bridge = bridge_on(registers, bus)
+        self.telemetry: TelemetrySender | None = None
+        if isinstance(self.bridge, UartBridge):
+            self.telemetry = TelemetrySender(registers, bus.bit_cycles(spec.timing.clock_hz))
         self._bus_ports = [port for port in bus.ports(registers) if port.name != CAPTURE.name]
         super().__init__(members(demo_ports(registers, bus)))
 

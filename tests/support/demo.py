@@ -7,8 +7,8 @@ from tachometry.boards.host.registers import HostRegisters
 from tachometry.sim.engines.board import BoardSimulation
 from tachometry.spec import TachometerSpec, of_texts
 from tachometry.spec.registers import frames
-from tachometry.spec.registers.buses import Bus, bus_of, manifest_on
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.buses import Bus, bus_of
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
 BOARD = "icebreaker"
 CLOCK_HZ = 12_000_000
@@ -29,7 +29,7 @@ def demo_map(method: str = "m", **more: str) -> DemoMap:
 
 
 def manifest_of(registers: DemoMap) -> dict[str, Any]:
-    return manifest_on(registers, uart())
+    return demo_manifest(registers, uart())
 
 
 @cache

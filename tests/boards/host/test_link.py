@@ -10,8 +10,8 @@ from support.telemetry import FRAME_CLOCKS, Sent, damaged, frames_of
 from tachometry.boards.host import link
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.spec import of_texts
-from tachometry.spec.registers.buses import bus_of, manifest_on
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 from tachometry.spec.registers.frames import with_check
 
 MANY, FEW = 10_000_000, 300_000  # bytes
@@ -23,7 +23,7 @@ def registers() -> HostRegisters:
     bus = bus_of("uart")
     assert bus is not None
     texts = {"ppr": "500", "clock": "12MHz", "bounds": "yes", "age": "yes", "filter": "4"}
-    return HostRegisters(manifest_on(DemoMap(of_texts("s", texts)), bus))
+    return HostRegisters(demo_manifest(DemoMap(of_texts("s", texts)), bus))
 
 
 @cache

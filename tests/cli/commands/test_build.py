@@ -15,8 +15,8 @@ from tachometry.boards.fpga.boards import BOARDS
 from tachometry.hdl.bus_tachometer import BusTachometer
 from tachometry.hdl.export import verilog_of
 from tachometry.spec import of_texts
-from tachometry.spec.registers.buses import bus_of, manifest_on
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 from tachometry.spec.registers.map import RegisterMap
 
 ALL = """
@@ -88,7 +88,7 @@ def test_a_bitstream(
     assert [port for port in listed if port["name"] == "leds"] == [
         {"name": "leds", "direction": "output", "width": 4, "signed": False}
     ]
-    wanted = manifest_on(DemoMap(spec), bus, "rig")
+    wanted = demo_manifest(DemoMap(spec), bus, "rig")
     del wanted["ports"]
     assert written == {"generator": written["generator"], "license": "BSD-2-Clause", **json.loads(json.dumps(wanted))}
     assert described == {

@@ -10,8 +10,7 @@ from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.monitor.selftest import Step, selftest
 from tachometry.spec import of_texts
 from tachometry.spec.emulator import EmulatorSettings, fastest, rate_of, speed_of
-from tachometry.spec.registers.buses import manifest_on
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
 _COMMON = {"ppr": "16", "clock": "8MHz", "tick": "20us"}
 CORES = {
@@ -52,7 +51,7 @@ def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
     spec = CORES[name]
     registers = DemoMap(spec)
     port = DemoPort(spec)
-    board = DemoBoard(port, manifest_on(registers, uart()), timeout=60)
+    board = DemoBoard(port, demo_manifest(registers, uart()), timeout=60)
     results = selftest(board, registers, period=40, chosen=random_steps(registers, len(name)))
     assert [result.difference for result in results if not result.passed] == []
     assert min(result.frames for result in results) > 5
@@ -63,7 +62,7 @@ def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
 def test_pins_and_settings_survive_a_restart() -> None:
     spec = CORES["index, filter, age"]
     registers = DemoMap(spec)
-    board = DemoBoard(DemoPort(spec), manifest_on(registers, uart()), timeout=60)
+    board = DemoBoard(DemoPort(spec), demo_manifest(registers, uart()), timeout=60)
     board.set(speed=-123456, rate=7, phase_error=-5, duty_b=3, jitter=31, bounce=9, drop=200)
     board.restart()
     words = board.link.words(registers["SPEED"].offset, 4)
@@ -76,7 +75,7 @@ def test_pins_and_settings_survive_a_restart() -> None:
 
 def test_settings_that_do_not_fit_are_refused() -> None:
     spec = CORES["index, filter, age"]
-    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), uart()), timeout=60)
+    board = DemoBoard(DemoPort(spec), demo_manifest(DemoMap(spec), uart()), timeout=60)
     with pytest.raises(ValueError, match="phase_error must be from -128 to 127, not 128"):
         board.set(phase_error=128)
     with pytest.raises(ValueError, match=r"settings must be some of rate, .*, jump, not nope"):
@@ -88,7 +87,7 @@ def test_settings_that_do_not_fit_are_refused() -> None:
 
 def test_the_speed_goes_where_it_shall_at_the_rate_that_is_set_with_it() -> None:
     spec = CORES["index, filter, age"]
-    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), uart()), timeout=60)
+    board = DemoBoard(DemoPort(spec), demo_manifest(DemoMap(spec), uart()), timeout=60)
     speed = speed_of(spec, 0.5 * fastest(spec))
     board.set(emulated=1, speed=speed, rate=1 << 10)
     # 2^16 times as slowly as at once: in so many clocks it has hardly begun to turn.
@@ -98,7 +97,7 @@ def test_the_speed_goes_where_it_shall_at_the_rate_that_is_set_with_it() -> None
 def test_the_index_is_high_in_a_quarter_of_each_revolution() -> None:
     """Found by the core, which captures its position."""
     spec = replace(CORES["index, filter, age"], index=True)
-    board = DemoBoard(DemoPort(spec), manifest_on(DemoMap(spec), uart()), timeout=60)
+    board = DemoBoard(DemoPort(spec), demo_manifest(DemoMap(spec), uart()), timeout=60)
     board.set(emulated=1, speed=speed_of(spec, 0.1 * fastest(spec)))
     seen = set()
     for _ in range(12):

@@ -9,7 +9,7 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl.demo import emulator, line
 from tachometry.sim.golden.emulator import Change, GoldenEmulator
-from tachometry.spec.emulator import EmulatorSettings
+from tachometry.spec.emulator import LATENCY, EmulatorSettings
 
 CLOCKS, SEEDS = 3000, range(8)
 
@@ -152,7 +152,7 @@ def test_the_speed_changes_at_the_rate() -> None:
 
 def test_a_jump_changes_both_lines_at_once() -> None:
     trace = GoldenEmulator().trace([Change(10, EmulatorSettings(), jump=True)], 100)
-    assert trace.clock.tolist() == [0, 14]
+    assert trace.clock.tolist() == [0, 11 + LATENCY]
     assert (trace.a.tolist(), trace.b.tolist()) == ([0, 1], [0, 1])
 
 

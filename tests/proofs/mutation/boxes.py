@@ -4,7 +4,7 @@ The tests of these boxes hold them against their golden models; here it is count
 tells from the right one. The accesses do not wait for answers where these come after a number of clocks that is known.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -137,18 +137,14 @@ def _bits(condition: NDArray[np.bool_]) -> NDArray[np.uint64]:
     return condition.astype(np.uint64)
 
 
-def _rare(rng: np.random.Generator, n_clocks: int) -> NDArray[np.bool_]:
-    """Begin of an access, at rates that change."""
-    rates = np.repeat(rng.choice([0.02, 0.2, 0.5], -(-n_clocks // 2000)), 2000)[:n_clocks]
-    return rng.random(n_clocks) < rates
+def _rare(rng: np.random.Generator, n_clocks: int, rates: Sequence[float] = (0.02, 0.2, 0.5)) -> NDArray[np.bool_]:
+    """Random clocks, at rates that change."""
+    rate = np.repeat(rng.choice(rates, -(-n_clocks // 2000)), 2000)[:n_clocks]
+    return rng.random(n_clocks) < rate
 
 
 def _captures(rng: np.random.Generator, n_clocks: int) -> Lines:
-    return {
-        "capture": _bits(
-            rng.random(n_clocks) < np.repeat(rng.choice([0, 0.01, 0.5], -(-n_clocks // 2000)), 2000)[:n_clocks]
-        )
-    }
+    return {"capture": _bits(_rare(rng, n_clocks, (0, 0.01, 0.5)))}
 
 
 def _native(rng: np.random.Generator, registers: RegisterMap, n_clocks: int) -> Lines:
