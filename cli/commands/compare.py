@@ -94,7 +94,8 @@ def compare(
     where it says nothing: at constant speed, and where noise hides it. A capture does not tell the true speed, so there
     are no errors.
     """
-    from tachometry.sim.studies.compare import BASELINES, common_instants, score
+    from tachometry.sim.studies.compare import common_instants, score
+    from tachometry.sim.studies.rivals import BASELINES
 
     given = {"--plot": plot, "--csv": csv}
     inputs = tables if capture is None else [capture]
@@ -197,7 +198,8 @@ def _time(seconds: float) -> str:
 def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Recording], Curve]]:
     """What is to be compared, each from what the encoder gave."""
     from tachometry.sim.signals.recording import PinTrace
-    from tachometry.sim.studies.compare import baseline_curve, core_curve
+    from tachometry.sim.studies.compare import core_curve
+    from tachometry.sim.studies.rivals import baseline_curve
 
     def core(name: str, spec: TachometerSpec) -> Callable[[Recording], Curve]:
         return lambda recording: core_curve(name, spec, PinTrace.of(recording, spec))

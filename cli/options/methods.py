@@ -34,7 +34,7 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
     make : callable
         See `core.common_core_options`.
     others : collection of str
-        Names that are no methods of cores.
+        Names that are no methods of cores; what is behind a colon of such a name is not read here.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, s
         method, *words = name.split(":")
         if method in METHODS:
             found.append((name, method, own_texts(method, words)))
-        elif name in others:
+        elif method in others:
             found.append((name, None, {}))
         else:
             raise ValueError(f"--methods must be of {', '.join([*METHODS, *others])}, or all, not {name!r}")

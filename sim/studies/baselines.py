@@ -83,17 +83,35 @@ class Estimate:
         return np.append(0.0, self.velocity)[np.searchsorted(self.time, t, side="right")]
 
 
-class _Readings(NamedTuple):
+class Readings(NamedTuple):
+    """What a controller reads, once per control period.
+
+    Parameters
+    ----------
+    time : float64 array, shape (n,), seconds
+    counts : int64 array, shape (n,)
+    changed_at : float64 array, shape (n,), seconds
+        Of the latest step, 0 before the first.
+    """
+
     time: FloatArray
     counts: IntArray
-    changed_at: FloatArray  # time of the latest step, 0 before the first
+    changed_at: FloatArray
 
     @property
     def difference(self) -> IntArray:
+        """Counts since the reading before."""
         return np.diff(self.counts, prepend=0)
 
 
-def _read(steps: Steps, period_s: float) -> _Readings:
+def read(steps: Steps, period_s: float) -> Readings:
+    """Readings at `period_s`, twice that, ..., up to the end.
+
+    Raises
+    ------
+    ValueError
+        If the period (s) is not more than 0, or there were more than `MAX_TICKS` readings.
+    """
     if not period_s > 0:
         raise ValueError(f"control period must be more than 0 s, not {period_s} s")
     if not steps.duration / period_s <= MAX_TICKS:
@@ -104,11 +122,17 @@ def _read(steps: Steps, period_s: float) -> _Readings:
     time = period_s * np.arange(1, n_periods + 1, dtype=np.float64)
     seen = np.searchsorted(steps.time, time, side="right")
     count = np.append(0, np.cumsum(steps.step))
-    return _Readings(time, count[seen], np.append(0.0, steps.time)[seen])
+    return Readings(time, count[seen], np.append(0.0, steps.time)[seen])
 
 
-def _clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
-    """What a clock shows at some times; a time within rounding of a clock edge is at the edge."""
+def clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
+    """What a clock of `clock_s` (s) shows at some times; a time within rounding of a clock edge is at the edge.
+
+    Raises
+    ------
+    ValueError
+        If the clock is not shorter than the control period.
+    """
     if not 0 < clock_s < period_s:
         raise ValueError(f"clock must be more than 0 s and shorter than the control period, not {clock_s} s")
     return np.floor(seconds / clock_s + 1e-6).astype(np.int64)
@@ -139,7 +163,7 @@ def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> 
     filter_s : float, seconds
         Time constant of the filter; 0 for none. SimpleFOC's default is 5 ms.
     """
-    readings = _read(steps, period_s)
+    readings = read(steps, period_s)
     raw = readings.difference * steps.count_rad / period_s
     return Estimate(readings.time, low_pass(raw, period_s, filter_s))
 
@@ -161,13 +185,13 @@ def timestamp_method(steps: Steps, period_s: float, timeout_s: float = 0.5, cloc
     clock_s : float, seconds
         Unit of the timestamps: about 0.5 us by default, 0.1 us with `hires-timestamp`.
     """
-    readings = _read(steps, period_s)
-    now = _clocks(readings.time, clock_s, period_s)
+    readings = read(steps, period_s)
+    now = clocks(readings.time, clock_s, period_s)
     new = readings.difference != 0
     event = np.flatnonzero(new)
     if not len(event):
         return Estimate(readings.time, np.zeros(len(now)))
-    stamp = _clocks(readings.changed_at[event], clock_s, period_s)
+    stamp = clocks(readings.changed_at[event], clock_s, period_s)
     moved = readings.difference[event]
     waited = (now[event[1:] - 1] - stamp[:-1]) * clock_s
     start = np.append(True, (np.diff(event) > 1) & (waited >= timeout_s))
@@ -202,9 +226,9 @@ def mixed_method(steps: Steps, period_s: float, timeout_s: float = 0.1, clock_s:
     clock_s : float, seconds
         Unit of the times of counts: 1 us in SimpleFOC.
     """
-    readings = _read(steps, period_s)
-    now = _clocks(readings.time, clock_s, period_s)
-    age = now - _clocks(readings.changed_at, clock_s, period_s)
+    readings = read(steps, period_s)
+    now = clocks(readings.time, clock_s, period_s)
+    age = now - clocks(readings.changed_at, clock_s, period_s)
     elapsed = np.diff(now, prepend=0) + np.append(0, age[:-1]) - age
     measured = (readings.difference != 0) & (2 * elapsed > np.diff(now, prepend=0))
     speed = np.divide(readings.difference, elapsed * clock_s, out=np.zeros(len(now)), where=measured)
@@ -241,7 +265,7 @@ def tracking_loop(
     kp, ki = 2 * bandwidth_rad_s, bandwidth_rad_s**2
     if not 0 < kp * period_s < 1:
         raise ValueError(f"twice the bandwidth times the control period must be less than 1, not {kp * period_s:.6g}")
-    readings = _read(steps, period_s)
+    readings = read(steps, period_s)
     least = 0.5 * period_s * ki if whole_counts else 0.0
     position = speed = 0.0  # counts, counts/s
     speeds = []

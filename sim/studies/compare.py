@@ -1,20 +1,17 @@
 """Several methods on the same edges: what each makes of them, and how far it is from the truth."""
 
-import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import FloatArray
-from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies import baselines
 from tachometry.spec import TachometerSpec
-from tachometry.spec.option import ParameterError
 
 TrueSpeed = Callable[[FloatArray], FloatArray]
 
@@ -23,29 +20,6 @@ _LONGEST_DELAY = 0.02  # seconds, that is looked for
 _ALIKE = 1e-9  # of a speed; a constant one has no delay
 # Shares of the mean square error that go with a delay: enough in any case, and at least.
 _MUCH, _LITTLE = 0.25, 0.01
-
-
-def _simplefoc(steps: baselines.Steps) -> baselines.Estimate:
-    raw = baselines.mixed_method(steps, 1e-3)
-    return baselines.Estimate(raw.time, baselines.low_pass(raw.velocity, 1e-3, 5e-3))
-
-
-# What people use now: how it is described, and its float model with the settings that its project comes with.
-BASELINES: dict[str, tuple[str, Callable[[baselines.Steps], baselines.Estimate]]] = {
-    "difference": ("counts in 1 ms, 5 ms low-pass", partial(baselines.finite_difference, period_s=1e-3)),
-    "hostmot2": ("LinuxCNC: timestamps, 1 ms", partial(baselines.timestamp_method, period_s=1e-3)),
-    "simplefoc": ("SimpleFOC: mixed time and frequency, 1 ms, 5 ms low-pass", _simplefoc),
-    "odrive": ("ODrive: tracking loop, 1000 rad/s, 125 us", partial(baselines.tracking_loop, period_s=125e-6)),
-    "moteus": (
-        "moteus: tracking loop, 400 Hz, 33 us",
-        partial(
-            baselines.tracking_loop,
-            period_s=1 / 30e3,
-            bandwidth_rad_s=2 * math.pi * 400 / baselines.MOTEUS_3DB_RATIO,
-            whole_counts=False,
-        ),
-    ),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,29 +86,18 @@ def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
     )
 
 
-def baseline_curve(name: str, recording: Recording, counts_per_rev: int, decoding: int) -> Curve:
-    """What one of the `BASELINES` shows, with an ideal decoder.
-
-    Raises
-    ------
-    ValueError
-        If it is shorter than two of its periods.
-    """
-    what, model = BASELINES[name]
-    estimate = model(baselines.Steps.of_recording(recording, counts_per_rev, decoding))
-    if len(estimate.time) < 2:
-        raise ParameterError(
-            "motion", f"must last at least two control periods of {name}, not {recording.duration:.6g} s"
-        )
-    return Curve(name, what, estimate, np.empty(0))
-
-
 def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float, earliest: float = 0.0) -> FloatArray:
     """Evenly spaced instants, a tick apart or more, from when every curve has begun, and `earliest` (s), to the end."""
     begun = max((curve.estimate.time[0] for curve in curves if len(curve.estimate.time)), default=0.0)
     begun = max(begun, earliest)
     n = min(int((duration - begun) / tick_seconds), _MOST_INSTANTS)
     return begun + (duration - begun) / max(n, 1) * np.arange(n, dtype=np.float64)
+
+
+def rms_error(curve: Curve, instants: FloatArray, truth: FloatArray) -> float:
+    """RMS error of the held velocity, rad/s, at some instants (s), where the true speed is known."""
+    error = curve.estimate.at(instants) - truth
+    return float(np.sqrt(np.mean(error * error)))
 
 
 def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueSpeed | None) -> Score:

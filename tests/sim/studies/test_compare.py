@@ -8,7 +8,8 @@ from support.lines import PPR, record
 
 from tachometry.sim.plots.compare import save_comparison
 from tachometry.sim.studies import baselines
-from tachometry.sim.studies.compare import BASELINES, Curve, baseline_curve, common_instants, core_curve, score
+from tachometry.sim.studies.compare import Curve, common_instants, core_curve, score
+from tachometry.sim.studies.rivals import BASELINES, baseline_curve
 from tachometry.spec import METHODS, Encoder, Timing
 
 
