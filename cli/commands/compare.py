@@ -9,20 +9,23 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tachometry.cli.commands.comparing import costs, given, tuned
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import Make, common_core_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
-from tachometry.spec import Encoder, TachometerSpec
-from tachometry.spec.units import SpeedUnit, format_time, parse_time
+from tachometry.cli.reports.compare import print_comparison, shown_time, write_comparison, write_costs
+from tachometry.spec import TachometerSpec
+from tachometry.spec.units import parse_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
     from tachometry.sim.signals.recording import Recording
-    from tachometry.sim.studies.compare import Curve, Score, TrueSpeed
+    from tachometry.sim.studies.compare import TrueSpeed
     from tachometry.sim.studies.size import Measurement
+    from tachometry.sim.studies.tune import Cost
 
 
 @click.command(
@@ -37,6 +40,9 @@ Examples:
   tachometry compare --ppr 500 --clock 10MHz --tick 100us \\
       --methods "s,s:cancel=no,m:average=10,hostmot2" \\
       --motion "sine:50rad/s:5Hz:1s" --size
+  tachometry compare --ppr 500 --clock 10MHz --tick 100us --tune \\
+      --motion constant:100rad/s:400ms --from 100ms \\
+      --jitter 0.05 --nonuniformity 0.1 --tradeoff delays.png
   tachometry compare --ppr 500 --clock 200kHz --tick 1ms --replay ramp.sr""",
 )
 @common_core_options
@@ -45,8 +51,18 @@ Examples:
     "--methods",
     default="all",
     metavar="LIST",
-    help="Methods to compare: all, or names with commas between. Methods of cores take options, as in m:average=10 or "
-    "s:cancel=no; difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use.",
+    help="Methods to compare: all, or names with commas between. Methods take options, as in m:average=10 or "
+    "hostmot2:period=500us. difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use; "
+    "least-squares, foaw and kalman are float models of estimators in the literature. "
+    "docs/compare.md has their options.",
+)
+@option(
+    "Methods",
+    "--tune",
+    is_flag=True,
+    help="In place of each float model without options, and of mt without options, show the best of many settings: the "
+    "one with the least RMS error. Its name has the options, and can be given to --methods. All other cores are as "
+    "they are given. It needs --motion.",
 )
 @optional_motion_options
 @option(
@@ -74,6 +90,16 @@ Examples:
 )
 @output("--plot", suffixes=(".png", ".pdf"), help="Figure of all velocities and of the error of each; .png or .pdf.")
 @output("--csv", help="CSV with a row per method: the table.")
+@output(
+    "--tradeoff",
+    suffixes=(".png", ".pdf", ".csv"),
+    help="Figure of error over delay, .png or .pdf, with a curve per method: those of all settings of the float "
+    "models, of m over --average, and of mt over --min-time, than which no other has both less error and less delay. "
+    "The error is that of --motion, such as a constant speed with a real disc. The delay is that of another motion "
+    "with an ideal encoder, whose speed goes to and fro between half the RMS speed of --motion and all of it, 10 times "
+    "a second: the RMS error over the RMS acceleration, which is the delay of an otherwise perfect method with that "
+    "error. Or .csv: the numbers of all settings. It needs --motion.",
+)
 def compare(
     make: Make,
     methods: str,
@@ -82,49 +108,66 @@ def compare(
     capture: Path | None,
     read: Callable[[Path, TachometerSpec], Recording],
     start: str | None,
+    tune: bool,
     size: bool,
     plot: Path | None,
     csv: Path | None,
+    tradeoff: Path | None,
 ) -> int:
     """Compare methods on the same edges, of a virtual encoder or a capture.
 
-    Cores are run by their golden models, which the hardware equals bit for bit; the others are float models with the
-    settings that their projects come with. Errors are those of the held velocity against the shaft's, from when every
-    method has given its first value; the delay is the shift of the true speed that comes closest. It is left out
-    where it says nothing: at constant speed, and where noise hides it. A capture does not tell the true speed, so there
-    are no errors.
+    Cores are run by their golden models, which the hardware equals bit for bit; the others are float models, those of
+    other projects with the settings that these come with unless options or --tune say otherwise. Errors are those of
+    the held velocity against the shaft's, from when every method has given its first value; the delay is the shift of
+    the true speed that comes closest. It is left out where it says nothing: at constant speed, and where noise hides
+    it. A capture does not tell the true speed, so there are no errors.
     """
     from tachometry.sim.studies.compare import common_instants, score
-    from tachometry.sim.studies.rivals import BASELINES
+    from tachometry.sim.studies.rivals import BASELINES, baseline_model
 
-    given = {"--plot": plot, "--csv": csv}
+    files = {"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}
     inputs = tables if capture is None else [capture]
-    outputs = Outputs({name: path for name, path in given.items() if path is not None}, inputs=inputs)
+    outputs = Outputs({name: path for name, path in files.items() if path is not None}, inputs=inputs)
     named = named_methods(methods, make, BASELINES)
+    for name in (name for name, spec in named.specs.items() if spec is None):
+        baseline_model(name)  # what is wrong is reported at once
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
     source = _source(record, capture, read, spec)
     earliest = 0.0 if start is None else float(parse_time("start", start))
     if earliest < 0:
         raise ValueError(f"--from must be at least 0, not {start}")
+    tick_s = float(spec.timing.tick_seconds)
     tools = _tools() if size else {}
+    n_tried: dict[str, int] = {}
     with outputs:
         duration = source.recording.duration
-        curves = [curve(source.recording) for curve in _chosen(named, spec.encoder)]
-        instants = common_instants(curves, duration, float(spec.timing.tick_seconds), earliest)
+        if tune or tradeoff is not None:
+            if source.true_speed is None:
+                raise ValueError(f"{'--tune' if tune else '--tradeoff'} must be given together with --motion")
+            judged = common_instants([], duration, tick_s, earliest)
+            if len(judged) < 2:
+                raise ValueError(f"{source.name} must last longer than --from, not {shown_time(duration)}")
+            asked = (named, spec.encoder, make, source.recording, judged, source.true_speed)
+            if path := outputs.get("--tradeoff"):
+                _tradeoff(path, spec, *costs(*asked))
+            if tune:
+                named, n_tried = tuned(*asked)
+        curves = [setting.curve(source.recording) for setting in given(named, spec.encoder)]
+        instants = common_instants(curves, duration, tick_s, earliest)
         if len(instants) < 2:
             until = "" if start is None else ", and beyond --from"
             raise ValueError(
-                f"{source.name} must last until every method has a value{until}, longer than {_time(duration)}"
+                f"{source.name} must last until every method has a value{until}, longer than {shown_time(duration)}"
             )
         scores = [score(curve, duration, instants, source.true_speed) for curve in curves]
         sizes = _sizes(named, tools) if size else {}
         if path := outputs.get("--csv"):
-            _write(path, scores, sizes, spec.shown_unit)
+            write_comparison(path, scores, sizes, spec.shown_unit)
         if path := outputs.get("--plot"):
             from tachometry.sim.plots.compare import save_comparison
 
             save_comparison(path, spec, curves, scores, instants, source.true_speed)
-    _print(scores, sizes, named, spec.shown_unit)
+    print_comparison(scores, sizes, named, n_tried, spec.shown_unit)
     from tachometry.cli.reports.run import merged_edges, print_warnings
 
     clock_hz = spec.timing.clock_hz
@@ -154,6 +197,16 @@ def _source(
     assert record is not None
     truth = record(spec)
     return _Source("--motion", truth.recording, truth.true_speed)
+
+
+def _tradeoff(path: Path, spec: TachometerSpec, costs: dict[str, list[Cost]], speed: float) -> None:
+    """Write the figure of error over delay, or its numbers."""
+    if path.suffix.lower() == ".csv":
+        write_costs(path, costs, spec.shown_unit)
+        return
+    from tachometry.sim.plots.tradeoff import save_tradeoff
+
+    save_tradeoff(path, spec, costs, speed)
 
 
 def _tools() -> dict[str, str]:
@@ -186,89 +239,3 @@ def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
             if report is not None:
                 report(done)
     return sizes
-
-
-def _time(seconds: float) -> str:
-    """A time to four digits."""
-    from fractions import Fraction
-
-    return format_time(Fraction(f"{seconds:.4g}"))
-
-
-def _chosen(named: Methods, encoder: Encoder) -> list[Callable[[Recording], Curve]]:
-    """What is to be compared, each from what the encoder gave."""
-    from tachometry.sim.signals.recording import PinTrace
-    from tachometry.sim.studies.compare import core_curve
-    from tachometry.sim.studies.rivals import baseline_curve
-
-    def core(name: str, spec: TachometerSpec) -> Callable[[Recording], Curve]:
-        return lambda recording: core_curve(name, spec, PinTrace.of(recording, spec))
-
-    def baseline(name: str) -> Callable[[Recording], Curve]:
-        return lambda recording: baseline_curve(name, recording, encoder.counts_per_rev, encoder.decoding)
-
-    return [baseline(name) if spec is None else core(name, spec) for name, spec in named.specs.items()]
-
-
-_SPEEDS = ("rms", "max")  # of a score, in rad/s
-_SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
-
-
-def _print(scores: list[Score], sizes: dict[str, Measurement], named: Methods, unit: SpeedUnit) -> None:
-    from rich.text import Text
-
-    from tachometry.cli.reports.terminal import print_table, stdout_console
-
-    def time(seconds: float | None) -> str:
-        return "-" if seconds is None else ("-" if seconds < 0 else "") + _time(abs(seconds))
-
-    rows = [
-        (
-            row.name,
-            f"{row.updates_per_second:.4g}",
-            time(row.mean_time),
-            time(row.worst_time),
-            "-" if row.rms is None else f"{unit.of(row.rms):.4g}",
-            "-" if row.max is None else f"{unit.of(row.max):.4g}",
-            time(row.delay),
-            *(_size_cells(sizes.get(row.name)) if sizes else ()),
-        )
-        for row in scores
-    ]
-    errors = (f"RMS ({unit.name})", f"max ({unit.name})")
-    heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay")
-    print_table((*heads, *(_SIZE if sizes else ())), rows)
-    console = stdout_console()
-    console.print()
-    for row in scores:
-        console.print(Text(f"{row.name}: {row.what}"))
-    if sizes:
-        console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/size.md")
-    for name, spec in named.specs.items():
-        for note in spec.notes if spec is not None else ():
-            console.print(Text(f"{name}: {note}"))
-    for name, reason in named.left_out.items():
-        console.print(Text(f"{name}: left out: {reason}"))
-
-
-def _size_cells(size: Measurement | None) -> list[str]:
-    return ["-" if size is None else form.format(size.figures[figure]) for figure, form in _SIZE.items()]
-
-
-def _write(path: Path, scores: list[Score], sizes: dict[str, Measurement], unit: SpeedUnit) -> None:
-    from tachometry.sim.signals.files import write_csv
-
-    names = [name for name in vars(scores[0]) if name != "what"]
-    figures = list(_SIZE) if sizes else []
-
-    def cells(row: Score) -> list[object]:
-        size = sizes.get(row.name)
-        values = [getattr(row, name) for name in names]
-        shown = [
-            unit.of(value) if name in _SPEEDS and value is not None else value
-            for name, value in zip(names, values, strict=True)
-        ]
-        return shown + [size and size.figures[figure] for figure in figures]
-
-    heads = [f"{name}_{unit.suffix}" if name in _SPEEDS else name for name in names]
-    write_csv(path, [*heads, *figures], map(cells, scores))

@@ -47,6 +47,17 @@ def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
         (["--from", "2s"], "--motion must last until every method has a value, and beyond --from, longer than 400ms"),
         (["--from", "-1s"], "--from must be at least 0, not -1s"),
         (["--plot", "x.jpg"], "file must end in .png or .pdf"),
+        (["--tradeoff", "x.svg"], "file must end in .png, .pdf or .csv"),
+        (["--methods", "hostmot2:x=1"], "options of hostmot2 must be of period, not 'x'"),
+        (["--methods", "hostmot2:period=1"], "period must be a number with one of the units s, ms, us, ns, not '1'"),
+        (["--methods", "hostmot2:period=0s"], "control period must be more than 0 s, not 0.0 s"),
+        (["--methods", "kalman:order=4"], "order of the filter must be 2 or 3, not 4"),
+        (["--tune", "--from", "2s"], "--motion must last longer than --from, not 400ms"),
+        (["--tune", "--motion", "stop:1us"], "--motion must last"),
+        (
+            ["--tradeoff", "new/t.png", "--motion", "stop:50ms"],
+            "--motion must move the shaft where there is a --tradeoff",
+        ),
     ],
 )
 def test_what_cannot_be_is_told_in_one_line(
@@ -130,3 +141,69 @@ def test_what_it_takes_to_get_going_can_be_left_out(tmp_path: Path) -> None:
             worst.append(float(next(csv.DictReader(file))["max_rad_s"]))
     assert worst[0] > 30
     assert worst[1] < 10
+
+
+# --- tuning
+
+
+def rows_of(path: Path) -> dict[str, dict[str, str]]:
+    with path.open() as file:
+        return {row["name"]: row for row in csv.DictReader(file)}
+
+
+def test_the_best_settings_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = [*CORE, "--motion", "constant:40rad/s:200ms", "--from", "50ms", "--jitter", "0.05"]
+    methods = ["s", "mt", "mt:min-time=2ms", "hostmot2", "hostmot2:period=2ms", "kalman"]
+    for name, more in (("usual", []), ("tuned", ["--tune"])):
+        names = ["--methods", ",".join(methods)]
+        assert run("compare", *options, *names, *more, "--csv", tmp_path / name) == 0
+    usual, tuned = rows_of(tmp_path / "usual"), rows_of(tmp_path / "tuned")
+    assert list(usual) == methods
+    told = capsys.readouterr().out
+    for name in ("s", "mt:min-time=2ms", "hostmot2:period=2ms"):
+        assert tuned[name] == usual[name]
+    for method in ("mt", "hostmot2", "kalman"):
+        found = [row for name, row in tuned.items() if name.startswith(f"{method}:")]
+        assert min(float(row["rms_rad_s"]) for row in found) < 0.8 * float(usual[method]["rms_rad_s"])
+    assert told.count("; best of ") == 3
+    assert "best of 9 settings" in told
+    again = [*options, "--methods", ",".join(tuned), "--csv", tmp_path / "again"]
+    assert run("compare", *again) == 0
+    assert rows_of(tmp_path / "again") == tuned
+
+
+def test_figure_of_error_over_delay(tmp_path: Path) -> None:
+    options = ["--motion", "constant:40rad/s:200ms", "--from", "50ms", "--methods", "s,m,mt:min-time=2ms,hostmot2"]
+    assert run("compare", *CORE, *options, "--tradeoff", tmp_path / "t.csv") == 0
+    with (tmp_path / "t.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    names = [row["name"] for row in rows]
+    assert names[0] == "s"
+    assert names.count("mt:min-time=2ms") == 1
+    assert {row["method"] for row in rows} == {"s", "m", "mt:min-time=2ms", "hostmot2"}
+    by = {row["name"]: row for row in rows}
+    slow, quick = by["hostmot2:period=8ms"], by["hostmot2:period=250us"]
+    assert float(slow["rms_rad_s"]) < float(quick["rms_rad_s"])
+    assert float(slow["equivalent_delay"]) > float(quick["equivalent_delay"])
+    assert [by["s"]["shown"], slow["shown"]] == ["1", "1"]
+    assert "0" in {row["shown"] for row in rows}
+    assert run("compare", *CORE, *options, "--tradeoff", tmp_path / "t.png") == 0
+    assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_speeds_of_the_figure_are_in_the_unit_of_the_core(tmp_path: Path) -> None:
+    found = []
+    for unit in ([], ["--unit", "rpm"]):
+        options = ["--motion", "constant:40rad/s:100ms", "--methods", "m:average=2", *unit]
+        assert run("compare", *CORE, *options, "--tradeoff", tmp_path / "t.csv") == 0
+        with (tmp_path / "t.csv").open() as file:
+            found.append(next(csv.DictReader(file)))
+    assert float(found[1]["rms_rpm"]) == pytest.approx(float(found[0]["rms_rad_s"]) * 30 / 3.14159265, rel=1e-6)
+
+
+def test_tuning_needs_the_truth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "c.csv").write_text("time,a,b\n0,0,0\n0.1,1,0\n")
+    for option in (["--tune"], ["--tradeoff", tmp_path / "new" / "t.png"]):
+        assert run("compare", *CORE, "--replay", tmp_path / "c.csv", *option) == 2
+        assert capsys.readouterr().err == f"tachometry: error: {option[0]} must be given together with --motion\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["c.csv"]

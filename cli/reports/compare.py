@@ -1,0 +1,118 @@
+"""What `compare` prints and writes: a row per method, with sizes if they were measured; and what settings cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tachometry.cli.options.methods import Methods
+from tachometry.spec.units import SpeedUnit, format_time
+
+if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
+    from tachometry.sim.studies.compare import Score
+    from tachometry.sim.studies.size import Measurement
+    from tachometry.sim.studies.tune import Cost
+
+_SPEEDS = ("rms", "max")  # of a score, in rad/s
+_SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
+
+
+def shown_time(seconds: float) -> str:
+    """A time to four digits."""
+    return format_time(Fraction(f"{seconds:.4g}"))
+
+
+def print_comparison(
+    scores: list[Score],
+    sizes: Mapping[str, Measurement],
+    named: Methods,
+    n_tried: Mapping[str, int],
+    unit: SpeedUnit,
+) -> None:
+    """Print the table, and below it what each method is.
+
+    Parameters
+    ----------
+    scores : list of Score
+    sizes : mapping of str to Measurement
+        Of cores, by name; empty if they were not measured.
+    named : Methods
+    n_tried : mapping of str to int
+        Number of settings of which one is the best.
+    unit : SpeedUnit
+    """
+    from rich.text import Text
+
+    from tachometry.cli.reports.terminal import print_table, stdout_console
+
+    def time(seconds: float | None) -> str:
+        return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
+
+    rows = [
+        (
+            row.name,
+            f"{row.updates_per_second:.4g}",
+            time(row.mean_time),
+            time(row.worst_time),
+            "-" if row.rms is None else f"{unit.of(row.rms):.4g}",
+            "-" if row.max is None else f"{unit.of(row.max):.4g}",
+            time(row.delay),
+            *(_size_cells(sizes.get(row.name)) if sizes else ()),
+        )
+        for row in scores
+    ]
+    errors = (f"RMS ({unit.name})", f"max ({unit.name})")
+    heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay")
+    print_table((*heads, *(_SIZE if sizes else ())), rows)
+    console = stdout_console()
+    console.print()
+    for row in scores:
+        tried = f"; best of {n_tried[row.name]} settings" if row.name in n_tried else ""
+        console.print(Text(f"{row.name}: {row.what}{tried}"))
+    if sizes:
+        console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/size.md")
+    for name, spec in named.specs.items():
+        for note in spec.notes if spec is not None else ():
+            console.print(Text(f"{name}: {note}"))
+    for name, reason in named.left_out.items():
+        console.print(Text(f"{name}: left out: {reason}"))
+
+
+def _size_cells(size: Measurement | None) -> list[str]:
+    return ["-" if size is None else form.format(size.figures[figure]) for figure, form in _SIZE.items()]
+
+
+def write_comparison(path: Path, scores: list[Score], sizes: Mapping[str, Measurement], unit: SpeedUnit) -> None:
+    """Write the table as CSV."""
+    from tachometry.sim.signals.files import write_csv
+
+    names = [name for name in vars(scores[0]) if name != "what"]
+    figures = list(_SIZE) if sizes else []
+
+    def cells(row: Score) -> list[object]:
+        size = sizes.get(row.name)
+        values = [getattr(row, name) for name in names]
+        shown = [
+            unit.of(value) if name in _SPEEDS and value is not None else value
+            for name, value in zip(names, values, strict=True)
+        ]
+        return shown + [size and size.figures[figure] for figure in figures]
+
+    heads = [f"{name}_{unit.suffix}" if name in _SPEEDS else name for name in names]
+    write_csv(path, [*heads, *figures], map(cells, scores))
+
+
+def write_costs(path: Path, costs: Mapping[str, Sequence[Cost]], unit: SpeedUnit) -> None:
+    """Write what all settings cost as CSV; the last column tells those that are in the figure."""
+    from tachometry.sim.signals.files import write_csv
+    from tachometry.sim.studies.tune import front
+
+    rows = [
+        (cost.method, cost.name, unit.of(cost.rms), cost.delay, int(cost in shown))
+        for tried in costs.values()
+        for shown in [front(tried)]
+        for cost in tried
+    ]
+    write_csv(path, ["method", "name", f"rms_{unit.suffix}", "equivalent_delay", "shown"], rows)
