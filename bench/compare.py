@@ -1,9 +1,12 @@
 """All methods and what others use, in several situations: writes docs/compare.md.
 
-Every table is that of a `tachometry compare`, whose command stands above it.
+First a table of all situations, with rivals tuned for each; then a table and a command for each of some.
 """
 
+import argparse
 import csv
+import os
+import re
 import shlex
 import sys
 import tempfile
@@ -11,11 +14,13 @@ import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
+import situations
 from pages import markdown, write
 
 from tachometry.cli.main import main as tachometry
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "compare.md"
+FIGURE = PAGE.with_name("compare.png")
 CORE = "--ppr 500 --clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/s"
 
 
@@ -113,12 +118,14 @@ shorter `--max-time` reduces this time.""",
 
 HEAD = """# Methods beside each other
 
-This page is made by `python bench/compare.py`. Each table is the output of the command above it. It shows the golden
-models of the cores, which the hardware equals bit for bit, and float models of what other projects use. The latter have
-the settings that their projects come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs.
-Errors are those of the held velocity against the shaft's speed. The delay is the shift of the true speed that comes
-closest. It is left out where it says nothing: where the true speed is constant, and where noise or an offset looks like
-a delay.
+This page is made by `python bench/compare.py`. It shows the golden models of the cores, which the hardware equals bit
+for bit, and float models of what other projects use and of estimators in the literature:
+
+- [all situations](#all-situations), where every rival has its best setting for each, and then
+  [one setting for all](#one-setting-for-all-situations);
+- what settings cost, [error over delay](#error-over-delay);
+- [the float models](#the-float-models) and their options;
+- [single situations](#single-situations) with everything as it comes.
 
 **When to use what**, according to the tables below:
 
@@ -140,6 +147,37 @@ a delay.
 Tsuji 2009, Fig. 8, agrees for M/T with a timer of 200 ns and S with ticks of 20 µs: M/T is better below about
 130 rad/s with an encoder of 81,000 counts, and S is better above ([figures.md](figures.md)).
 
+"""
+
+
+# Of the figure: a real disc at constant speed.
+COSTS = (
+    "--methods all --motion constant:100rad/s:400ms --from 100ms "
+    "--jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1"
+)
+ABOUT_COSTS = """## Error over delay
+
+At constant speed the slowest filter is the best, and on a fast sine the fastest. The figure shows what each method can
+be in between. Upwards is the RMS error with a real disc at 100 rad/s. To the right is the *equivalent delay*: the RMS
+error over the RMS acceleration, while the speed of an ideal encoder goes to and fro between 50 and 100 rad/s, 10 times
+a second. A method that is only late has its delay there. A method that follows ramps without a lag pays where the
+acceleration changes. Every point is a setting than which no other of the same method has both less error and less
+delay; cores without a setting to be tuned are single points.
+"""
+ABOUT_MODELS = """## The float models
+
+Their options follow the name and a colon, as in `--methods hostmot2:period=500us,kalman:order=3:process-noise=1e5`.
+`period` is the control period, at which the encoder is read. Process noise is the standard deviation of the
+acceleration in rad/s² (order 2) or of its derivative in rad/s³ (order 3); a noise bound is in counts. `least-squares`
+is not faster than 2 counts in the time since the latest edge, which its papers do not have.
+"""
+SINGLE = """## Single situations
+
+Each table from here on is the output of the command above it. The float models of other projects have the settings that
+these come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs; those of the literature read
+it every 100 µs. Errors are those of the held velocity against the shaft's speed. The delay is the shift of the true
+speed that comes closest. It is left out where it says nothing: where the true speed is constant, and where noise or an
+offset looks like a delay.
 """
 
 
@@ -175,11 +213,33 @@ def section(situation: Situation) -> str:
     return f"## {situation.title}\n\n{text}\n\n{shown}\n\n{table(rows(situation.command))}"
 
 
-def page() -> str:
+def figure() -> str:
+    """The part of the page with the figure, which is written as well."""
+    command = f"tachometry compare {CORE} {COSTS} --tradeoff docs/{FIGURE.name}"
+    rows(command.replace(f"docs/{FIGURE.name}", shlex.quote(str(FIGURE))))
+    shown = re.sub(" (?=--(methods|jitter|tradeoff))", " \\\\\n        ", command)
+    return f"{ABOUT_COSTS}\n    {shown}\n\n![RMS error over equivalent delay of all methods]({FIGURE.name})\n"
+
+
+def page(n_seeds: int, jobs: int) -> str:
     """The page docs/compare.md."""
-    return HEAD + "\n".join(section(situation) for situation in SITUATIONS)
+    table_of_all = situations.part(n_seeds, jobs)
+    models = f"{ABOUT_MODELS}\n{situations.model_table()}"
+    return "\n".join([HEAD + table_of_all, figure(), models, SINGLE, *map(section, SITUATIONS)])
+
+
+def main() -> None:
+    """Write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of what is random (%(default)s)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="processes (%(default)s)")
+    options = parser.parse_args()
+    for name in ("seeds", "jobs"):
+        if getattr(options, name) < 1:
+            parser.error(f"--{name} must be at least 1, not {getattr(options, name)}")
+    write(PAGE, page(options.seeds, options.jobs))
+    sys.stdout.write(f"written: {PAGE}, {FIGURE}\n")
 
 
 if __name__ == "__main__":
-    write(PAGE, page())
-    sys.stdout.write(f"written: {PAGE}\n")
+    main()

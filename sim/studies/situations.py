@@ -1,7 +1,7 @@
 """Situations in which methods are compared: a motion, an encoder, and from when on errors count."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -11,10 +11,10 @@ PULSES_PER_REV = 500
 """Of the encoder; every edge counts."""
 
 # Faults of encoders, by the options of the command line.
-IDEAL = MappingProxyType[str, str]({})
-JITTER = MappingProxyType({"jitter": "0.05"})
-REAL = MappingProxyType({"jitter": "0.05", "nonuniformity": "0.1", "phase-error": "10"})
-BAD = MappingProxyType({"jitter": "0.1", "nonuniformity": "0.2", "phase-error": "20"})
+IDEAL: Mapping[str, str] = {}
+JITTER = {"jitter": "0.05"}
+REAL = {"jitter": "0.05", "nonuniformity": "0.1", "phase-error": "10"}
+BAD = {"jitter": "0.1", "nonuniformity": "0.2", "phase-error": "20"}
 
 _NUMBERS = {"jitter": "jitter", "nonuniformity": "nonuniformity", "phase-error": "phase_error_deg"}
 
@@ -36,7 +36,7 @@ class Situation:
     name: str
     motion: str
     start: str
-    faults: MappingProxyType[str, str]
+    faults: Mapping[str, str]
 
     @property
     def start_s(self) -> float:
@@ -93,7 +93,7 @@ SITUATIONS = (
         "unit velocity, vibration",
         "ramp:31rad/s:32rad/s:400ms",
         "100ms",
-        MappingProxyType({"vibration": "0.2mrad:170Hz", "nonuniformity": "0.1"}),
+        {"vibration": "0.2mrad:170Hz", "nonuniformity": "0.1"},
     ),
     Situation("reversals, jitter", _REVERSALS, "100ms", JITTER),
     Situation("reversals, real", _REVERSALS, "100ms", REAL),
@@ -104,7 +104,7 @@ SITUATIONS = (
     Situation("fast sine, real", _FAST_SINE, "100ms", REAL),
     Situation("trapezoid", _TRAPEZOID, "10ms", IDEAL),
     Situation("trapezoid, real", _TRAPEZOID, "10ms", REAL),
-    Situation("rest on an edge", "stop:1s", "100ms", MappingProxyType({"vibration": "0.3mrad:40Hz"})),
+    Situation("rest on an edge", "stop:1s", "100ms", {"vibration": "0.3mrad:40Hz"}),
     Situation("stop", _STOP, "100ms", IDEAL),
     Situation("stop, real", _STOP, "100ms", REAL),
 )

@@ -83,7 +83,7 @@ def best(curves: Iterable[Curve], instants: FloatArray, true_speed: TrueSpeed) -
     truth = true_speed(instants)
     found, least = None, np.inf
     for curve in curves:
-        error = _error(curve, instants, truth)
+        error = error_of(curve, instants, truth)
         if error is not None and error < least:
             found, least = curve, error
     if found is None:
@@ -91,7 +91,7 @@ def best(curves: Iterable[Curve], instants: FloatArray, true_speed: TrueSpeed) -
     return found
 
 
-def _error(curve: Curve, instants: FloatArray, truth: FloatArray) -> float | None:
+def error_of(curve: Curve, instants: FloatArray, truth: FloatArray) -> float | None:
     """RMS error from the first value on; None if there is none by then."""
     begun = int(np.searchsorted(instants, curve.estimate.time[0])) if len(curve.estimate.time) else len(instants)
     return rms_error(curve, instants[begun:], truth[begun:]) if begun < len(instants) else None
@@ -131,7 +131,7 @@ Judged = tuple[FloatArray, TrueSpeed]  # instants in seconds, and the true speed
 def cost(method: str, still: Curve, moving: Curve, judged: Judged, judged_moving: Judged) -> Cost | None:
     """What a setting costs: its error in one motion, its delay in another; None if it has no value by then."""
     instants, true_speed = judged
-    rms = _error(still, instants, true_speed(instants))
+    rms = error_of(still, instants, true_speed(instants))
     if rms is None or not len(moving.estimate.time):
         return None
     return Cost(method, still.name, rms, equivalent_delay(moving, *judged_moving))

@@ -1,4 +1,4 @@
-"""docs/compare.md: its tables are those that its commands print now."""
+"""docs/compare.md: its tables are what is measured now."""
 
 import re
 from typing import Any
@@ -7,6 +7,7 @@ import pytest
 from support.script import load
 
 page = load("compare")
+situations = load("situations")
 DOCS = page.PAGE.read_text(encoding="utf-8")
 
 
@@ -22,3 +23,75 @@ def test_table_of_a_situation(situation: Any) -> None:
     rows = {line.split(" | ")[0].removeprefix("| "): line for line in expected}
     for name in names:
         assert rows[name] in shown, name
+
+
+def cells(heading: str, name: str) -> list[str]:
+    """A row of the first table under a heading."""
+    part = DOCS.split(f"## {heading}\n")[1].split("\n## ")[0]
+    (line, *_) = [line for line in part.splitlines() if line.startswith(f"| {name} |")]
+    return [cell.strip().strip("*") for cell in line.strip("|").split("|")[1:]]
+
+
+NOT_RANDOM = [situation for situation in situations.SITUATIONS if not situation.random]
+
+
+@pytest.mark.parametrize("situation", NOT_RANDOM, ids=lambda situation: situation.name)
+def test_row_of_all_situations(situation: Any) -> None:
+    """Of those that take one seed; some errors are nothing but rounding, which is that of the machine."""
+    columns = (*situations.OURS, *situations.RIVALS)
+    (found,) = situations.best(situations.measured([situation], 20, 1, columns), columns).values()
+    shown = [float(cell) for cell in cells("All situations", situation.name)]
+    assert [cell.mean for cell in found] == pytest.approx(shown, rel=0.01, abs=1e-7)
+    assert all(cell.spread is None for cell in found)
+
+
+@pytest.mark.parametrize("name", ["slow sine, real", "stop, real"])
+def test_row_of_one_setting_for_all(name: str) -> None:
+    """With all seeds of the page."""
+    part = DOCS.split("## One setting for all situations\n")[1]
+    heads = re.findall("`([^`]+)`", next(line for line in part.splitlines() if line.startswith("| situation")))
+    (n_seeds,) = re.findall(r"with seeds 1 to (\d+)", DOCS)
+    (situation,) = [one for one in situations.SITUATIONS if one.name == name]
+    assert tuple(heads[: len(situations.OURS)]) == situations.OURS
+    columns = ["hostmot2", "mt", *situations.OURS]
+    table = situations.measured([situation], int(n_seeds), 1, columns)[name]
+    checked = 0
+    for head, shown in zip(heads, cells("One setting for all situations", name), strict=True):
+        if head in table:
+            assert str(table[head]) == shown
+            checked += 1
+    assert checked >= len(columns)
+
+
+def test_options_of_the_models_are_on_the_page() -> None:
+    assert situations.model_table() in DOCS
+    assert situations.motion_table() in DOCS
+
+
+def cell(name: str, *errors: float) -> Any:
+    return situations.Cell.of(name, list(errors))
+
+
+def test_the_best_has_the_least_mean_and_one_for_all_the_least_product(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(situations, "settings", lambda method: ["x", "x:a=1", "x:a=2", "x:a=3"])
+    table = {
+        "1": {"x": cell("x", 4, 6), "x:a=1": cell("x:a=1", 1, 3), "x:a=2": cell("x:a=2", 9, 9)},
+        "2": {"x": cell("x", 2), "x:a=1": cell("x:a=1", 8), "x:a=2": cell("x:a=2", 1e-9), "x:a=3": cell("x:a=3", 3)},
+    }
+    found = situations.best(table, ["x"])
+    assert [row[0].name for row in found.values()] == ["x:a=1", "x:a=2"]
+    assert [str(row[0]) for row in found.values()] == ["2 ± 1", "1e-09"]
+    assert situations.single(table, "x") == "x:a=2"  # 9 times the least that counts
+    table["2"]["x:a=2"] = cell("x:a=2", 2)
+    assert situations.single(table, "x") == "x"  # and x:a=3 cannot be everywhere
+    shown = situations.error_table(["`x`"], found)
+    assert shown.splitlines()[2] == "| 1 | **2 ± 1** |"
+    assert situations.setting_table(found).splitlines()[2] == "| 1 | `a=1` |"
+
+
+def test_processes_find_what_one_finds() -> None:
+    some = situations.SITUATIONS[-2:]
+    alone, together = (situations.measured(some, 2, jobs, ["hostmot2"]) for jobs in (1, 2))
+    assert alone == together
+    assert [len(table) for table in alone.values()] == [9, 9]
+    assert [next(iter(table.values())).spread is None for table in alone.values()] == [True, False]

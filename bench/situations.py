@@ -1,0 +1,245 @@
+"""The table of all situations: cores as they are, and every rival with its best setting for the row.
+
+Part of docs/compare.md.
+"""
+
+import math
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+
+from pages import markdown
+
+from tachometry.cli.options.methods import listed_methods
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.baselines import Steps
+from tachometry.sim.studies.compare import Curve, common_instants, core_curve
+from tachometry.sim.studies.rivals import BASELINES, settings, steps_curve
+from tachometry.sim.studies.situations import PULSES_PER_REV, SITUATIONS, Situation
+from tachometry.sim.studies.tune import TUNED, core_settings, error_of
+from tachometry.spec import of_texts
+
+# Columns that are not tuned: one setting for all situations, as `tachometry compare --methods` takes it.
+OURS = ("s", "mt:min-time=1ms")
+RIVALS = (*TUNED, *BASELINES)
+CORE = {"ppr": str(PULSES_PER_REV), "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
+
+_TICK_S = 1e-4
+_DECODING = 4
+
+_SMALL = 0.01  # rad/s
+_ABOUT = """RMS errors in rad/s. The first columns are cores with one setting for all rows. Each of the others is
+*tuned*: the setting with the least mean error of all that are tried, for every row anew. So at constant speed they show
+what a filter gives that may be as slow as it likes. The least error of a row is bold."""
+_SEEDS = """Mean ± standard deviation with seeds 1 to {n_seeds}, and one number where nothing is random."""
+_ENCODERS = """An encoder with {lines} lines, decoding 4. A *real* one has a jitter of 5 %, a nonuniformity of 0.1 and
+a phase error of 10°. A *bad* one has twice that."""
+_ABOUT_SINGLE = """A drive has one setting for all that it does. These are the same situations, each rival with the
+setting that has the least geometric mean of the errors of all rows. For this mean, an error below {small:g} rad/s
+counts as {small:g} rad/s."""
+
+Errors = Mapping[str, float]  # rad/s, RMS, by the name of a method with its options
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A setting in a situation.
+
+    Parameters
+    ----------
+    name : str
+    mean : float, rad/s
+        Of the RMS errors with all seeds.
+    spread : float or None, rad/s
+        Standard deviation of these; None if there is one only.
+    """
+
+    name: str
+    mean: float
+    spread: float | None
+
+    @staticmethod
+    def of(name: str, errors: list[float]) -> "Cell":
+        """Of the errors with all seeds."""
+        mean = sum(errors) / len(errors)
+        if len(errors) == 1:
+            return Cell(name, mean, None)
+        return Cell(name, mean, math.sqrt(sum((error - mean) ** 2 for error in errors) / (len(errors) - 1)))
+
+    def __str__(self) -> str:
+        return f"{self.mean:.3g}" + ("" if self.spread is None else f" ± {self.spread:.1g}")
+
+
+Table = Mapping[str, Mapping[str, Cell]]  # by situation, and by the name of a method with its options
+Cells = Mapping[str, list[Cell]]  # by situation, in the order of columns
+
+
+def tried(column: str) -> list[str]:
+    """All settings of a column; its name is the only one of `OURS`."""
+    if column in OURS:
+        return [column]
+    return [name for name, _ in core_settings(column)] if column in TUNED else settings(column)
+
+
+def errors(situation: Situation, seed: int, names: Iterable[str]) -> Errors:
+    """RMS errors (rad/s) of methods with one seed; those that are impossible are left out."""
+    truth = situation.record(seed)
+    steps = Steps.of_recording(truth.recording, _DECODING * PULSES_PER_REV, _DECODING)
+    instants = common_instants([], truth.recording.duration, _TICK_S, situation.start_s)
+    speed = truth.true_speed(instants)
+
+    def curve(name: str) -> Curve:
+        ((_, method, given),) = listed_methods(name, BASELINES)
+        if method is None:
+            return steps_curve(name, steps)
+        spec = of_texts(method, CORE | given)
+        return core_curve(name, spec, PinTrace.of(truth.recording, spec))
+
+    found = {}
+    for name in names:
+        with suppress(ValueError):  # such as a loop that is not stable
+            error = error_of(curve(name), instants, speed)
+            if error is not None:
+                found[name] = error
+    return found
+
+
+def _errors(task: tuple[Situation, int, list[str]]) -> Errors:
+    return errors(*task)
+
+
+def measured(
+    situations: Iterable[Situation], n_seeds: int, jobs: int, columns: Iterable[str] = (*OURS, *RIVALS)
+) -> Table:
+    """Errors of all settings of the columns: by situation and by name.
+
+    Parameters
+    ----------
+    situations : iterable of Situation
+    n_seeds : int
+        Number of seeds, from 1 on, where something is random.
+    jobs : int
+        Number of processes.
+    columns : iterable of str
+    """
+    names = [name for column in columns for name in tried(column)]
+    tasks = [
+        (situation, seed, names)
+        for situation in situations
+        for seed in range(1, (n_seeds if situation.random else 1) + 1)
+    ]
+    if jobs == 1:
+        results = list(map(_errors, tasks))
+    else:
+        with ProcessPoolExecutor(jobs) as pool:
+            results = list(pool.map(_errors, tasks))
+    found: dict[str, dict[str, list[float]]] = {}
+    for (situation, _, _), result in zip(tasks, results, strict=True):
+        of_situation = found.setdefault(situation.name, {})
+        for name, error in result.items():
+            of_situation.setdefault(name, []).append(error)
+    return {
+        situation: {name: Cell.of(name, errors) for name, errors in by_name.items()}
+        for situation, by_name in found.items()
+    }
+
+
+def best(table: Table, columns: Iterable[str]) -> Cells:
+    """By situation a cell for each column: the setting with the least mean error there."""
+    return {
+        situation: [
+            min((by_name[name] for name in tried(column) if name in by_name), key=lambda cell: cell.mean)
+            for column in columns
+        ]
+        for situation, by_name in table.items()
+    }
+
+
+def single(table: Table, column: str) -> str:
+    """The setting of a column that is the best over all situations, by the geometric mean of its errors.
+
+    An error that is less than `_SMALL` counts as that: what is good enough in one situation makes up for no other.
+    """
+    everywhere = [name for name in tried(column) if all(name in by_name for by_name in table.values())]
+
+    def logarithms(name: str) -> float:
+        return sum(math.log(max(by_name[name].mean, _SMALL)) for by_name in table.values())
+
+    return min(everywhere, key=logarithms)
+
+
+def error_table(heads: Sequence[str], cells: Cells) -> str:
+    """Errors in Markdown; the least of a row is bold."""
+
+    def shown(row: list[Cell]) -> list[str]:
+        least = min(cell.mean for cell in row)
+        return [f"**{cell}**" if cell.mean == least else str(cell) for cell in row]
+
+    return markdown(["situation", *heads], [[situation, *shown(row)] for situation, row in cells.items()])
+
+
+def setting_table(cells: Cells) -> str:
+    """The best settings in Markdown: the options that follow the name of the method."""
+
+    def shown(cell: Cell) -> str:
+        return f"`{options}`" if (options := cell.name.partition(":")[2]) else "as it comes"
+
+    body = [[situation, *map(shown, row)] for situation, row in cells.items()]
+    return markdown(["situation", *RIVALS], body, left=range(len(RIVALS) + 1))
+
+
+def motion_table() -> str:
+    """What the situations are, in Markdown."""
+    return markdown(
+        ["situation", "options"], [[situation.name, f"`{situation.options}`"] for situation in SITUATIONS], left=(0, 1)
+    )
+
+
+def model_table() -> str:
+    """The float models, in Markdown."""
+
+    def values(name: str) -> str:
+        swept = BASELINES[name].swept
+        options = dict.fromkeys(option for one in swept for option in one)
+        texts = {option: dict.fromkeys(" ".join(one.get(option, "") for one in swept).split()) for option in options}
+        return "; ".join(f"{option}: {', '.join(of)}" for option, of in texts.items())
+
+    heads = ["method", "what it is", "without options", "options", "tuned over"]
+    body = [
+        [f"`{name}`", model.title, model.usual, ", ".join(f"`{option}`" for option in model.parameters), values(name)]
+        for name, model in BASELINES.items()
+    ]
+    return markdown(heads, body, left=range(len(heads)))
+
+
+def part(n_seeds: int, jobs: int) -> str:
+    """This part of the page."""
+    table = measured(SITUATIONS, n_seeds, jobs)
+    ours = [f"`{name}`" for name in OURS]
+    singles = [single(table, rival) for rival in RIVALS]
+    in_all = {situation: [by_name[name] for name in (*OURS, *singles)] for situation, by_name in table.items()}
+    return f"""## All situations
+
+{_filled(_ABOUT)}
+
+- {_filled(_SEEDS.format(n_seeds=n_seeds), "  ")}
+- {_filled(_ENCODERS.format(lines=PULSES_PER_REV), "  ")}
+
+{error_table([*ours, *RIVALS], best(table, (*OURS, *RIVALS)))}
+The best settings, which `tachometry compare --methods` takes behind the name and a colon:
+
+{setting_table(best(table, RIVALS))}
+The motions and encoders, as options of `tachometry compare`. With `--tune` it finds the best settings for one seed:
+
+{motion_table()}
+## One setting for all situations
+
+{_filled(_ABOUT_SINGLE.format(small=_SMALL))}
+
+{error_table([*ours, *(f"`{name}`" for name in singles)], in_all)}"""
+
+
+def _filled(text: str, indent: str = "") -> str:
+    return textwrap.fill(" ".join(text.split()), 120, initial_indent=indent, subsequent_indent=indent).lstrip()
