@@ -34,15 +34,16 @@ def _draw(spec: TachometerSpec, costs: Mapping[str, Sequence[Cost]], speed: floa
     axes.set_xscale("log")
     axes.set_yscale("log")
     for place, (method, tried) in enumerate(costs.items()):
-        shown = front(tried)
+        shown, again = front(tried), place >= len(COLOURS)  # colours are used twice
         axes.plot(
             [1e3 * cost.delay for cost in shown],
             [unit.of(cost.rms) for cost in shown],
             color=COLOURS[place % len(COLOURS)],
-            marker=_MARKS[place % len(_MARKS)],
+            marker=_MARKS[(place + 5 * again) % len(_MARKS)],
             markersize=4,
+            fillstyle="none" if again else "full",
             linewidth=1,
-            linestyle="-" if place < len(COLOURS) else "--",
+            linestyle="--" if again else "-",
             label=in_words(method),
         )
     slow, fast = unit.of(speed / 2), unit.of(speed)

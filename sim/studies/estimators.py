@@ -15,6 +15,9 @@ from tachometry.sim.studies.baselines import Estimate, IntArray, Steps, clocks, 
 QUANTISATION = 1 / math.sqrt(12)
 """Standard deviation of what is lost when a position is counted, in counts."""
 
+_MOST_EDGES = _LONGEST = 10_000  # edges of a polynomial, and periods of a window
+_MOST_ORDER = 5  # beyond that, digits are lost
+_LEAST_INDEX, _GREATEST_INDEX = 1e-15, 1e6
 _MOST_SILENT = 2  # counts that the shaft may go without one: the slots of a bad disc are that uneven
 _AT_ONCE = 1 << 20  # edges of polynomials, for which memory is needed at once
 _RIDGE = 1e-12  # of the normal equations: edges with one timestamp do not make them singular
@@ -41,9 +44,9 @@ def least_squares(
     ----------
     steps : Steps
     period_s : float, seconds
-    edges : int, more than `order`
+    edges : int, more than `order`, at most 10,000
         Number of edges that the polynomial is fitted to.
-    order : int, at least 1
+    order : int, from 1 to 5
         Of the polynomial: 1 for a straight line, which lags by half of its length, 2 with acceleration.
     timeout_s : float, seconds
     clock_s : float, seconds
@@ -54,10 +57,12 @@ def least_squares(
     ValueError
         If a parameter is out of range.
     """
-    if order < 1:
-        raise ValueError(f"order of the polynomial must be at least 1, not {order}")
-    if edges <= order:
-        raise ValueError(f"number of edges must be more than the order, {order}, not {edges}")
+    if not 1 <= order <= _MOST_ORDER:
+        raise ValueError(f"order of the polynomial must be from 1 to {_MOST_ORDER}, not {order}")
+    if not order < edges <= _MOST_EDGES:
+        raise ValueError(
+            f"number of edges must be more than the order, {order}, and at most {_MOST_EDGES}, not {edges}"
+        )
     readings = read(steps, period_s)
     now = clocks(readings.time, clock_s, period_s) * clock_s
     speed = np.zeros(len(now))
@@ -134,7 +139,7 @@ def adaptive_window(
     period_s : float, seconds
     noise_bound : float, counts, at least 0
         The paper's d: greatest distance of a reading from the line. Counting alone needs 1.
-    longest : int, periods, at least 1
+    longest : int, periods, from 1 to 10,000
         No window is longer.
     best_fit : bool
         The slope of the least squares in place of that between the ends.
@@ -146,8 +151,8 @@ def adaptive_window(
     """
     if not noise_bound >= 0:
         raise ValueError(f"noise bound must be at least 0 counts, not {noise_bound}")
-    if longest < 1:
-        raise ValueError(f"longest window must be at least 1 period, not {longest}")
+    if not 1 <= longest <= _LONGEST:
+        raise ValueError(f"longest window must be from 1 to {_LONGEST} periods, not {longest}")
     readings = read(steps, period_s)
     count = np.append(0, readings.counts).astype(np.float64)
     slope = np.zeros(len(count))
@@ -182,7 +187,7 @@ def kalman_gains(index: float, order: int) -> tuple[float, float, float]:
 
     Parameters
     ----------
-    index : float, more than 0
+    index : float, from 1e-15 to 1e6
         Tracking index: standard deviation of the acceleration's change in a period (order 3), or of the acceleration
         (order 2), times the period squared, over that of the measured position.
     order : int, 2 or 3
@@ -193,10 +198,10 @@ def kalman_gains(index: float, order: int) -> tuple[float, float, float]:
     ValueError
         If a parameter is out of range.
     """
-    if not 0 < index < math.inf:
-        raise ValueError(f"tracking index must be more than 0, not {index}")
     if order not in (2, 3):
         raise ValueError(f"order of the filter must be 2 or 3, not {order}")
+    if not _LEAST_INDEX <= index <= _GREATEST_INDEX:
+        raise ValueError(f"tracking index must be from {_LEAST_INDEX:g} to {_GREATEST_INDEX:g}, not {index:g}")
     if order == 2:
         u = 2 * index / (math.sqrt(index * index + 8 * index) + index)
     else:
@@ -218,7 +223,8 @@ def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: i
     steps : Steps
     period_s : float, seconds
     process_noise : float, more than 0, rad/s^2 with order 2, rad/s^3 with order 3
-        Standard deviation of the acceleration, or of its derivative.
+        Standard deviation of the acceleration, or of its derivative; the tracking index that follows from it must be
+        as for `kalman_gains`.
     order : int, 2 or 3
         States: position and speed, and acceleration with order 3.
 
@@ -227,10 +233,8 @@ def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: i
     ValueError
         If a parameter is out of range.
     """
-    if not 0 < process_noise < math.inf:
-        raise ValueError(f"process noise must be more than 0, not {process_noise}")
     readings = read(steps, period_s)
-    index = process_noise * period_s**order / (steps.count_rad * QUANTISATION)
+    index = process_noise * period_s ** min(order, 3) / (steps.count_rad * QUANTISATION)
     alpha, beta, gamma = kalman_gains(index, order)
     position = speed = acceleration = 0.0  # counts, per period, per period squared
     speeds = []

@@ -217,7 +217,7 @@ def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
         if option not in baseline.parameters:
             raise ValueError(f"options of {method} must be of {', '.join(baseline.parameters)}, not {option!r}")
         parameter = baseline.parameters[option]
-        arguments[parameter.argument] = parameter.read(option.replace("-", "_"), text)
+        arguments[parameter.argument] = parameter.read(option, text)
     settings = ", ".join(word.replace("=", " ", 1) for word in words) or baseline.usual
     return f"{baseline.title}: {settings}", partial(baseline.model, **arguments)
 

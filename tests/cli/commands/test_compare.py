@@ -191,6 +191,20 @@ def test_figure_of_error_over_delay(tmp_path: Path) -> None:
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_delays_are_those_with_an_ideal_encoder(tmp_path: Path) -> None:
+    """The error is that with the faults that are given; the index line is there if the core wants it."""
+    found = []
+    for more in ([], ["--nonuniformity", "0.3", "--jitter", "0.2"], ["--index"]):
+        options = ["--motion", "constant:40rad/s:100ms", "--from", "20ms", "--methods", "s,kalman:period=1ms", *more]
+        assert run("compare", *CORE, *options, "--tradeoff", tmp_path / "t.csv") == 0
+        with (tmp_path / "t.csv").open() as file:
+            found.append([(row["rms_rad_s"], row["equivalent_delay"]) for row in csv.DictReader(file)])
+    ideal, faulty, with_index = found
+    assert with_index == ideal
+    assert [delay for _, delay in faulty] == [delay for _, delay in ideal]
+    assert all(float(worse) > 1.2 * float(rms) for (worse, _), (rms, _) in zip(faulty, ideal, strict=True))
+
+
 def test_speeds_of_the_figure_are_in_the_unit_of_the_core(tmp_path: Path) -> None:
     found = []
     for unit in ([], ["--unit", "rpm"]):

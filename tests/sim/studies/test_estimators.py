@@ -201,14 +201,20 @@ def test_kalman_filter_with_acceleration_does_not_lag_on_a_ramp() -> None:
 def test_refusals() -> None:
     steps = counts_of(1, 1, 1)
     for refused, text in (
-        (lambda: least_squares(steps, PERIOD, 2, 2), "number of edges must be more than the order, 2, not 2"),
-        (lambda: least_squares(steps, PERIOD, 2, 0), "order of the polynomial must be at least 1, not 0"),
+        (lambda: least_squares(steps, PERIOD, 2, 2), "must be more than the order, 2, and at most 10000, not 2"),
+        (lambda: least_squares(steps, PERIOD, 10_001), "must be more than the order, 2, and at most 10000, not 10001"),
+        (lambda: least_squares(steps, PERIOD, 2, 0), "order of the polynomial must be from 1 to 5, not 0"),
+        (lambda: least_squares(steps, PERIOD, 9, 6), "order of the polynomial must be from 1 to 5, not 6"),
         (lambda: adaptive_window(steps, PERIOD, -0.1), "noise bound must be at least 0 counts, not -0.1"),
         (lambda: adaptive_window(steps, PERIOD, math.nan), "noise bound must be at least 0 counts, not nan"),
-        (lambda: adaptive_window(steps, PERIOD, longest=0), "longest window must be at least 1 period, not 0"),
-        (lambda: kalman(steps, PERIOD, 0.0), "process noise must be more than 0, not 0"),
+        (lambda: adaptive_window(steps, PERIOD, longest=0), "longest window must be from 1 to 10000 periods, not 0"),
+        (lambda: adaptive_window(steps, PERIOD, longest=10**5), "must be from 1 to 10000 periods, not 100000"),
+        (lambda: kalman(steps, PERIOD, 0.0), "tracking index must be from 1e-15 to 1e\\+06, not 0"),
+        (lambda: kalman(steps, PERIOD, -5.0), "tracking index must be from 1e-15 to 1e\\+06, not -0.0"),
+        (lambda: kalman(steps, PERIOD, 1e99), "tracking index must be from 1e-15 to 1e\\+06, not 2.2"),
         (lambda: kalman(steps, PERIOD, order=1), "order of the filter must be 2 or 3, not 1"),
-        (lambda: kalman_gains(0.0, 2), "tracking index must be more than 0, not 0"),
+        (lambda: kalman(steps, PERIOD, order=10**30), "order of the filter must be 2 or 3, not 1000"),
+        (lambda: kalman_gains(math.nan, 2), "tracking index must be from 1e-15 to 1e\\+06, not nan"),
     ):
         with pytest.raises(ValueError, match=text):
             refused()
