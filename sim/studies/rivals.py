@@ -138,7 +138,7 @@ BASELINES: dict[str, Baseline] = {
             {
                 "period": "33us 125us",
                 "bandwidth": "50rad/s 100rad/s 200rad/s 350rad/s 500rad/s 700rad/s 1000rad/s 1400rad/s 2000rad/s "
-                "2800rad/s 4000rad/s",
+                "2800rad/s 4000rad/s 8000rad/s 12000rad/s",
             },
         ),
         {"period_s": 125e-6},
@@ -148,7 +148,12 @@ BASELINES: dict[str, Baseline] = {
         "400 Hz, 33 us",
         _moteus,
         {"period": _PERIOD, "pll-filter": Parameter("pll_filter_hz", _frequency)},
-        ({"period": "33us 100us", "pll-filter": "20Hz 40Hz 80Hz 140Hz 200Hz 280Hz 400Hz 560Hz 800Hz 1120Hz 1600Hz"},),
+        (
+            {
+                "period": "33us 100us",
+                "pll-filter": "20Hz 40Hz 80Hz 140Hz 200Hz 280Hz 400Hz 560Hz 800Hz 1120Hz 1600Hz 3200Hz 4500Hz",
+            },
+        ),
         {"period_s": 1 / 30e3, "pll_filter_hz": 400.0},
     ),
     "least-squares": Baseline(

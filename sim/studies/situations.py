@@ -71,6 +71,8 @@ _RAMP = "ramp:0:100rad/s:400ms"
 _VERY_SLOW = "constant:0.5rad/s:2s"
 _SLOW = "constant:1.3rad/s:1s"
 _FAST = "constant:217rad/s:400ms"
+_UNIT = "ramp:31rad/s:32rad/s:400ms"
+_VIBRATION = {"vibration": "0.2mrad:170Hz"}
 _REVERSALS = "sine:50rad/s:5Hz:400ms"
 _SLOW_SINE = "sine:3rad/s:2Hz:1s"
 _FAST_SINE = "sine:100rad/s:50Hz:300ms"
@@ -89,12 +91,8 @@ SITUATIONS = (
     Situation("fast, jitter", _FAST, "100ms", JITTER),
     Situation("fast, real", _FAST, "100ms", REAL),
     Situation("fast, bad", _FAST, "100ms", BAD),
-    Situation(
-        "unit velocity, vibration",
-        "ramp:31rad/s:32rad/s:400ms",
-        "100ms",
-        {"vibration": "0.2mrad:170Hz", "nonuniformity": "0.1"},
-    ),
+    Situation("unit velocity, vibration", _UNIT, "100ms", {**_VIBRATION, "nonuniformity": "0.1"}),
+    Situation("unit velocity, vibration, real", _UNIT, "100ms", {**_VIBRATION, **REAL}),
     Situation("reversals, jitter", _REVERSALS, "100ms", JITTER),
     Situation("reversals, real", _REVERSALS, "100ms", REAL),
     Situation("reversals, bad", _REVERSALS, "100ms", BAD),
@@ -104,6 +102,7 @@ SITUATIONS = (
     Situation("fast sine, real", _FAST_SINE, "100ms", REAL),
     Situation("trapezoid", _TRAPEZOID, "10ms", IDEAL),
     Situation("trapezoid, real", _TRAPEZOID, "10ms", REAL),
+    # A real disc has its edges elsewhere, and then the shaft does not rest on one.
     Situation("rest on an edge", "stop:1s", "100ms", {"vibration": "0.3mrad:40Hz"}),
     Situation("stop", _STOP, "100ms", IDEAL),
     Situation("stop, real", _STOP, "100ms", REAL),

@@ -42,7 +42,7 @@ def test_settings_are_all_different_and_of_known_options(method: str) -> None:
             model(STEPS)
         except ValueError:
             n_refused += 1
-    assert n_refused <= 1  # a loop that is not stable
+    assert n_refused <= 4  # loops that are not stable
 
 
 @pytest.mark.parametrize("method", BASELINES)
