@@ -82,7 +82,7 @@ def test_the_best_has_the_least_mean_and_one_for_all_the_least_product(monkeypat
     assert [row[0].name for row in found.values()] == ["x:a=1", "x:a=2"]
     assert [str(row[0]) for row in found.values()] == ["2 ± 1", "1e-09"]
     assert situations.single(table, "x") == "x:a=2"  # 9 times the least that counts
-    table["2"]["x:a=2"] = cell("x:a=2", 2)
+    table["1"]["x:a=2"] = cell("x:a=2", 2000)
     assert situations.single(table, "x") == "x"  # and x:a=3 cannot be everywhere
     shown = situations.error_table(["`x`"], found)
     assert shown.splitlines()[2] == "| 1 | **2 ± 1** |"

@@ -49,6 +49,7 @@ def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
         (["--plot", "x.jpg"], "file must end in .png or .pdf"),
         (["--tradeoff", "x.svg"], "file must end in .png, .pdf or .csv"),
         (["--methods", "hostmot2:x=1"], "options of hostmot2 must be of period, not 'x'"),
+        (["--motion", "stop:1us", "--methods", "difference,hostmot2:x=1"], "options of hostmot2 must be of period"),
         (["--methods", "hostmot2:period=1"], "period must be a number with one of the units s, ms, us, ns, not '1'"),
         (["--methods", "hostmot2:period=0s"], "control period must be more than 0 s, not 0.0 s"),
         (["--methods", "kalman:order=4"], "order of the filter must be 2 or 3, not 4"),
@@ -180,6 +181,7 @@ def test_figure_of_error_over_delay(tmp_path: Path) -> None:
     names = [row["name"] for row in rows]
     assert names[0] == "s"
     assert names.count("mt:min-time=2ms") == 1
+    assert "m:average=10" in names
     assert {row["method"] for row in rows} == {"s", "m", "mt:min-time=2ms", "hostmot2"}
     by = {row["name"]: row for row in rows}
     slow, quick = by["hostmot2:period=8ms"], by["hostmot2:period=250us"]
@@ -189,6 +191,17 @@ def test_figure_of_error_over_delay(tmp_path: Path) -> None:
     assert "0" in {row["shown"] for row in rows}
     assert run("compare", *CORE, *options, "--tradeoff", tmp_path / "t.png") == 0
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_settings_that_cannot_be_are_left_out(tmp_path: Path) -> None:
+    """A minimum time beyond the maximum, a loop that is not stable, a period that is too long for the motion."""
+    core = "--ppr 100 --clock 1MHz --tick 1ms --max-time 3ms".split()
+    options = ["--motion", "constant:40rad/s:12ms", "--methods", "mt,odrive,hostmot2", "--tradeoff", tmp_path / "t.csv"]
+    assert run("compare", *core, *options, "--tune") == 0
+    with (tmp_path / "t.csv").open() as file:
+        names = {row["name"] for row in csv.DictReader(file)}
+    assert {"mt:min-time=2ms", "odrive:period=33us:bandwidth=4000rad/s", "hostmot2:period=2ms"} <= names
+    assert not {"mt:min-time=10ms", "odrive:period=125us:bandwidth=4000rad/s", "hostmot2:period=8ms"} & names
 
 
 def test_delays_are_those_with_an_ideal_encoder(tmp_path: Path) -> None:

@@ -132,7 +132,8 @@ def test_the_window_on_a_noiseless_ramp_is_the_longest_and_after_a_change_of_spe
     steps = counts_of(*[3] * 40, *[5] * 40)
     speed = adaptive_window(steps, PERIOD, 0.0, 10, best_fit).velocity * PERIOD / COUNT
     np.testing.assert_allclose(speed, [3] * 40 + [5] * 40)
-    wide = adaptive_window(steps, PERIOD, 100.0, 10, best_fit=False).velocity * PERIOD / COUNT
+    wide = adaptive_window(steps, PERIOD, 1e6, 10, best_fit=False).velocity * PERIOD / COUNT
+    np.testing.assert_allclose(wide[:40], 3)  # no window begins before time 0
     np.testing.assert_allclose(wide[39:51], [3 + 0.2 * n for n in range(11)] + [5])
 
 

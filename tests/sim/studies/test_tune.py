@@ -10,6 +10,7 @@ from tachometry.sim.plots.tradeoff import save_tradeoff
 from tachometry.sim.studies.baselines import Estimate
 from tachometry.sim.studies.compare import Curve
 from tachometry.sim.studies.tune import (
+    CORES,
     SETTLED_S,
     Cost,
     best,
@@ -20,7 +21,7 @@ from tachometry.sim.studies.tune import (
     possible,
     triangle,
 )
-from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec import METHODS, Encoder, STachometer, Timing, of_texts
 
 INSTANTS = np.arange(0.1, 0.4, 1e-4)
 
@@ -88,6 +89,10 @@ def test_the_front_has_what_nothing_is_better_than() -> None:
 def test_settings_of_cores() -> None:
     assert core_settings("s") == [("s", {})]
     assert ("mt:min-time=1ms", {"min-time": "1ms"}) in core_settings("mt")
+    core = {"ppr": "500", "clock": "10MHz", "tick": "100us", "max-time": "10ms"}
+    for method in CORES.keys() & METHODS.keys():
+        specs = [of_texts(method, core | options) for _, options in core_settings(method)]
+        assert len(set(specs)) == len(specs) > 5
 
 
 def test_equal_figures_are_equal_files(tmp_path: Path) -> None:
