@@ -42,6 +42,8 @@ class TachometerSpec(Numbers):
     own_ticks: ClassVar[bool] = False
     # Whether the 0 that the maximum time forces is the last update before the next count.
     last_at_rest: ClassVar[bool] = False
+    # Whether its windows can have bounds.
+    has_bounds: ClassVar[bool] = True
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
     # Whether pairwise tests give all options all of their values.
@@ -63,13 +65,16 @@ class TachometerSpec(Numbers):
             raise ParameterError("filter_clocks", f"must be from 0 to 255, not {self.filter_clocks}")
         if self.index_reset and not self.index:
             raise ParameterError("index_reset", "must be given together with an index")
+        self._check_edge_error()
+        if self.lowpass is not None:
+            self._check_lowpass(self.lowpass)
+
+    def _check_edge_error(self) -> None:
         if not 0 <= self.edge_error <= 1:
             raise ParameterError("edge_error", f"must be from 0 to 1, not {float(self.edge_error):.9g}")
         if self.edge_error and not self.bounds:
             raise ParameterError("edge_error", "must be given together with bounds")
         object.__setattr__(self, "edge_error", Fraction(math.ceil(8 * self.edge_error), 8))
-        if self.lowpass is not None:
-            self._check_lowpass(self.lowpass)
 
     def _check_lowpass(self, bandwidth: Fraction) -> None:
         least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))

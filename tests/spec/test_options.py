@@ -98,7 +98,7 @@ def test_none_is_leaving_it_out() -> None:
 @pytest.mark.parametrize(
     ("method", "texts", "message"),
     [
-        ("x", {}, "method must be one of s, m, t, mt, rairan, not 'x'"),
+        ("x", {}, "method must be one of s, m, t, mt, rairan, track, not 'x'"),
         ("s", {}, "ppr must be given"),
         ("s", PPR | {"average": "2"}, "average must not be given with method s: it is for m"),
         ("s", PPR | {"min-time": "2"}, "min_time must not be given with method s: it is for mt"),
@@ -152,7 +152,7 @@ def test_parameters_of_another_version_are_refused() -> None:
         of_parameters(parameters | {"later": 1})
     with pytest.raises(ParameterError, match=r": max_ticks is missing$"):
         of_parameters({name: value for name, value in parameters.items() if name != "max_ticks"})
-    with pytest.raises(ParameterError, match=r"^method must be one of s, m, t, mt, rairan, not 'x'$"):
+    with pytest.raises(ParameterError, match=r"^method must be one of s, m, t, mt, rairan, track, not 'x'$"):
         of_parameters(parameters | {"method": "x"})
     with pytest.raises(ParameterError, match="must be"):
         of_parameters(parameters | {"tick_cycles": 0})

@@ -29,6 +29,7 @@ from tachometry.spec import (
     STachometer,
     TachometerSpec,
     Timing,
+    TrackTachometer,
 )
 from tachometry.spec.methods.timed import TimedTachometer
 
@@ -91,6 +92,19 @@ EVENTS = {
         *(event for event in [*TIMED, *COMMON] if event != "out of range"),
     ],
     "t": [*TIMED, *COMMON],
+    "track": [
+        "agile",
+        "not agile",
+        "growing memory",
+        "constant memory",
+        "several counts",
+        "counts that cancel",
+        "rest",
+        "first count",
+        "speed that falls",
+        "greatest speed",
+        *(event for event in COMMON if event not in ("bounds", "waited for the filter")),
+    ],
     "rairan": [
         "low",
         "high",
@@ -115,6 +129,11 @@ def _count(found: NDArray[Any]) -> int:
     return int(np.count_nonzero(found))
 
 
+def fewest_ticks(method: str) -> int:
+    """Ticks that a random case has at least; long ones are fewer."""
+    return MIN_TICKS // 5 if method == "track" else MIN_TICKS
+
+
 def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding, PinTrace]:
     """A configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
     rng = np.random.default_rng(seed)
@@ -124,10 +143,12 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     if timed:  # a division takes some ticks, or only part of one
         tick_cycles = int(rng.choice([1, 2, 2, 3, 3, 4, 4, 8, 8, 32], p=[0.12] + 8 * [0.105] + [0.04]))
         max_ticks = int(rng.choice([2, 3, 10, 60])) * (1 if tick_cycles > 8 else 5)
+    elif method == "track":  # its program takes hundreds of clocks
+        tick_cycles = int(rng.choice([1000, 1024, 1200]))
     elif tick_cycles > 4 and method != "rairan":  # for time
         max_ticks = min(max_ticks, 5)
     decoding = int(rng.choice([1, 2, 4, 4]))
-    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else MIN_TICKS + 20
+    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else fewest_ticks(method) + 20
     external = tick_cycles > 1 and bool(rng.random() < 0.3) and not METHODS[method].own_ticks
     if external:
         n_ticks += n_ticks // 4  # fewer may come
@@ -142,6 +163,8 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         tick_cycles = int(rng.choice([1, 1, 1, 1, 1, 2, 2, 2, 3, 4]))
         band, longer = [([0.14], 1.16), ([0.3], 1.35), ([1.003, 1.4, 3.25], 1.6)][int(rng.integers(3))]
         n_ticks = int(longer * MIN_TICKS)
+    if method == "track":
+        band = [0.02, 0.1, 0.5, 1.003, 3.25, 20]
     duration = n_ticks * tick_cycles / CLOCK_HZ
     # One step takes at least a clock, and one decoded count takes 4/decoding of them.
     fastest = tick_cycles * decoding / 4
@@ -171,7 +194,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     spec = METHODS[method](
         encoder=Encoder(PULSES_PER_REV, decoding),
         timing=Timing(CLOCK_HZ, tick_cycles, max_ticks),
-        frac_bits=int(rng.integers(4, 13 if timed and rng.random() < 0.8 else 25)),
+        frac_bits=int(rng.integers(4, 13 if method == "track" or (timed and rng.random() < 0.8) else 25)),
         max_speed=max_speed,
         **(options := random_options(method, rng)),
         position_width=int(rng.choice([8, 16, 32, 48])),
@@ -180,10 +203,10 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         index_reset=encoder.index and bool(rng.random() < 0.5),
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
         age=bool(rng.random() < 0.5),
-        bounds=bool(rng.random() < 0.5) and not options.get("paper_exact"),
+        bounds=bool(rng.random() < 0.5) and not options.get("paper_exact") and METHODS[method].has_bounds,
     )
     if rng.random() < 0.25 and getattr(spec, "adaptive", None) is None:
-        spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))
+        spec = replace(spec, lowpass=Fraction(max(1, round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0)))))
     if spec.bounds:
         # From a stream of its own: all else stays as it is without it.
         spec = replace(spec, edge_error=Fraction(max(0, int(rng.spawn(1)[0].integers(-8, 9))), 8))
@@ -205,6 +228,15 @@ def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
     """Options of the method."""
     if method == "s":
         return {"cancel": bool(rng.random() < 0.75)}
+    if method == "track":
+        return {
+            "bandwidth": Fraction(int(rng.choice([20, 50, 200, 500]))),
+            "least_memory": Fraction(int(rng.choice([5, 7, 9])), 10),
+            "edge_error": Fraction(int(rng.choice([1, 4, 8])), 10),
+            "agile": bool(rng.random() < 0.8),
+            "growing_memory": bool(rng.random() < 0.8),
+            "fine_bits": int(rng.choice([1, 8, 16])),
+        }
     if method == "rairan":
         return {
             "estimate": str(rng.choice(["n1", "n2", "n3", "n3"])),
@@ -272,6 +304,8 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         }
     if isinstance(spec, TimedTachometer):
         return covered_by_timed(spec, run)
+    if isinstance(spec, TrackTachometer):
+        return covered_by_track(spec, run)
     assert isinstance(spec, STachometer)
     changed = np.diff(m_e, prepend=0) != 0
     by_count = ~updates.forced
@@ -281,6 +315,25 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         "forced, then alteration": _count(updates.forced[:-1] & by_count[1:]),
         "m_s = 1": _count(updates.interval == 1),
         "reciprocal carried": spec.carried and len(updates.clock),
+    }
+
+
+def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
+    """The same for the tracking method."""
+    m_e, updates = run.ticks.pulse_count, run.updates
+    n = len(updates.clock)
+    rest = updates.forced & (updates.interval == spec.timing.max_ticks)
+    return {
+        "agile": n * spec.agile,
+        "not agile": n * (not spec.agile),
+        "growing memory": n * spec.growing_memory,
+        "constant memory": n * (not spec.growing_memory),
+        "several counts": _count(np.abs(m_e) > 1),
+        "counts that cancel": _count(~updates.forced & (m_e[:n] == 0)),
+        "rest": _count(rest),
+        "first count": _count(rest[:-1] & ~updates.forced[1:]),
+        "speed that falls": _count(updates.forced[1:] & (np.abs(np.diff(updates.velocity)) > 1)),
+        "greatest speed": _count(np.abs(updates.velocity) == spec.full_scale),
     }
 
 
@@ -353,7 +406,7 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
     # Ticks of an adaptive dt are longer.
-    ticks, updates = MIN_TICKS // (4 if spec.parameters.get("adaptive") else 1), 5 if timed else fewest
+    ticks, updates = fewest_ticks(method) // (4 if spec.parameters.get("adaptive") else 1), 5 if timed else fewest
     if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
     problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, trace, actual)]

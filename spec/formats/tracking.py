@@ -1,0 +1,206 @@
+"""Formats of the tracking recursion: how many bits its numbers have, and why these are enough.
+
+All numbers have F fraction bits. p is in counts, relative to the position; v is in counts per U, a in counts per U²,
+where U is 2^k clocks, about 1/(4·λ_0). In this unit of time the gains of p, v and a are of a similar size, so one word
+fits all three. Times are whole clocks. Products are rounded down.
+
+Error analysis. With λT_s small, the gains of a tick with a count are 3d, 3d²·u and d³·u² (d = 1 − θ ≈ λT_s;
+u = U/T_s). A rounding that takes half an LSB from a in every tick is an input that the filter answers with a constant
+deviation e = ½·2^−F/(d³u²) from the counts, and with the velocity error 3d·e in counts per tick. The other roundings,
+of v by an LSB and of p by half of one, give less, as d·u is at most 1/4. So the error is below
+2^−F·(3/2 + 3·d·u + (d·u)²)/(d·u)², which is largest for the smallest λ. F is chosen so that it is at most a quarter of
+an LSB of the velocity.
+
+The multipliers d, d·U/m and the share of the mean error are below 2, and have B fraction bits, which leaves their
+relative error below 2^−B/d. It only moves the poles.
+"""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+
+from tachometry.spec.units import ceil_log2, signed_width
+
+LEVELS = 16  # of λ, from λ_0 to λ_0/10, with equal ratios
+RATIOS = tuple(10 ** (-level / (LEVELS - 1)) for level in range(LEVELS))
+SHORTEST_MEMORY = 0.2  # of 1 − θ_min: it does not fall further as λ does
+AGILE = 4  # times λ_0
+STEP_BACK = 4  # levels, when the mean error is large
+FACTOR_BITS = 16  # of constants that hardly matter: a twelfth, and the threshold of the mean error
+GROWTH = 10  # λ falls by its e-th part in so many of its time constants
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """Formats and constants of a tracking recursion.
+
+    Parameters
+    ----------
+    clock_hz, tick_cycles, longest_tick, max_ticks, max_count : int
+        Clock, nominal and longest tick in clocks, the longest silence in ticks, most counts of a tick.
+    external : bool
+        Whether ticks come from outside, and differ in length.
+    bandwidth : Fraction, rad/s
+        λ_0.
+    least_memory : Fraction
+        θ_min at λ_0.
+    edge_error : Fraction, counts
+        E.
+    growing : bool
+        Whether λ falls to λ_0/10 while the errors are small.
+    velocity_bits, fine_bits : int
+        Fraction bits of the velocity in counts per tick, and of the position.
+    """
+
+    clock_hz: int
+    tick_cycles: int
+    longest_tick: int
+    max_ticks: int
+    max_count: int
+    external: bool
+    bandwidth: Fraction
+    least_memory: Fraction
+    edge_error: Fraction
+    growing: bool
+    velocity_bits: int
+    fine_bits: int
+
+    @cached_property
+    def unit_bits(self) -> int:
+        """k: the unit of time U is 2^k clocks, at most 1/(4·λ_0), but at least half the longest tick."""
+        fitting = -ceil_log2(AGILE * self.bandwidth / self.clock_hz)
+        return max(fitting, self.longest_tick.bit_length() - 1)
+
+    @property
+    def unit_ticks(self) -> Fraction:
+        """u: U in nominal ticks."""
+        return Fraction(1 << self.unit_bits, self.tick_cycles)
+
+    def rate(self, level: int) -> float:
+        """λ of a level, per clock."""
+        return float(self.bandwidth) * RATIOS[level] / self.clock_hz
+
+    def most(self, level: int) -> float:
+        """The greatest x = λ·m·T_s that counts for the gains of a level: −ln θ_min."""
+        return -math.log(1 - float(1 - self.least_memory) * max(RATIOS[level], SHORTEST_MEMORY))
+
+    @cached_property
+    def frac_bits(self) -> int:
+        """F, by the error analysis above."""
+        level = LEVELS - 1 if self.growing else 0
+        share = 1 - math.exp(-min(self.rate(level) * self.tick_cycles, self.most(level)))
+        gain = share * float(self.unit_ticks)
+        error = (1.5 + 3 * gain + gain * gain) / (gain * gain)
+        return max(self.velocity_bits + 2 + math.ceil(math.log2(error)), self.fine_bits + 2)
+
+    @property
+    def gain_bits(self) -> int:
+        """B: fraction bits of the multipliers."""
+        return max(20, self.velocity_bits + 8)
+
+    @property
+    def max_velocity(self) -> int:
+        """Greatest |v|, in 2^−F counts per U: `max_count` counts in a tick as long as nominal."""
+        return (self.max_count << (self.frac_bits + self.unit_bits)) // self.tick_cycles
+
+    @property
+    def max_acceleration(self) -> int:
+        """Greatest |a|, in 2^−F counts per U²: a quarter of the greatest speed within U."""
+        return self.max_velocity >> 2
+
+    @property
+    def max_error(self) -> int:
+        """|e| from which the recursion starts anew, in counts: no shaft within the greatest speed has it."""
+        return 2 * self.max_count + 2
+
+    @property
+    def max_gap(self) -> int:
+        """Most clocks from a tick with counts to the end of the next one, and what the first count was early."""
+        return (self.max_ticks + 1) * self.longest_tick
+
+    @property
+    def gap_bits(self) -> int:
+        """Bits of a number of clocks between counts."""
+        return self.max_gap.bit_length()
+
+    @property
+    def times_bits(self) -> int:
+        """Bits of the sum of the times from the counts of a tick to its end, in clocks."""
+        return max((self.max_count * (self.longest_tick - 1)).bit_length(), 1)
+
+    @property
+    def number_bits(self) -> int:
+        """Bits of the number of counts of a tick."""
+        return self.max_count.bit_length()
+
+    @property
+    def places_bits(self) -> int:
+        """Bits of the sum of twice the places of a tick's counts, relative to its end; signed."""
+        return signed_width(self.max_count * (2 * self.max_count - 1))
+
+    @property
+    def start_bits(self) -> int:
+        """Bits that the first velocity is computed coarser by, so that it cannot leave the word."""
+        return min((self.max_count + 1).bit_length(), self.unit_bits)
+
+    @cached_property
+    def width(self) -> int:
+        """W: bits of a word."""
+        counts = self.max_count
+        moved = 2 * max(counts, self.max_velocity * self.longest_tick / 2 ** (self.unit_bits + self.frac_bits))
+        greatest = max(
+            counts * (counts + moved),  # the sum over the counts of a tick
+            self.max_velocity / 2**self.frac_bits * 1.5,  # before it is held within its limit
+            self.max_velocity / 2**self.frac_bits * (counts + 2) / 2**self.start_bits,  # the first one
+            self.max_acceleration / 2**self.frac_bits + self.max_error,
+            2 * self.max_error + 2 * moved + 2,  # p
+            AGILE * self.rate(0) * (1 << self.gap_bits),  # x
+        )
+        whole = math.ceil(math.log2(greatest))
+        # What is in clocks, or a quotient of clocks, has no fraction bits.
+        return max(whole + self.frac_bits, self.gap_bits, self.unit_bits + self.gain_bits) + 1
+
+    def fixed(self, value: float | Fraction) -> int:
+        """A number with F fraction bits."""
+        return round(value * (1 << self.frac_bits))
+
+    def rate_word(self, rate: float) -> int:
+        """What a gap in clocks is multiplied by, and the product shifted right by gap_bits − 1, for x = rate·gap."""
+        return round(rate * 2.0 ** (self.frac_bits + self.gap_bits - 1))
+
+    @cached_property
+    def rates(self) -> tuple[int, ...]:
+        """The same for each level."""
+        return tuple(self.rate_word(self.rate(level)) for level in range(LEVELS))
+
+    @cached_property
+    def agile_rate(self) -> int:
+        """The same for an agile correction."""
+        return self.rate_word(AGILE * self.rate(0))
+
+    @cached_property
+    def most_x(self) -> tuple[int, ...]:
+        """Greatest x of each level."""
+        return tuple(self.fixed(self.most(level)) for level in range(LEVELS))
+
+    @cached_property
+    def spans(self) -> tuple[int, ...]:
+        """Clocks without trouble after which each level gives way to the next."""
+        edges = [0.0]
+        for upper, lower in pairwise(RATIOS):
+            edges.append(GROWTH * (1 / math.sqrt(upper * lower) - 1) / float(self.bandwidth))
+        spans = [round((end - begin) * self.clock_hz) for begin, end in pairwise(edges)]
+        longest = (1 << (self.width - 1)) - 1
+        return (*(min(span, longest - self.max_gap) for span in spans), longest)
+
+    @property
+    def late_limit(self) -> int:
+        """How far p may go from the position while no count comes: ½ + 1.5·E."""
+        return self.fixed(Fraction(1, 2) + Fraction(3, 2) * self.edge_error)
+
+    @property
+    def mean_threshold(self) -> int:
+        """(0.25·E)²: the square of the mean error over the share of the last error in it, that is trouble."""
+        return round((self.edge_error / 4) ** 2 * (1 << FACTOR_BITS))
