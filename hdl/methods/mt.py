@@ -54,7 +54,8 @@ class MTMethod(TimedDatapath):
         # Counts since the window opened: as long as none is against the one before, their sum but for the sign.
         counted = Signal(range(self._cycle_counts))
         number = Signal.like(counted)
-        cycled, waived = Signal(), Signal()
+        cycled = Signal()
+        waived = Signal()
         m.d.comb += number.eq(counted + 1)
         with m.If(length == self._patient_periods):
             m.d.sync += waived.eq(1)

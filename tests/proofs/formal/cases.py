@@ -236,6 +236,11 @@ _WINDOW_OF_MT_PROBES = {
     "core_late": "datapath.late",
     "core_travelled": "datapath.travelled",
 }
+_CYCLES_OF_MT_PROBES = {
+    "core_counted": "datapath.counted",
+    "core_cycled": "datapath.cycled",
+    "core_waived": "datapath.waived",
+}
 
 
 def timed(
@@ -268,6 +273,7 @@ def timed(
         "MAX_TICKS": max_ticks,
         "MAX_PERIODS": spec.max_periods,
         "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,
+        "CYCLE": spec.cycle_counts if isinstance(spec, MTTachometer) else 1,
         "MAX_QUOTIENT": spec.max_quotient,
         "SATURATES": int(spec.saturates),
         "FLAGS": int(spec.flags_range),
@@ -277,6 +283,7 @@ def timed(
         "DIVISION_CLOCKS": spec.division_clocks,
     }
     probes = _TIMED_PROBES | _STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
+    probes |= within("cycles", _CYCLES_OF_MT_PROBES, parameters["CYCLE"] > 1)
     probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
@@ -360,6 +367,7 @@ PROOFS = [
     rairan("Rairán", 3, 4, 2),
     timed("T", TTachometer, 2, 1),
     timed("M/T", MTTachometer, 2, 1),
+    timed("M/T of whole cycles", MTTachometer, 2, 1, whole_cycles=True),
     timed("T in ticks", TTachometer, 2, 2, 12, timer="tick"),
     timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),
     after_upset(
@@ -371,5 +379,6 @@ PROOFS = [
     after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_stalled"),
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
+    *mt_after_upset("upset, M/T of whole cycles", timed("", MTTachometer, 2, 1, whole_cycles=True)),
     *ON_BUSES,
 ]

@@ -129,6 +129,7 @@ MUTANTS = [
     Mutant("Rairán", "pr_flag", RairanCounters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
     Mutant("T", "pt_update", QuotientVelocity, "compared & (measuring | nearer)", "compared & nearer"),
     Mutant("M/T in ticks", "pt_update", MTMethod, "length == self._min_periods", "length == self._min_periods - 1", 32),
+    Mutant("M/T of whole cycles", "pt_update", MTMethod, "cycled.eq(0), waived.eq(0)", "cycled.eq(0)", 48),
     Mutant("T in ticks", "pt_spacing", Divider, "steps.eq(self._steps - 1)", "steps.eq(self._steps - 2)", 32),
     Mutant("T", "pt_interval", GapTimer, "self.age.eq(1)", "self.age.eq(2)"),
     Mutant("T", "pt_range", GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods", 32),
