@@ -310,7 +310,7 @@ _MT_GIVEN = (
     "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
     "lemma_left lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
     "lemma_window_free pt_update pt_held pt_spacing pt_rest",
-    "lemma_travelled",
+    "lemma_travelled lemma_waived lemma_counted lemma_one_way",
 )
 
 

@@ -73,7 +73,8 @@ module timed #(
 
   // Clocks since the last count, after reset as if for ever; timer periods since the last count or forced 0.
   reg [W-1:0] idle = LONG + B, age = 1, length = 1;
-  wire [W-1:0] waited = UPSET ? core_age : age, lasted;
+  wire [W-1:0] waited = UPSET ? core_age : age;
+  wire late;
   reg was_negative = 0;
   wire last_negative = UPSET ? core_negative : was_negative;
   wire opened = idle < LONG;
@@ -102,9 +103,9 @@ module timed #(
   wire shown_within, shown_waived;
   reg turned_back = 0;  // within the window
   wire within = UPSET ? shown_within : (way & (CYCLE - 1)) != 0 && (way > CYCLE || way < -CYCLE);
-  wire waived = UPSET ? shown_waived : turned_back || lasted > PATIENCE;
+  wire waived = UPSET ? shown_waived : turned_back || length > PATIENCE;
   wire waits = CYCLE > 1 && within && !waived && negative == last_negative;
-  wire closes = MT && count && opened && lasted > MIN_PERIODS && !waits;
+  wire closes = MT && count && opened && late && !waits;
   always @(posedge clk)
     if (rst) begin
       travelled <= 0;
@@ -275,7 +276,7 @@ module timed #(
       wire [I-1:0] core_length;
       wire core_late;
       wire signed [I+Q-1:0] core_travelled;
-      assign lasted = UPSET ? core_length : length;
+      assign late = UPSET ? core_late : length > MIN_PERIODS;
       always @* begin
         lemma_length: assert (length >= 1 && (!opened || (length <= PATIENCE + age && core_length == length
             && core_late == (length > MIN_PERIODS))));
@@ -284,7 +285,7 @@ module timed #(
         lemma_travelled: assert (!opened || (core_travelled == P * travelled && travelled <= farthest && -travelled <= farthest));
         lemma_window_free: assert (since == 0 || !measuring || since >= (length - 1) * PHASES + phase);
       end
-    end else assign lasted = length;
+    end else assign late = 0;
     if (CYCLE > 1) begin : cycles
       wire [$clog2(CYCLE)-1:0] core_counted;
       wire core_cycled, core_waived;
