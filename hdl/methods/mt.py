@@ -1,6 +1,6 @@
 """The M/T method."""
 
-from amaranth import Const, Module, Mux, Signal, Value
+from amaranth import Module, Mux, Signal, Value, ValueLike
 
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
@@ -31,7 +31,7 @@ class MTMethod(TimedDatapath):
         total = Signal.like(travelled)
         ends = Signal()
         opens = Signal()
-        may_end = self.quotient_velocity.free if spec.may_be_late else Const(1)
+        may_end: ValueLike = self.quotient_velocity.free if spec.may_be_late else 1
         if self._cycle_counts > 1:
             may_end = ~self._waits(m, length, opens)
         m.d.comb += [

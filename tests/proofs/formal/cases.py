@@ -305,13 +305,14 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
     )
 
 
-# What can be said of M/T without what is divided; the last one takes as long as all the others.
-_MT_GIVEN = (
-    "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
+# What can be said of M/T without what is divided; "travelled" takes as long as all the others.
+_MT_GIVEN = {
+    "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
     "lemma_left lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
     "lemma_window_free pt_update pt_held pt_spacing pt_rest",
-    "lemma_travelled lemma_waived lemma_counted lemma_one_way",
-)
+    "travelled": "lemma_travelled",
+}
+_CYCLES_GIVEN = {"cycles": "lemma_waived lemma_counted lemma_one_way"}
 
 
 def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
@@ -326,13 +327,14 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
     settled = clocks - spec.max_periods - spec.max_interval - spec.division_clocks - 1
     upset = replace(proof, parameters=proof.parameters | {"UPSET": 1, "SETTLED": 0})
     late = upset.parameters | {"SETTLED": settled}
+    parts = _MT_GIVEN | (_CYCLES_GIVEN if spec.cycle_counts > 1 else {})
     return [
         *(
             replace(upset, name=f"{name}: {part}", depth=1, recovers=settled, only=given)
-            for part, given in zip(("given", "travelled"), _MT_GIVEN, strict=True)
+            for part, given in parts.items()
         ),
         replace(upset, name=f"{name}: since", parameters=late, depth=1, recovers=clocks, only="lemma_fresh"),
-        replace(upset, name=name, given=" ".join(_MT_GIVEN), without="lemma_fresh"),
+        replace(upset, name=name, given=" ".join(parts.values()), without="lemma_fresh"),
     ]
 
 

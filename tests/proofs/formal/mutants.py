@@ -192,6 +192,31 @@ MUTANTS = [
         "compared & nearer",
     ),
     Mutant("upset, M/T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant(
+        "upset, M/T of whole cycles: given",
+        "pt_update",
+        MTMethod,
+        "length.eq(length + 1)",
+        "length.eq(length + ~length.all())",
+    ),
+    Mutant(
+        "upset, M/T of whole cycles: travelled",
+        "lemma_travelled",
+        MTMethod,
+        "travelled.eq(Mux(opens, 0, total))",
+        "travelled.eq(Mux(ends, 0, total))",
+    ),
+    Mutant(
+        "upset, M/T of whole cycles: since",
+        "lemma_fresh",
+        QuotientVelocity,
+        "compared & (measuring | nearer)",
+        "compared & nearer",
+    ),
+    Mutant("upset, M/T of whole cycles", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant(
+        "upset, M/T of whole cycles: cycles", "lemma_waived", MTMethod, "cycled.eq(0), waived.eq(0)", "cycled.eq(0)"
+    ),
     Mutant("wishbone", "pb_error", RegisterBank, "(bus.address >= len(self._map.registers))", "0"),
     Mutant("wishbone", "pb_read", RegisterBank, "init=(1 << len(bus.address)) - 1", "init=0"),
     Mutant("wishbone", "pb_snapshot", RegisterBank, "self.capture | (bus.read", "(bus.read"),
