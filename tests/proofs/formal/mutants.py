@@ -194,7 +194,7 @@ MUTANTS = [
     Mutant("upset, M/T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
     Mutant(
         "upset, M/T of whole cycles: given",
-        "pt_update",
+        "lemma_length",
         MTMethod,
         "length.eq(length + 1)",
         "length.eq(length + ~length.all())",

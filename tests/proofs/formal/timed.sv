@@ -276,7 +276,7 @@ module timed #(
       wire [I-1:0] core_length;
       wire core_late;
       wire signed [I+Q-1:0] core_travelled;
-      assign late = UPSET ? core_late : length > MIN_PERIODS;
+      assign late = UPSET && CYCLE > 1 ? core_late : (UPSET ? core_length : length) > MIN_PERIODS;
       always @* begin
         lemma_length: assert (length >= 1 && (!opened || (length <= PATIENCE + age && core_length == length
             && core_late == (length > MIN_PERIODS))));
