@@ -156,6 +156,9 @@ CONFIGURATIONS = (
     Configuration("t", "T method", TTachometer(**COMMON), TIMED_BARS, is_option=False),
     Configuration("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS, is_option=False),
     Configuration(
+        "mt-whole-cycles", "M/T method, whole cycles", MTTachometer(**COMMON, whole_cycles=True), is_option=False
+    ),
+    Configuration(
         "track",
         "tracking, 1000 rad/s, 16 bits",
         TrackTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), velocity_width=16),

@@ -74,8 +74,8 @@ def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
             why = f"it is for {others}" if others else "there is no such option"
             raise ParameterError(parameter, f"must not be given with method {method}: {why}")
         if (fits := known[name].fits) is not None and not fits(spec):
-            others = [about.name for about in known.values() if about.field == known[name].field]
-            instead = f", but {others[0]}" if others[0] != name else ""
+            other = next(about.name for about in known.values() if about.field == known[name].field)
+            instead = "" if other == name else f", but {other}"
             raise ParameterError(parameter, f"must not be given with method {method}{instead}")
     encoder, timing = Encoder(**read_options(Encoder, given)), Timing(**read_options(Timing, given))
     return spec(encoder=encoder, timing=timing, **read_options(spec, given))
