@@ -149,6 +149,9 @@ CONFIGURATIONS = (
     ),
     Configuration("t", "T method", TTachometer(**COMMON), TIMED_BARS, is_option=False),
     Configuration("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS, is_option=False),
+    Configuration(
+        "mt-whole-cycles", "M/T method, whole cycles", MTTachometer(**COMMON, whole_cycles=True), is_option=False
+    ),
     Configuration("t-tick", "T method, times in ticks", TTachometer(**COMMON, timer="tick"), is_option=False),
     Configuration("mt-tick", "M/T method, times in ticks", MTTachometer(**COMMON, timer="tick"), is_option=False),
     *(

@@ -1,6 +1,6 @@
 """The M/T method."""
 
-from amaranth import Module, Mux, Signal, Value
+from amaranth import Module, Mux, Signal, Value, ValueLike
 
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
@@ -12,11 +12,16 @@ class MTMethod(TimedDatapath):
     ½·s(opening) + counts between + ½·s(closing) is a sum over pairs of consecutive counts: a count of the same sign as
     the one before adds one, and a count of the other sign, which meets the same edge again, adds none. On the lattice a
     tick with m_e counts adds m_e, or one count less if their sign is not that before.
+
+    With `spec.cycle_counts` more than 1, a window that has completed a cycle without a reversal waits for the end of
+    the next one, until `spec.patient_periods` are over.
     """
 
     def __init__(self, spec: MTTachometer) -> None:
         super().__init__(spec)
         self._min_periods = spec.min_periods
+        self._patient_periods = spec.patient_periods
+        self._cycle_counts = spec.cycle_counts
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:
         spec, timer = self._spec, self.gap_timer
@@ -26,8 +31,11 @@ class MTMethod(TimedDatapath):
         total = Signal.like(travelled)
         ends = Signal()
         opens = Signal()
+        may_end: ValueLike = self.quotient_velocity.free if spec.may_be_late else 1
+        if self._cycle_counts > 1:
+            may_end = ~self._waits(m, length, opens)
         m.d.comb += [
-            ends.eq(timer.count & timer.opened & late & (self.quotient_velocity.free if spec.may_be_late else 1)),
+            ends.eq(timer.count & timer.opened & late & may_end),
             opens.eq(ends | ~timer.opened),
             total.eq(travelled + self._distance),
         ]
@@ -40,6 +48,24 @@ class MTMethod(TimedDatapath):
         with m.If(timer.count):
             m.d.sync += travelled.eq(Mux(opens, 0, total))
         return ends, total, Mux(ends, length, timer.age)
+
+    def _waits(self, m: Module, length: Signal, opens: Signal) -> Value:
+        """Whether this count lies within a cycle that the window is to complete."""
+        # Counts since the window opened: as long as none is against the one before, their sum but for the sign.
+        counted = Signal(range(self._cycle_counts))
+        number = Signal.like(counted)
+        cycled = Signal()
+        waived = Signal()
+        m.d.comb += number.eq(counted + 1)
+        with m.If(length == self._patient_periods):
+            m.d.sync += waived.eq(1)
+        with m.If(self.gap_timer.count):
+            m.d.sync += [counted.eq(number), cycled.eq(cycled | (number == 0))]
+            with m.If(~self._same):
+                m.d.sync += waived.eq(1)
+        with m.If(opens):
+            m.d.sync += [counted.eq(0), cycled.eq(0), waived.eq(0)]
+        return cycled & (number != 0) & ~waived & self._same
 
     @property
     def _distance(self) -> Value:

@@ -64,11 +64,21 @@ def t_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_t
 
 
 def mt_performance(
-    speed: Floats, m_c: int, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None
+    speed: Floats,
+    m_c: int,
+    counts_per_rev: int,
+    tick_seconds: float,
+    max_ticks: int | None = None,
+    cycle_counts: int = 1,
 ) -> Performance:
-    """M/T method with the minimum time of m_c ticks: eqs. (14) to (16)."""
+    """M/T method with the minimum time of m_c ticks: eqs. (14) to (16).
+
+    Measurements of `cycle_counts` counts or more last a multiple of them.
+    """
     m_s = tsuji.tsuji_eq16_interval(speed, m_c, counts_per_rev, tick_seconds)
     counted = np.rint(speed / tsuji.unit_velocity(counts_per_rev, tick_seconds) * m_s)
+    more = np.where(counted < cycle_counts, 0, -counted % cycle_counts)
+    counted, m_s = counted + more, m_s * (1 + more / np.maximum(counted, 1))
     m_s, forced = _limited(m_s, max_ticks)
     resolution = tsuji.tsuji_eq14_resolution(counted, m_s, m_c, counts_per_rev, tick_seconds)
     return Performance(
@@ -153,7 +163,9 @@ def _of_t(spec: TTachometer, speed: Floats) -> Performance:
 
 def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
     timer_seconds = float(spec.timing.tick_seconds) / spec.timer_periods
-    return mt_performance(speed, spec.min_periods, spec.encoder.counts_per_rev, timer_seconds, spec.max_periods)
+    return mt_performance(
+        speed, spec.min_periods, spec.encoder.counts_per_rev, timer_seconds, spec.max_periods, spec.cycle_counts
+    )
 
 
 def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:

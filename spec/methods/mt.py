@@ -23,6 +23,9 @@ class MTTachometer(TimedTachometer):
     ----------
     min_time : int or None
         T_c in clocks; None: a tick.
+    whole_cycles : bool
+        A window that has travelled a cycle of the lines in T_c stays open until it has travelled whole cycles, up to
+        twice T_c. Both of its ends are then edges of one kind, and errors of phase and duty cancel.
 
     Raises
     ------
@@ -38,6 +41,11 @@ class MTTachometer(TimedTachometer):
         unit="clocks",
         parse=_clocks,
         tests=("", "longest"),
+    )
+    whole_cycles: bool = option(
+        False,
+        "Let measurements last whole cycles of A and B, so that phase and duty errors of the encoder cancel; "
+        "below one cycle per Tc, and at reversals, they end as without.",
     )
 
     method = "mt"
@@ -57,6 +65,12 @@ class MTTachometer(TimedTachometer):
                 "min_time",
                 f"must be a multiple of {self.timer_cycles} clocks with times in ticks, not {self.min_time}",
             )
+        if self.whole_cycles and self.on_lattice:
+            raise ParameterError(
+                "whole_cycles", "must not be given with times in ticks, which are coarser than the errors that cancel"
+            )
+        if self.whole_cycles and self.paper_exact:
+            raise ParameterError("whole_cycles", "must not be given with paper_exact, which has no such windows")
 
     @property
     def _min_time(self) -> int:
@@ -72,6 +86,16 @@ class MTTachometer(TimedTachometer):
         return self.min_periods * self.timer_cycles
 
     @property
+    def cycle_counts(self) -> int:
+        """Counts of which a window that has travelled as many holds a multiple; 1: any number."""
+        return self.encoder.decoding if self.whole_cycles else 1
+
+    @property
+    def patient_periods(self) -> int:
+        """Timer periods after which any count closes a window."""
+        return self.min_periods * (2 if self.cycle_counts > 1 else 1)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         return (*self._raised("minimum time", self._min_time, self.min_time_cycles), *super().notes)
 
@@ -79,7 +103,7 @@ class MTTachometer(TimedTachometer):
     def max_interval(self) -> int:
         # A window stays open while the one before is divided.
         late = -(-self.division_clocks // self.min_tick_cycles) if self.may_be_late else 0
-        return max(self.min_periods, late) + self.max_periods
+        return max(self.patient_periods, late) + self.max_periods
 
     @property
     def remembered_periods(self) -> int:

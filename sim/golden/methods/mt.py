@@ -30,6 +30,8 @@ class Model:
         firsts = np.append(np.flatnonzero(first), n)
         next_first = firsts[np.searchsorted(firsts, np.arange(n), side="right")]
         closing = np.searchsorted(period, period + spec.min_periods, side="right")
+        if spec.whole_cycles:
+            closing = self._whole(counts, closing)
         if spec.may_be_late:
             closing = np.maximum(closing, self._free(counts, first))
         ends = np.flatnonzero(chain(np.minimum(closing, next_first)))
@@ -49,6 +51,20 @@ class Model:
             known=~none,
         )
         return updates(spec, counts, with_silences(spec, counts, found), ticks)
+
+    def _whole(self, counts: Counts, later: Ints) -> Ints:
+        """The count that closes the window of each opening one; `later`: the first one later than T_c.
+
+        It is the first after a whole number of cycles, if the window has gone through one, and does not turn before.
+        """
+        spec, n = self._spec, len(later)
+        opening, cycle = np.arange(n), spec.encoder.decoding
+        through = later - opening  # counts, which are the distance as long as the shaft does not turn
+        whole = opening + -(-through // cycle) * cycle
+        turns = np.append(np.flatnonzero(counts.size[1:] != counts.size[:-1]) + 1, n)
+        turn = np.maximum(later, turns[np.searchsorted(turns, opening, side="right")])
+        latest = np.searchsorted(counts.period, counts.period + 2 * spec.min_periods, side="right")
+        return np.where(through < cycle, later, np.minimum(np.minimum(whole, turn), latest))
 
     def _free(self, counts: Counts, first: NDArray[np.bool_]) -> Ints:
         """The first count after each opening one with which a division can begin.

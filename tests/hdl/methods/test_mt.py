@@ -7,7 +7,7 @@ from support.mutant import caught, mutant
 from support.timed import SILENCE, TICK, run, silence, spec_of, speed
 
 from tachometry.hdl.methods import mt as mt_method
-from tachometry.spec import MTTachometer
+from tachometry.spec import Encoder, MTTachometer
 
 
 def check_windows() -> None:
@@ -95,9 +95,101 @@ def test_silence_in_a_window() -> None:
     check_silence_in_a_window()
 
 
+def windows(steps: dict[int, int], decoding: int = 4, min_time: int = 50) -> list[tuple[int, int, int]]:
+    """Clock, distance and time of the measurements with whole cycles; none of them is forced."""
+    encoder = Encoder(100 // decoding, decoding)
+    spec = spec_of("mt", encoder=encoder, min_time=min_time, whole_cycles=True, bound_decay=False)
+    found = []
+    for clock, velocity, time, forced in run(spec, steps, max(steps) + 1):
+        assert not forced
+        (distance,) = [one for one in range(-40, 41) if speed(one, time) == velocity]
+        found.append((clock, distance, time))
+    return found
+
+
+def check_whole_cycles() -> None:
+    """Once a cycle is complete, a window ends with a whole one; 4 counts at x4, 2 at x2, and any number at x1."""
+    for sign in (1, -1):
+        steps = dict.fromkeys(range(5, 200, 12), sign)
+        assert windows(steps) == [(101, 8 * sign, 96), (197, 8 * sign, 96)]
+        assert windows(steps, 2) == [(5 + 72 * n, 6 * sign, 72) for n in (1, 2)]
+        assert windows(steps, 1) == [(5 + 60 * n, 5 * sign, 60) for n in (1, 2, 3)]
+    # The first count later than T_c completes a cycle at once.
+    assert windows(dict.fromkeys(range(5, 200, 13), 1)) == [(5 + 52 * n, 4, 52) for n in (1, 2, 3)]
+
+
+def test_whole_cycles() -> None:
+    check_whole_cycles()
+
+
+def check_less_than_a_cycle() -> None:
+    """A shaft that turns less than a cycle in T_c is measured as without: the first count later than T_c ends it."""
+    assert windows(dict.fromkeys(range(5, 200, 20), 1)) == [(5 + 60 * n, 3, 60) for n in (1, 2, 3)]
+    # After a fast start too: nothing of the window before is left.
+    steps = dict.fromkeys([*range(5, 102, 12), 141, 181, 221], 1)
+    assert windows(steps) == [(101, 8, 96), (181, 2, 80)]
+
+
+def test_less_than_a_cycle() -> None:
+    check_less_than_a_cycle()
+
+
+def check_patience() -> None:
+    """A shaft that slows down within a cycle keeps no window open: any count later than twice T_c ends it."""
+    begun = dict.fromkeys(range(5, 50, 10), 1)  # a cycle
+    assert windows(begun | {70: 1, 105: 1, 106: 1}) == [(106, 7, 101)]
+    assert windows(begun | {70: 1, 140: 1}) == [(140, 6, 135)]
+    # The time counts from the count that opened the window; whole cycles go on after it.
+    again = dict.fromkeys(range(150, 255, 10), 1)
+    assert windows(begun | {70: 1, 140: 1} | again) == [(140, 6, 135), (220, 8, 80)]
+
+
+def test_patience() -> None:
+    check_patience()
+
+
+def check_turning() -> None:
+    """A window in which the shaft turns ends with the first count later than T_c after that."""
+    begun = dict.fromkeys(range(5, 50, 10), 1)
+    # 4 and 2 there, 1 back: the count that shows the reversal ends it.
+    assert windows(begun | {56: 1, 60: 1, 70: -1}) == [(60 + 10, 6, 65)]
+    # Earlier reversals too, in either rhythm; and the next window knows nothing of them.
+    turned = {5: 1, 15: -1, 25: -1, 35: -1, 45: -1, 52: -1, 58: -1}
+    assert windows(turned) == [(58, -5, 53)]
+    assert windows(turned | dict.fromkeys(range(68, 180, 10), -1)) == [(58, -5, 53), (138, -8, 80)]
+    # The opening count may be against the one before it.
+    steps = dict.fromkeys(range(5, 60, 12), 1) | {66: -1} | dict.fromkeys(range(76, 160, 10), -1)
+    assert windows(steps) == [(66, 4, 61), (146, -8, 80)]
+
+
+def test_turning() -> None:
+    check_turning()
+
+
+def check_whole_cycles_after_silence() -> None:
+    """The window begins anew with the count after it."""
+    before = dict.fromkeys(range(5, 60, 10), 1)
+    begin = 55 + SILENCE + 30
+    spec = spec_of("mt", min_time=50, whole_cycles=True, bound_decay=False)
+    got = run(spec, before | dict.fromkeys(range(begin, begin + 120, 10), 1), begin + 115)
+    assert got == [*silence(55, begin), (begin + 80, speed(8, 80), 80, False)]
+
+
+def test_whole_cycles_after_silence() -> None:
+    check_whole_cycles_after_silence()
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (
+            {"whole_cycles": True, "timer": "tick"},
+            "whole_cycles must not be given with times in ticks, which are coarser than the errors that cancel",
+        ),
+        (
+            {"whole_cycles": True, "paper_exact": True},
+            "whole_cycles must not be given with paper_exact, which has no such windows",
+        ),
         ({"min_time": 0}, "min_time must be from 1 to 400 clocks, the maximum time, not 0"),
         ({"min_time": 401}, "min_time must be from 1 to 400 clocks, the maximum time, not 401"),
         (
@@ -121,6 +213,22 @@ MUTANTS = {
     "open after a silence": ("timer.count & timer.opened & late", "timer.count & late", check_silence_in_a_window),
     "distance kept through silence": ("ends | ~timer.opened", "ends", check_silence_in_a_window),
     "age for the length": ("Mux(ends, length, timer.age)", "timer.age", check_windows),
+    "cycles of one count more": ("number.eq(counted + 1)", "number.eq(counted + 2)", check_whole_cycles),
+    "no cycle is waited for": ("return cycled &", "return 0 &", check_whole_cycles),
+    "a cycle is always waited for": ("return cycled &", "return", check_less_than_a_cycle),
+    "a cycle of the window before": ("cycled.eq(0), waived", "waived", check_less_than_a_cycle),
+    "phase of the window before": ("[counted.eq(0), cycled", "[cycled", check_turning),
+    "waived in the window before": ("cycled.eq(0), waived.eq(0)", "cycled.eq(0)", check_turning),
+    "no end to patience": ("== self._patient_periods", "== 0", check_patience),
+    "patience as long as T_c": ("== self._patient_periods", "== self._patient_periods - 1", check_patience),
+    "patience of the window before": ("cycled.eq(0), waived.eq(0)", "cycled.eq(0)", check_patience),
+    "waiting after a reversal": ("with m.If(~self._same)", "with m.If(0)", check_turning),
+    "waiting at a reversal": (" & ~waived & self._same", " & ~waived", check_turning),
+    "silence in a cycle": (
+        "[counted.eq(0), cycled",
+        "[counted.eq(Mux(self.gap_timer.opened, 0, counted)), cycled",
+        check_whole_cycles_after_silence,
+    ),
     "one for m_e": ("return self._size +", "return self._one +", check_lattice),
 }
 

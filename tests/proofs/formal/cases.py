@@ -236,6 +236,11 @@ _WINDOW_OF_MT_PROBES = {
     "core_late": "datapath.late",
     "core_travelled": "datapath.travelled",
 }
+_CYCLES_OF_MT_PROBES = {
+    "core_counted": "datapath.counted",
+    "core_cycled": "datapath.cycled",
+    "core_waived": "datapath.waived",
+}
 
 
 def timed(
@@ -268,6 +273,7 @@ def timed(
         "MAX_TICKS": max_ticks,
         "MAX_PERIODS": spec.max_periods,
         "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,
+        "CYCLE": spec.cycle_counts if isinstance(spec, MTTachometer) else 1,
         "MAX_QUOTIENT": spec.max_quotient,
         "SATURATES": int(spec.saturates),
         "FLAGS": int(spec.flags_range),
@@ -277,6 +283,7 @@ def timed(
         "DIVISION_CLOCKS": spec.division_clocks,
     }
     probes = _TIMED_PROBES | _STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
+    probes |= within("cycles", _CYCLES_OF_MT_PROBES, parameters["CYCLE"] > 1)
     probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
@@ -298,13 +305,14 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
     )
 
 
-# What can be said of M/T without what is divided; the last one takes as long as all the others.
-_MT_GIVEN = (
-    "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
+# What can be said of M/T without what is divided; "travelled" takes as long as all the others.
+_MT_GIVEN = {
+    "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
     "lemma_left lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
     "lemma_window_free pt_update pt_held pt_spacing pt_rest",
-    "lemma_travelled",
-)
+    "travelled": "lemma_travelled",
+}
+_CYCLES_GIVEN = {"cycles": "lemma_waived lemma_counted lemma_one_way"}
 
 
 def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
@@ -319,13 +327,14 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
     settled = clocks - spec.max_periods - spec.max_interval - spec.division_clocks - 1
     upset = replace(proof, parameters=proof.parameters | {"UPSET": 1, "SETTLED": 0})
     late = upset.parameters | {"SETTLED": settled}
+    parts = _MT_GIVEN | (_CYCLES_GIVEN if spec.cycle_counts > 1 else {})
     return [
         *(
             replace(upset, name=f"{name}: {part}", depth=1, recovers=settled, only=given)
-            for part, given in zip(("given", "travelled"), _MT_GIVEN, strict=True)
+            for part, given in parts.items()
         ),
         replace(upset, name=f"{name}: since", parameters=late, depth=1, recovers=clocks, only="lemma_fresh"),
-        replace(upset, name=name, given=" ".join(_MT_GIVEN), without="lemma_fresh"),
+        replace(upset, name=name, given=" ".join(parts.values()), without="lemma_fresh"),
     ]
 
 
@@ -360,6 +369,7 @@ PROOFS = [
     rairan("Rairán", 3, 4, 2),
     timed("T", TTachometer, 2, 1),
     timed("M/T", MTTachometer, 2, 1),
+    timed("M/T of whole cycles", MTTachometer, 2, 1, whole_cycles=True),
     timed("T in ticks", TTachometer, 2, 2, 12, timer="tick"),
     timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),
     after_upset(
@@ -371,5 +381,6 @@ PROOFS = [
     after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_stalled"),
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
+    *mt_after_upset("upset, M/T of whole cycles", timed("", MTTachometer, 2, 1, whole_cycles=True)),
     *ON_BUSES,
 ]

@@ -13,6 +13,7 @@ module timed #(
     parameter MAX_TICKS = 4,
     parameter MAX_PERIODS = 16,   // timer periods in the maximum time
     parameter MIN_PERIODS = 4,    // M/T: in T_c
+    parameter CYCLE = 1,          // M/T: counts in a cycle that a window completes; 1: none
     parameter MAX_QUOTIENT = 4,
     parameter SATURATES = 1,
     parameter FLAGS = 1,          // there is an out_of_range
@@ -27,6 +28,7 @@ module timed #(
 );
   localparam V = VELOCITY_WIDTH, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS, W = 8;
   localparam P = LATTICE ? 1 : T, B = DIVISION_CLOCKS, LONG = MAX_PERIODS * (LATTICE ? T : 1), PHASES = LATTICE ? T : 1;
+  localparam PATIENCE = MIN_PERIODS * (CYCLE > 1 ? 2 : 1);  // timer periods after which any count closes a window
   wire tick, velocity_valid, forced, stalled;
   wire signed [COUNT_WIDTH-1:0] pulse_count;
   wire signed [V-1:0] velocity;
@@ -71,7 +73,8 @@ module timed #(
 
   // Clocks since the last count, after reset as if for ever; timer periods since the last count or forced 0.
   reg [W-1:0] idle = LONG + B, age = 1, length = 1;
-  wire [W-1:0] waited = UPSET ? core_age : age, lasted;
+  wire [W-1:0] waited = UPSET ? core_age : age;
+  wire late;
   reg was_negative = 0;
   wire last_negative = UPSET ? core_negative : was_negative;
   wire opened = idle < LONG;
@@ -96,12 +99,20 @@ module timed #(
   reg signed [W-1:0] travelled = 0;
   wire signed [W-1:0] turned = negative == last_negative ? 0 : negative ? 1 : -1;
   wire signed [W-1:0] pair = MT && LATTICE ? size + turned : negative != last_negative ? 0 : negative ? -1 : 1;
-  wire closes = MT && count && opened && lasted > MIN_PERIODS;
+  wire signed [W-1:0] way = travelled + pair;
+  wire shown_within, shown_waived;
+  reg turned_back = 0;  // within the window
+  wire within = UPSET ? shown_within : (way & (CYCLE - 1)) != 0 && (way > CYCLE || way < -CYCLE);
+  wire waived = UPSET ? shown_waived : turned_back || length > PATIENCE;
+  wire waits = CYCLE > 1 && within && !waived && negative == last_negative;
+  wire closes = MT && count && opened && late && !waits;
   always @(posedge clk)
     if (rst) begin
       travelled <= 0;
       length <= 1;
+      turned_back <= 0;
     end else begin
+      if (count) turned_back <= !closes && opened && (turned_back || negative != last_negative);
       if (period) length <= closes || !opened || overdue ? 1 : length + 1;
       if (count) travelled <= closes || !opened ? 0 : travelled + pair;
     end
@@ -214,7 +225,7 @@ module timed #(
     lemma_kept: assert (!fresh_division || since == 0 || (core_measuring == measuring && core_forced == silent
         && core_by == times));
     lemma_asked: assert (!fresh_division || since == 0 || (times >= 1 && distance <= most && -distance <= most));
-    lemma_times: assert (!fresh_division || since == 0 || times <= MAX_PERIODS + (MT ? MIN_PERIODS : 0));
+    lemma_times: assert (!fresh_division || since == 0 || times <= MAX_PERIODS + (MT ? PATIENCE : 0));
     lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
     lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
     lemma_left: assert (!core_running || core_left == ((distance << j) & ((1 << Q) - 1)));
@@ -265,22 +276,34 @@ module timed #(
       wire [I-1:0] core_length;
       wire core_late;
       wire signed [I+Q-1:0] core_travelled;
-      assign lasted = UPSET ? core_length : length;
+      assign late = UPSET && CYCLE > 1 ? core_late : (UPSET ? core_length : length) > MIN_PERIODS;
       always @* begin
-        lemma_length: assert (length >= 1 && (!opened || (length <= MIN_PERIODS + age && core_length == length
+        lemma_length: assert (length >= 1 && (!opened || (length <= PATIENCE + age && core_length == length
             && core_late == (length > MIN_PERIODS))));
         lemma_unopened: assert (opened || length == 1);
         lemma_core_length: assert (opened || age == 1 || (core_length == 1 && !core_late));
         lemma_travelled: assert (!opened || (core_travelled == P * travelled && travelled <= farthest && -travelled <= farthest));
         lemma_window_free: assert (since == 0 || !measuring || since >= (length - 1) * PHASES + phase);
       end
-    end else assign lasted = length;
+    end else assign late = 0;
+    if (CYCLE > 1) begin : cycles
+      wire [$clog2(CYCLE)-1:0] core_counted;
+      wire core_cycled, core_waived;
+      wire signed [W-1:0] distance = travelled < 0 ? -travelled : travelled;
+      assign shown_within = core_cycled && core_counted != CYCLE - 1, shown_waived = core_waived;
+      always @* begin
+        lemma_waived: assert (!opened || core_waived == (turned_back || length > PATIENCE));
+        lemma_counted: assert (!opened || turned_back || (core_counted == (distance & (CYCLE - 1))
+            && core_cycled == (distance >= CYCLE)));
+        lemma_one_way: assert (!opened || turned_back || travelled == 0 || (travelled < 0) == was_negative);
+      end
+    end else assign shown_within = 0, shown_waived = 0;
   endgenerate
   always @* begin
     pt_update: assert (due && due_measuring ? velocity_valid : !velocity_valid || due);
     pt_spacing: assert (!velocity_valid || spacing >= B);
     pt_interval: assert (!fresh || kept || (interval == shown_times && forced == shown_silent));
-    pt_range: assert (!fresh || !velocity_valid || (interval >= 1 && interval <= MAX_PERIODS + (MT ? MIN_PERIODS : 0)));
+    pt_range: assert (!fresh || !velocity_valid || (interval >= 1 && interval <= MAX_PERIODS + (MT ? PATIENCE : 0)));
     pt_velocity: assert (!fresh || kept || (SATURATES && beyond) || (have <= wanted && wanted < have + divisor)
         || (shown_times == 0 && velocity == 0));
     pt_flag: assert (!fresh || kept || shown_times == 0 || beyond == (FLAGS && (!fits || shown_many)));

@@ -13,6 +13,8 @@ APART = {
     frozenset({("tick", "1"), ("external-tick", "yes")}),
     frozenset({("paper-exact", "yes"), ("bounds", "yes edge-error 0.3")}),
     frozenset({("paper-exact", "yes"), ("adaptive", "25%")}),
+    frozenset({("paper-exact", "yes"), ("whole-cycles", "yes")}),
+    frozenset({("timer", "tick"), ("whole-cycles", "yes")}),
     frozenset({("adaptive", "25%"), ("max-time", "2")}),
     frozenset({("adaptive", "25%"), ("max-time", "3")}),
     frozenset({("adaptive", "25%"), ("lowpass", "20kHz")}),

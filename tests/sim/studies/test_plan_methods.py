@@ -13,11 +13,16 @@ from tachometry.sim.studies.plan import plan_at
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 
 TICKS = 3000
-OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 3}, "adaptive": {"adaptive": Fraction(1, 20)}}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "m": {"average": 3},
+    "adaptive": {"adaptive": Fraction(1, 20)},
+    "whole cycles": {"whole_cycles": True},
+}
+OF_METHOD = {"adaptive": "rairan", "whole cycles": "mt"}
 
 
 def spec_of(method: str) -> TachometerSpec:
-    return METHODS["rairan" if method == "adaptive" else method](
+    return METHODS[OF_METHOD.get(method, method)](
         encoder=Encoder(500),
         timing=Timing(1_000_000, 100, 50),
         max_speed=Speed.parse("900rad/s"),
@@ -32,7 +37,7 @@ def speeds() -> list[float]:
     return [*(10 ** np.random.default_rng(5).uniform(-2, 1.3, 40)).tolist(), *near]
 
 
-@pytest.mark.parametrize("method", [*METHODS, "adaptive"])
+@pytest.mark.parametrize("method", [*METHODS, *OF_METHOD])
 def test_no_error_is_greater_than_the_resolution(method: str) -> None:
     spec = spec_of(method)
     tick = float(spec.timing.tick_seconds)

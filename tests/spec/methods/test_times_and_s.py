@@ -74,6 +74,11 @@ def test_the_longest_measurement() -> None:
     assert [t().max_interval, t().interval_width] == [200, 8]
     assert [mt().max_interval, mt(min_time=77).max_interval] == [220, 277]
     assert [mt(timer="tick").max_interval, mt(timer="tick", max_tick_cycles=20).max_interval] == [1 + 10, 7 + 10]
+    # With whole cycles it comes after twice T_c; at x1 each count is one.
+    assert mt(whole_cycles=True, min_time=77).max_interval == 2 * 77 + 200
+    assert [(one.cycle_counts, one.patient_periods) for one in (mt(), mt(whole_cycles=True))] == [(1, 20), (4, 40)]
+    x1 = MTTachometer(encoder=Encoder(8, 1), timing=timing(20, 10), frac_bits=4, whole_cycles=True)
+    assert (x1.cycle_counts, x1.max_interval) == (1, 220)
     assert [one.may_be_late for one in (mt(), mt(timer="tick"), mt(max_tick_cycles=40))] == [False] * 3
     assert mt(timer="tick", max_tick_cycles=20).may_be_late
     assert [one.interval_unit_cycles for one in (t(), t(timer="tick"))] == [1, 20]
