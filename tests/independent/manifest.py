@@ -36,10 +36,10 @@ WORDS = {
     "s": {**_SHARED, "cancel": "cancel"},
     "m": {**_SHARED, "average": "average"},
     "t": {**_SHARED, **_TIMED},
-    "mt": {**_SHARED, **_TIMED, "min_time": "min-time"},
+    "mt": {**_SHARED, **_TIMED, "min_time": "min-time", "whole_cycles": "whole-cycles"},
     "rairan": {**_SHARED, **_RAIRAN},
 }
-_FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact")
+_FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles")
 
 
 def parameter(settings: Settings, name: str, shown: object) -> object:

@@ -381,6 +381,5 @@ PROOFS = [
     after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_stalled"),
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
-    *mt_after_upset("upset, M/T of whole cycles", timed("", MTTachometer, 2, 1, whole_cycles=True)),
     *ON_BUSES,
 ]
