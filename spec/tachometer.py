@@ -229,6 +229,11 @@ class TachometerSpec(Numbers):
         return ()
 
     @property
+    def method_entries(self) -> dict[str, dict[str, Any]]:
+        """Entries of the manifest that say how numbers of these outputs are read, by the names of the ports."""
+        return {}
+
+    @property
     def bound_ports(self) -> tuple[Port, ...]:
         """Ports that enclose the true speed."""
         if not self.bounds:

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 from tachometry.spec.formats.tracking import Tracking
 from tachometry.spec.formats.tracking_program import Program
@@ -192,6 +193,18 @@ class TrackTachometer(TachometerSpec):
                 help="Position at the end of this period, between the counts as well; it wraps as position does.",
             ),
         )
+
+    @property
+    def method_entries(self) -> dict[str, dict[str, Any]]:
+        return {
+            "acceleration": {
+                "width": self.acceleration_width,
+                "frac_bits": self.acceleration_frac_bits,
+                "unit": self.acceleration_unit,
+                "rad_per_s2_per_lsb": self.acceleration_per_lsb,
+            },
+            "position_fine": {"frac_bits": self.fine_bits},
+        }
 
     @property
     def standstill_ticks(self) -> int:
