@@ -22,7 +22,7 @@ from tachometry.sim.studies.tune import TUNED, core_settings, error_of
 from tachometry.spec import of_texts
 
 # Columns that are not tuned: one setting for all situations, as `tachometry compare --methods` takes it.
-OURS = ("s", "mt:min-time=1ms")
+OURS = ("track", "track:edge-error=0.6", "s", "mt:min-time=1ms")
 RIVALS = (*TUNED, *BASELINES)
 CORE = {"ppr": str(PULSES_PER_REV), "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
 

@@ -31,9 +31,9 @@ def common_options() -> tuple[Option, ...]:
 
 
 def own_options(method: str) -> tuple[Option, ...]:
-    """Options of a method beyond those that every method has."""
-    common = {about.name for about in common_options()}
-    return tuple(about for about in options_of(METHODS[method]) if about.name not in common)
+    """Options of a method beyond those that every method has, and those of these that it has in another way."""
+    common = common_options()
+    return tuple(about for about in options_of(METHODS[method]) if about not in common)
 
 
 def methods_with(name: str) -> list[str]:
