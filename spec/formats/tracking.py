@@ -28,7 +28,7 @@ RATIOS = tuple(10 ** (-level / (LEVELS - 1)) for level in range(LEVELS))
 SHORTEST_MEMORY = 0.2  # of 1 − θ_min: it does not fall further as λ does
 AGILE = 4  # times λ_0
 STEP_BACK = 4  # levels, when the mean error is large
-FACTOR_BITS = 16  # of constants that hardly matter: a twelfth, and the threshold of the mean error
+FACTOR_BITS = 16  # of a twelfth, and significant bits of the threshold of the mean error
 GROWTH = 10  # λ falls by its e-th part in so many of its time constants
 
 
@@ -87,13 +87,22 @@ class Tracking:
         return -math.log(1 - float(1 - self.least_memory) * max(RATIOS[level], SHORTEST_MEMORY))
 
     @cached_property
+    def _least_gain(self) -> float:
+        """d in ticks that all have counts, at the least λ."""
+        level = LEVELS - 1 if self.growing else 0
+        return 1 - math.exp(-min(self.rate(level) * self.tick_cycles, self.most(level)))
+
+    @cached_property
     def frac_bits(self) -> int:
         """F, by the error analysis above."""
-        level = LEVELS - 1 if self.growing else 0
-        share = 1 - math.exp(-min(self.rate(level) * self.tick_cycles, self.most(level)))
-        gain = share * float(self.unit_ticks)
+        gain = self._least_gain * float(self.unit_ticks)
         error = (1.5 + 3 * gain + gain * gain) / (gain * gain)
         return max(self.velocity_bits + 2 + math.ceil(math.log2(error)), self.fine_bits + 2)
+
+    @property
+    def acceleration_error(self) -> float:
+        """Error of a, in 2^−F counts per U²."""
+        return 1.5 / self._least_gain + 1.5 * float(self.unit_ticks)
 
     @property
     def gain_bits(self) -> int:
@@ -141,9 +150,16 @@ class Tracking:
         return signed_width(self.max_count * (2 * self.max_count - 1))
 
     @property
+    def least_gap(self) -> int:
+        """Fewest clocks between the first two counts."""
+        return max(self.tick_cycles // self.max_count, 1)
+
+    @cached_property
     def start_bits(self) -> int:
         """Bits that the first velocity is computed coarser by, so that it cannot leave the word."""
-        return min((self.max_count + 1).bit_length(), self.unit_bits)
+        # Before it is held within the greatest velocity: the counts of a tick and one more in the shortest time.
+        bits = ceil_log2(Fraction((self.max_count + 2) << self.unit_bits, self.least_gap)) + self.frac_bits + 1
+        return min(max(bits - self.width, 0), self.unit_bits)
 
     @cached_property
     def width(self) -> int:
@@ -153,7 +169,6 @@ class Tracking:
         greatest = max(
             counts * (counts + moved),  # the sum over the counts of a tick
             self.max_velocity / 2**self.frac_bits * 1.5,  # before it is held within its limit
-            self.max_velocity / 2**self.frac_bits * (counts + 2) / 2**self.start_bits,  # the first one
             self.max_acceleration / 2**self.frac_bits + self.max_error,
             2 * self.max_error + 2 * moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
@@ -201,6 +216,11 @@ class Tracking:
         return self.fixed(Fraction(1, 2) + Fraction(3, 2) * self.edge_error)
 
     @property
+    def mean_threshold_bits(self) -> int:
+        """Fraction bits of the threshold of the mean error."""
+        return FACTOR_BITS - math.floor(2 * math.log2(self.edge_error / 4))
+
+    @property
     def mean_threshold(self) -> int:
         """(0.25·E)²: the square of the mean error over the share of the last error in it, that is trouble."""
-        return round((self.edge_error / 4) ** 2 * (1 << FACTOR_BITS))
+        return round((self.edge_error / 4) ** 2 * (1 << self.mean_threshold_bits))

@@ -164,11 +164,11 @@ class TrackTachometer(TachometerSpec):
 
     @cached_property
     def acceleration_frac_bits(self) -> int:
-        """Fraction bits of the acceleration: the most with which the greatest one fits."""
+        """Fraction bits of the acceleration: its error is at most a quarter of an LSB, and the greatest one fits."""
         form = self.form
         one = self._acceleration_per_count / form.unit_ticks**2 / (1 << form.frac_bits)  # of a word, in the unit
         fitting = math.floor(math.log2(((1 << (self.acceleration_width - 1)) - 2) / (form.max_acceleration * one)))
-        return min(fitting, math.floor(-math.log2(one)) - 1)
+        return min(fitting, math.floor(-math.log2(4 * form.acceleration_error * one)))
 
     @property
     def acceleration_per_lsb(self) -> float:

@@ -181,7 +181,7 @@ class Recursion:
         e3 = (e2 * d) >> bits
         h = (e1 * r) >> bits
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += (h * r) >> bits
+        self.a += ((h * r) >> (bits - 1)) + 1 >> 1
         i = (h * d) >> bits
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
@@ -196,7 +196,7 @@ class Recursion:
         share = self._reach(form.rates[self.level], form.most_x[self.level]) >> 2
         self.mean += ((e - self.mean) * share) >> form.frac_bits
         size = min(abs(self.mean), form.fixed(1))
-        limit = (share * form.mean_threshold) >> FACTOR_BITS
+        limit = (share * form.mean_threshold) >> form.mean_threshold_bits
         self.age += self.gap
         if agile:
             self.age = self.level = 0
