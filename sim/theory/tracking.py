@@ -88,6 +88,12 @@ class Tuning:
         )
 
     @property
+    def shortest_gap(self) -> float:
+        """Seconds, whole clocks, between the first two counts: less is taken for so much."""
+        tick_cycles = round(self.tick_seconds / self.clock_seconds)
+        return max(tick_cycles // self.max_count, 1) * self.clock_seconds
+
+    @property
     def greatest_velocity(self) -> float:
         """Counts per second."""
         return self.max_count / self.tick_seconds
@@ -183,7 +189,10 @@ class Recursion:
             edges = (-after - np.array(steps) / 2).tolist()
             if alone:
                 ages, edges = ages[-1:], edges[-1:]
-            self._count(sum(ages) / len(ages), sum(edges) / len(edges), sum(steps))
+            if self.phase is Phase.REST and len(edges) > 1:  # just begun anew: none of them is the first
+                self._rest()
+            else:
+                self._count(sum(ages) / len(ages), sum(edges) / len(edges), sum(steps))
         elif self.silent >= tuning.max_ticks:
             self._rest()
         else:
@@ -221,8 +230,7 @@ class Recursion:
             self.place, self.velocity, self.acceleration, self.gap = edge, 0.0, 0.0, age
             self.phase = Phase.ONE
         elif self.phase is Phase.ONE:
-            shortest = max(tuning.tick_seconds // (tuning.clock_seconds * tuning.max_count), 1) * tuning.clock_seconds
-            speed = (edge - self.place + moved) / max(self.gap - age, shortest)
+            speed = (edge - self.place + moved) / max(self.gap - age, tuning.shortest_gap)
             self._forget()
             self.velocity = min(max(speed, -tuning.greatest_velocity), tuning.greatest_velocity)
             self.place, self.acceleration = edge + self.velocity * age, 0.0

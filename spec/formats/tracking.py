@@ -28,7 +28,8 @@ RATIOS = tuple(10 ** (-level / (LEVELS - 1)) for level in range(LEVELS))
 SHORTEST_MEMORY = 0.2  # of 1 − θ_min: it does not fall further as λ does
 AGILE = 4  # times λ_0
 STEP_BACK = 4  # levels, when the mean error is large
-FACTOR_BITS = 16  # of a twelfth, and significant bits of the threshold of the mean error
+THRESHOLD_BITS = 16  # of the threshold of the mean error, that count
+MOST_EXTRA_BITS = 12
 GROWTH = 10  # λ falls by its e-th part in so many of its time constants
 
 
@@ -86,28 +87,45 @@ class Tracking:
         """The greatest x = λ·m·T_s that counts for the gains of a level: −ln θ_min."""
         return -math.log(1 - float(1 - self.least_memory) * max(RATIOS[level], SHORTEST_MEMORY))
 
-    @cached_property
-    def _least_gain(self) -> float:
-        """d in ticks that all have counts, at the least λ."""
+    def _gains(self) -> list[tuple[int, float]]:
+        """m and d where errors are greatest: a count in every tick, as seldom as may be, and where x reaches its most.
+
+        In all of them λ is the least.
+        """
         level = LEVELS - 1 if self.growing else 0
-        return 1 - math.exp(-min(self.rate(level) * self.tick_cycles, self.most(level)))
+        each = self.rate(level) * self.tick_cycles
+        ticks = {1, self.max_ticks, max(1, min(round(self.most(level) / each), self.max_ticks))}
+        return [(m, 1 - math.exp(-min(each * m, self.most(level)))) for m in sorted(ticks)]
+
+    @cached_property
+    def extra_bits(self) -> int:
+        """S, by the error analysis above."""
+        most = max(m / (d * float(self.unit_ticks)) for m, d in self._gains())
+        return min(max(math.ceil(math.log2(most)), 0), MOST_EXTRA_BITS)
 
     @cached_property
     def frac_bits(self) -> int:
         """F, by the error analysis above."""
-        gain = self._least_gain * float(self.unit_ticks)
-        error = (1.5 + 3 * gain + gain * gain) / (gain * gain)
-        return max(self.velocity_bits + 2 + math.ceil(math.log2(error)), self.fine_bits + 2)
+        u = float(self.unit_ticks)
+        finest = 0
+        for m, d in self._gains():
+            error = m / (d * d * u) * (1 + m / (d * u) / 2 ** (self.extra_bits + 1))  # of p, in 2^−F
+            velocity = 3 * d / m * error + 3 / (d * u) + 2
+            bits = (self.velocity_bits + math.log2(velocity), self.fine_bits + math.log2(error + 1))
+            finest = max(finest, *(2 + math.ceil(each) for each in bits))
+        return finest
 
     @property
     def acceleration_error(self) -> float:
-        """Error of a, in 2^−F counts per U²."""
-        return 1.5 / self._least_gain + 1.5 * float(self.unit_ticks)
+        """Error of a, in its LSB."""
+        u = float(self.unit_ticks)
+        return max((4.5 * u / m) * 2**self.extra_bits + 1.5 / d for m, d in self._gains())
 
     @property
     def gain_bits(self) -> int:
         """B: fraction bits of the multipliers."""
-        return max(20, self.velocity_bits + 8)
+        d = self._gains()[0][1]
+        return max(20, self.velocity_bits + 1 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks)))))
 
     @property
     def max_velocity(self) -> int:
@@ -116,8 +134,8 @@ class Tracking:
 
     @property
     def max_acceleration(self) -> int:
-        """Greatest |a|, in 2^−F counts per U²: a quarter of the greatest speed within U."""
-        return self.max_velocity >> 2
+        """Greatest |a|, in 2^−(F + S) counts per U²: a quarter of the greatest speed within U."""
+        return (self.max_velocity << self.extra_bits) >> 2
 
     @property
     def max_error(self) -> int:
@@ -169,7 +187,7 @@ class Tracking:
         greatest = max(
             counts * (counts + moved),  # the sum over the counts of a tick
             self.max_velocity / 2**self.frac_bits * 1.5,  # before it is held within its limit
-            self.max_acceleration / 2**self.frac_bits + self.max_error,
+            self.max_acceleration / 2**self.frac_bits + self.max_error * 2**self.extra_bits,
             2 * self.max_error + 2 * moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
         )
@@ -218,7 +236,7 @@ class Tracking:
     @property
     def mean_threshold_bits(self) -> int:
         """Fraction bits of the threshold of the mean error."""
-        return FACTOR_BITS - math.floor(2 * math.log2(self.edge_error / 4))
+        return THRESHOLD_BITS - math.floor(2 * math.log2(self.edge_error / 4))
 
     @property
     def mean_threshold(self) -> int:

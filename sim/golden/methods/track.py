@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking import FACTOR_BITS, LEVELS, STEP_BACK
+from tachometry.spec.formats.tracking import LEVELS, STEP_BACK
 
 REST, BEGUN, TRACKS = range(3)
 
@@ -98,7 +98,7 @@ class Recursion:
         """Take tick i; `alone`: only its last count; `quiet`: there was no count for the maximum time."""
         form, length, most = self._form, windows.length[i], self._constants
         self.gap += length
-        half = (self.a * length) >> (form.unit_bits + 1)
+        half = (self.a * length) >> (form.unit_bits + form.extra_bits + 1)
         self.v += half
         self.p += (self.v * length) >> form.unit_bits
         self.v += half
@@ -122,6 +122,8 @@ class Recursion:
             self.p = self.a = 0
             self.v = form.max_velocity if moved > 0 else -form.max_velocity
             self.phase = TRACKS
+        elif self.phase == REST and number > 1:  # none of them is the first
+            self._rest()
         elif self.phase == REST:
             self._anew()
             self.p, self.v, self.a, self.gap = places, 0, 0, times
@@ -173,15 +175,14 @@ class Recursion:
         x = self._reach(rate, form.most_x[0 if agile else level])
         one, bits = form.fixed(1), form.gain_bits
         square = (x * x) >> form.frac_bits
-        divisor = (x >> 1) + ((square * self._constants["twelfth"]) >> FACTOR_BITS) + one
-        d = (x << bits) // divisor
+        d = (3 * x << bits) // ((square + 6 * x >> 2) + 3 * one)
         r = (d << form.unit_bits) // self.gap
         e1 = (e * d) >> bits
         e2 = (e1 * d) >> bits
         e3 = (e2 * d) >> bits
         h = (e1 * r) >> bits
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += ((h * r) >> (bits - 1)) + 1 >> 1
+        self.a += ((h * r) >> (bits - form.extra_bits - 1)) + 1 >> 1
         i = (h * d) >> bits
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
@@ -250,7 +251,7 @@ class Model:
             state.tick(windows, i, alone, elapsed == spec.timing.max_ticks)
             before, phase = phase, state.phase
             silent = 0 if counted else elapsed
-            ahead = state.v + ((state.a * spec.program.lead) >> form.unit_bits)
+            ahead = state.v + ((state.a * spec.program.lead) >> (form.unit_bits + form.extra_bits))
             ahead = max(-form.max_velocity, min(ahead, form.max_velocity))
             velocity = ((ahead * form.tick_cycles) >> velocity_shift) + 1 >> 1
             acceleration = ((state.a * factor) >> (shift - 1)) + 1 >> 1
