@@ -282,29 +282,26 @@ class Program:
             *(Do(Op.FROM_MQ), Do(Op.SUB, "coarse_v"), Do(Op.NEGATIVE), Do(Op.ADD, "coarse_v")),
             Do(Op.DOUBLE, steps=form.start_bits),
             *(Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, "v")),
-            *(Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "v", self._times_shift + 1), *self._coarser),
-            *(Do(Op.ADD, "x"), Do(Op.STORE, "p")),
+            *(*self._moved_by_v, Do(Op.ADD, "x"), Do(Op.STORE, "p")),
             *(*self._anew, Do(Op.STORE, "a"), Do(Op.PHASE, Phase.TRACKS)),
         ]
 
     @property
-    def _times_shift(self) -> int:
-        """Right shift of v·Στ that all bits of Στ need: k, or more."""
-        return max(self.form.unit_bits, self.form.times_bits - 1)
-
-    @property
-    def _coarser(self) -> list[Step]:
-        """What is missing of a product that was shifted by more than k."""
-        missing = self._times_shift - self.form.unit_bits
-        return [Do(Op.DOUBLE, steps=missing)] if missing else []
+    def _moved_by_v(self) -> list[Step]:
+        """ac = v·Στ."""
+        shift = max(self.form.unit_bits, self.form.times_bits - 1)  # of a product in which all bits of Στ count
+        missing = shift - self.form.unit_bits
+        finer: list[Step] = []
+        if missing:
+            finer = [*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, "v"), Do(Op.DOUBLE, steps=missing), Do(Op.STORE, "t")]
+        return [*finer, Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "t" if missing else "v", shift + 1)]
 
     @property
     def _error(self) -> list[Step]:
         """e: the mean distance of the counts of the tick from where they were expected."""
         return [
             *(Do(Op.INPUT, Input.NUMBER), Do(Op.STORE, "r")),
-            *(Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "v", self._times_shift + 1), *self._coarser),
-            Do(Op.STORE, "t"),
+            *(*self._moved_by_v, Do(Op.STORE, "t")),
             *(Do(Op.INPUT, Input.PLACES), Do(Op.ADD, "t"), Do(Op.KEEP, "t")),
             *(Do(Op.LOAD_SIGNED, "t"), Do(Op.TO_MQ), Do(Op.DIV, "r", self.form.width)),
             *(Do(Op.FROM_MQ), Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.SUB, "p"), Do(Op.KEEP, "e")),

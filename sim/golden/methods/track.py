@@ -136,9 +136,8 @@ class Recursion:
                 self._track(number, times, places)
 
     def _moved_by_v(self, times: int) -> int:
-        """v times the sum of some times; where that has more bits than the unit of time, their low ones are lost."""
-        shift = max(self._form.unit_bits, self._form.times_bits - 1)
-        return ((self.v * times) >> shift) << (shift - self._form.unit_bits)
+        """v times the sum of some times."""
+        return (self.v * times) >> self._form.unit_bits
 
     def _second(self, times: int, places: int) -> None:
         """The speed from the first count to this one, coarser by some bits."""
