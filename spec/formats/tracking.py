@@ -125,7 +125,7 @@ class Tracking:
     def gain_bits(self) -> int:
         """B: fraction bits of the multipliers."""
         d = self._gains()[0][1]
-        return max(20, self.velocity_bits + 1 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks)))))
+        return max(20, self.velocity_bits + 3 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks)))))
 
     @property
     def max_velocity(self) -> int:

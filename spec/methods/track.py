@@ -168,7 +168,7 @@ class TrackTachometer(TachometerSpec):
         form = self.form
         one = self._acceleration_per_count / form.unit_ticks**2 / (1 << (form.frac_bits + form.extra_bits))  # LSB of a
         fitting = math.floor(math.log2(((1 << (self.acceleration_width - 1)) - 2) / (form.max_acceleration * one)))
-        return min(fitting, math.floor(-math.log2(4 * form.acceleration_error * one)))
+        return min(fitting, math.floor(-math.log2(8 * form.acceleration_error * one)))
 
     @property
     def acceleration_per_lsb(self) -> float:
