@@ -28,7 +28,8 @@ RATIOS = tuple(10 ** (-level / (LEVELS - 1)) for level in range(LEVELS))
 SHORTEST_MEMORY = 0.2  # of 1 − θ_min: it does not fall further as λ does
 AGILE = 4  # times λ_0
 STEP_BACK = 4  # levels, when the mean error is large
-FACTOR_BITS = 16  # of constants that hardly matter: a twelfth, and the threshold of the mean error
+THRESHOLD_BITS = 16  # of the threshold of the mean error, that count
+MOST_EXTRA_BITS = 12
 GROWTH = 10  # λ falls by its e-th part in so many of its time constants
 
 
@@ -86,19 +87,45 @@ class Tracking:
         """The greatest x = λ·m·T_s that counts for the gains of a level: −ln θ_min."""
         return -math.log(1 - float(1 - self.least_memory) * max(RATIOS[level], SHORTEST_MEMORY))
 
+    def _gains(self) -> list[tuple[int, float]]:
+        """m and d where errors are greatest: a count in every tick, as seldom as may be, and where x reaches its most.
+
+        In all of them λ is the least.
+        """
+        level = LEVELS - 1 if self.growing else 0
+        each = self.rate(level) * self.tick_cycles
+        ticks = {1, self.max_ticks, max(1, min(round(self.most(level) / each), self.max_ticks))}
+        return [(m, 1 - math.exp(-min(each * m, self.most(level)))) for m in sorted(ticks)]
+
+    @cached_property
+    def extra_bits(self) -> int:
+        """S, by the error analysis above."""
+        most = max(m / (d * float(self.unit_ticks)) for m, d in self._gains())
+        return min(max(math.ceil(math.log2(most)), 0), MOST_EXTRA_BITS)
+
     @cached_property
     def frac_bits(self) -> int:
         """F, by the error analysis above."""
-        level = LEVELS - 1 if self.growing else 0
-        share = 1 - math.exp(-min(self.rate(level) * self.tick_cycles, self.most(level)))
-        gain = share * float(self.unit_ticks)
-        error = (1.5 + 3 * gain + gain * gain) / (gain * gain)
-        return max(self.velocity_bits + 2 + math.ceil(math.log2(error)), self.fine_bits + 2)
+        u = float(self.unit_ticks)
+        finest = 0
+        for m, d in self._gains():
+            error = m / (d * d * u) * (1 + m / (d * u) / 2 ** (self.extra_bits + 1))  # of p, in 2^−F
+            velocity = 3 * d / m * error + 3 / (d * u) + 2
+            bits = (self.velocity_bits + math.log2(velocity), self.fine_bits + math.log2(error + 1))
+            finest = max(finest, *(2 + math.ceil(each) for each in bits))
+        return finest
+
+    @property
+    def acceleration_error(self) -> float:
+        """Error of a, in its LSB."""
+        u = float(self.unit_ticks)
+        return max((4.5 * u / m) * 2**self.extra_bits + 1.5 / d for m, d in self._gains())
 
     @property
     def gain_bits(self) -> int:
         """B: fraction bits of the multipliers."""
-        return max(20, self.velocity_bits + 8)
+        d = self._gains()[0][1]
+        return max(20, self.velocity_bits + 3 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks)))))
 
     @property
     def max_velocity(self) -> int:
@@ -107,8 +134,8 @@ class Tracking:
 
     @property
     def max_acceleration(self) -> int:
-        """Greatest |a|, in 2^−F counts per U²: a quarter of the greatest speed within U."""
-        return self.max_velocity >> 2
+        """Greatest |a|, in 2^−(F + S) counts per U²: a quarter of the greatest speed within U."""
+        return (self.max_velocity << self.extra_bits) >> 2
 
     @property
     def max_error(self) -> int:
@@ -141,9 +168,16 @@ class Tracking:
         return signed_width(self.max_count * (2 * self.max_count - 1))
 
     @property
+    def least_gap(self) -> int:
+        """Fewest clocks between the first two counts."""
+        return max(self.tick_cycles // self.max_count, 1)
+
+    @cached_property
     def start_bits(self) -> int:
         """Bits that the first velocity is computed coarser by, so that it cannot leave the word."""
-        return min((self.max_count + 1).bit_length(), self.unit_bits)
+        # Before it is held within the greatest velocity: the counts of a tick and one more in the shortest time.
+        bits = ceil_log2(Fraction((self.max_count + 2) << self.unit_bits, self.least_gap)) + self.frac_bits + 1
+        return min(max(bits - self.width, 0), self.unit_bits)
 
     @cached_property
     def width(self) -> int:
@@ -153,8 +187,7 @@ class Tracking:
         greatest = max(
             counts * (counts + moved),  # the sum over the counts of a tick
             self.max_velocity / 2**self.frac_bits * 1.5,  # before it is held within its limit
-            self.max_velocity / 2**self.frac_bits * (counts + 2) / 2**self.start_bits,  # the first one
-            self.max_acceleration / 2**self.frac_bits + self.max_error,
+            self.max_acceleration / 2**self.frac_bits + self.max_error * 2**self.extra_bits,
             2 * self.max_error + 2 * moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
         )
@@ -201,6 +234,11 @@ class Tracking:
         return self.fixed(Fraction(1, 2) + Fraction(3, 2) * self.edge_error)
 
     @property
+    def mean_threshold_bits(self) -> int:
+        """Fraction bits of the threshold of the mean error."""
+        return THRESHOLD_BITS - math.floor(2 * math.log2(self.edge_error / 4))
+
+    @property
     def mean_threshold(self) -> int:
         """(0.25·E)²: the square of the mean error over the share of the last error in it, that is trouble."""
-        return round((self.edge_error / 4) ** 2 * (1 << FACTOR_BITS))
+        return round((self.edge_error / 4) ** 2 * (1 << self.mean_threshold_bits))

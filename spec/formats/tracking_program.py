@@ -11,7 +11,7 @@ from enum import IntEnum
 from fractions import Fraction
 from functools import cached_property
 
-from tachometry.spec.formats.tracking import FACTOR_BITS, LEVELS, Tracking
+from tachometry.spec.formats.tracking import LEVELS, Tracking
 
 MAX_STEPS = 127
 STATES = 16  # words that change; the constants follow
@@ -127,7 +127,7 @@ class Program:
     agile : bool
         Whether a large error is corrected with four times the bandwidth.
     acceleration_factor : Fraction
-        LSBs of the output in 2^−F counts per U².
+        LSBs of the output in one of a.
     delay : int
         Clocks from an edge to the port, less those of the program: the velocity is that of the clock in which it is
         shown.
@@ -164,7 +164,6 @@ class Program:
             "length": form.tick_cycles,
             "one": one,
             "lsb": 1,
-            "twelfth": round(Fraction(1 << FACTOR_BITS, 12)),
             "most_v": form.max_velocity,
             "most_a": form.max_acceleration,
             "lost": form.fixed(form.max_error),
@@ -176,7 +175,7 @@ class Program:
             "rate0": form.rates[0],
             "agile_rate": form.agile_rate,
             "most_x0": form.most_x[0],
-            "least_gap": max(form.tick_cycles // form.max_count, 1),
+            "least_gap": form.least_gap,
             "coarse_v": form.max_velocity >> form.start_bits,
             "acceleration": self.acceleration_scale[0],
             "lead": self.lead,
@@ -223,7 +222,7 @@ class Program:
         k = self.form.unit_bits
         return [
             *(*self._length, Do(Op.ADD, "gap"), Do(Op.STORE, "gap")),
-            *(Do(Op.MUL, "a", k + 2), Do(Op.STORE, "h"), Do(Op.ADD, "v"), Do(Op.STORE, "v")),
+            *(Do(Op.MUL, "a", k + 2 + self.form.extra_bits), Do(Op.STORE, "h"), Do(Op.ADD, "v"), Do(Op.STORE, "v")),
             *self._length,
             *(Do(Op.MUL, "v", k + 1), Do(Op.ADD, "p"), Do(Op.STORE, "p")),
             *(Do(Op.LOAD, "v"), Do(Op.ADD, "h"), Do(Op.STORE, "v")),
@@ -258,13 +257,18 @@ class Program:
 
     @property
     def _first(self) -> list[Step]:
-        """The first count: p is its place, and its time is kept."""
-        return [
+        """The first count: p is its place, and its time is kept.
+
+        In the tick behind an error that was too large, several may have been added up. There is no first one, then.
+        """
+        first: list[Step] = [
             *(*self._anew, Do(Op.STORE, "v"), Do(Op.STORE, "a")),
             *(Do(Op.INPUT, Input.PLACES), Do(Op.STORE, "p")),
             *(Do(Op.INPUT, Input.TIMES), Do(Op.STORE, "gap")),
             Do(Op.PHASE, Phase.BEGUN),
         ]
+        several = [Do(Op.INPUT, Input.NUMBER), *[Do(Op.SUB, "lsb")] * 2]
+        return [*several, Choice(Condition.NEGATIVE, first, self._rest)]
 
     @property
     def _second(self) -> list[Step]:
@@ -278,29 +282,26 @@ class Program:
             *(Do(Op.FROM_MQ), Do(Op.SUB, "coarse_v"), Do(Op.NEGATIVE), Do(Op.ADD, "coarse_v")),
             Do(Op.DOUBLE, steps=form.start_bits),
             *(Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, "v")),
-            *(Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "v", self._times_shift + 1), *self._coarser),
-            *(Do(Op.ADD, "x"), Do(Op.STORE, "p")),
+            *(*self._moved_by_v, Do(Op.ADD, "x"), Do(Op.STORE, "p")),
             *(*self._anew, Do(Op.STORE, "a"), Do(Op.PHASE, Phase.TRACKS)),
         ]
 
     @property
-    def _times_shift(self) -> int:
-        """Right shift of v·Στ that all bits of Στ need: k, or more."""
-        return max(self.form.unit_bits, self.form.times_bits - 1)
-
-    @property
-    def _coarser(self) -> list[Step]:
-        """What is missing of a product that was shifted by more than k."""
-        missing = self._times_shift - self.form.unit_bits
-        return [Do(Op.DOUBLE, steps=missing)] if missing else []
+    def _moved_by_v(self) -> list[Step]:
+        """ac = v·Στ."""
+        shift = max(self.form.unit_bits, self.form.times_bits - 1)  # of a product in which all bits of Στ count
+        missing = shift - self.form.unit_bits
+        finer: list[Step] = []
+        if missing:
+            finer = [*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, "v"), Do(Op.DOUBLE, steps=missing), Do(Op.STORE, "t")]
+        return [*finer, Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "t" if missing else "v", shift + 1)]
 
     @property
     def _error(self) -> list[Step]:
         """e: the mean distance of the counts of the tick from where they were expected."""
         return [
             *(Do(Op.INPUT, Input.NUMBER), Do(Op.STORE, "r")),
-            *(Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "v", self._times_shift + 1), *self._coarser),
-            Do(Op.STORE, "t"),
+            *(*self._moved_by_v, Do(Op.STORE, "t")),
             *(Do(Op.INPUT, Input.PLACES), Do(Op.ADD, "t"), Do(Op.KEEP, "t")),
             *(Do(Op.LOAD_SIGNED, "t"), Do(Op.TO_MQ), Do(Op.DIV, "r", self.form.width)),
             *(Do(Op.FROM_MQ), Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.SUB, "p"), Do(Op.KEEP, "e")),
@@ -336,7 +337,7 @@ class Program:
             *(Do(Op.MUL, "t", f + 1), Do(Op.ADD, "mean"), Do(Op.KEEP, "mean")),
             *(Do(Op.LOAD_SIGNED, "mean"), Do(Op.SUB, "one"), Do(Op.NEGATIVE), Do(Op.ADD, "one"), Do(Op.STORE, "t")),
             *(Do(Op.TO_MQ), Do(Op.MUL, "t", f + 1), Do(Op.STORE, "t")),
-            *(*self._times("mean_limit", "x", FACTOR_BITS), Do(Op.STORE, "x")),
+            *(*self._times("mean_limit", "x", self.form.mean_threshold_bits), Do(Op.STORE, "x")),
             *(Do(Op.LOAD, "age"), Do(Op.ADD, "gap"), Do(Op.STORE, "age")),
             Choice(
                 Condition.FLAG,
@@ -361,7 +362,7 @@ class Program:
 
     @property
     def _gains(self) -> list[Step]:
-        """d = 1 − e^−x = x/(1 + x/2 + x²/12), and r = d·U/gap."""
+        """d = 1 − e^−x = 3x/(3 + (6x + x²)/4), and r = d·U/gap."""
         form = self.form
         usual = self._reach("rate", "most_x") if form.growing else self._reach("rate0", "most_x0")
         reach: list[Step] = usual
@@ -369,10 +370,9 @@ class Program:
             reach = [Choice(Condition.FLAG, self._reach("agile_rate", "most_x0"), usual)]
         return [
             *(*reach, Do(Op.STORE, "x")),
-            *(Do(Op.TO_MQ), Do(Op.MUL, "x", form.frac_bits + 1), Do(Op.STORE, "t")),
-            *(*self._times("twelfth", "t", FACTOR_BITS), Do(Op.ADD, "one"), Do(Op.STORE, "t")),
-            *(Do(Op.LOAD, "x"), Do(Op.SHIFT, steps=1), Do(Op.ADD, "t"), Do(Op.STORE, "t")),
-            *(*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, "x"), Do(Op.FRACTION, "t", form.gain_bits)),
+            *(Do(Op.TO_MQ), Do(Op.MUL, "x", form.frac_bits + 1), *[Do(Op.ADD, "x")] * 6, Do(Op.SHIFT, steps=2)),
+            *(*[Do(Op.ADD, "one")] * 3, Do(Op.STORE, "t")),
+            *(*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, "x"), *[Do(Op.ADD, "x")] * 2, Do(Op.FRACTION, "t", form.gain_bits)),
             *(Do(Op.FROM_MQ), Do(Op.STORE, "d"), Do(Op.DIV, "gap", form.width + form.unit_bits)),
             *(Do(Op.FROM_MQ), Do(Op.STORE, "r")),
         ]
@@ -387,7 +387,8 @@ class Program:
             *(*self._times("d", "e2", b), *[Do(Op.ADD, "e1")] * 3, *[Do(Op.SUB, "e2")] * 3),
             *(Do(Op.ADD, "p"), Do(Op.STORE, "p")),
             *(*self._times("r", "e1", b), Do(Op.STORE, "h")),
-            *(*self._times("r", "h", b), Do(Op.ADD, "a"), Do(Op.STORE, "a")),
+            *(*self._times("r", "h", b - self.form.extra_bits - 1), Do(Op.ADD, "lsb"), Do(Op.SHIFT, steps=1)),
+            *(Do(Op.ADD, "a"), Do(Op.STORE, "a")),
             *(*self._times("d", "h", b), Do(Op.STORE, "t"), Do(Op.SHIFT, steps=1), Do(Op.ADD, "t"), Do(Op.STORE, "t")),
             *(Do(Op.LOAD, "v"), *[Do(Op.ADD, "h")] * 3, Do(Op.SUB, "t"), Do(Op.STORE, "v")),
             *(*self._zero, Do(Op.STORE, "gap")),
@@ -446,7 +447,7 @@ class Program:
     def _show(self) -> list[Step]:
         """The outputs, rounded."""
         return [
-            *(*self._times("lead", "a", self.form.unit_bits), Do(Op.ADD, "v"), Do(Op.STORE, "x")),
+            *(*self._times("lead", "a", self.form.unit_bits + self.form.extra_bits), Do(Op.ADD, "v"), Do(Op.STORE, "x")),
             *self._held("x", "most_v"),
             *(*self._times("length", "x", self.velocity_shift), Do(Op.ADD, "lsb"), Do(Op.SHIFT, steps=1)),
             Do(Op.STORE, "t"),

@@ -144,7 +144,7 @@ class TrackTachometer(TachometerSpec):
     def program(self) -> Program:
         """What the datapath does from a tick to the update."""
         form = self.form
-        per_lsb = self._acceleration_per_count / (form.unit_ticks**2 * (1 << form.frac_bits))
+        per_lsb = self._acceleration_per_count / (form.unit_ticks**2 * (1 << (form.frac_bits + form.extra_bits)))
         delay = self.pin_to_count + self.tick_latency + FETCH_CLOCKS + self.low_pass_latency + self.output_latency
         return Program(form, self.agile, Fraction(2) ** self.acceleration_frac_bits * per_lsb, delay)
 
@@ -165,11 +165,11 @@ class TrackTachometer(TachometerSpec):
 
     @cached_property
     def acceleration_frac_bits(self) -> int:
-        """Fraction bits of the acceleration: the most with which the greatest one fits."""
+        """Fraction bits of the acceleration: its error is at most a quarter of an LSB, and the greatest one fits."""
         form = self.form
-        one = self._acceleration_per_count / form.unit_ticks**2 / (1 << form.frac_bits)  # of a word, in the unit
+        one = self._acceleration_per_count / form.unit_ticks**2 / (1 << (form.frac_bits + form.extra_bits))  # LSB of a
         fitting = math.floor(math.log2(((1 << (self.acceleration_width - 1)) - 2) / (form.max_acceleration * one)))
-        return min(fitting, math.floor(-math.log2(one)) - 1)
+        return min(fitting, math.floor(-math.log2(8 * form.acceleration_error * one)))
 
     @property
     def acceleration_per_lsb(self) -> float:

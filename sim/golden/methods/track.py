@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking import FACTOR_BITS, LEVELS, STEP_BACK
+from tachometry.spec.formats.tracking import LEVELS, STEP_BACK
 
 REST, BEGUN, TRACKS = range(3)
 
@@ -98,7 +98,7 @@ class Recursion:
         """Take tick i; `alone`: only its last count; `quiet`: there was no count for the maximum time."""
         form, length, most = self._form, windows.length[i], self._constants
         self.gap += length
-        half = (self.a * length) >> (form.unit_bits + 1)
+        half = (self.a * length) >> (form.unit_bits + form.extra_bits + 1)
         self.v += half
         self.p += (self.v * length) >> form.unit_bits
         self.v += half
@@ -122,6 +122,8 @@ class Recursion:
             self.p = self.a = 0
             self.v = form.max_velocity if moved > 0 else -form.max_velocity
             self.phase = TRACKS
+        elif self.phase == REST and number > 1:  # none of them is the first
+            self._rest()
         elif self.phase == REST:
             self._anew()
             self.p, self.v, self.a, self.gap = places, 0, 0, times
@@ -134,9 +136,8 @@ class Recursion:
                 self._track(number, times, places)
 
     def _moved_by_v(self, times: int) -> int:
-        """v times the sum of some times; where that has more bits than the unit of time, their low ones are lost."""
-        shift = max(self._form.unit_bits, self._form.times_bits - 1)
-        return ((self.v * times) >> shift) << (shift - self._form.unit_bits)
+        """v times the sum of some times."""
+        return (self.v * times) >> self._form.unit_bits
 
     def _second(self, times: int, places: int) -> None:
         """The speed from the first count to this one, coarser by some bits."""
@@ -173,15 +174,14 @@ class Recursion:
         x = self._reach(rate, form.most_x[0 if agile else level])
         one, bits = form.fixed(1), form.gain_bits
         square = (x * x) >> form.frac_bits
-        divisor = (x >> 1) + ((square * self._constants["twelfth"]) >> FACTOR_BITS) + one
-        d = (x << bits) // divisor
+        d = (3 * x << bits) // ((square + 6 * x >> 2) + 3 * one)
         r = (d << form.unit_bits) // self.gap
         e1 = (e * d) >> bits
         e2 = (e1 * d) >> bits
         e3 = (e2 * d) >> bits
         h = (e1 * r) >> bits
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += (h * r) >> bits
+        self.a += ((h * r) >> (bits - form.extra_bits - 1)) + 1 >> 1
         i = (h * d) >> bits
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
@@ -196,7 +196,7 @@ class Recursion:
         share = self._reach(form.rates[self.level], form.most_x[self.level]) >> 2
         self.mean += ((e - self.mean) * share) >> form.frac_bits
         size = min(abs(self.mean), form.fixed(1))
-        limit = (share * form.mean_threshold) >> FACTOR_BITS
+        limit = (share * form.mean_threshold) >> form.mean_threshold_bits
         self.age += self.gap
         if agile:
             self.age = self.level = 0
@@ -250,7 +250,7 @@ class Model:
             state.tick(windows, i, alone, elapsed == spec.timing.max_ticks)
             before, phase = phase, state.phase
             silent = 0 if counted else elapsed
-            ahead = state.v + ((state.a * spec.program.lead) >> form.unit_bits)
+            ahead = state.v + ((state.a * spec.program.lead) >> (form.unit_bits + form.extra_bits))
             ahead = max(-form.max_velocity, min(ahead, form.max_velocity))
             velocity = ((ahead * form.tick_cycles) >> velocity_shift) + 1 >> 1
             acceleration = ((state.a * factor) >> (shift - 1)) + 1 >> 1
