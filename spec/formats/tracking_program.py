@@ -280,21 +280,23 @@ class Program:
             *(Do(Op.INPUT, Input.PLACES), Do(Op.STORE, "x"), Do(Op.SUB, "p"), Do(Op.KEEP, "e")),
             *(Do(Op.LOAD_SIGNED, "e"), Do(Op.TO_MQ), Do(Op.DIV, "r", form.width + form.unit_bits - form.start_bits)),
             *(Do(Op.FROM_MQ), Do(Op.SUB, "coarse_v"), Do(Op.NEGATIVE), Do(Op.ADD, "coarse_v")),
-            Do(Op.DOUBLE, steps=form.start_bits),
+            *([Do(Op.DOUBLE, steps=form.start_bits)] if form.start_bits else []),
             *(Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, "v")),
             *(*self._moved_by_v, Do(Op.ADD, "x"), Do(Op.STORE, "p")),
             *(*self._anew, Do(Op.STORE, "a"), Do(Op.PHASE, Phase.TRACKS)),
         ]
 
+    def _shifted(self, word: str, bits: int) -> list[Step]:
+        """t = word << bits."""
+        double: list[Step] = [Do(Op.DOUBLE, steps=bits)] if bits else []
+        return [*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, word), *double, Do(Op.STORE, "t")]
+
     @property
     def _moved_by_v(self) -> list[Step]:
         """ac = v·Στ."""
         shift = max(self.form.unit_bits, self.form.times_bits - 1)  # of a product in which all bits of Στ count
-        missing = shift - self.form.unit_bits
-        finer: list[Step] = []
-        if missing:
-            finer = [*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, "v"), Do(Op.DOUBLE, steps=missing), Do(Op.STORE, "t")]
-        return [*finer, Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "t" if missing else "v", shift + 1)]
+        finer = self._shifted("v", shift - self.form.unit_bits)
+        return [*finer, Do(Op.INPUT, Input.TIMES), Do(Op.TO_MQ), Do(Op.MUL, "t", shift + 1)]
 
     @property
     def _error(self) -> list[Step]:
@@ -387,8 +389,7 @@ class Program:
             *(*self._times("d", "e2", b), *[Do(Op.ADD, "e1")] * 3, *[Do(Op.SUB, "e2")] * 3),
             *(Do(Op.ADD, "p"), Do(Op.STORE, "p")),
             *(*self._times("r", "e1", b), Do(Op.STORE, "h")),
-            *(*self._times("r", "h", b - self.form.extra_bits - 1), Do(Op.ADD, "lsb"), Do(Op.SHIFT, steps=1)),
-            *(Do(Op.ADD, "a"), Do(Op.STORE, "a")),
+            *(*self._shifted("h", self.form.extra_bits), *self._times("r", "t", b), Do(Op.ADD, "a"), Do(Op.STORE, "a")),
             *(*self._times("d", "h", b), Do(Op.STORE, "t"), Do(Op.SHIFT, steps=1), Do(Op.ADD, "t"), Do(Op.STORE, "t")),
             *(Do(Op.LOAD, "v"), *[Do(Op.ADD, "h")] * 3, Do(Op.SUB, "t"), Do(Op.STORE, "v")),
             *(*self._zero, Do(Op.STORE, "gap")),

@@ -181,7 +181,7 @@ class Recursion:
         e3 = (e2 * d) >> bits
         h = (e1 * r) >> bits
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += ((h * r) >> (bits - form.extra_bits - 1)) + 1 >> 1
+        self.a += (h * r) >> (bits - form.extra_bits)
         i = (h * d) >> bits
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
