@@ -88,7 +88,7 @@ def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:
             *(UPDATE, "interval", spec.interval_width),
             unit=f"{spec.interval_unit_cycles} clocks",
             help="Length of the measurement: m_s in ticks (s), the number of averaged ticks (m), timer periods (t, "
-            "mt), Ndt1 in sampling periods dt (rairan), or ticks from the last one with counts before this one (track).",
+            "mt), Ndt1 in sampling periods dt (rairan), or ticks since the last one with counts (track).",
         ),
         held(
             UPDATE,
