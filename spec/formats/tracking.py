@@ -29,7 +29,7 @@ SHORTEST_MEMORY = 0.2  # of 1 − θ_min: it does not fall further as λ does
 AGILE = 4  # times λ_0
 STEP_BACK = 4  # levels, when the mean error is large
 THRESHOLD_BITS = 16  # of the threshold of the mean error, that count
-MOST_EXTRA_BITS = 12
+MOST_EXTRA_BITS = 9
 LEAST_TICK_BITS = 8  # a tick has more than 2^8 clocks, as the program does
 GROWTH = 10  # λ falls by its e-th part in so many of its time constants
 
@@ -50,7 +50,8 @@ class Tracking:
         θ_min at λ_0.
     edge_error : Fraction, counts
         E.
-    growing : bool
+    agile, growing : bool
+        Whether a large error is corrected with four times the bandwidth.
         Whether λ falls to λ_0/10 while the errors are small.
     velocity_bits, fine_bits : int
         Fraction bits of the velocity in counts per tick, and of the position.
@@ -65,6 +66,7 @@ class Tracking:
     bandwidth: Fraction
     least_memory: Fraction
     edge_error: Fraction
+    agile: bool
     growing: bool
     velocity_bits: int
     fine_bits: int
@@ -110,10 +112,10 @@ class Tracking:
         u = float(self.unit_ticks)
         finest = 0
         for m, d in self._gains():
-            error = m / (d * d * u) * (1 + m / (d * u) / 2 ** (self.extra_bits + 1))  # of p, in 2^−F
-            velocity = 3 * d / m * error + 3 / (d * u) + 2
+            error = m / (d * d * u) / 2 * (1 + m / (d * u) / 2**self.extra_bits)  # of p, in 2^−F
+            velocity = 3 * d / m * error + 1.5 / (d * u) + 1
             bits = (self.velocity_bits + math.log2(velocity), self.fine_bits + math.log2(error + 1))
-            finest = max(finest, *(2 + math.ceil(each) for each in bits))
+            finest = max(finest, *(1 + math.ceil(each) for each in bits))
         return finest
 
     @property
@@ -135,8 +137,8 @@ class Tracking:
 
     @property
     def max_acceleration(self) -> int:
-        """Greatest |a|, in 2^−(F + S) counts per U²: a quarter of the greatest speed within U."""
-        return (self.max_velocity << self.extra_bits) >> 2
+        """Greatest |a|, in 2^−(F + S) counts per U²: an eighth of the greatest speed within U."""
+        return (self.max_velocity << self.extra_bits) >> 3
 
     @property
     def max_error(self) -> int:
@@ -198,12 +200,17 @@ class Tracking:
     @cached_property
     def width(self) -> int:
         """W: bits of a word."""
-        counts = self.max_count
-        moved = self._moved
+        counts, moved = self.max_count, self._moved
+        # The greatest d²·U/gap and d³·(U/gap)², which are those of the greatest x.
+        rate = (AGILE if self.agile else 1) * self.rate(0) * (1 << self.unit_bits)
+        d = 1 - math.exp(-self.most(0))
+        of_v, of_a = rate * d**2 / self.most(0), rate**2 * d**3 / self.most(0) ** 2
         greatest = max(
             counts * (counts + moved),  # the sum over the counts of a tick
-            self.max_velocity / 2**self.frac_bits * 1.5,  # before it is held within its limit
-            self.max_acceleration / 2**self.frac_bits + self.max_error * 2**self.extra_bits,
+            # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
+            self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
+            self.max_error * of_v * 2**self.extra_bits,  # h
+            self.max_acceleration / 2**self.frac_bits + self.max_error * of_a * 2**self.extra_bits,
             2 * self.max_error + 2 * moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
         )
