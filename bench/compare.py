@@ -25,7 +25,7 @@ CORE = "--ppr 500 --clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/
 
 
 # All, and M/T with windows of 1 ms, as long as those of S at high speed and of what reads the encoder every 1 ms.
-WITH_LONG_MT = "s,m,t,mt,mt:min-time=1ms,rairan,difference,hostmot2,simplefoc,odrive,moteus"
+WITH_LONG_MT = "s,m,t,mt,mt:min-time=1ms,rairan,track,difference,hostmot2,simplefoc,odrive,moteus"
 
 
 @dataclass(frozen=True)
