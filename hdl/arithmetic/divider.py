@@ -1,6 +1,6 @@
 """A quotient, bit by bit."""
 
-from amaranth import Cat, Module, Mux, Signal, signed
+from amaranth import Cat, Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -70,9 +70,11 @@ class Divider(wiring.Component):
             self.busy.eq(running),
             self.quotient.eq(Cat(~negative, digits[:-1], ~digits[-1])),
         ]
-        doubled = Cat(left[-1], remainder).as_signed()
+        # 2·remainder ± by with one adder: −by is ~by + 1, and the 1 comes from an additional bit at the adder's end.
+        term = Cat(by, Const(0)) ^ (~negative).replicate(len(by) + 1)
+        total = Cat(1, left[-1], remainder).as_signed() + Cat(~negative, term).as_signed()
         m.d.sync += [
-            remainder.eq(Mux(negative, doubled + by, doubled - by)),
+            remainder.eq(total >> 1),
             left.eq(left << 1),
             steps.eq(steps - 1),
             digits.eq(Cat(~negative, digits)),

@@ -15,7 +15,8 @@ def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
     m.d.comb += [
         above.eq(value > Const(limit, value.shape())),
         below.eq(value < Const(-limit, value.shape())),
-        held.eq(Mux(above, limit, Mux(below, -limit, value))),
         changed.eq(above | below),
+        # Not by `above` and `below`: most bits of the bounds are 0, and a register needs only its reset for these.
+        held.eq(Mux(changed, Mux(value[-1], -limit, limit), value)),
     ]
     return held, changed

@@ -86,16 +86,18 @@ class QuotientVelocity(wiring.Component):
         m.d.comb += self.updates.p.eq(new)
         m.submodules.divider = divider = self.divider
         measuring, rounds, compared = (Signal(name=name) for name in ("measuring", "rounds", "compared"))
+        # Where a result may be too large, a clock between the two holds it within its range.
+        holds = Signal(name="holds") if spec.saturates else rounds
         # Not before the result of the last division is in `velocity`.
         decays = Signal()
         if spec.decays:
-            m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.busy & ~rounds & ~compared)
+            m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.busy & ~rounds & ~holds & ~compared)
         backward = new.velocity[-1]
         halves = self.dividend << 1
         greatest = Mux(backward, -3 * spec.timer_periods, 3 * spec.timer_periods)
-        m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(rounds & ~self.measure)]
+        m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(holds & ~self.measure)]
         m.d.comb += [
-            self.free.eq(~(measuring & (divider.busy | rounds))),
+            self.free.eq(~(measuring & (divider.busy | rounds | holds))),
             divider.start.eq(self.measure | decays),
             divider.divisor.eq(self.divisor),
             divider.dividend.eq(Mux(self.measure, halves, greatest) if spec.decays else halves),
@@ -112,9 +114,11 @@ class QuotientVelocity(wiring.Component):
         rounded = Signal(signed(len(divider.quotient)), reset_less=True)
         with m.If(divider.done):
             m.d.sync += rounded.eq((divider.quotient + 1) >> 1)
-        shown, saturated = (
-            saturate(m, rounded, spec.max_count << spec.native_frac_bits) if spec.saturates else (rounded, 0)
-        )
+        shown, saturated = rounded, Signal(name="saturated", reset_less=True)
+        if spec.saturates:
+            held, changed = saturate(m, rounded, spec.max_count << spec.native_frac_bits)
+            shown = Signal.like(held, name="shown", reset_less=True)
+            m.d.sync += [holds.eq(rounds & ~self.measure), shown.eq(held), saturated.eq(changed)]
         change = Signal(signed(max(len(shown), spec.native_width) + 1))
         m.d.comb += change.eq(shown - new.velocity)
         nearer = Signal(reset_less=True)

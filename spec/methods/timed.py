@@ -170,8 +170,8 @@ class TimedTachometer(TachometerSpec):
     @property
     def division_clocks(self) -> int:
         """Clocks from one division to the next."""
-        # A clock for each digit, its sign included, one to round and one to compare.
-        return self.quotient_bits + 3
+        # A clock for each digit, its sign included, one to round, one to hold it in its range, and one to compare.
+        return self.quotient_bits + 3 + self.saturates
 
     @property
     def datapath_latency(self) -> int:

@@ -52,8 +52,8 @@ def test_wide_quotients() -> None:
 
 
 MUTANTS = {
-    "restoring nothing": ("Mux(negative, doubled + by, doubled - by)", "doubled - by"),
-    "no digit of the dividend": ("Cat(left[-1], remainder)", "Cat(0, remainder)"),
+    "restoring nothing": ("(~negative).replicate", "Const(1).replicate"),
+    "no digit of the dividend": ("Cat(1, left[-1], remainder)", "Cat(1, 0, remainder)"),
     "first sign inverted": ("~digits[-1])", "digits[-1])"),
     "no correction": ("Cat(~negative, digits[:-1]", "Cat(1, digits[:-1]"),
     "a step too many": ("steps.eq(self._steps - 1)", "steps.eq(self._steps)"),

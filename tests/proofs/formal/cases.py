@@ -287,6 +287,8 @@ def timed(
     probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
+    held = {"core_holds": "holds", "core_shown": "shown", "core_saturated": "saturated"}
+    probes |= within("holds", {name: f"datapath.quotient_velocity.{at}" for name, at in held.items()}, spec.saturates)
     probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
     return Proof(name, spec, "timed", parameters, probes, depth=4)
 

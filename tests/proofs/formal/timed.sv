@@ -37,7 +37,7 @@ module timed #(
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
-  wire core_running, core_rounds, core_compared, core_measuring, core_forced, core_opened;
+  wire core_running, core_rounds, core_holding, core_compared, core_measuring, core_forced, core_opened;
   wire [$clog2(MAX_TICKS+1)-1:0] core_empty;
   wire core_rests;
   wire core_negative, core_longest;
@@ -122,8 +122,8 @@ module timed #(
   reg measuring = 0, silent = 0, many_now = 0;
   reg signed [I+Q:0] distance = 0;
   reg [I-1:0] times = 1;
-  wire free = UPSET ? !core_measuring || !(core_running || core_rounds) : since == 0 || since == B || !measuring;
-  wire idles = UPSET ? !(core_running || core_rounds || core_compared) : since == 0;
+  wire free = UPSET ? !core_measuring || !(core_running || core_rounds || core_holding) : since == 0 || since == B || !measuring;
+  wire idles = UPSET ? !(core_running || core_rounds || core_holding || core_compared) : since == 0;
   wire measured = MT ? closes : count && free && (opened || many);
   wire decays = tick && !count && !seen && !overdue && idles;
   wire signed [W-1:0] pairs = MT ? travelled + pair : many ? (negative ? -1 : 1) : pair;
@@ -246,6 +246,15 @@ module timed #(
     lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+1-:V]));
   end
   generate
+    if (SATURATES) begin : holds
+      wire core_holds, core_saturated;
+      wire signed [V-1:0] core_shown;
+      assign core_holding = core_holds;
+      always @* begin
+        lemma_holds: assert (core_holds == (since == N + 3));
+        lemma_held: assert (since < N + 3 || (core_shown == shown && core_saturated == (shown != core_rounded)));
+      end
+    end else assign core_holding = 0;
     if (FLAGS) begin : flag
       wire core_beyond;
       always @* lemma_beyond: assert (since == 0 || core_beyond == many_now);

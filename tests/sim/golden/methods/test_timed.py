@@ -96,7 +96,7 @@ def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
     [
         ("mt", MTMethod, "self.quotient_velocity.free if spec.may_be_late else 1", "1"),
         ("t", QuotientVelocity, "divider.done & ~self.measure", "divider.done"),
-        ("t", QuotientVelocity, "rounds & ~self.measure", "rounds"),
+        ("t", QuotientVelocity, "compared.eq(holds & ~self.measure)", "compared.eq(holds)"),
     ],
 )
 def test_mutants_are_caught(method: str, box: type, right: str, wrong: str) -> None:
