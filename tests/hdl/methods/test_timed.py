@@ -188,7 +188,12 @@ MUTANTS = {
         check_standstill,
     ),
     "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
-    "decaying too early": (quotient_velocity.QuotientVelocity, " & ~rounds & ~holds & ~compared", "", check_turning_tail),
+    "decaying too early": (
+        quotient_velocity.QuotientVelocity,
+        " & ~rounds & ~holds & ~compared",
+        "",
+        check_turning_tail,
+    ),
 }
 
 
