@@ -12,6 +12,7 @@ from tachometry.hdl.front_end.index_capture import IndexCapture
 from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.idle import HasIdleCounters, IdleCounter
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
 from tachometry.hdl.output.low_pass import LowPass
@@ -73,6 +74,19 @@ class Tachometer(wiring.Component):
     def spec(self) -> TachometerSpec:
         """What this core was built from."""
         return self._spec
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter, ...]:
+        """See `IdleCounter`."""
+        boxes: dict[str, object] = {"datapath": self.datapath}
+        if not self._spec.own_ticks:
+            boxes["sampling_clock"] = self.sampling_clock
+        return tuple(
+            counter.within(name)
+            for name, box in boxes.items()
+            if isinstance(box, HasIdleCounters)
+            for counter in box.idle_counters
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -73,12 +73,13 @@ class Divider(wiring.Component):
         # 2·remainder ± by with one adder: −by is ~by + 1, and the 1 comes from an additional bit at the adder's end.
         term = Cat(by, Const(0)) ^ (~negative).replicate(len(by) + 1)
         total = Cat(1, left[-1], remainder).as_signed() + Cat(~negative, term).as_signed()
-        m.d.sync += [
-            remainder.eq(total >> 1),
-            left.eq(left << 1),
-            steps.eq(steps - 1),
-            digits.eq(Cat(~negative, digits)),
-        ]
+        with m.If(running):
+            m.d.sync += [
+                remainder.eq(total >> 1),
+                left.eq(left << 1),
+                steps.eq(steps - 1),
+                digits.eq(Cat(~negative, digits)),
+            ]
         with m.If(self.done):
             m.d.sync += running.eq(0)
         with m.If(self.start):

@@ -104,12 +104,13 @@ class SerialScaler(_Scaler):
             addend.eq(self.q ^ sign.replicate(len(self.q))),
             borrow.eq(sign & bits[0]),
             bits.eq(bits >> 1),
-            step.eq(step + 1),
             adding.eq(running),
             last.eq(running & sign),
             added.eq(last),
             self.results.valid.eq(added),
         ]
+        with m.If(running):
+            m.d.sync += step.eq(step + 1)
         with m.If(~bits[0]):
             m.d.sync += addend.eq(0)
         with m.If(sign):

@@ -4,6 +4,8 @@ from amaranth import Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
+from tachometry.hdl.idle import IdleCounter
+
 
 class SamplingClock(wiring.Component):
     """Divides time into windows of `tick_cycles` clocks, the first of which begins with the first clock after reset.
@@ -29,6 +31,11 @@ class SamplingClock(wiring.Component):
             raise ValueError(f"tick_cycles must be at least 1, not {tick_cycles}")
         self._tick_cycles = tick_cycles
         super().__init__({"last": Out(1)})
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter, ...]:
+        """See `IdleCounter`."""
+        return (IdleCounter("left", -1, (-1,)),) if self._tick_cycles > 1 else ()
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

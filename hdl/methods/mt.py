@@ -2,6 +2,7 @@
 
 from amaranth import Module, Mux, Signal, Value, ValueLike
 
+from tachometry.hdl.idle import IdleCounter
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
 
@@ -22,6 +23,13 @@ class MTMethod(TimedDatapath):
         self._min_periods = spec.min_periods
         self._patient_periods = spec.patient_periods
         self._cycle_counts = spec.cycle_counts
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter, ...]:
+        """See `IdleCounter`."""
+        counters = super().idle_counters
+        stops = (self._min_periods, self._patient_periods)
+        return (*counters, IdleCounter("length", 1, stops)) if counters else ()
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:
         spec, timer = self._spec, self.gap_timer

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.registers import registers
+from tachometry.hdl.idle import IdleCounter
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.spec import RairanTachometer
@@ -57,6 +58,11 @@ class RairanMethod(wiring.Component):
     def probes(self) -> dict[str, Value]:
         """What a waveform should show of the inside."""
         return {"c_ep": self.counters.c_more + self.counters.any, "c_dt": self.counters.c_dt}
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter, ...]:
+        """See `IdleCounter`."""
+        return (IdleCounter("counters.left", -1, (-1,)),) if self._spec.timing.tick_cycles > 1 else ()
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

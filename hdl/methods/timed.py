@@ -4,6 +4,7 @@ from amaranth import Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
+from tachometry.hdl.idle import IdleCounter
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
@@ -46,6 +47,13 @@ class TimedDatapath(wiring.Component):
     def probes(self) -> dict[str, Value]:
         """What a waveform should show of the inside."""
         return {"gap": self.gap_timer.age}
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter, ...]:
+        """See `IdleCounter`."""
+        if self._spec.on_lattice:  # which counts with the tick
+            return ()
+        return (IdleCounter("gap_timer.age", 1, (self._spec.max_periods - 1,)),)
 
     @property
     def _size(self) -> Signal:

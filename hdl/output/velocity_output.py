@@ -77,8 +77,9 @@ class SerialVelocityOutput(_VelocityOutput):
         complete = Signal()
         step = Signal(range(bits + 1), reset_less=True)
         bit = Signal(reset_less=True)
+        with m.If(running):
+            m.d.sync += step.eq(step + 1)
         m.d.sync += [
-            step.eq(step + 1),
             bit.eq(Const(output.multiplier >> 1, bits + 1).bit_select(step, 1)),
             rounding.eq(running & (step == bits - 1)),
             complete.eq(rounding),

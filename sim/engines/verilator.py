@@ -33,6 +33,8 @@ struct Model {{
   void outputs(int64_t *row) const {{ {outputs} }}
   void shown(uint32_t *words) const {{ {shown} }}
   void edge() {{ top.clk = 1; top.eval(); }}
+  int64_t idle() const {{ return 0; }}
+  void move_on(int64_t) {{}}
 }};
 struct Working {{
   Model &model;
