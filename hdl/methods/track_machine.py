@@ -60,6 +60,8 @@ _CONTROLS: dict[Op, dict[str, int]] = {
     Op.FROM_MQ: {"left": Left.MQ, "to_ac": 1},
     Op.TO_MQ: {"to_mq": 1},
     Op.INPUT: {"clear": 1, "input": 1, "to_ac": 1},
+    Op.ADD_INPUT: {"input": 1, "to_ac": 1},
+    Op.SUB_INPUT: {"subtract": 1, "input": 1, "to_ac": 1},
     Op.POSITIVE: {"positive": 1},
     Op.NEGATIVE: {"negative": 1},
     Op.WAIT: {},
@@ -270,14 +272,15 @@ class TrackMachine(wiring.Component):
         form = self._program.form
         inputs: dict[Input, Value] = {
             Input.TIMES: self.times,
-            Input.NUMBER: self.number,
+            Input.NUMBER: self.number << form.mean_bits,
             Input.PLACES: self.places << (form.frac_bits - 1),
             Input.MOVED: self.moved << form.frac_bits,
             Input.LENGTH: self.length,
+            Input.LENGTH_SHIFTED: self.length << form.gap_shift,
         }
         found: Value = Value.cast(0)
         for item, value in inputs.items():
-            if item == Input.LENGTH and not form.external:
+            if item >= Input.LENGTH and not form.external:
                 continue
             if value.shape().signed:
                 value = Cat(value, value[-1].replicate(form.width))[: form.width]

@@ -247,10 +247,10 @@ class Recursion:
         tuning = self.tuning
         agile = tuning.agile and self._is_large(error)
         self.error_before = error
-        if tuning.growing:
-            self._remember(error, agile)
         rate = _AGILE * tuning.bandwidth if agile else tuning.rate(self.level)
         x = min(rate * self.gap, tuning.reach(0 if agile else self.level))
+        if tuning.growing:
+            self._remember(error, x / 4, agile)
         d = x / (1 + x / 2 + x * x / 12)  # 1 − e^−x
         self.place += (1 - (1 - d) ** 3) * error
         self.velocity += 1.5 * (1 - (1 - d) ** 2) * d * error / self.gap
@@ -264,9 +264,8 @@ class Recursion:
         same = math.copysign(1, error) * self.error_before
         return self.reaches(abs(error), limit) and self.reaches(same, limit / 4)
 
-    def _remember(self, error: float, agile: bool) -> None:
+    def _remember(self, error: float, share: float, agile: bool) -> None:
         tuning = self.tuning
-        share = min(tuning.rate(self.level) * self.gap, tuning.reach(self.level)) / 4
         self.mean_error += (error - self.mean_error) * share
         self.untroubled += self.gap
         if agile:

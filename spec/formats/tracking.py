@@ -30,6 +30,7 @@ AGILE = 4  # times λ_0
 STEP_BACK = 4  # levels, when the mean error is large
 THRESHOLD_BITS = 16  # of the threshold of the mean error, that count
 MOST_EXTRA_BITS = 12
+LEAST_TICK_BITS = 8  # a tick has more than 2^8 clocks, as the program does
 GROWTH = 10  # λ falls by its e-th part in so many of its time constants
 
 
@@ -168,6 +169,21 @@ class Tracking:
         return signed_width(self.max_count * (2 * self.max_count - 1))
 
     @property
+    def _moved(self) -> float:
+        """Counts that v says for a tick, at most: more than a may add to it."""
+        return 2 * max(self.max_count, self.max_velocity * self.longest_tick / 2 ** (self.unit_bits + self.frac_bits))
+
+    @property
+    def mean_bits(self) -> int:
+        """Bits of a mean over the counts of a tick."""
+        return math.ceil(math.log2(self.max_count + self._moved)) + self.frac_bits
+
+    @property
+    def gap_shift(self) -> int:
+        """Left shift of a gap after which it is greater than d: no tick is as short as this allows."""
+        return self.gain_bits - LEAST_TICK_BITS
+
+    @property
     def least_gap(self) -> int:
         """Fewest clocks between the first two counts."""
         return max(self.tick_cycles // self.max_count, 1)
@@ -183,7 +199,7 @@ class Tracking:
     def width(self) -> int:
         """W: bits of a word."""
         counts = self.max_count
-        moved = 2 * max(counts, self.max_velocity * self.longest_tick / 2 ** (self.unit_bits + self.frac_bits))
+        moved = self._moved
         greatest = max(
             counts * (counts + moved),  # the sum over the counts of a tick
             self.max_velocity / 2**self.frac_bits * 1.5,  # before it is held within its limit
@@ -192,8 +208,8 @@ class Tracking:
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
         )
         whole = math.ceil(math.log2(greatest))
-        # What is in clocks, or a quotient of clocks, has no fraction bits.
-        return max(whole + self.frac_bits, self.gap_bits, self.unit_bits + self.gain_bits) + 1
+        divisor = max(self.number_bits + self.mean_bits, self.gap_bits + self.gap_shift)
+        return max(whole + self.frac_bits, divisor) + 1
 
     def fixed(self, value: float | Fraction) -> int:
         """A number with F fraction bits."""

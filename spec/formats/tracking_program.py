@@ -36,6 +36,8 @@ class Op(IntEnum):
     TO_MQ = 10  # mq = ac
     FROM_MQ = 11  # ac = mq
     INPUT = 12  # ac = an input
+    ADD_INPUT = 25  # ac = ac + an input
+    SUB_INPUT = 26  # ac = ac − an input
     POSITIVE = 13  # ac = max(ac, 0)
     NEGATIVE = 14  # ac = min(ac, 0)
     TEST = 15  # flag = ac ≥ 0
@@ -52,10 +54,12 @@ class Input(IntEnum):
     """What `INPUT` loads."""
 
     TIMES = 0  # Σ of the times from the counts of the tick to its end, clocks
-    NUMBER = 1  # n, of these counts
+    NUMBER = 1  # n, of these counts, shifted left by the bits of a mean
     PLACES = 2  # Σ of their places relative to the end of the tick, counts
     MOVED = 3  # counts of the tick, forward less backward
     LENGTH = 4  # clocks of the tick
+    LENGTH_SHIFTED = 5  # the same, shifted left as `gap_shifted` is
+    ZERO = 7
 
 
 class Condition(IntEnum):
@@ -106,6 +110,13 @@ class Choice:
 
 
 Step = Do | Choice
+
+_ZERO = Do(Op.INPUT, Input.ZERO)  # ac = 0
+
+
+def _doubled(bits: int) -> list[Step]:
+    """ac = ac << bits, for mq without its leading bit."""
+    return [Do(Op.DOUBLE, steps=bits)] if bits else []
 
 
 @dataclass(frozen=True)
@@ -162,7 +173,11 @@ class Program:
         form, one = self.form, self.form.fixed(1)
         return {
             "length": form.tick_cycles,
+            "length_shifted": form.tick_cycles << form.gap_shift,
+            "several": 2 << form.mean_bits,
             "one": one,
+            "three": 3 * one,
+            "three_quarters": 3 * one >> 2,
             "lsb": 1,
             "most_v": form.max_velocity,
             "most_a": form.max_acceleration,
@@ -192,7 +207,7 @@ class Program:
         """The address of a word."""
         if isinstance(word, int):
             return word
-        states = ("p v a h gap mean before age e d r e1 e2 t x".split()).index
+        states = ("p v a h gap gap_shifted mean before age e d r e1 e2 t x".split()).index
         if word in self.constants:
             return STATES + list(self.constants).index(word)
         if word in self.tables:
@@ -216,11 +231,21 @@ class Program:
         """ac = mq = clocks of this tick."""
         return [Do(Op.INPUT, Input.LENGTH) if self.form.external else Do(Op.LOAD, "length"), Do(Op.TO_MQ)]
 
+    @staticmethod
+    def _within(most: str) -> list[Step]:
+        """ac = ac, held within ±most."""
+        return [
+            *(Do(Op.SUB, most), Do(Op.NEGATIVE), *[Do(Op.ADD, most)] * 2),
+            *(Do(Op.POSITIVE), Do(Op.SUB, most)),
+        ]
+
     @property
     def _predict(self) -> list[Step]:
         """p ← p + v·L + a·L²/2, v ← v + a·L; the gap grows by L."""
         k = self.form.unit_bits
+        length = Do(Op.ADD_INPUT, Input.LENGTH_SHIFTED) if self.form.external else Do(Op.ADD, "length_shifted")
         return [
+            *(Do(Op.LOAD, "gap_shifted"), length, Do(Op.STORE, "gap_shifted")),
             *(*self._length, Do(Op.ADD, "gap"), Do(Op.STORE, "gap")),
             *(Do(Op.MUL, "a", k + 2 + self.form.extra_bits), Do(Op.STORE, "h"), Do(Op.ADD, "v"), Do(Op.STORE, "v")),
             *self._length,
@@ -229,15 +254,10 @@ class Program:
         ]
 
     @property
-    def _zero(self) -> list[Step]:
-        """ac = 0."""
-        return [Do(Op.LOAD, "lsb"), Do(Op.SUB, "lsb")]
-
-    @property
     def _anew(self) -> list[Step]:
         """What is known of the errors is forgotten."""
-        stores = [Do(Op.STORE, word) for word in ("gap", "mean", "before", "age")]
-        return [*self._zero, *stores, Do(Op.LEVEL, Level.FIRST)]
+        stores = [Do(Op.STORE, word) for word in ("gap", "gap_shifted", "mean", "before", "age")]
+        return [_ZERO, *stores, Do(Op.LEVEL, Level.FIRST)]
 
     @property
     def _rest(self) -> list[Step]:
@@ -267,7 +287,7 @@ class Program:
             *(Do(Op.INPUT, Input.TIMES), Do(Op.STORE, "gap")),
             Do(Op.PHASE, Phase.BEGUN),
         ]
-        several = [Do(Op.INPUT, Input.NUMBER), *[Do(Op.SUB, "lsb")] * 2]
+        several = [Do(Op.INPUT, Input.NUMBER), Do(Op.SUB, "several")]
         return [*several, Choice(Condition.NEGATIVE, first, self._rest)]
 
     @property
@@ -275,12 +295,12 @@ class Program:
         """The second count: v is the distance over the time, and p its place, moved on by v."""
         form = self.form
         return [
-            *(Do(Op.INPUT, Input.TIMES), Do(Op.STORE, "t"), Do(Op.LOAD, "gap"), Do(Op.SUB, "t")),
+            *(Do(Op.LOAD, "gap"), Do(Op.SUB_INPUT, Input.TIMES)),
             *(Do(Op.SUB, "least_gap"), Do(Op.POSITIVE), Do(Op.ADD, "least_gap"), Do(Op.STORE, "r")),
             *(Do(Op.INPUT, Input.PLACES), Do(Op.STORE, "x"), Do(Op.SUB, "p"), Do(Op.KEEP, "e")),
             *(Do(Op.LOAD_SIGNED, "e"), Do(Op.TO_MQ), Do(Op.DIV, "r", form.width + form.unit_bits - form.start_bits)),
             *(Do(Op.FROM_MQ), Do(Op.SUB, "coarse_v"), Do(Op.NEGATIVE), Do(Op.ADD, "coarse_v")),
-            *([Do(Op.DOUBLE, steps=form.start_bits)] if form.start_bits else []),
+            *_doubled(form.start_bits),
             *(Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, "v")),
             *(*self._moved_by_v, Do(Op.ADD, "x"), Do(Op.STORE, "p")),
             *(*self._anew, Do(Op.STORE, "a"), Do(Op.PHASE, Phase.TRACKS)),
@@ -288,8 +308,7 @@ class Program:
 
     def _shifted(self, word: str, bits: int) -> list[Step]:
         """t = word << bits."""
-        double: list[Step] = [Do(Op.DOUBLE, steps=bits)] if bits else []
-        return [*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, word), *double, Do(Op.STORE, "t")]
+        return [_ZERO, Do(Op.TO_MQ), Do(Op.LOAD, word), *_doubled(bits), Do(Op.STORE, "t")]
 
     @property
     def _moved_by_v(self) -> list[Step]:
@@ -303,17 +322,16 @@ class Program:
         """e: the mean distance of the counts of the tick from where they were expected."""
         return [
             *(Do(Op.INPUT, Input.NUMBER), Do(Op.STORE, "r")),
-            *(*self._moved_by_v, Do(Op.STORE, "t")),
-            *(Do(Op.INPUT, Input.PLACES), Do(Op.ADD, "t"), Do(Op.KEEP, "t")),
-            *(Do(Op.LOAD_SIGNED, "t"), Do(Op.TO_MQ), Do(Op.DIV, "r", self.form.width)),
-            *(Do(Op.FROM_MQ), Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.SUB, "p"), Do(Op.KEEP, "e")),
+            *(*self._moved_by_v, Do(Op.ADD_INPUT, Input.PLACES), Do(Op.KEEP, "t"), _ZERO, Do(Op.TO_MQ)),
+            *(Do(Op.LOAD_SIGNED, "t"), Do(Op.FRACTION, "r", self.form.mean_bits), Do(Op.FROM_MQ), Do(Op.STORE, "t")),
+            *(Do(Op.LOAD_SIGNED, "t"), Do(Op.SUB, "p"), Do(Op.KEEP, "e")),
         ]
 
     @property
     def _is_agile(self) -> list[Step]:
         """flag = |e| > 2·E, or |e| > E and the error before, of the same sign, is greater than E/4."""
         if not self.agile:
-            return [*self._zero, Do(Op.SUB, "lsb"), Do(Op.TEST)]
+            return [_ZERO, Do(Op.SUB, "lsb"), Do(Op.TEST)]
         return [
             *(Do(Op.LOAD_SIGNED, "e"), Do(Op.SUB, "error"), Do(Op.TEST)),
             *(Do(Op.LOAD_SIGNED, "before"), Do(Op.SUB, "some_error"), Do(Op.TEST_AND)),
@@ -321,31 +339,35 @@ class Program:
             *(Do(Op.LOAD, "e"), Do(Op.STORE, "before")),
         ]
 
-    def _reach(self, rate: str, most: str) -> list[Step]:
-        """ac = x = min(rate·gap, most)."""
-        return [
-            *self._times("gap", rate, self.form.gap_bits - 1),
-            *(Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most)),
-        ]
+    @property
+    def _reach(self) -> list[Step]:
+        """x = min(λ·m·T_s, most), with four times the bandwidth if `flag`."""
+
+        def reach(rate: str, most: str) -> list[Step]:
+            least = [Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most)]
+            return [*self._times("gap", rate, self.form.gap_bits - 1), *least]
+
+        usual = reach("rate", "most_x") if self.form.growing else reach("rate0", "most_x0")
+        choice = Choice(Condition.FLAG, reach("agile_rate", "most_x0"), usual)
+        return [*([choice] if self.agile else usual), Do(Op.STORE, "x")]
 
     @property
     def _remember(self) -> list[Step]:
         """The mean error, and from it the level of λ: `flag` is still whether the error is large."""
         f = self.form.frac_bits
-        trouble: list[Step] = [Do(Op.LOAD, "mean"), Do(Op.SHIFT, steps=1), Do(Op.STORE, "mean"), *self._zero]
+        trouble: list[Step] = [Do(Op.LOAD, "mean"), Do(Op.SHIFT, steps=1), Do(Op.STORE, "mean"), _ZERO]
         return [
-            *(*self._reach("rate", "most_x"), Do(Op.SHIFT, steps=2), Do(Op.STORE, "x"), Do(Op.TO_MQ)),
-            *(Do(Op.LOAD, "e"), Do(Op.SUB, "mean"), Do(Op.STORE, "t")),
-            *(Do(Op.MUL, "t", f + 1), Do(Op.ADD, "mean"), Do(Op.KEEP, "mean")),
+            *(Do(Op.SHIFT, steps=2), Do(Op.STORE, "h"), Do(Op.LOAD, "e"), Do(Op.SUB, "mean"), Do(Op.STORE, "t")),
+            *(*self._times("h", "t", f), Do(Op.ADD, "mean"), Do(Op.KEEP, "mean")),
             *(Do(Op.LOAD_SIGNED, "mean"), Do(Op.SUB, "one"), Do(Op.NEGATIVE), Do(Op.ADD, "one"), Do(Op.STORE, "t")),
             *(Do(Op.TO_MQ), Do(Op.MUL, "t", f + 1), Do(Op.STORE, "t")),
-            *(*self._times("mean_limit", "x", self.form.mean_threshold_bits), Do(Op.STORE, "x")),
+            *(*self._times("mean_limit", "h", self.form.mean_threshold_bits), Do(Op.STORE, "h")),
             *(Do(Op.LOAD, "age"), Do(Op.ADD, "gap"), Do(Op.STORE, "age")),
             Choice(
                 Condition.FLAG,
-                [*self._zero, Do(Op.STORE, "age"), Do(Op.LEVEL, Level.FIRST)],
+                [_ZERO, Do(Op.STORE, "age"), Do(Op.LEVEL, Level.FIRST)],
                 [
-                    *(Do(Op.LOAD, "x"), Do(Op.SUB, "t")),
+                    *(Do(Op.LOAD, "h"), Do(Op.SUB, "t")),
                     Choice(
                         Condition.NEGATIVE,
                         [*trouble, Do(Op.STORE, "age"), Do(Op.LEVEL, Level.BACK)],
@@ -354,7 +376,7 @@ class Program:
                             Choice(
                                 Condition.NEGATIVE,
                                 [],
-                                [*self._zero, Do(Op.STORE, "age"), Do(Op.LEVEL, Level.NEXT)],
+                                [_ZERO, Do(Op.STORE, "age"), Do(Op.LEVEL, Level.NEXT)],
                             ),
                         ],
                     ),
@@ -364,19 +386,20 @@ class Program:
 
     @property
     def _gains(self) -> list[Step]:
-        """d = 1 − e^−x = 3x/(3 + (6x + x²)/4), and r = d·U/gap."""
+        """d = 1 − e^−x = x/(1 + x/2 + x²/12) = 3x/((x + 3)²/4 + 3/4), and r = d·U/gap."""
         form = self.form
-        usual = self._reach("rate", "most_x") if form.growing else self._reach("rate0", "most_x0")
-        reach: list[Step] = usual
-        if self.agile:
-            reach = [Choice(Condition.FLAG, self._reach("agile_rate", "most_x0"), usual)]
         return [
-            *(*reach, Do(Op.STORE, "x")),
-            *(Do(Op.TO_MQ), Do(Op.MUL, "x", form.frac_bits + 1), *[Do(Op.ADD, "x")] * 6, Do(Op.SHIFT, steps=2)),
-            *(*[Do(Op.ADD, "one")] * 3, Do(Op.STORE, "t")),
-            *(*self._zero, Do(Op.TO_MQ), Do(Op.LOAD, "x"), *[Do(Op.ADD, "x")] * 2, Do(Op.FRACTION, "t", form.gain_bits)),
-            *(Do(Op.FROM_MQ), Do(Op.STORE, "d"), Do(Op.DIV, "gap", form.width + form.unit_bits)),
-            *(Do(Op.FROM_MQ), Do(Op.STORE, "r")),
+            *(Do(Op.LOAD, "x"), Do(Op.ADD, "three"), Do(Op.STORE, "t"), Do(Op.TO_MQ)),
+            *(
+                Do(Op.MUL, "t", form.frac_bits + 3),
+                Do(Op.ADD, "three_quarters"),
+                Do(Op.STORE, "t"),
+                _ZERO,
+                Do(Op.TO_MQ),
+            ),
+            *(Do(Op.LOAD, "x"), *[Do(Op.ADD, "x")] * 2, Do(Op.FRACTION, "t", form.gain_bits)),
+            *(Do(Op.FROM_MQ), Do(Op.STORE, "d"), _ZERO, Do(Op.TO_MQ), Do(Op.LOAD, "d")),
+            *(Do(Op.FRACTION, "gap_shifted", form.unit_bits + form.gap_shift), Do(Op.FROM_MQ), Do(Op.STORE, "r")),
         ]
 
     @property
@@ -388,25 +411,26 @@ class Program:
             *(*self._times("d", "e1", b), Do(Op.STORE, "e2")),
             *(*self._times("d", "e2", b), *[Do(Op.ADD, "e1")] * 3, *[Do(Op.SUB, "e2")] * 3),
             *(Do(Op.ADD, "p"), Do(Op.STORE, "p")),
-            *(*self._times("r", "e1", b), Do(Op.STORE, "h")),
-            *(*self._shifted("h", self.form.extra_bits), *self._times("r", "t", b), Do(Op.ADD, "a"), Do(Op.STORE, "a")),
+            # All bits of r have left mq.
+            *(*self._times("r", "e1", b), Do(Op.STORE, "h"), *_doubled(self.form.extra_bits), Do(Op.STORE, "t")),
+            *(*self._times("r", "t", b), Do(Op.ADD, "a"), Do(Op.STORE, "a")),
             *(*self._times("d", "h", b), Do(Op.STORE, "t"), Do(Op.SHIFT, steps=1), Do(Op.ADD, "t"), Do(Op.STORE, "t")),
             *(Do(Op.LOAD, "v"), *[Do(Op.ADD, "h")] * 3, Do(Op.SUB, "t"), Do(Op.STORE, "v")),
-            *(*self._zero, Do(Op.STORE, "gap")),
+            *(_ZERO, Do(Op.STORE, "gap"), Do(Op.STORE, "gap_shifted")),
         ]
 
     @property
     def _counted(self) -> list[Step]:
         """A tick with counts."""
-        moved: list[Step] = [
-            *(Do(Op.INPUT, Input.MOVED), Do(Op.STORE, "t")),
-            *(Do(Op.LOAD, "p"), Do(Op.SUB, "t"), Do(Op.STORE, "p")),
-        ]
+        moved: list[Step] = [Do(Op.LOAD, "p"), Do(Op.SUB_INPUT, Input.MOVED), Do(Op.STORE, "p")]
         tracks: list[Step] = [
             *(*self._error, Do(Op.LOAD_SIGNED, "e"), Do(Op.SUB, "lost")),
             Choice(
                 Condition.NEGATIVE,
-                [*self._is_agile, *(self._remember if self.form.growing else []), *self._gains, *self._correct],
+                [
+                    *(*self._is_agile, *self._reach, *(self._remember if self.form.growing else [])),
+                    *(*self._gains, *self._correct),
+                ],
                 self._rest,
             ),
         ]
@@ -436,20 +460,12 @@ class Program:
             ),
         ]
 
-    def _held(self, word: str, most: str) -> list[Step]:
-        """The word, held within ±most."""
-        return [
-            *(Do(Op.LOAD, word), Do(Op.SIGN), Do(Op.LOAD_SIGNED, word)),
-            *(Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most), Do(Op.STORE, "t")),
-            *(Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, word)),
-        ]
-
     @property
     def _show(self) -> list[Step]:
         """The outputs, rounded."""
         return [
-            *(*self._times("lead", "a", self.form.unit_bits + self.form.extra_bits), Do(Op.ADD, "v"), Do(Op.STORE, "x")),
-            *self._held("x", "most_v"),
+            *(*self._times("lead", "a", self.form.unit_bits + self.form.extra_bits), Do(Op.ADD, "v")),
+            *(*self._within("most_v"), Do(Op.STORE, "x")),
             *(*self._times("length", "x", self.velocity_shift), Do(Op.ADD, "lsb"), Do(Op.SHIFT, steps=1)),
             Do(Op.STORE, "t"),
             *(*self._times("acceleration", "a", self.acceleration_scale[1] - 1), Do(Op.ADD, "lsb")),
@@ -464,7 +480,8 @@ class Program:
         return [
             *self._predict,
             Choice(Condition.COUNTED, self._counted, silent),
-            *(*self._held("v", "most_v"), *self._held("a", "most_a")),
+            *(Do(Op.LOAD, "v"), *self._within("most_v"), Do(Op.STORE, "v")),
+            *(Do(Op.LOAD, "a"), *self._within("most_a"), Do(Op.STORE, "a")),
             *self._show,
         ]
 

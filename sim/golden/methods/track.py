@@ -167,14 +167,12 @@ class Recursion:
         )
         if self._spec.agile:
             self.before = e
+        rate = form.agile_rate if agile else form.rates[self.level]
+        x = min((rate * self.gap) >> (form.gap_bits - 1), form.most_x[0 if agile else self.level])
         if form.growing:
-            self._remember(e, agile)
-        level = self.level
-        rate = form.agile_rate if agile else form.rates[level]
-        x = self._reach(rate, form.most_x[0 if agile else level])
+            self._remember(e, x >> 2, agile)
         one, bits = form.fixed(1), form.gain_bits
-        square = (x * x) >> form.frac_bits
-        d = (3 * x << bits) // ((square + 6 * x >> 2) + 3 * one)
+        d = (3 * x << bits) // (((x + 3 * one) ** 2 >> (form.frac_bits + 2)) + (3 * one >> 2))
         r = (d << form.unit_bits) // self.gap
         e1 = (e * d) >> bits
         e2 = (e1 * d) >> bits
@@ -186,14 +184,9 @@ class Recursion:
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
 
-    def _reach(self, rate: int, most: int) -> int:
-        """x = λ·m·T_s, at most so much."""
-        return min((rate * self.gap) >> (self._form.gap_bits - 1), most)
-
-    def _remember(self, e: int, agile: bool) -> None:
-        """The mean error, and what follows for λ."""
+    def _remember(self, e: int, share: int, agile: bool) -> None:
+        """The mean error, and what follows for λ at the next count."""
         form = self._form
-        share = self._reach(form.rates[self.level], form.most_x[self.level]) >> 2
         self.mean += ((e - self.mean) * share) >> form.frac_bits
         size = min(abs(self.mean), form.fixed(1))
         limit = (share * form.mean_threshold) >> form.mean_threshold_bits
