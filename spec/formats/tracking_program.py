@@ -29,7 +29,7 @@ class Op(IntEnum):
     KEEP = 5  # x = ac, sign = ac < 0
     SIGN = 23  # sign = ac < 0
     DOUBLE = 24  # ac = ac << steps, for mq without its leading bit
-    MUL = 6  # ac = ⌊x·mq / 2^(steps − 1)⌋ with the low bits of mq
+    MUL = 6  # ac = x·mq / 2^(steps − 1), rounded, with the low bits of mq
     DIV = 7  # mq = ⌊mq·2^(steps − W) / x⌋
     FRACTION = 8  # mq = ⌊ac·2^steps / x⌋, for ac < x and mq without leading bits
     SHIFT = 9  # ac = ac >> steps
@@ -164,8 +164,8 @@ class Program:
 
     @property
     def velocity_shift(self) -> int:
-        """Right shift of v·T, but for the last bit, which is rounded."""
-        return self.form.unit_bits + self.form.frac_bits - self.form.velocity_bits - 1
+        """Right shift of v·T for the output."""
+        return self.form.unit_bits + self.form.frac_bits - self.form.velocity_bits
 
     @cached_property
     def constants(self) -> dict[str, int]:
@@ -223,7 +223,7 @@ class Program:
         return words
 
     def _times(self, factor: str, word: str, bits: int) -> list[Step]:
-        """ac = word·factor >> bits."""
+        """ac = word·factor/2^bits."""
         return [Do(Op.LOAD, factor), Do(Op.TO_MQ), Do(Op.MUL, word, bits + 1)]
 
     @property
@@ -247,9 +247,9 @@ class Program:
         return [
             *(Do(Op.LOAD, "gap_shifted"), length, Do(Op.STORE, "gap_shifted")),
             *(*self._length, Do(Op.ADD, "gap"), Do(Op.STORE, "gap")),
-            *(Do(Op.MUL, "a", k + 2 + self.form.extra_bits), Do(Op.STORE, "h"), Do(Op.ADD, "v"), Do(Op.STORE, "v")),
-            *self._length,
-            *(Do(Op.MUL, "v", k + 1), Do(Op.ADD, "p"), Do(Op.STORE, "p")),
+            *(Do(Op.MUL, "a", k + 1 + self.form.extra_bits), Do(Op.STORE, "h")),
+            *(Do(Op.SHIFT, steps=1), Do(Op.ADD, "v"), Do(Op.STORE, "t"), *self._length),
+            *(Do(Op.MUL, "t", k + 1), Do(Op.ADD, "p"), Do(Op.STORE, "p")),
             *(Do(Op.LOAD, "v"), Do(Op.ADD, "h"), Do(Op.STORE, "v")),
         ]
 
@@ -466,10 +466,8 @@ class Program:
         return [
             *(*self._times("lead", "a", self.form.unit_bits + self.form.extra_bits), Do(Op.ADD, "v")),
             *(*self._within("most_v"), Do(Op.STORE, "x")),
-            *(*self._times("length", "x", self.velocity_shift), Do(Op.ADD, "lsb"), Do(Op.SHIFT, steps=1)),
-            Do(Op.STORE, "t"),
-            *(*self._times("acceleration", "a", self.acceleration_scale[1] - 1), Do(Op.ADD, "lsb")),
-            *(Do(Op.SHIFT, steps=1), Do(Op.STORE, "x")),
+            *(*self._times("length", "x", self.velocity_shift), Do(Op.STORE, "t")),
+            *(*self._times("acceleration", "a", self.acceleration_scale[1]), Do(Op.STORE, "x")),
             *(Do(Op.LOAD, "t"), Do(Op.TO_MQ), Do(Op.LOAD, "x"), Do(Op.OUT, "p")),
         ]
 

@@ -13,6 +13,11 @@ from tachometry.spec.formats.tracking import LEVELS, STEP_BACK
 REST, BEGUN, TRACKS = range(3)
 
 
+def rounded(product: int, bits: int) -> int:
+    """A product over 2^bits; from the middle, up."""
+    return (product + (1 << bits >> 1)) >> bits
+
+
 @dataclass(frozen=True)
 class Windows:
     """The counts of every tick.
@@ -98,10 +103,9 @@ class Recursion:
         """Take tick i; `alone`: only its last count; `quiet`: there was no count for the maximum time."""
         form, length, most = self._form, windows.length[i], self._constants
         self.gap += length
-        half = (self.a * length) >> (form.unit_bits + form.extra_bits + 1)
-        self.v += half
-        self.p += (self.v * length) >> form.unit_bits
-        self.v += half
+        more = rounded(self.a * length, form.unit_bits + form.extra_bits)
+        self.p += rounded((self.v + (more >> 1)) * length, form.unit_bits)
+        self.v += more
         if windows.number[i]:
             alone = alone or windows.number[i] > form.max_count
             number = 1 if alone else windows.number[i]
@@ -137,7 +141,7 @@ class Recursion:
 
     def _moved_by_v(self, times: int) -> int:
         """v times the sum of some times."""
-        return (self.v * times) >> self._form.unit_bits
+        return rounded(self.v * times, self._form.unit_bits)
 
     def _second(self, times: int, places: int) -> None:
         """The speed from the first count to this one, coarser by some bits."""
@@ -168,32 +172,32 @@ class Recursion:
         if self._spec.agile:
             self.before = e
         rate = form.agile_rate if agile else form.rates[self.level]
-        x = min((rate * self.gap) >> (form.gap_bits - 1), form.most_x[0 if agile else self.level])
+        x = min(rounded(rate * self.gap, form.gap_bits - 1), form.most_x[0 if agile else self.level])
         if form.growing:
             self._remember(e, x >> 2, agile)
         one, bits = form.fixed(1), form.gain_bits
-        d = (3 * x << bits) // (((x + 3 * one) ** 2 >> (form.frac_bits + 2)) + (3 * one >> 2))
+        d = (3 * x << bits) // (rounded((x + 3 * one) ** 2, form.frac_bits + 2) + (3 * one >> 2))
         r = (d << form.unit_bits) // self.gap
-        e1 = (e * d) >> bits
-        e2 = (e1 * d) >> bits
-        e3 = (e2 * d) >> bits
-        h = (e1 * r) >> bits
+        e1 = rounded(e * d, bits)
+        e2 = rounded(e1 * d, bits)
+        e3 = rounded(e2 * d, bits)
+        h = rounded(e1 * r, bits)
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += (h * r) >> (bits - form.extra_bits)
-        i = (h * d) >> bits
+        self.a += rounded(h * r, bits - form.extra_bits)
+        i = rounded(h * d, bits)
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
 
     def _remember(self, e: int, share: int, agile: bool) -> None:
         """The mean error, and what follows for λ at the next count."""
         form = self._form
-        self.mean += ((e - self.mean) * share) >> form.frac_bits
+        self.mean += rounded((e - self.mean) * share, form.frac_bits)
         size = min(abs(self.mean), form.fixed(1))
-        limit = (share * form.mean_threshold) >> form.mean_threshold_bits
+        limit = rounded(share * form.mean_threshold, form.mean_threshold_bits)
         self.age += self.gap
         if agile:
             self.age = self.level = 0
-        elif (size * size) >> form.frac_bits > limit:
+        elif rounded(size * size, form.frac_bits) > limit:
             self.mean >>= 1
             self.age, self.level = 0, max(self.level - STEP_BACK, 0)
         elif self.age >= form.spans[self.level]:
@@ -208,7 +212,7 @@ class Recursion:
         self.p = sign * form.late_limit
         if sign * self.v >= 0:
             size = abs(self.v)
-            fall = 2 * ((size * length) >> form.unit_bits) + form.fixed(1)
+            fall = 2 * rounded(size * length, form.unit_bits) + form.fixed(1)
             self.v = sign * ((size << form.frac_bits) // fall)
             self.a = sign * min(sign * self.a, 0)
 
@@ -230,7 +234,7 @@ class Model:
         windows = Windows.of(steps, ticks.clock - spec.tick_latency)
         state = Recursion(spec)
         factor, shift = spec.program.acceleration_scale
-        velocity_shift, fine_shift = spec.program.velocity_shift, form.frac_bits - spec.fine_bits - 1
+        velocity_shift, fine_shift = spec.program.velocity_shift, form.frac_bits - spec.fine_bits
         half = 1 << (spec.position_width + spec.fine_bits - 1)
         rows: list[tuple[int, int, int, int]] = []
         silent = spec.timing.max_ticks  # ticks in a row before this one; the time before reset was silent
@@ -243,11 +247,11 @@ class Model:
             state.tick(windows, i, alone, elapsed == spec.timing.max_ticks)
             before, phase = phase, state.phase
             silent = 0 if counted else elapsed
-            ahead = state.v + ((state.a * spec.program.lead) >> (form.unit_bits + form.extra_bits))
+            ahead = state.v + rounded(state.a * spec.program.lead, form.unit_bits + form.extra_bits)
             ahead = max(-form.max_velocity, min(ahead, form.max_velocity))
-            velocity = ((ahead * form.tick_cycles) >> velocity_shift) + 1 >> 1
-            acceleration = ((state.a * factor) >> (shift - 1)) + 1 >> 1
-            fine = (position << spec.fine_bits) + ((state.p >> fine_shift) + 1 >> 1)
+            velocity = rounded(ahead * form.tick_cycles, velocity_shift)
+            acceleration = rounded(state.a * factor, shift)
+            fine = (position << spec.fine_bits) + rounded(state.p, fine_shift)
             rows.append((velocity, acceleration, (fine + half) % (2 * half) - half, elapsed))
         shown = np.array(rows, dtype=np.int64).reshape(-1, 4).T
         columns = {
