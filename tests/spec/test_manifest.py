@@ -40,7 +40,7 @@ def test_bounds_are_there_where_they_apply(method: str) -> None:
 
 def test_tracking_has_no_bounds() -> None:
     assert [name for name, spec in METHODS.items() if not spec.has_bounds] == ["track"]
-    with pytest.raises(ParameterError, match="^bounds must not be given with method track"):
+    with pytest.raises(ParameterError, match=r"^bounds must not be given with method track"):
         of_texts("track", had_by("track", BASE) | {"bounds": "yes"})
 
 
