@@ -19,7 +19,7 @@ from independent.stimulus import Lines, steady
 
 TRACKING = [case for case in CASES if case.settings.method == "track"]
 FIRST = 5  # ticks before the motion
-PART = 400  # ticks of each part of it, in which all that was before is forgotten
+PART = 800  # ticks of each part of it, in which all that was before is forgotten
 SETTLED = 100  # of these, those in which it is
 
 
