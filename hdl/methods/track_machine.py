@@ -170,7 +170,7 @@ class TrackMachine(wiring.Component):
             m.d.sync += [held.eq(fetched & valid), active.eq(held & valid)]
         with m.Else():
             m.d.sync += now.more.eq(now.more - 1)
-        with m.If(~fetched & ~self.begin):  # at rest it is at the first instruction
+        with m.If(stop | (~fetched & ~self.begin)):  # at rest it is at the first instruction
             m.d.sync += pc.eq(0)
         with m.Elif(done):
             m.d.sync += pc.eq(place + 1)
