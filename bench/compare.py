@@ -21,11 +21,11 @@ from tachometry.cli.main import main as tachometry
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "compare.md"
 FIGURE = PAGE.with_name("compare.png")
-CORE = "--ppr 500 --clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/s"
+CORE = "--ppr 500 --clock 48MHz --tick 100us --max-time 10ms --max-speed 400rad/s"
 
 
 # All, and M/T with windows of 1 ms, as long as those of S at high speed and of what reads the encoder every 1 ms.
-WITH_LONG_MT = "s,m,t,mt,mt:min-time=1ms,rairan,difference,hostmot2,simplefoc,odrive,moteus"
+WITH_LONG_MT = "s,m,t,mt,mt:min-time=1ms,rairan,track,difference,hostmot2,simplefoc,odrive,moteus"
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ LinuxCNC's timestamps of 0.5 µs are the best by far.""",
     ),
     Situation(
         "Ramp",
-        """Times in clocks of 0.1 µs are better than a lattice of 100 µs. M/T (T_c is a tick) and T are the best by
+        """Times in clocks of 21 ns are better than a lattice of 100 µs. M/T (T_c is a tick) and T are the best by
 a factor of 20 and more. LinuxCNC's timestamps follow, and then the tracking loops, which lag by a
 constant 2 ms. Of the methods without a divider, S is the best core.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",

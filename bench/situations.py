@@ -24,7 +24,7 @@ from tachometry.spec import of_texts
 # Columns that are not tuned: one setting for all situations, as `tachometry compare --methods` takes it.
 OURS = ("track", "track:edge-error=0.6", "s", "mt:min-time=1ms")
 RIVALS = (*TUNED, *BASELINES)
-CORE = {"ppr": str(PULSES_PER_REV), "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
+CORE = {"ppr": str(PULSES_PER_REV), "clock": "48MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
 
 _TICK_S = 1e-4
 _DECODING = 4

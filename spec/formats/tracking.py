@@ -1,18 +1,22 @@
 """Formats of the tracking recursion: how many bits its numbers have, and why these are enough.
 
-All numbers have F fraction bits. p is in counts, relative to the position; v is in counts per U, a in counts per U²,
-where U is 2^k clocks, about 1/(4·λ_0). In this unit of time the gains of p, v and a are of a similar size, so one word
-fits all three. Times are whole clocks. Products are rounded down.
+p is in counts, relative to the position; v is in counts per U, where U is 2^k clocks, about 1/(4·λ_0). Both have F
+fraction bits. a is in counts per U², and has F + S fraction bits. In this unit of time the three are of a similar size,
+so one word fits all. Times are whole clocks. Products are rounded to the nearest.
 
-Error analysis. With λT_s small, the gains of a tick with a count are 3d, 3d²·u and d³·u² (d = 1 − θ ≈ λT_s;
-u = U/T_s). A rounding that takes half an LSB from a in every tick is an input that the filter answers with a constant
-deviation e = ½·2^−F/(d³u²) from the counts, and with the velocity error 3d·e in counts per tick. The other roundings,
-of v by an LSB and of p by half of one, give less, as d·u is at most 1/4. So the error is below
-2^−F·(3/2 + 3·d·u + (d·u)²)/(d·u)², which is largest for the smallest λ. F is chosen so that it is at most a quarter of
-an LSB of the velocity.
+Error analysis. A count comes every m ticks; d = 1 − θ, and u = U/T_s. The count adds d³·(u/m)²·e to a. The product
+h = d²·(u/m)·e is rounded by at most 2^−F/2, which adds d·(u/m)/2·2^−F to a. The sum a is rounded by 2^−(F + S)/2. If
+both go one way with each count, a keeps still only where a constant deviation e of p from the counts makes up for them:
 
-The multipliers d, d·U/m and the share of the mean error are below 2, and have B fraction bits, which leaves their
-relative error below 2^−B/d. It only moves the poles.
+    |e| ≤ 2^−F/2 · m/(d²·u) · (1 + m/(d·u·2^S))
+
+S makes the second term as small as the first. This e gives the velocity 3·d/m·|e| in counts per tick; the roundings of v
+add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at most half an LSB of the velocity, and |e| at
+most half one of the fine position. They are greatest for the least λ, and either for m = 1, for the longest silence, or
+where x = λ·m·T_s has just reached its most.
+
+The gains d and d·U/m are less than 2 and have B fraction bits. Their relative error is below 2^−B/d. It only moves the
+poles. B is such that a transient of one count per tick is off by at most an eighth of an LSB for it.
 """
 
 import math

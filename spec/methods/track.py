@@ -208,6 +208,14 @@ class TrackTachometer(TachometerSpec):
         }
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        disc = (
+            f"--edge-error {float(self.edge_error):.4g} suits a disc whose (phase error + duty error)/180 °e + "
+            f"nonuniformity + 3 x jitter is no more"
+        )
+        return (*super().notes, disc)
+
+    @property
     def standstill_ticks(self) -> int:
         return self.timing.max_ticks
 
