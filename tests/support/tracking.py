@@ -1,6 +1,8 @@
 """The program of the tracking method, executed in integers without bounds; and hostile counts for it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +43,19 @@ class Tick:
         return self.number > 0
 
 
+class Executed(NamedTuple):
+    """An instruction, the clocks of the program behind it, and what `ac` and `mq` are then; None: not defined."""
+
+    instruction: Instruction
+    clocks: int
+    ac: int | None
+    mq: int
+
+
+# What finds 0 in ac.
+CLEARING = (Op.LOAD, Op.LOAD_SIGNED, Op.MUL, Op.DIV, Op.INPUT)
+
+
 class Interpreter:
     """Executes a program as `spec.formats.tracking_program` says, and asserts that all it computes fits its words.
 
@@ -64,9 +79,9 @@ class Interpreter:
         assert width <= self.program.form.width, f"{what}: {value} has {width} bits, not {self.program.form.width}"
         return value
 
-    def run(self, tick: Tick) -> list[tuple[int, int | None, int]]:
-        """Execute the whole program; of every instruction the clock behind it, `ac` and `mq`, None: not defined."""
-        seen: list[tuple[int, int | None, int]] = []
+    def run(self, tick: Tick) -> list[Executed]:
+        """Execute the whole program."""
+        seen: list[Executed] = []
         place = clocks = 0
         code = self.program.instructions
         while not place or code[place - 1].op != Op.OUT:
@@ -74,19 +89,22 @@ class Interpreter:
             place += 1
             if now.op == Op.JUMP:
                 taken = self._holds(Condition(now.steps), tick)
+                if taken and code[place + 1].op in CLEARING:  # it was fetched
+                    self.ac = None  # type: ignore[assignment]
                 place = now.address if taken else place
                 clocks += TAKEN if taken else NOT_TAKEN
             else:
                 self.x = self.memory[now.address + (self.level if now.address >= TABLES else 0)]
                 self._execute(now, tick)
                 clocks += now.steps
-            seen.append((clocks, self.ac, self.mq))
+            seen.append(Executed(now, clocks, self.ac, self.mq))
         return seen
 
     def _holds(self, condition: Condition, tick: Tick) -> bool:
+        if condition == Condition.NEGATIVE:
+            return self.ac < 0
         return {
             Condition.ALWAYS: True,
-            Condition.NEGATIVE: self.ac < 0,
             Condition.FLAG: self.flag,
             Condition.COUNTED: tick.counted,
             Condition.BEYOND: tick.beyond,
@@ -187,7 +205,7 @@ def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tu
     last = np.empty(n_ticks, dtype=np.int64)
     now = silent = 0
     for i in range(n_ticks):
-        length = int(rng.choice([shortest, longest, spec.timing.tick_cycles, rng.integers(shortest, longest + 1)]))
+        length = int(rng.choice([shortest, longest, spec.timing.tick_cycles, int(rng.integers(shortest, longest + 1))]))
         if i % 40 == 0:  # how many counts a tick has for a while, which way, and when
             numbers = rng.choice([1, 2, most, most, most + 1, 3 * most, int(rng.integers(1, most + 2))], 3)
             ways = rng.choice(["+", "-", "random", "turn"])
@@ -216,16 +234,20 @@ def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tu
     return Steps(clock, np.concatenate(steps).astype(np.int64), none, none, none), last
 
 
-def tick_of(spec: TrackTachometer, windows: Windows, i: int, alone: bool, quiet: bool) -> Tick:
-    """A tick of some windows, as the front end of the program gives it."""
+def ticks_of(spec: TrackTachometer, windows: Windows, core: Interpreter) -> Iterator[Tick]:
+    """These windows, as the front end of the program gives them; `core` runs each of them before the next."""
     most = spec.max_count
-    alone = alone or windows.number[i] > most
-    return Tick(
-        number=min(windows.number[i], 1) if alone else windows.number[i],
-        times=windows.last_time[i] if alone else windows.times[i],
-        places=windows.last_place[i] if alone else windows.places[i],
-        moved=max(-most, min(windows.moved[i], most)),
-        length=windows.length[i],
-        beyond=abs(windows.moved[i]) > most,
-        quiet=quiet,
-    )
+    silent, before = spec.timing.max_ticks, Phase.REST
+    for i, number in enumerate(windows.number):
+        alone = silent > 0 or before != Phase.TRACKS or number > most
+        before = core.phase  # it is known too late for the next tick
+        yield Tick(
+            number=min(number, 1) if alone else number,
+            times=windows.last_time[i] if alone else windows.times[i],
+            places=windows.last_place[i] if alone else windows.places[i],
+            moved=max(-most, min(windows.moved[i], most)),
+            length=windows.length[i],
+            beyond=abs(windows.moved[i]) > most,
+            quiet=silent + 1 >= spec.timing.max_ticks,
+        )
+        silent = 0 if number else silent + 1
