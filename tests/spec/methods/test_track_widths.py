@@ -8,6 +8,8 @@ from support.tracking import Interpreter, hostile, ticks_of
 from tachometry.sim.golden.methods.track import Model, Windows, rounded
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TrackTachometer
+from tachometry.spec.formats.tracking import LEVELS
+from tachometry.spec.formats.tracking_program import Phase
 
 CASES, TICKS = 40, 400
 
@@ -39,3 +41,18 @@ def test_hostile_counts(seed: int) -> None:
     spec, *_ = random_case(seed, "track")
     assert isinstance(spec, TrackTachometer)
     assert check(spec, seed) >= spec.form.width - 6
+
+
+@pytest.mark.parametrize("seed", range(CASES, CASES + 20))
+def test_states_at_their_limits(seed: int) -> None:
+    """Wherever v, a and the level of λ are, whatever the counts were before."""
+    spec, *_ = random_case(seed, "track")
+    assert isinstance(spec, TrackTachometer)
+    rng, program = np.random.default_rng(seed), spec.program
+    core = Interpreter(program)
+    for tick in ticks_of(spec, Windows.of(*hostile(spec, rng, TICKS)), core):
+        if core.phase == Phase.TRACKS and rng.random() < 0.5:
+            core.memory[program.address("v")] = int(rng.choice([-1, 1])) * spec.form.max_velocity
+            core.memory[program.address("a")] = int(rng.choice([-1, 0, 1])) * spec.form.max_acceleration
+            core.level = int(rng.integers(LEVELS)) if spec.growing_memory else 0
+        core.run(tick)
