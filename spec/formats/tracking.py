@@ -213,7 +213,11 @@ class Tracking:
             counts * (counts + moved),  # the sum over the counts of a tick
             # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
             self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
-            self.max_error * of_v * 2**self.extra_bits,  # h
+            # What is multiplied: on its way to a product the adder holds nearly twice as much.
+            2 * self.max_error * of_v * 2**self.extra_bits,  # h
+            2 * self.max_acceleration / 2**self.frac_bits,
+            2 * self.max_velocity / 2**self.frac_bits * max(1.125, 2 ** (self.times_bits - 1 - self.unit_bits)),
+            4 * self.max_error,  # e less its mean
             self.max_acceleration / 2**self.frac_bits + self.max_error * of_a * 2**self.extra_bits,
             2 * self.max_error + 2 * moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
