@@ -49,7 +49,7 @@ class Tuning:
     max_ticks, max_count : int
         Ticks without a count after which it rests, and most counts of a tick.
     unit_seconds : float
-        The time in which the acceleration changes the speed by at most a quarter of the greatest one.
+        The time in which the acceleration changes the speed by at most an eighth of the greatest one.
     lead_seconds : float
         Time from an edge in the last clock of a tick to the clock in which the velocity is shown.
     """
@@ -101,7 +101,7 @@ class Tuning:
     @property
     def greatest_acceleration(self) -> float:
         """Counts per second²."""
-        return self.greatest_velocity / (4 * self.unit_seconds)
+        return self.greatest_velocity / (8 * self.unit_seconds)
 
     def rate(self, level: int) -> float:
         """λ of a level, rad/s."""
@@ -247,10 +247,10 @@ class Recursion:
         tuning = self.tuning
         agile = tuning.agile and self._is_large(error)
         self.error_before = error
+        if tuning.growing:
+            self._remember(error, agile)
         rate = _AGILE * tuning.bandwidth if agile else tuning.rate(self.level)
         x = min(rate * self.gap, tuning.reach(0 if agile else self.level))
-        if tuning.growing:
-            self._remember(error, x / 4, agile)
         d = x / (1 + x / 2 + x * x / 12)  # 1 − e^−x
         self.place += (1 - (1 - d) ** 3) * error
         self.velocity += 1.5 * (1 - (1 - d) ** 2) * d * error / self.gap
@@ -264,8 +264,9 @@ class Recursion:
         same = math.copysign(1, error) * self.error_before
         return self.reaches(abs(error), limit) and self.reaches(same, limit / 4)
 
-    def _remember(self, error: float, share: float, agile: bool) -> None:
+    def _remember(self, error: float, agile: bool) -> None:
         tuning = self.tuning
+        share = min(tuning.rate(self.level) * self.gap, tuning.reach(self.level)) / 4
         self.mean_error += (error - self.mean_error) * share
         self.untroubled += self.gap
         if agile:

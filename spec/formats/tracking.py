@@ -1,18 +1,22 @@
 """Formats of the tracking recursion: how many bits its numbers have, and why these are enough.
 
-All numbers have F fraction bits. p is in counts, relative to the position; v is in counts per U, a in counts per U²,
-where U is 2^k clocks, about 1/(4·λ_0). In this unit of time the gains of p, v and a are of a similar size, so one word
-fits all three. Times are whole clocks. Products are rounded down.
+p is in counts, relative to the position; v is in counts per U, where U is 2^k clocks, about 1/(4·λ_0). Both have F
+fraction bits. a is in counts per U², and has F + S fraction bits. In this unit of time the three are of a similar size,
+so one word fits all. Times are whole clocks. Products are rounded to the nearest.
 
-Error analysis. With λT_s small, the gains of a tick with a count are 3d, 3d²·u and d³·u² (d = 1 − θ ≈ λT_s;
-u = U/T_s). A rounding that takes half an LSB from a in every tick is an input that the filter answers with a constant
-deviation e = ½·2^−F/(d³u²) from the counts, and with the velocity error 3d·e in counts per tick. The other roundings,
-of v by an LSB and of p by half of one, give less, as d·u is at most 1/4. So the error is below
-2^−F·(3/2 + 3·d·u + (d·u)²)/(d·u)², which is largest for the smallest λ. F is chosen so that it is at most a quarter of
-an LSB of the velocity.
+Error analysis. A count comes every m ticks; d = 1 − θ, and u = U/T_s. The count adds d³·(u/m)²·e to a. The product
+h = d²·(u/m)·e is rounded by at most 2^−F/2, which adds d·(u/m)/2·2^−F to a. The sum a is rounded by 2^−(F + S)/2. If
+both go one way with each count, a keeps still only where a constant deviation e of p from the counts makes up for them:
 
-The multipliers d, d·U/m and the share of the mean error are below 2, and have B fraction bits, which leaves their
-relative error below 2^−B/d. It only moves the poles.
+    |e| ≤ 2^−F/2 · m/(d²·u) · (1 + m/(d·u·2^S))
+
+S makes the second term as small as the first. This e gives the velocity 3·d/m·|e| in counts per tick; the roundings of v
+add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at most half an LSB of the velocity, and |e| at
+most half one of the fine position. They are greatest for the least λ, and either for m = 1, for the longest silence, or
+where x = λ·m·T_s has just reached its most.
+
+The gains d and d·U/m are less than 2 and have B fraction bits. Their relative error is below 2^−B/d. It only moves the
+poles. B is such that a transient of one count per tick is off by at most an eighth of an LSB for it.
 """
 
 import math
@@ -29,7 +33,7 @@ SHORTEST_MEMORY = 0.2  # of 1 − θ_min: it does not fall further as λ does
 AGILE = 4  # times λ_0
 STEP_BACK = 4  # levels, when the mean error is large
 THRESHOLD_BITS = 16  # of the threshold of the mean error, that count
-MOST_EXTRA_BITS = 12
+MOST_EXTRA_BITS = 9
 LEAST_TICK_BITS = 8  # a tick has more than 2^8 clocks, as the program does
 GROWTH = 10  # λ falls by its e-th part in so many of its time constants
 
@@ -50,7 +54,8 @@ class Tracking:
         θ_min at λ_0.
     edge_error : Fraction, counts
         E.
-    growing : bool
+    agile, growing : bool
+        Whether a large error is corrected with four times the bandwidth.
         Whether λ falls to λ_0/10 while the errors are small.
     velocity_bits, fine_bits : int
         Fraction bits of the velocity in counts per tick, and of the position.
@@ -65,6 +70,7 @@ class Tracking:
     bandwidth: Fraction
     least_memory: Fraction
     edge_error: Fraction
+    agile: bool
     growing: bool
     velocity_bits: int
     fine_bits: int
@@ -110,10 +116,10 @@ class Tracking:
         u = float(self.unit_ticks)
         finest = 0
         for m, d in self._gains():
-            error = m / (d * d * u) * (1 + m / (d * u) / 2 ** (self.extra_bits + 1))  # of p, in 2^−F
-            velocity = 3 * d / m * error + 3 / (d * u) + 2
+            error = m / (d * d * u) / 2 * (1 + m / (d * u) / 2**self.extra_bits)  # of p, in 2^−F
+            velocity = 3 * d / m * error + 1.5 / (d * u) + 1
             bits = (self.velocity_bits + math.log2(velocity), self.fine_bits + math.log2(error + 1))
-            finest = max(finest, *(2 + math.ceil(each) for each in bits))
+            finest = max(finest, *(1 + math.ceil(each) for each in bits))
         return finest
 
     @property
@@ -135,8 +141,8 @@ class Tracking:
 
     @property
     def max_acceleration(self) -> int:
-        """Greatest |a|, in 2^−(F + S) counts per U²: a quarter of the greatest speed within U."""
-        return (self.max_velocity << self.extra_bits) >> 2
+        """Greatest |a|, in 2^−(F + S) counts per U²: an eighth of the greatest speed within U."""
+        return (self.max_velocity << self.extra_bits) >> 3
 
     @property
     def max_error(self) -> int:
@@ -198,12 +204,21 @@ class Tracking:
     @cached_property
     def width(self) -> int:
         """W: bits of a word."""
-        counts = self.max_count
-        moved = self._moved
+        counts, moved = self.max_count, self._moved
+        # The greatest d²·U/gap and d³·(U/gap)², which are those of the greatest x.
+        rate = (AGILE if self.agile else 1) * self.rate(0) * (1 << self.unit_bits)
+        d = 1 - math.exp(-self.most(0))
+        of_v, of_a = rate * d**2 / self.most(0), rate**2 * d**3 / self.most(0) ** 2
         greatest = max(
             counts * (counts + moved),  # the sum over the counts of a tick
-            self.max_velocity / 2**self.frac_bits * 1.5,  # before it is held within its limit
-            self.max_acceleration / 2**self.frac_bits + self.max_error * 2**self.extra_bits,
+            # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
+            self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
+            # What is multiplied: on its way to a product the adder holds nearly twice as much.
+            2 * self.max_error * of_v * 2**self.extra_bits,  # h
+            2 * self.max_acceleration / 2**self.frac_bits,
+            2 * self.max_velocity / 2**self.frac_bits * max(1.125, 2 ** (self.times_bits - 1 - self.unit_bits)),
+            4 * self.max_error,  # e less its mean
+            self.max_acceleration / 2**self.frac_bits + self.max_error * of_a * 2**self.extra_bits,
             2 * self.max_error + 2 * moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
         )

@@ -135,8 +135,6 @@ class Program:
     Parameters
     ----------
     form : Tracking
-    agile : bool
-        Whether a large error is corrected with four times the bandwidth.
     acceleration_factor : Fraction
         LSBs of the output in one of a.
     delay : int
@@ -145,7 +143,6 @@ class Program:
     """
 
     form: Tracking
-    agile: bool
     acceleration_factor: Fraction
     delay: int
 
@@ -235,8 +232,8 @@ class Program:
     def _within(most: str) -> list[Step]:
         """ac = ac, held within ±most."""
         return [
-            *(Do(Op.SUB, most), Do(Op.NEGATIVE), *[Do(Op.ADD, most)] * 2),
-            *(Do(Op.POSITIVE), Do(Op.SUB, most)),
+            *(Do(Op.KEEP, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most)),
+            *(Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t")),
         ]
 
     @property
@@ -330,7 +327,7 @@ class Program:
     @property
     def _is_agile(self) -> list[Step]:
         """flag = |e| > 2·E, or |e| > E and the error before, of the same sign, is greater than E/4."""
-        if not self.agile:
+        if not self.form.agile:
             return [_ZERO, Do(Op.SUB, "lsb"), Do(Op.TEST)]
         return [
             *(Do(Op.LOAD_SIGNED, "e"), Do(Op.SUB, "error"), Do(Op.TEST)),
@@ -339,17 +336,10 @@ class Program:
             *(Do(Op.LOAD, "e"), Do(Op.STORE, "before")),
         ]
 
-    @property
-    def _reach(self) -> list[Step]:
-        """x = min(λ·m·T_s, most), with four times the bandwidth if `flag`."""
-
-        def reach(rate: str, most: str) -> list[Step]:
-            least = [Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most)]
-            return [*self._times("gap", rate, self.form.gap_bits - 1), *least]
-
-        usual = reach("rate", "most_x") if self.form.growing else reach("rate0", "most_x0")
-        choice = Choice(Condition.FLAG, reach("agile_rate", "most_x0"), usual)
-        return [*([choice] if self.agile else usual), Do(Op.STORE, "x")]
+    def _reach(self, rate: str, most: str) -> list[Step]:
+        """ac = x = min(λ·m·T_s, most)."""
+        least = [Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most)]
+        return [*self._times("gap", rate, self.form.gap_bits - 1), *least]
 
     @property
     def _remember(self) -> list[Step]:
@@ -357,7 +347,14 @@ class Program:
         f = self.form.frac_bits
         trouble: list[Step] = [Do(Op.LOAD, "mean"), Do(Op.SHIFT, steps=1), Do(Op.STORE, "mean"), _ZERO]
         return [
-            *(Do(Op.SHIFT, steps=2), Do(Op.STORE, "h"), Do(Op.LOAD, "e"), Do(Op.SUB, "mean"), Do(Op.STORE, "t")),
+            *(
+                *self._reach("rate", "most_x"),
+                Do(Op.SHIFT, steps=2),
+                Do(Op.STORE, "h"),
+                Do(Op.LOAD, "e"),
+                Do(Op.SUB, "mean"),
+                Do(Op.STORE, "t"),
+            ),
             *(*self._times("h", "t", f), Do(Op.ADD, "mean"), Do(Op.KEEP, "mean")),
             *(Do(Op.LOAD_SIGNED, "mean"), Do(Op.SUB, "one"), Do(Op.NEGATIVE), Do(Op.ADD, "one"), Do(Op.STORE, "t")),
             *(Do(Op.TO_MQ), Do(Op.MUL, "t", f + 1), Do(Op.STORE, "t")),
@@ -388,8 +385,12 @@ class Program:
     def _gains(self) -> list[Step]:
         """d = 1 − e^−x = x/(1 + x/2 + x²/12) = 3x/((x + 3)²/4 + 3/4), and r = d·U/gap."""
         form = self.form
+        usual = self._reach("rate", "most_x") if form.growing else self._reach("rate0", "most_x0")
+        reach: list[Step] = usual
+        if form.agile:
+            reach = [Choice(Condition.FLAG, self._reach("agile_rate", "most_x0"), usual)]
         return [
-            *(Do(Op.LOAD, "x"), Do(Op.ADD, "three"), Do(Op.STORE, "t"), Do(Op.TO_MQ)),
+            *(*reach, Do(Op.STORE, "x"), Do(Op.ADD, "three"), Do(Op.STORE, "t"), Do(Op.TO_MQ)),
             *(
                 Do(Op.MUL, "t", form.frac_bits + 3),
                 Do(Op.ADD, "three_quarters"),
@@ -428,7 +429,7 @@ class Program:
             Choice(
                 Condition.NEGATIVE,
                 [
-                    *(*self._is_agile, *self._reach, *(self._remember if self.form.growing else [])),
+                    *(*self._is_agile, *(self._remember if self.form.growing else [])),
                     *(*self._gains, *self._correct),
                 ],
                 self._rest,

@@ -80,7 +80,7 @@ class TrackTachometer(TachometerSpec):
     )
     agile: bool = option(True, "Follow counts that are off by more than --edge-error with four times the bandwidth.")
     growing_memory: bool = option(True, "Let the bandwidth fall to a tenth while the counts come where expected.")
-    fine_bits: int = option(8, "Fraction bits of position_fine, 1 to 16.", metavar="N", tests=("", "1", "16"))
+    fine_bits: int = option(6, "Fraction bits of position_fine, 1 to 16.", metavar="N", tests=("", "1", "16"))
 
     method = "track"
     title = "Tracking"
@@ -135,6 +135,7 @@ class TrackTachometer(TachometerSpec):
             bandwidth=self.bandwidth,
             least_memory=self.least_memory,
             edge_error=self.edge_error,
+            agile=self.agile,
             growing=self.growing_memory,
             velocity_bits=self.native_frac_bits,
             fine_bits=self.fine_bits,
@@ -146,7 +147,7 @@ class TrackTachometer(TachometerSpec):
         form = self.form
         per_lsb = self._acceleration_per_count / (form.unit_ticks**2 * (1 << (form.frac_bits + form.extra_bits)))
         delay = self.pin_to_count + self.tick_latency + FETCH_CLOCKS + self.low_pass_latency + self.output_latency
-        return Program(form, self.agile, Fraction(2) ** self.acceleration_frac_bits * per_lsb, delay)
+        return Program(form, Fraction(2) ** self.acceleration_frac_bits * per_lsb, delay)
 
     @property
     def _acceleration_per_count(self) -> Fraction:
@@ -205,6 +206,14 @@ class TrackTachometer(TachometerSpec):
             },
             "position_fine": {"frac_bits": self.fine_bits},
         }
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        disc = (
+            f"--edge-error {float(self.edge_error):.4g} suits a disc whose (phase error + duty error)/180 °e + "
+            f"nonuniformity + 3 x jitter is no more"
+        )
+        return (*super().notes, disc)
 
     @property
     def standstill_ticks(self) -> int:

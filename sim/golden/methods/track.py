@@ -171,10 +171,9 @@ class Recursion:
         )
         if self._spec.agile:
             self.before = e
-        rate = form.agile_rate if agile else form.rates[self.level]
-        x = min(rounded(rate * self.gap, form.gap_bits - 1), form.most_x[0 if agile else self.level])
         if form.growing:
-            self._remember(e, x >> 2, agile)
+            self._remember(e, agile)
+        x = self._reach(form.agile_rate, form.most_x[0]) if agile else self._level_reach
         one, bits = form.fixed(1), form.gain_bits
         d = (3 * x << bits) // (rounded((x + 3 * one) ** 2, form.frac_bits + 2) + (3 * one >> 2))
         r = (d << form.unit_bits) // self.gap
@@ -188,9 +187,18 @@ class Recursion:
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
 
-    def _remember(self, e: int, share: int, agile: bool) -> None:
-        """The mean error, and what follows for λ at the next count."""
-        form = self._form
+    def _reach(self, rate: int, most: int) -> int:
+        """x = λ·m·T_s, at most so much."""
+        return min(rounded(rate * self.gap, self._form.gap_bits - 1), most)
+
+    @property
+    def _level_reach(self) -> int:
+        """x of the level."""
+        return self._reach(self._form.rates[self.level], self._form.most_x[self.level])
+
+    def _remember(self, e: int, agile: bool) -> None:
+        """The mean error, and what follows for λ."""
+        form, share = self._form, self._level_reach >> 2
         self.mean += rounded((e - self.mean) * share, form.frac_bits)
         size = min(abs(self.mean), form.fixed(1))
         limit = rounded(share * form.mean_threshold, form.mean_threshold_bits)

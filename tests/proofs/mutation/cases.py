@@ -118,6 +118,8 @@ def _case(
 
 _FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_reset": True}
 
+_TRACK: dict[str, Any] = {"bandwidth": Fraction(6), "fine_bits": 1}
+
 # Ticks of an odd number of clocks: inverters in a loop would cancel over an even one.
 CASES = [
     _case("s", "table", 3, 6, 1, 340, age=True),
@@ -141,4 +143,19 @@ CASES = [
     _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),
     _case("rairan", "n2", 5, 6, 2, 340, estimate="n2", **_FRONT),
     _case("rairan", "to the letter", 3, 6, 2, 340, estimate="n1", paper_exact=True),
+    _case("track", "growing memory", 711, 6, 2, 340, age=True, **_TRACK),
+    _case("track", "constant memory", 1101, 5, 2, 340, growing_memory=False, max_tick_cycles=1203, **_TRACK),
+    _case(
+        "track",
+        "not agile, low pass",
+        611,
+        4,
+        3,
+        340,
+        agile=False,
+        growing_memory=False,
+        lowpass=Fraction(1, 2),
+        **_FRONT,
+        **_TRACK,
+    ),
 ]
