@@ -104,7 +104,7 @@ COLUMNS = _Columns()
 
 def _column(about: Option) -> str:
     """Name of the column of a method's option; clocks are shown as seconds."""
-    return f"{about.field}_s" if about.unit == "clocks" else about.field
+    return about.field + {"clocks": "_s", "rad/s": "_rad_s"}.get(about.unit, "")
 
 
 def _content(about: Option) -> tuple[str, str]:
@@ -285,6 +285,8 @@ def _core(spec: TachometerSpec) -> Row:
     own = {}
     for about in own_options(spec.method):
         value = spec.parameters[about.field]
+        if about.unit == "rad/s":
+            value = float(getattr(spec, about.field))
         own[_column(about)] = seconds(value) if about.unit == "clocks" else value
     return {
         "ppr": spec.encoder.pulses_per_rev,
