@@ -170,7 +170,7 @@ class TrackMachine(wiring.Component):
             m.d.sync += [held.eq(fetched & valid), active.eq(held & valid)]
         with m.Else():
             m.d.sync += now.more.eq(now.more - 1)
-        with m.If(stop | (~fetched & ~self.begin)):  # at rest it is at the first instruction
+        with m.If(stop | (~fetched & ~self.begin)):  # at rest, and at once, it is at the first instruction
             m.d.sync += pc.eq(0)
         with m.Elif(done):
             m.d.sync += pc.eq(place + 1)
@@ -194,7 +194,7 @@ class TrackMachine(wiring.Component):
         ac, mq = Signal(width, reset_less=True), Signal(form.width, reset_less=True)
         negative, flag, sign = ac[-1], Signal(), Signal()
         left, right, total = Signal(width), Signal(width), Signal(width)
-        minus, carry = Signal(), Signal()
+        minus = Signal()
         # Nested as it is, it takes two cells a bit.
         low, high = now.left[0], now.left[1]
         shifted, kept = Mux(low, mq.as_signed(), Cat(mq[-1], ac)[: form.width].as_signed()), Mux(low, ac >> 1, ac)
@@ -202,9 +202,8 @@ class TrackMachine(wiring.Component):
         m.d.comb += [
             minus.eq(now.subtract | (now.by_sign & sign) | (now.divide & ~negative)),
             right.eq(Mux(now.multiply & ~mq[0], 0, x) ^ minus.replicate(form.width)),
-            # The last bit that leaves a product rounds it. The carry comes from an additional bit at the adder's end.
-            carry.eq(Mux(now.multiply, done & ac[0], minus)),
-            total.eq((Cat(1, left).as_signed() + Cat(carry, right).as_signed()) >> 1),
+            # The carry into the adder comes from an additional bit at its end.
+            total.eq((Cat(1, left).as_signed() + Cat(minus, right).as_signed()) >> 1),
         ]
         work = Signal()
         m.d.comb += work.eq(active)
@@ -226,21 +225,21 @@ class TrackMachine(wiring.Component):
         with m.If(work & now.keep):
             m.d.sync += sign.eq(negative)
         phase = Signal(Phase)
-        with m.If(work), m.Switch(now.special):
-            with m.Case(Special.TEST):
-                m.d.sync += flag.eq(~negative)
-            with m.Case(Special.TEST_AND):
-                m.d.sync += flag.eq(flag & ~negative)
-            with m.Case(Special.TEST_OR):
-                m.d.sync += flag.eq(flag | ~negative)
-            with m.Case(Special.JUMP):
-                m.d.comb += taken.eq(self._holds(Cat(now.left, now.by_sign), negative, flag, phase))
-            with m.Case(Special.LEVEL):
-                m.d.sync += level.eq(self._next_level(now.address, level))
-            with m.Case(Special.PHASE):
-                m.d.sync += phase.eq(now.address)
-            with m.Case(Special.OUT):
-                m.d.comb += stop.eq(1)
+        special = Mux(work, now.special, Special.NONE)
+        with m.If(special == Special.TEST):
+            m.d.sync += flag.eq(~negative)
+        with m.Elif(special == Special.TEST_AND):
+            m.d.sync += flag.eq(flag & ~negative)
+        with m.Elif(special == Special.TEST_OR):
+            m.d.sync += flag.eq(flag | ~negative)
+        with m.Elif(special == Special.JUMP):
+            m.d.comb += taken.eq(self._holds(Cat(now.left, now.by_sign), negative, flag, phase))
+        with m.Elif(special == Special.LEVEL):
+            m.d.sync += level.eq(self._next_level(now.address, level))
+        with m.Elif(special == Special.PHASE):
+            m.d.sync += phase.eq(now.address)
+        with m.Elif(special == Special.OUT):
+            m.d.comb += stop.eq(1)
         m.d.comb += [
             self.tracks.eq(phase == Phase.TRACKS),
             self.out.eq(stop),
