@@ -170,7 +170,7 @@ class TrackMachine(wiring.Component):
             m.d.sync += [held.eq(fetched & valid), active.eq(held & valid)]
         with m.Else():
             m.d.sync += now.more.eq(now.more - 1)
-        with m.If(stop | (~fetched & ~self.begin)):  # at rest, and at once, it is at the first instruction
+        with m.If(stop | (~fetched & ~self.begin)):  # at rest it is at the first instruction
             m.d.sync += pc.eq(0)
         with m.Elif(done):
             m.d.sync += pc.eq(place + 1)
@@ -194,7 +194,7 @@ class TrackMachine(wiring.Component):
         ac, mq = Signal(width, reset_less=True), Signal(form.width, reset_less=True)
         negative, flag, sign = ac[-1], Signal(), Signal()
         left, right, total = Signal(width), Signal(width), Signal(width)
-        minus = Signal()
+        minus, carry = Signal(), Signal()
         # Nested as it is, it takes two cells a bit.
         low, high = now.left[0], now.left[1]
         shifted, kept = Mux(low, mq.as_signed(), Cat(mq[-1], ac)[: form.width].as_signed()), Mux(low, ac >> 1, ac)
@@ -202,8 +202,9 @@ class TrackMachine(wiring.Component):
         m.d.comb += [
             minus.eq(now.subtract | (now.by_sign & sign) | (now.divide & ~negative)),
             right.eq(Mux(now.multiply & ~mq[0], 0, x) ^ minus.replicate(form.width)),
-            # The carry into the adder comes from an additional bit at its end.
-            total.eq((Cat(1, left).as_signed() + Cat(minus, right).as_signed()) >> 1),
+            # The last bit that leaves a product rounds it. The carry comes from an additional bit at the adder's end.
+            carry.eq(Mux(now.multiply, done & ac[0], minus)),
+            total.eq((Cat(1, left).as_signed() + Cat(carry, right).as_signed()) >> 1),
         ]
         work = Signal()
         m.d.comb += work.eq(active)
