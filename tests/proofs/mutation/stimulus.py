@@ -47,7 +47,7 @@ def noise_lines(
 def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20) -> PinTrace:
     """Such lines."""
     cycles = spec.timing.tick_cycles
-    factor = 1 if cycles <= _LONG else 10 / cycles
+    factor = 1 if cycles <= _LONG else float(rng.choice([1, 10 / cycles, 10 / cycles, 30 / cycles]))
     return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts, factor))
 
 
