@@ -7,7 +7,8 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from support.lockstep import EVENTS, lockstep
+from support.events import EVENTS
+from support.lockstep import lockstep
 
 from tachometry.sim.engines.pysim import PySim
 from tachometry.spec import METHODS
