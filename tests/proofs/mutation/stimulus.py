@@ -47,7 +47,7 @@ def noise_lines(
 def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20) -> PinTrace:
     """Such lines."""
     cycles = spec.timing.tick_cycles
-    factor = 1 if cycles <= _LONG else 10 / cycles
+    factor = 1 if cycles <= _LONG else float(rng.choice([1, 10 / cycles, 10 / cycles, 30 / cycles]))
     return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts, factor))
 
 
@@ -101,7 +101,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
     shaken = False
     n_clocks *= 1 if spec.timing.tick_cycles <= _LONG else 10
     longest = spec.longest_tick * spec.timing.max_ticks
-    n_silences = 40 if spec.timing.tick_cycles <= _LONG else 10
+    n_silences, noises = (40, (1,)) if spec.timing.tick_cycles <= _LONG else (10, (1, 3, 6))
     while done < n_clocks:
         if done > n_clocks // 4 and not shaken:
             trace, shaken = rattle(spec, rng), True
@@ -109,7 +109,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
             trace = stress(
                 spec, int(rng.integers(1 << 30)), _EDGES if spec.timing.tick_cycles <= _LONG else _EDGES // 3
             )
-        elif len(traces) % 8 == 1:
+        elif len(traces) % 8 in noises:
             trace = noise(spec, rng, n_silences * longest)
         elif len(traces) % 8 == 2:
             trace = bursts(spec, rng)
