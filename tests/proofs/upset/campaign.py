@@ -32,10 +32,13 @@ _OF_POSITION = ("position", "index_position", "swallowed_edges")
 
 def spec_of(method: str) -> TachometerSpec:
     """A core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends."""
-    timing, bounds = Timing(5_000_000, TICK_CYCLES, MAX_TICKS), METHODS[method].has_bounds
-    return METHODS[method](
-        **{"encoder": Encoder(500, 4), "timing": timing, "age": True, "bounds": bounds} | _OPTIONS.get(method, {})
-    )
+    options: dict[str, Any] = {
+        "encoder": Encoder(500, 4),
+        "timing": Timing(5_000_000, TICK_CYCLES, MAX_TICKS),
+        "age": True,
+        "bounds": METHODS[method].has_bounds,
+    }
+    return METHODS[method](**options | _OPTIONS.get(method, {}))
 
 
 def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
