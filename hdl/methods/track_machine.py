@@ -226,21 +226,21 @@ class TrackMachine(wiring.Component):
         with m.If(work & now.keep):
             m.d.sync += sign.eq(negative)
         phase = Signal(Phase)
-        with m.If(work), m.Switch(now.special):
-            with m.Case(Special.TEST):
-                m.d.sync += flag.eq(~negative)
-            with m.Case(Special.TEST_AND):
-                m.d.sync += flag.eq(flag & ~negative)
-            with m.Case(Special.TEST_OR):
-                m.d.sync += flag.eq(flag | ~negative)
-            with m.Case(Special.JUMP):
-                m.d.comb += taken.eq(self._holds(Cat(now.left, now.by_sign), negative, flag, phase))
-            with m.Case(Special.LEVEL):
-                m.d.sync += level.eq(self._next_level(now.address, level))
-            with m.Case(Special.PHASE):
-                m.d.sync += phase.eq(now.address)
-            with m.Case(Special.OUT):
-                m.d.comb += stop.eq(1)
+        special = Mux(work, now.special, Special.NONE)
+        with m.If(special == Special.TEST):
+            m.d.sync += flag.eq(~negative)
+        with m.Elif(special == Special.TEST_AND):
+            m.d.sync += flag.eq(flag & ~negative)
+        with m.Elif(special == Special.TEST_OR):
+            m.d.sync += flag.eq(flag | ~negative)
+        with m.Elif(special == Special.JUMP):
+            m.d.comb += taken.eq(self._holds(Cat(now.left, now.by_sign), negative, flag, phase))
+        with m.Elif(special == Special.LEVEL):
+            m.d.sync += level.eq(self._next_level(now.address, level))
+        with m.Elif(special == Special.PHASE):
+            m.d.sync += phase.eq(now.address)
+        with m.Elif(special == Special.OUT):
+            m.d.comb += stop.eq(1)
         m.d.comb += [
             self.tracks.eq(phase == Phase.TRACKS),
             self.out.eq(stop),

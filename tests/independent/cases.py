@@ -111,13 +111,14 @@ CASES = [
     ),
     _case(
         "track_rad",
-        "tick=1100 max-time=11000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes fine-bits=1 bandwidth=50Hz",
+        "tick=1100 max-time=11000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes fine-bits=1 bandwidth=50Hz "
+        "least-memory=0.95 growing-memory=no",
         120_000,
     ),
     _case(
         "track_rev",
         "tick=1500 max-time=6000 unit=rev/s lsb=2^-10 velocity-width=12 external-tick=yes max-tick-period=2000 "
-        "fine-bits=16 least-memory=0.95 bandwidth=0.2kHz growing-memory=no",
+        "fine-bits=16 bandwidth=0.2kHz growing-memory=no",
         120_000,
         seed="track_rev1",  # with a speed that does not fit, and a rest
     ),

@@ -210,7 +210,7 @@ class Settings:
     @cached_property
     def fine_bits(self) -> int:
         """Fraction bits of `position_fine`."""
-        return self._whole("fine-bits", 8)
+        return self._whole("fine-bits", 6)
 
     @cached_property
     def average(self) -> int:

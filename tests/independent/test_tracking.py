@@ -19,8 +19,10 @@ from independent.stimulus import Lines, steady
 
 TRACKING = [case for case in CASES if case.settings.method == "track"]
 FIRST = 5  # ticks before the motion
-PART = 400  # ticks of each part of it, in which all that was before is forgotten
+PART = 800  # ticks of each part of it, in which all that was before is forgotten
 SETTLED = 100  # of these, those in which it is
+# Clocks from an edge to the next: slow and fast, within the greatest speed and the bits of the velocity.
+SPEEDS = {"track_rpm": (3001, 500), "track_rev": (625, 260)}
 
 
 def ramp(at: int, begin: Fraction, end: Fraction, clocks: int) -> list[tuple[int, int]]:
@@ -149,7 +151,7 @@ def test_a_known_motion(case: Case, generated: Callable[..., Path]) -> None:
     settings = case.settings
     folder = generated(case.name, "--method", "track", *arguments(settings.words))
     manifest = json.loads((folder / f"{case.name}.json").read_text())
-    motion = Motion(settings, *((625, 260) if settings.max_speed is None else (3001, 500)))
+    motion = Motion(settings, *SPEEDS.get(case.name, (625, 157)))
     motion.play(folder, manifest)
     for part in (0, 2, 3):
         check_steady(motion, part)

@@ -33,7 +33,7 @@ def check_tracking(
     for tick, update, row in zip(ticks, updates, rows, strict=False):
         assert row["interval"] == update.interval, (update, row)
         assert row["forced"] == update.forced, (update, row)
-        most = min(limit_of(settings), settings.max_velocity * settings.lsb_per_count + 1)
+        most = min(limit_of(settings), float(settings.max_velocity * settings.lsb_per_count) + 1)
         assert abs(row["velocity"]) <= most, row
         bits = settings.position_bits + settings.fine_bits
         off = wrapped(row["position_fine"] - tick.position * one, bits)

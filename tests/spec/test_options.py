@@ -42,9 +42,9 @@ def test_defaults_are_those_of_python(method: str) -> None:
     assert of_texts(method, texts) == made(encoder=Encoder(20), timing=coarse, unit="rpm")
     assert of_texts(method, texts).frac_bits < 10  # as many as there can be
     if not made.own_ticks:
-        external = of_texts(method, PPR | {"external-tick": "yes", "clock": "10MHz"})
-        assert external == made(encoder=Encoder(500), timing=Timing(10_000_000), max_tick_cycles=TWO_TICKS)
-        assert external.max_tick_cycles == 400
+        external = of_texts(method, PPR | {"external-tick": "yes", "clock": "50MHz"})
+        assert external == made(encoder=Encoder(500), timing=Timing(50_000_000), max_tick_cycles=TWO_TICKS)
+        assert external.max_tick_cycles == 2000
 
 
 def test_every_option_does_what_it_says() -> None:
