@@ -60,8 +60,11 @@ class TickCounts(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         form = self._form
-        number, times, places = (Signal.like(port) for port in (self.number, self.times, self.places))
-        alone, fresh = Signal(init=1), Signal()
+        number = Signal.like(self.number, name="open_number")
+        times = Signal.like(self.times, name="open_times")
+        places = Signal.like(self.places, name="open_places")
+        alone = Signal(init=1)
+        fresh = Signal()
         counts, backward = self.step.any(), self.step[-1]
         m.d.sync += fresh.eq(self.tick)
         # A count that replaces those before it, or the beginning of a tick.
@@ -91,7 +94,7 @@ class TickCounts(wiring.Component):
             ]
         m.d.comb += self.quiet.eq(quiet)
         if form.external:
-            length = Signal.like(self.length, init=1)
+            length = Signal.like(self.length, name="open_length", init=1)
             m.d.sync += length.eq(length + 1)
             with m.If(self.tick):
                 m.d.sync += [self.length.eq(length), length.eq(1)]

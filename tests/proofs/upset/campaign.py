@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 from unittest.mock import patch
 
@@ -18,17 +19,26 @@ TICK_CYCLES, MAX_TICKS = 100, 20
 _OPTIONS: dict[str, dict[str, Any]] = {
     "m": {"average": 10},
     # A tick in which the program has room, and few of them to a rest.
-    "track": {"timing": Timing(35_000_000, 700, 8), "frac_bits": 8, "max_speed": Speed.parse("500rad/s")},
+    "track": {
+        "timing": Timing(35_000_000, 700, 6),
+        "frac_bits": 6,
+        "bandwidth": Fraction(5000),
+        "max_speed": Speed.parse("500rad/s"),
+    },
 }
+_CYCLES = {"track": 12}  # of a motion; others have 40
 _OF_POSITION = ("position", "index_position", "swallowed_edges")
 
 
 def spec_of(method: str) -> TachometerSpec:
     """A core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends."""
-    timing, bounds = Timing(5_000_000, TICK_CYCLES, MAX_TICKS), METHODS[method].has_bounds
-    return METHODS[method](
-        **{"encoder": Encoder(500, 4), "timing": timing, "age": True, "bounds": bounds} | _OPTIONS.get(method, {})
-    )
+    options: dict[str, Any] = {
+        "encoder": Encoder(500, 4),
+        "timing": Timing(5_000_000, TICK_CYCLES, MAX_TICKS),
+        "age": True,
+        "bounds": METHODS[method].has_bounds,
+    }
+    return METHODS[method](**options | _OPTIONS.get(method, {}))
 
 
 def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
@@ -143,13 +153,20 @@ def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> 
     return np.append(last, trace.n_clocks)[found] + rest + spec.tick_to_velocity - clock
 
 
-def upsets(method: str, n: int, seed: int = 1, n_cycles: int = 40) -> Campaign:
+def _forgive(shown: NDArray[np.int64], right: NDArray[np.int64], column: int, fine_bits: int) -> None:
+    """Whole counts by which the fine position is off, as the position is, until the next reset."""
+    off = shown[-1, column] - right[-1, column]
+    if off % (1 << fine_bits) == 0:
+        shown[:, column] -= off
+
+
+def upsets(method: str, n: int, seed: int = 1) -> Campaign:
     """Flip every bit as often as any other, at random clocks, `n` times in all, and see how long that is seen.
 
     Right are the outputs that the golden model gives for these pins with the core's own ticks.
     """
     spec = spec_of(method)
-    trace = motion(spec, n_cycles, seed)
+    trace = motion(spec, _CYCLES.get(method, 40), seed)
     core = Upsettable(spec, trace)
     rng = np.random.default_rng(seed)
     end = allowed(spec, trace, np.arange(trace.n_clocks))
@@ -170,7 +187,10 @@ def upsets(method: str, n: int, seed: int = 1, n_cycles: int = 40) -> Campaign:
             phase = int(own % spec.timing.tick_cycles)
         if phase not in expected:
             expected[phase] = _expected(spec, trace, phase)
-        wrong = np.flatnonzero((shown != expected[phase][clock[number] : clock[number] + length]).any(axis=1))
+        right = expected[phase][clock[number] : clock[number] + length]
+        if "position_fine" in _compared(spec):
+            _forgive(shown, right, _compared(spec).index("position_fine"), spec.parameters["fine_bits"])
+        wrong = np.flatnonzero((shown != right).any(axis=1))
         clocks[number] = wrong[-1] + 1 if len(wrong) else 0
     return Campaign(spec, core.bits, bit, clocks, end[clock])
 
