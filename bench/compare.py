@@ -131,8 +131,8 @@ for bit, and float models of what other projects use and of estimators in the li
 
 **When to use what**, according to the tables below:
 
-- *Tracking* (`--method track`): use it where its tick and its area are to be had. It has the least error of the cores in
-  nearly all situations, with one setting, and it says the acceleration and the position between counts. It needs a
+- *Tracking* (`--method track`): use it where its tick and its area are to be had. It has the least error of the cores
+  in nearly all situations, with one setting, and it says the acceleration and the position between counts. It needs a
   timer, two block RAMs and ticks of about 800 clocks. With a bad disc, tell it so (`--edge-error 0.6`): with the
   default it takes the disc's errors for changes of the speed.
 - *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 16 µs, down to a clock; it is the
@@ -155,9 +155,10 @@ for bit, and float models of what other projects use and of estimators in the li
   times worse on a ramp and at speed with a real disc.
 
 Where another one beats tracking that is set for all situations: least squares tuned per row, as said; Kalman filters
-tuned per row for sines, a bad disc and an ideal trapezoid; loops and filters tuned for slow constant speeds, where 50 ms
-of delay cost nothing; ODrive's loop on an ideal slow sine, 0.11 against 0.13 rad/s; FOAW and LinuxCNC's timestamps on a
-sudden stop, 0.76 and 0.81 against 0.84; M/T and LinuxCNC's timestamps on an ideal trapezoid, 0.49 and 0.55 against 0.63.
+tuned per row for sines, a bad disc and an ideal trapezoid; loops and filters tuned for slow constant speeds, where 50
+ms of delay cost nothing; ODrive's loop on an ideal slow sine, 0.11 against 0.13 rad/s; FOAW and LinuxCNC's timestamps on a
+sudden stop, 0.76 and 0.81 against 0.84; M/T and LinuxCNC's timestamps on an ideal trapezoid, 0.49 and 0.55 against
+0.63.
 
 Without `--method`, `generate` makes S all the same: it is the only one that every clock, tick and option suits, so what
 is generated does not depend on whether a tick is long enough.

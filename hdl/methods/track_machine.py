@@ -8,17 +8,8 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.spec.formats.tracking import LEVELS, STEP_BACK, Tracking
-from tachometry.spec.formats.tracking_program import (
-    MAX_STEPS,
-    STATES,
-    TABLES,
-    Condition,
-    Input,
-    Instruction,
-    Op,
-    Phase,
-    Program,
-)
+from tachometry.spec.formats.tracking_code import MAX_STEPS, Condition, Input, Instruction, Op, Phase
+from tachometry.spec.formats.tracking_program import STATES, TABLES, Program
 
 
 class Left(IntEnum):
@@ -97,7 +88,7 @@ def _word(layout: data.StructLayout, code: Instruction) -> int:
 
 
 class TrackMachine(wiring.Component):
-    """Runs the program once for every tick; `spec.formats.tracking_program` says what each operation does.
+    """Runs the program once for every tick; `spec.formats.tracking_code` says what each operation does.
 
     While an instruction is executed, the word of the next one has been read, that of the one behind is being read, and
     a fourth one is fetched.

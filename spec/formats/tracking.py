@@ -10,8 +10,8 @@ both go one way with each count, a keeps still only where a constant deviation e
 
     |e| ≤ 2^−F/2 · m/(d²·u) · (1 + m/(d·u·2^S))
 
-S makes the second term as small as the first. This e gives the velocity 3·d/m·|e| in counts per tick; the roundings of v
-add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at most half an LSB of the velocity, and |e| at
+S makes the second term as small as the first. This e gives the velocity 3·d/m·|e| in counts per tick; the roundings of
+v add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at most half an LSB of the velocity, and |e| at
 most half one of the fine position. They are greatest for the least λ, and either for m = 1, for the longest silence, or
 where x = λ·m·T_s has just reached its most.
 

@@ -11,18 +11,8 @@ from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.track import Windows
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import LEVELS, STEP_BACK
-from tachometry.spec.formats.tracking_program import (
-    NOT_TAKEN,
-    TABLES,
-    TAKEN,
-    Condition,
-    Input,
-    Instruction,
-    Level,
-    Op,
-    Phase,
-    Program,
-)
+from tachometry.spec.formats.tracking_code import NOT_TAKEN, TAKEN, Condition, Input, Instruction, Level, Op, Phase
+from tachometry.spec.formats.tracking_program import TABLES, Program
 
 
 @dataclass(frozen=True)
@@ -57,7 +47,7 @@ CLEARING = (Op.LOAD, Op.LOAD_SIGNED, Op.MUL, Op.DIV, Op.INPUT)
 
 
 class Interpreter:
-    """Executes a program as `spec.formats.tracking_program` says, and asserts that all it computes fits its words.
+    """Executes a program as `spec.formats.tracking_code` says, and asserts that all it computes fits its words.
 
     Parameters
     ----------

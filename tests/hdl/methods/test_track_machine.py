@@ -18,19 +18,8 @@ from tachometry.hdl.methods import track_machine
 from tachometry.sim.golden.methods.track import Windows
 from tachometry.spec import Encoder, Speed, Timing, TrackTachometer
 from tachometry.spec.formats.tracking import LEVELS
-from tachometry.spec.formats.tracking_program import (
-    STATES,
-    TABLES,
-    Choice,
-    Condition,
-    Do,
-    Instruction,
-    Level,
-    Op,
-    Phase,
-    Program,
-    Step,
-)
+from tachometry.spec.formats.tracking_code import Choice, Condition, Do, Instruction, Level, Op, Phase, Step
+from tachometry.spec.formats.tracking_program import STATES, TABLES, Program
 from tachometry.spec.methods.track import FETCH_CLOCKS
 
 ZERO = STATES  # the address of a word that is 0

@@ -9,7 +9,7 @@ from tachometry.sim.golden.methods.track import Model, Windows, rounded
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import LEVELS
-from tachometry.spec.formats.tracking_program import Phase
+from tachometry.spec.formats.tracking_code import Phase
 
 CASES, TICKS = 40, 400
 
