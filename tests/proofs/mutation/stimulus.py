@@ -108,7 +108,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         if done > n_clocks // 4 and not shaken:
             trace, shaken = rattle(spec, rng), True
         elif len(traces) % period in (0, 4):
-            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES // 3 if long else _EDGES)
+            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES // 2 if long else _EDGES)
         elif len(traces) % period in ((1, 3, 6) if long else (1,)):
             trace = noise(spec, rng, n_silences * longest)
         elif len(traces) % period == 2:
