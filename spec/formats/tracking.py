@@ -256,8 +256,8 @@ class Tracking:
         for upper, lower in pairwise(RATIOS):
             edges.append(GROWTH * (1 / math.sqrt(upper * lower) - 1) / float(self.bandwidth))
         spans = [round((end - begin) * self.clock_hz) for begin, end in pairwise(edges)]
-        longest = (1 << (self.width - 1)) - 1
-        return (*(min(span, longest - self.max_gap) for span in spans), longest)
+        longest = (1 << (self.width - 1)) - 1 - self.max_gap
+        return (*(min(span, longest) for span in spans), longest)
 
     @property
     def late_limit(self) -> int:

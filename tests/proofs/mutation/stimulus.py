@@ -99,22 +99,27 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
     starts: list[int] = []
     done = 0
     shaken = False
-    n_clocks *= 1 if spec.timing.tick_cycles <= _LONG else 10
+    long = spec.timing.tick_cycles > _LONG
+    n_clocks *= 10 if long else 1
+    period = 64 if long else 8  # with more resets between
     longest = spec.longest_tick * spec.timing.max_ticks
-    n_silences, noises = (40, (1,)) if spec.timing.tick_cycles <= _LONG else (10, (1, 3, 6))
+    n_silences = 10 if long else 40
     while done < n_clocks:
         if done > n_clocks // 4 and not shaken:
             trace, shaken = rattle(spec, rng), True
-        elif len(traces) % 8 in (0, 4):
-            trace = stress(
-                spec, int(rng.integers(1 << 30)), _EDGES if spec.timing.tick_cycles <= _LONG else _EDGES // 3
-            )
-        elif len(traces) % 8 in noises:
+        elif len(traces) % period in (0, 4):
+            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES // 2 if long else _EDGES)
+        elif len(traces) % period in ((1, 3, 6) if long else (1,)):
             trace = noise(spec, rng, n_silences * longest)
-        elif len(traces) % 8 == 2:
+        elif len(traces) % period == 2:
             trace = bursts(spec, rng)
+        elif long and len(traces) % 2:  # within a tick
+            trace = noise(spec, rng, int(rng.integers(4, 60)), 2)
         else:  # soon after a reset
             trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
+            if long:  # about when an update comes
+                update = spec.tick_latency + spec.datapath_latency + int(rng.integers(1, 4)) * spec.timing.tick_cycles
+                trace = trace.until(max(min(update + int(rng.integers(-8, 4)), trace.n_clocks), 1))
         # Some end early: the next reset comes in the middle.
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)

@@ -45,7 +45,7 @@ def test_hostile_counts(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(CASES, CASES + 20))
 def test_states_at_their_limits(seed: int) -> None:
-    """Wherever v, a and the level of λ are, whatever the counts were before."""
+    """Wherever v, a and the level of λ are and however long it has lasted, whatever the counts were before."""
     spec, *_ = random_case(seed, "track")
     assert isinstance(spec, TrackTachometer)
     rng, program = np.random.default_rng(seed), spec.program
@@ -55,4 +55,5 @@ def test_states_at_their_limits(seed: int) -> None:
             core.memory[program.address("v")] = int(rng.choice([-1, 1])) * spec.form.max_velocity
             core.memory[program.address("a")] = int(rng.choice([-1, 0, 1])) * spec.form.max_acceleration
             core.level = int(rng.integers(LEVELS)) if spec.growing_memory else 0
+            core.memory[program.address("age")] = spec.form.spans[core.level] - 1
         core.run(tick)
