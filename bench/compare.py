@@ -157,8 +157,8 @@ for bit, and float models of what other projects use and of estimators in the li
 Where another one beats tracking that is set for all situations: least squares tuned per row, as said; Kalman filters
 tuned per row for sines, a bad disc and an ideal trapezoid; loops and filters tuned for slow constant speeds, where
 50 ms of delay cost nothing; ODrive's loop on an ideal slow sine, 0.11 against 0.13 rad/s; FOAW and LinuxCNC's
-timestamps on a sudden stop, 0.76 and 0.81 against 0.84; M/T and LinuxCNC's timestamps on an ideal trapezoid, 0.49 and
-0.55 against 0.63.
+timestamps on a sudden stop, 0.76 and 0.81 against 0.89; M/T and LinuxCNC's timestamps on an ideal trapezoid, 0.49 and
+0.55 against 0.62.
 
 Without `--method`, `generate` makes S all the same: it is the only one that every clock, tick and option suits, so what
 is generated does not depend on whether a tick is long enough.
