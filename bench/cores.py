@@ -19,6 +19,7 @@ from tachometry.spec import (
     STachometer,
     TachometerSpec,
     Timing,
+    TrackTachometer,
     TTachometer,
 )
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
@@ -78,6 +79,11 @@ RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
 ADAPTIVE_BARS = {"ECP5": {"COMB": 700, "MULT": 0, "Fmax": 100}}
 TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
 EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
+TRACK_BARS = {
+    "ECP5": {"COMB": 700, "FF": 600, "DP16KD": 2, "MULT": 0, "Fmax": 100},
+    "HX8K": {"LC": 900},
+    "UP5K": {"Fmax": 24},
+}
 # The reference core, and 250 COMB and 100 FF for the bank.
 BUS_BARS = {"ECP5": {"COMB": 273 + 250, "FF": 220 + 100}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
@@ -152,6 +158,14 @@ CONFIGURATIONS = (
     Configuration(
         "mt-whole-cycles", "M/T method, whole cycles", MTTachometer(**COMMON, whole_cycles=True), is_option=False
     ),
+    Configuration(
+        "track",
+        "tracking, 1000 rad/s, 16 bits",
+        TrackTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), velocity_width=16),
+        TRACK_BARS,
+        is_option=False,
+    ),
+    Configuration("track-wide", "tracking, no max_speed", TrackTachometer(**COMMON), is_option=False),
     Configuration("t-tick", "T method, times in ticks", TTachometer(**COMMON, timer="tick"), is_option=False),
     Configuration("mt-tick", "M/T method, times in ticks", MTTachometer(**COMMON, timer="tick"), is_option=False),
     *(

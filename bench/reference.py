@@ -16,7 +16,14 @@ from tachometry.spec.registers.page import tables
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 # Cores with all ports that the methods have.
-EVERYTHING = {"ppr": "500", "index": "yes", "filter": "4", "age": "yes", "bounds": "yes", "velocity-width": "20"}
+EVERYTHING: dict[str, str | None] = {
+    "ppr": "500",
+    "index": "yes",
+    "filter": "4",
+    "age": "yes",
+    "bounds": "yes",
+    "velocity-width": "20",
+}
 EXTERNAL = {"external-tick": "yes"}
 # The core whose registers are shown: that of docs/integration.md.
 SPEED = {
@@ -197,9 +204,10 @@ def registers() -> str:
 
 def _cores(method: str) -> list[TachometerSpec]:
     """Cores that have among them every port of a method."""
-    cores = [of_texts(method, EVERYTHING)]
+    everything = EVERYTHING if METHODS[method].has_bounds else EVERYTHING | {"bounds": None}
+    cores = [of_texts(method, everything)]
     if not METHODS[method].own_ticks:
-        cores.append(of_texts(method, EVERYTHING | EXTERNAL))
+        cores.append(of_texts(method, everything | EXTERNAL))
     if method == "rairan":
         timing = Timing(1_000_000, 100, 50)
         cores.append(METHODS[method](encoder=Encoder(500), timing=timing, adaptive=Fraction(1, 100)))  # type: ignore[call-arg]

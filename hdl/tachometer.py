@@ -100,7 +100,8 @@ class Tachometer(wiring.Component):
             self.overflow.eq(pulse_counter.overflow),
         ]
         ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
-        taken = {"tick": self.tick, "pulse_count": self.pulse_count, "step_now": decoder.step, "stamp": ticks}
+        taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")}
+        taken |= {"step_now": decoder.step, "stamp": ticks}
         inputs = datapath.signature.members
         if "step" in inputs:
             # As late as `tick`: with it, all steps of the window have come.

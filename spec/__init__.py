@@ -10,6 +10,7 @@ from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.t import TTachometer
+from tachometry.spec.methods.track import TrackTachometer
 from tachometry.spec.option import Option, ParameterError, is_derived, options_of, read_options
 from tachometry.spec.parameters import TWO_TICKS
 from tachometry.spec.port import Port
@@ -19,7 +20,8 @@ from tachometry.spec.units import Speed
 
 # Every method by its name; `DATAPATHS` in hdl/ and `MODELS` in sim/golden/ hold what belongs to it.
 METHODS: dict[str, type[TachometerSpec]] = {
-    spec.method: spec for spec in (STachometer, MTachometer, TTachometer, MTTachometer, RairanTachometer)
+    spec.method: spec
+    for spec in (STachometer, MTachometer, TTachometer, MTTachometer, RairanTachometer, TrackTachometer)
 }
 
 
@@ -29,9 +31,9 @@ def common_options() -> tuple[Option, ...]:
 
 
 def own_options(method: str) -> tuple[Option, ...]:
-    """Options of a method beyond those that every method has."""
-    common = {about.name for about in common_options()}
-    return tuple(about for about in options_of(METHODS[method]) if about.name not in common)
+    """Options of a method beyond those that every method has, and those of these that it has in another way."""
+    common = common_options()
+    return tuple(about for about in options_of(METHODS[method]) if about not in common)
 
 
 def methods_with(name: str) -> list[str]:
@@ -72,8 +74,9 @@ def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
             why = f"it is for {others}" if others else "there is no such option"
             raise ParameterError(parameter, f"must not be given with method {method}: {why}")
         if (fits := known[name].fits) is not None and not fits(spec):
-            instead = next(about.name for about in known.values() if about.field == known[name].field)
-            raise ParameterError(parameter, f"must not be given with method {method}, but {instead}")
+            other = next(about.name for about in known.values() if about.field == known[name].field)
+            instead = "" if other == name else f", but {other}"
+            raise ParameterError(parameter, f"must not be given with method {method}{instead}")
     encoder, timing = Encoder(**read_options(Encoder, given)), Timing(**read_options(Timing, given))
     return spec(encoder=encoder, timing=timing, **read_options(spec, given))
 
@@ -126,6 +129,7 @@ __all__ = [
     "TTachometer",
     "TachometerSpec",
     "Timing",
+    "TrackTachometer",
     "common_options",
     "methods_with",
     "of_parameters",

@@ -81,6 +81,7 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             "full_scale": spec.full_scale * 2.0**-spec.frac_bits,
             "full_scale_rad_per_s": spec.full_scale * spec.rad_per_s_per_lsb,
         },
+        **spec.method_entries,
         "max_time_cycles": spec.max_time_cycles,
         **({} if spec.min_time_cycles is None else {"min_time_cycles": spec.min_time_cycles}),
         **({"bounds": {"none": spec.shown_absent_bound}} if spec.bounds else {}),

@@ -147,6 +147,7 @@ class Parameters:
         False,
         "Outputs velocity_lower and velocity_upper, which enclose the true mean speed over the measured window, and "
         "bounds_valid. They hold for an ideal disc and ideal lines, or within --edge-error, while no count is lost.",
+        fits=lambda spec: spec.has_bounds,
     )
     edge_error: Fraction = option(  # noqa: RUF009
         Fraction(0),

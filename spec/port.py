@@ -87,13 +87,14 @@ def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:
         held(
             *(UPDATE, "interval", spec.interval_width),
             unit=f"{spec.interval_unit_cycles} clocks",
-            help="Length of the measurement: m_s in ticks (s), the number of averaged ticks (m), timer periods (t, mt) "
-            "or Ndt1 in sampling periods dt (rairan).",
+            help="Length of the measurement: m_s in ticks (s), the number of averaged ticks (m), timer periods (t, "
+            "mt), Ndt1 in sampling periods dt (rairan), or ticks since the last one with counts (track).",
         ),
         held(
             UPDATE,
             "forced",
-            help="No count or alteration caused this update: the maximum time passed, or the velocity decayed.",
+            help="No count or alteration caused this update: the maximum time passed, the velocity decayed, or the "
+            "tick held no count (track).",
         ),
         strobe(TICK, "One clock for every sampling period."),
         held(TICK, "pulse_count", spec.count_width, signed=True, unit="counts", help="m_e, the counts of this period."),

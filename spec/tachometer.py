@@ -42,6 +42,8 @@ class TachometerSpec(Numbers):
     own_ticks: ClassVar[bool] = False
     # Whether the 0 that the maximum time forces is the last update before the next count.
     last_at_rest: ClassVar[bool] = False
+    # Whether its windows can have bounds.
+    has_bounds: ClassVar[bool] = True
     # The clock after the window completes the sum, the next saturates and registers it.
     tick_latency: ClassVar[int] = 2
     # Whether pairwise tests give all options all of their values.
@@ -63,13 +65,16 @@ class TachometerSpec(Numbers):
             raise ParameterError("filter_clocks", f"must be from 0 to 255, not {self.filter_clocks}")
         if self.index_reset and not self.index:
             raise ParameterError("index_reset", "must be given together with an index")
+        self._check_edge_error()
+        if self.lowpass is not None:
+            self._check_lowpass(self.lowpass)
+
+    def _check_edge_error(self) -> None:
         if not 0 <= self.edge_error <= 1:
             raise ParameterError("edge_error", f"must be from 0 to 1, not {float(self.edge_error):.9g}")
         if self.edge_error and not self.bounds:
             raise ParameterError("edge_error", "must be given together with bounds")
         object.__setattr__(self, "edge_error", Fraction(math.ceil(8 * self.edge_error), 8))
-        if self.lowpass is not None:
-            self._check_lowpass(self.lowpass)
 
     def _check_lowpass(self, bandwidth: Fraction) -> None:
         least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))
@@ -203,15 +208,20 @@ class TachometerSpec(Numbers):
         """
         if self.lowpass is not None:
             return None
+        # What counts the ticks of a silence may have to begin anew.
+        silence = ((1 << self.timing.max_ticks.bit_length()) + 1) * self.longest_tick
+        method = self.remembered_clocks + self.tick_to_velocity
+        return self.front_recovery_clocks + max(method, silence) + self.tick_latency
+
+    @property
+    def front_recovery_clocks(self) -> int:
+        """Clocks after which, from any state, a window begins all counts of which are right."""
         # A line that must be known anew has to hold still once more.
         held = 1 << max(self.filter_clocks - 1, 1).bit_length()
         conditioned = 2 + (held + self.filter_clocks if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
-        # What counts the ticks of a silence may have to begin anew.
-        silence = ((1 << self.timing.max_ticks.bit_length()) + 1) * self.longest_tick
-        method = self.remembered_clocks + self.tick_to_velocity
-        return conditioned + 1 + window + max(method, silence) + self.tick_latency
+        return conditioned + 1 + window
 
     @property
     def remembered_clocks(self) -> int:
@@ -222,6 +232,11 @@ class TachometerSpec(Numbers):
     def method_ports(self) -> tuple[Port, ...]:
         """Outputs that only this method has; they are new with `velocity_valid`."""
         return ()
+
+    @property
+    def method_entries(self) -> dict[str, dict[str, Any]]:
+        """Entries of the manifest that say how numbers of these outputs are read, by the names of the ports."""
+        return {}
 
     @property
     def bound_ports(self) -> tuple[Port, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,6 +84,13 @@ Examples:
 )
 @option(
     "Methods",
+    "--until",
+    metavar="TIME",
+    help="Leave out errors after this time, in s, ms, us or ns. With --from, --plot shows a part of a long capture. "
+    "[default: the end]",
+)
+@option(
+    "Methods",
     "--size",
     is_flag=True,
     help="Also measure the cores on an ECP5: COMB, FF, Fmax. It takes half a minute a core, and needs the extra "
@@ -108,6 +116,7 @@ def compare(
     capture: Path | None,
     read: Callable[[Path, TachometerSpec], Recording],
     start: str | None,
+    until: str | None,
     tune: bool,
     size: bool,
     plot: Path | None,
@@ -136,15 +145,19 @@ def compare(
     earliest = 0.0 if start is None else float(parse_time("start", start))
     if earliest < 0:
         raise ValueError(f"--from must be at least 0, not {start}")
+    latest = math.inf if until is None else float(parse_time("until", until))
+    if latest <= earliest:
+        raise ValueError(f"--until must be later than --from, {shown_time(earliest)}, not {until}")
     tick_s = float(spec.timing.tick_seconds)
     tools = _tools() if size else {}
     n_tried: dict[str, int] = {}
     with outputs:
         duration = source.recording.duration
+        end = min(duration, latest)
         if tune or tradeoff is not None:
             if source.true_speed is None:
                 raise ValueError(f"{'--tune' if tune else '--tradeoff'} must be given together with --motion")
-            judged = common_instants([], duration, tick_s, earliest)
+            judged = common_instants([], end, tick_s, earliest)
             if len(judged) < 2:
                 raise ValueError(f"{source.name} must last longer than --from, not {shown_time(duration)}")
             asked = (named, spec.encoder, make, source.recording, judged, source.true_speed)
@@ -153,12 +166,11 @@ def compare(
             if tune:
                 named, n_tried = tuned(*asked)
         curves = [setting.curve(source.recording) for setting in given(named, spec.encoder)]
-        instants = common_instants(curves, duration, tick_s, earliest)
+        instants = common_instants(curves, end, tick_s, earliest)
         if len(instants) < 2:
-            until = "" if start is None else ", and beyond --from"
-            raise ValueError(
-                f"{source.name} must last until every method has a value{until}, longer than {shown_time(duration)}"
-            )
+            beyond = "" if start is None else ", and beyond --from"
+            what = source.name if end == duration else "--until"
+            raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {shown_time(end)}")
         scores = [score(curve, duration, instants, source.true_speed) for curve in curves]
         sizes = _sizes(named, tools) if size else {}
         if path := outputs.get("--csv"):

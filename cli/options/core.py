@@ -47,7 +47,7 @@ def _made_common(declared: tuple[declaration.Option, ...]) -> tuple[click.Option
         Option(
             [f"--{about.name}", _argument(about.name)],
             group=about.group,
-            help=about.help if about.flag else about.help + _default(about),
+            help=(about.help if about.flag else about.help + _default(about)) + _otherwise(about.name),
             required=about.required,
             **_kind(about),
         )
@@ -55,11 +55,20 @@ def _made_common(declared: tuple[declaration.Option, ...]) -> tuple[click.Option
     )
 
 
+def _otherwise(name: str) -> str:
+    """What `--help` says of the methods that have a common option in another way."""
+    own = {method: about for method in METHODS for about in own_options(method) if about.name == name}
+    return "".join(f" Method {method}: {about.help}{_default(about)}" for method, about in own.items())
+
+
 def own_click_options() -> Sequence[click.Option]:
     """The options that not all methods have; without defaults, so that it is seen where they do not belong."""
     found: dict[str, dict[str, declaration.Option]] = {}
+    common = {about.name for about in common_options()}
     for method in METHODS:
         for about in own_options(method):
+            if about.name in common:  # whose help says so
+                continue
             found.setdefault(about.name, {})[method] = about
     return tuple(_made_own(name, tuple(by_method.items())) for name, by_method in found.items())
 

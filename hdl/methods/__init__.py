@@ -8,6 +8,7 @@ from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.rairan import RairanMethod
 from tachometry.hdl.methods.s import SMethod
 from tachometry.hdl.methods.t import TMethod
+from tachometry.hdl.methods.track import TrackMethod
 
 # By the name of the method.
 DATAPATHS: dict[str, Callable[..., Datapath]] = {
@@ -16,4 +17,5 @@ DATAPATHS: dict[str, Callable[..., Datapath]] = {
     "t": TMethod,
     "mt": MTMethod,
     "rairan": RairanMethod,
+    "track": TrackMethod,
 }

@@ -25,8 +25,9 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
     index-reset`, `yes edge-error 0.3`.
     """
     every = spec_class(method).pairs_all
-    found = {about.name: about.tested for about in own_options(method)}
-    found |= {about.name: about.tested if every else about.tested[: about.few] for about in common_options()}
+    common = {about.name: about.tested if every else about.tested[: about.few] for about in common_options()}
+    own = {about.name: about.tested for about in own_options(method)}
+    found = own | {name: values for name, values in common.items() if name not in own}
     known = _known(method)
     for name in [name for name in found if known[name].needs]:
         values = found.pop(name)

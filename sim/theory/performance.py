@@ -12,9 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.theory import rairan, tsuji
+from tachometry.sim.theory import rairan, tracking_filter, tsuji
 from tachometry.sim.theory.checks import Floats
-from tachometry.spec import MTachometer, MTTachometer, RairanTachometer, STachometer, TachometerSpec, TTachometer
+from tachometry.spec import (
+    MTachometer,
+    MTTachometer,
+    RairanTachometer,
+    STachometer,
+    TachometerSpec,
+    TrackTachometer,
+    TTachometer,
+)
 
 # An interval of just `max_ticks` is to be no longer for the rounding of a double.
 _SLACK = 1e-9
@@ -189,6 +197,32 @@ def _steady_shift(spec: RairanTachometer, ratio: Floats) -> NDArray[np.int64]:
     return np.where(ratio * rule.slow <= 1, 0, np.clip(doubled, 0, rule.max_shift)).astype(np.int64)
 
 
+def _of_track(spec: TrackTachometer, speed: Floats) -> Performance:
+    """The tracking method when its memory has grown: edges are known to half a clock, and errors may all be one way.
+
+    T_m is how long the past counts, 1/λ. Counts that come more seldom than this keep a weight, so it is longer there.
+    """
+    timing, form = spec.timing, spec.form
+    level = len(form.rates) - 1 if spec.growing_memory else 0
+    ratio = speed / spec.unit_velocity
+    ticks, forced = _limited(np.maximum(1 / ratio, 1), timing.max_ticks)
+    x = np.minimum(form.rate(level) * timing.tick_cycles * ticks, form.most(level))
+    worst = np.array([tracking_filter.worst_gain(each) for each in x.tolist()])
+    place = ratio / (2 * timing.tick_cycles)  # counts in half a clock
+    tick_seconds = float(timing.tick_seconds)
+    return Performance(
+        _or_forced(
+            worst * place / ticks * spec.unit_velocity,
+            forced,
+            timing.max_ticks,
+            spec.encoder.counts_per_rev,
+            tick_seconds,
+        ),
+        ticks * tick_seconds / x,
+        forced,
+    )
+
+
 def unknown(spec: TachometerSpec, speed: Floats) -> Performance:
     """For a method that has no equations here."""
     nothing = np.full(len(speed), math.nan)
@@ -202,4 +236,5 @@ PERFORMANCES: dict[str, Callable[[Any, Floats], Performance]] = {
     "t": _of_t,
     "mt": _of_mt,
     "rairan": _of_rairan,
+    "track": _of_track,
 }

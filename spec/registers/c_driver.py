@@ -106,9 +106,25 @@ static inline double NAME_in_unit(int64_t velocity) { return (double)velocity * 
 
 // A position in rad.
 static inline double NAME_rad(int64_t position) { return (double)position * PREFIX_RAD_PER_COUNT; }
-
+@MORE@
 #endif
 """
+
+# Functions for outputs that only some methods have.
+_MORE = {
+    "acceleration": """
+// An acceleration in rad/s².
+static inline double NAME_rad_per_s2(int64_t acceleration) {
+  return (double)acceleration * PREFIX_RAD_PER_S2_PER_LSB;
+}
+""",
+    "position_fine": """
+// A fine position in rad.
+static inline double NAME_fine_rad(int64_t position_fine) {
+  return (double)position_fine * (PREFIX_POSITION_FINE_PER_LSB * PREFIX_RAD_PER_COUNT);
+}
+""",
+}
 
 
 def c_driver(registers: RegisterMap, name: str) -> str:
@@ -129,6 +145,7 @@ def c_driver(registers: RegisterMap, name: str) -> str:
             f"  counters->{field} = (uint8_t)(word >> {_macro('COUNTERS', field)}_SHIFT);"
             for field in registers.counted
         ],
+        "MORE": "".join(_MORE[one] for one in registers.spec.method_entries).split("\n"),
     }
     text = _HEAD
     for key, lines in parts.items():

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from tachometry.spec.provenance import notice
 from tachometry.spec.registers.map import WORD, Register, RegisterMap
 from tachometry.spec.registers.values import is_whole, sentences
+from tachometry.spec.tachometer import TachometerSpec
 
 Macro = tuple[str, str, str]  # name, value, and what it means
 
@@ -52,7 +53,17 @@ def numbers(registers: RegisterMap) -> tuple[Macro, ...]:
         ("UNIT_PER_LSB", repr(2.0**-spec.frac_bits), f"One LSB of velocity in {spec.unit}."),
         ("RAD_PER_S_PER_LSB", repr(radians), "One LSB of velocity in rad/s."),
         ("RAD_PER_COUNT", repr(2 * math.pi / spec.encoder.counts_per_rev), "One count of position in rad."),
+        *_of_method(spec),
     )
+
+
+def _of_method(spec: TachometerSpec) -> Iterator[Macro]:
+    """How outputs are read that only this method has."""
+    for name, entry in spec.method_entries.items():
+        unit = entry.get("unit", "counts")
+        yield f"{name.upper()}_PER_LSB", repr(2.0 ** -entry["frac_bits"]), f"One LSB of {name} in {unit}."
+        if "rad_per_s2_per_lsb" in entry:
+            yield "RAD_PER_S2_PER_LSB", repr(entry["rad_per_s2_per_lsb"]), f"One LSB of {name} in rad/s²."
 
 
 def of_register(register: Register) -> Iterator[Macro]:

@@ -1,6 +1,5 @@
-"""Random motions through hardware and golden model, side by side, and what they covered."""
+"""Random motions through hardware and golden model, side by side."""
 
-import itertools
 from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
@@ -8,25 +7,22 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from support.events import covered
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.golden.front_end import changes, decode, filter_line
-from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep as side_by_side
 from tachometry.spec import (
     METHODS,
     Encoder,
-    MTachometer,
     MTTachometer,
     ParameterError,
     RairanTachometer,
     Speed,
-    STachometer,
     TachometerSpec,
     Timing,
 )
@@ -36,83 +32,10 @@ PULSES_PER_REV = 100
 CLOCK_HZ = 1_000_000
 MIN_TICKS, MIN_UPDATES = 2000, 200
 
-STATES = ("00", "10", "11", "01")
-LEGAL = [f"{STATES[k]}->{STATES[(k + d) % 4]}" for k in range(4) for d in (1, -1)]
-ILLEGAL = [f"{STATES[k]}->{STATES[(k + 2) % 4]}" for k in range(4)]
-COMMON = [
-    "m_e saturated",
-    "sign change",
-    "stalled",
-    "count after stalled",
-    "position wrapped",
-    "glitch swallowed",
-    "index captured",
-    "position reset",
-    "external tick",
-    "external tick too early",
-    "external tick missing",
-    "velocity saturated",
-    "bounds",
-    "aged",
-    "filtered",
-    "waited for the filter",
-    *LEGAL,
-    *ILLEGAL,
-]
-TIMED = [
-    "times in clocks",
-    "times in ticks",
-    "paper exact",
-    "reversal",
-    "count after a silence",
-    "count at the maximum time",
-    "one after the other",
-    "forced after the maximum time",
-    "forced again",
-    "decay",
-    "decay backward",
-    "decay again",
-    "out of range",
-    "speed beyond the maximum",
-]
-EVENTS = {
-    "s": [
-        "suppressed return",
-        "alteration at max_ticks",
-        "forced, then alteration",
-        "m_s = 1",
-        "reciprocal carried",
-        "update in every clock",
-        *COMMON,
-    ],
-    "m": ["one tick", "a power of two", "another number", "update in every clock", *COMMON],
-    "mt": [
-        "longer than the maximum time",
-        *(event for event in [*TIMED, *COMMON] if event != "out of range"),
-    ],
-    "t": [*TIMED, *COMMON],
-    "rairan": [
-        "low",
-        "high",
-        "reversal",
-        "speed that fell",
-        "rest",
-        "count after rest",
-        "dt longer than nominal",
-        "to the letter",
-        "dt longer",
-        "dt shorter again",
-        "n1",
-        "n2",
-        "n3",
-        "update in every clock",
-        *(event for event in COMMON if "external" not in event),
-    ],
-}
 
-
-def _count(found: NDArray[Any]) -> int:
-    return int(np.count_nonzero(found))
+def fewest_ticks(method: str) -> int:
+    """Ticks that a random case has at least; long ones are fewer."""
+    return MIN_TICKS // 5 if method == "track" else MIN_TICKS
 
 
 def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding, PinTrace]:
@@ -124,10 +47,12 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     if timed:  # a division takes some ticks, or only part of one
         tick_cycles = int(rng.choice([1, 2, 2, 3, 3, 4, 4, 8, 8, 32], p=[0.12] + 8 * [0.105] + [0.04]))
         max_ticks = int(rng.choice([2, 3, 10, 60])) * (1 if tick_cycles > 8 else 5)
+    elif method == "track":  # its program takes hundreds of clocks
+        tick_cycles = int(rng.choice([1000, 1024, 1200]))
     elif tick_cycles > 4 and method != "rairan":  # for time
         max_ticks = min(max_ticks, 5)
     decoding = int(rng.choice([1, 2, 4, 4]))
-    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else MIN_TICKS + 20
+    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else fewest_ticks(method) + 20
     external = tick_cycles > 1 and bool(rng.random() < 0.3) and not METHODS[method].own_ticks
     if external:
         n_ticks += n_ticks // 4  # fewer may come
@@ -142,6 +67,8 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         tick_cycles = int(rng.choice([1, 1, 1, 1, 1, 2, 2, 2, 3, 4]))
         band, longer = [([0.14], 1.16), ([0.3], 1.35), ([1.003, 1.4, 3.25], 1.6)][int(rng.integers(3))]
         n_ticks = int(longer * MIN_TICKS)
+    if method == "track":
+        band = [0.02, 0.1, 0.5, 1.003, 3.25, 20]
     duration = n_ticks * tick_cycles / CLOCK_HZ
     # One step takes at least a clock, and one decoded count takes 4/decoding of them.
     fastest = tick_cycles * decoding / 4
@@ -171,19 +98,19 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     spec = METHODS[method](
         encoder=Encoder(PULSES_PER_REV, decoding),
         timing=Timing(CLOCK_HZ, tick_cycles, max_ticks),
-        frac_bits=int(rng.integers(4, 13 if timed and rng.random() < 0.8 else 25)),
+        frac_bits=int(rng.integers(4, 13 if method == "track" or (timed and rng.random() < 0.8) else 25)),
         max_speed=max_speed,
         **(options := random_options(method, rng)),
         position_width=int(rng.choice([8, 16, 32, 48])),
-        filter_clocks=min(int(rng.choice([0, 0, 0, 1, 2, 5])), tick_cycles if method == "rairan" else 5),
+        filter_clocks=filter_of(method, int(rng.choice([0, 0, 0, 1, 2, 5])), tick_cycles),
         index=encoder.index,
         index_reset=encoder.index and bool(rng.random() < 0.5),
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
         age=bool(rng.random() < 0.5),
-        bounds=bool(rng.random() < 0.5) and not options.get("paper_exact"),
+        bounds=bool(rng.random() < 0.5) and not options.get("paper_exact") and METHODS[method].has_bounds,
     )
     if rng.random() < 0.25 and getattr(spec, "adaptive", None) is None:
-        spec = replace(spec, lowpass=Fraction(round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0))))
+        spec = replace(spec, lowpass=Fraction(max(1, round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0)))))
     if spec.bounds:
         # From a stream of its own: all else stays as it is without it.
         spec = replace(spec, edge_error=Fraction(max(0, int(rng.spawn(1)[0].integers(-8, 9))), 8))
@@ -196,15 +123,32 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         spec = replace(spec, adaptive=Fraction(1, 4))
         spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.max_pulse_count))))
     spec = random_output(spec, rng)
+    earliest = spec.min_tick_cycles if method == "track" else 0  # elsewhere ticks are as short anyway
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
     trace = encoding.recording.place(CLOCK_HZ)
-    return spec, encoding, random_ticks(trace, tick_cycles, rng) if spec.max_tick_cycles else trace
+    return spec, encoding, trace if spec.max_tick_cycles is None else random_ticks(trace, tick_cycles, rng, earliest)
+
+
+def filter_of(method: str, clocks: int, tick_cycles: int) -> int:
+    """Clocks of the glitch filter that are few or many beside those between two edges."""
+    if method == "track":
+        return 16 * clocks
+    return min(clocks, tick_cycles) if method == "rairan" else clocks
 
 
 def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
     """Options of the method."""
     if method == "s":
         return {"cancel": bool(rng.random() < 0.75)}
+    if method == "track":
+        return {
+            "bandwidth": Fraction(int(rng.choice([20, 50, 200, 500]))),
+            "least_memory": Fraction(int(rng.choice([5, 7, 9])), 10),
+            "edge_error": Fraction(int(rng.choice([1, 4, 8])), 10),
+            "agile": bool(rng.random() < 0.8),
+            "growing_memory": bool(rng.random() < 0.8),
+            "fine_bits": int(rng.choice([1, 8, 16])),
+        }
     if method == "rairan":
         return {
             "estimate": str(rng.choice(["n1", "n2", "n3", "n3"])),
@@ -238,109 +182,15 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
     return spec
 
 
-def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator) -> PinTrace:
-    """An external tick about as long as nominal: regular for a while, then not, then missing."""
+def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator, earliest: int = 0) -> PinTrace:
+    """An external tick about as long as nominal: regular for a while, then not, then missing; some are the earliest."""
     n = trace.n_clocks // tick_cycles + 1
     gaps = np.full(n, tick_cycles)
     gaps[n // 2 :] += rng.integers(-tick_cycles // 2, tick_cycles, n - n // 2)
     gaps[rng.random(n) < 0.02] *= 5
+    if earliest:
+        gaps[rng.random(n) < 0.05] = earliest
     return trace.with_tick_in(np.cumsum(np.maximum(gaps, 2)) + int(rng.integers(0, 3)))
-
-
-def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
-    """How often each event that only the method knows happened."""
-    m_e, updates = run.ticks.pulse_count, run.updates
-    if isinstance(spec, MTachometer):
-        n = spec.average
-        kind = "one tick" if n == 1 else "a power of two" if spec.shift is not None else "another number"
-        return {kind: len(updates.clock)}
-    if isinstance(spec, RairanTachometer):
-        rows, rest = len(updates.clock), updates.forced & (updates["n_ep1"] == 0)
-        shift = updates.get("dt_shift")
-        return {
-            "low": _count(updates.interval > 1),
-            "high": _count(updates["n_ep1"] > 1),
-            "reversal": _count((updates["n_ep1"] == 0) & ~rest),
-            "speed that fell": _count(updates.forced & ~rest),
-            "rest": _count(rest),
-            "count after rest": _count(rest[:-1] & (updates["n_ep1"][1:] == 1)),
-            "dt longer than nominal": _count(np.diff(run.ticks.clock) > spec.timing.tick_cycles),
-            "to the letter": rows * spec.paper_exact,
-            "dt longer": _count(shift),
-            "dt shorter again": _count(np.diff(shift) < 0),
-            spec.estimate: rows,
-        }
-    if isinstance(spec, TimedTachometer):
-        return covered_by_timed(spec, run)
-    assert isinstance(spec, STachometer)
-    changed = np.diff(m_e, prepend=0) != 0
-    by_count = ~updates.forced
-    return {
-        "suppressed return": _count(changed & ~alterations(m_e)),
-        "alteration at max_ticks": _count(by_count & (updates.interval == spec.timing.max_ticks)),
-        "forced, then alteration": _count(updates.forced[:-1] & by_count[1:]),
-        "m_s = 1": _count(updates.interval == 1),
-        "reciprocal carried": spec.carried and len(updates.clock),
-    }
-
-
-def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
-    """The same for the methods that measure times."""
-    updates, n = run.updates, len(run.updates.clock)
-    velocity, forced, interval = updates.velocity, updates.forced, updates.interval
-    decay = forced & (interval < spec.max_periods) & (velocity != 0) if spec.decays else np.zeros(n, dtype=np.bool_)
-    overdue = forced & ~decay
-    flagged = updates.get("out_of_range")
-    return {
-        "times in ticks" if spec.on_lattice else "times in clocks": n,
-        "paper exact": n * spec.paper_exact,
-        "reversal": _count(~forced & (velocity == 0)),
-        "longer than the maximum time": _count(
-            np.abs(velocity) * interval > spec.timer_periods << spec.native_frac_bits + 1
-        ),
-        "count after a silence": _count(overdue[:-1] & ~forced[1:]),
-        "count at the maximum time": _count(~forced & (interval == spec.max_periods)),
-        "one after the other": _count(np.diff(updates.clock) == spec.update_spacing),
-        "forced after the maximum time": _count(overdue),
-        "forced again": _count(overdue[1:] & overdue[:-1]),
-        "decay": _count(decay),
-        "decay backward": _count(decay & (velocity < 0)),
-        "decay again": _count(decay[1:] & decay[:-1]),
-        "out of range": _count(flagged) * spec.on_lattice,
-        "speed beyond the maximum": _count(flagged) * (not spec.on_lattice),
-    }
-
-
-def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
-    """How often each event of the coverage table happened."""
-    updates = run.updates
-    sign = np.sign(updates.velocity)
-    found = Counter(
-        covered_by_method(spec, run)
-        | {
-            "m_e saturated": _count(run.ticks.overflow),
-            "sign change": _count(np.diff(sign[sign != 0])),
-            "stalled": _count(run.ticks.stalled),
-            "count after stalled": _count(np.diff(run.ticks.stalled.astype(np.int64)) < 0),
-            "index captured": len(run.index.clock),
-            "position reset": len(run.index.clock) * spec.index_reset,
-            "external tick": len(run.ticks.clock) * (spec.max_tick_cycles is not None),
-            "external tick too early": _count(~np.isin(run.tick_errors, run.ticks.clock)),
-            "external tick missing": _count(np.isin(run.tick_errors, run.ticks.clock)),
-            "velocity saturated": _count(updates.get("velocity_overflow")),
-            "filtered": len(updates.clock) * (spec.lowpass is not None),
-            "waited for the filter": spec.lowpass is not None
-            and _count(np.diff(updates.clock) == spec.low_pass.latency - 2),
-            "bounds": _count(updates.get("bounds_valid")),
-            "aged": _count(run.ticks.get("age")),
-            "update in every clock": _count(np.diff(updates.clock) == 1),
-            "glitch swallowed": int(run.ticks.get("swallowed_edges")[-1]) // 2,
-            "position wrapped": _count(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
-        }
-    )
-    lines = [f"{a}{b}" for a, b in zip(trace.a, trace.b, strict=True)]
-    found.update(f"{before}->{after}" for before, after in itertools.pairwise(lines))
-    return found
 
 
 def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter[str]]:
@@ -353,7 +203,7 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
     # The filter may take one of several.
     fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
     # Ticks of an adaptive dt are longer.
-    ticks, updates = MIN_TICKS // (4 if spec.parameters.get("adaptive") else 1), 5 if timed else fewest
+    ticks, updates = fewest_ticks(method) // (4 if spec.parameters.get("adaptive") else 1), 5 if timed else fewest
     if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
         problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
     problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, trace, actual)]

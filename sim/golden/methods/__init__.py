@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tachometry.sim.golden.methods import m, mt, rairan, s, t
+from tachometry.sim.golden.methods import m, mt, rairan, s, t, track
 
 # By the name of the method.
 MODELS: dict[str, Any] = {
@@ -11,4 +11,5 @@ MODELS: dict[str, Any] = {
     "t": t.Model,
     "mt": mt.Model,
     "rairan": rairan.Model,
+    "track": track.Model,
 }

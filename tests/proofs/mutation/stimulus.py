@@ -10,6 +10,7 @@ from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
 from tachometry.spec import TachometerSpec
 
 _EDGES = 60  # of a motion, at each of its speeds
+_LONG = 100  # clocks of a tick with which motions have fewer edges, and lines change a few times in a tick
 _RATTLE = 40_000  # clocks
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
@@ -33,21 +34,27 @@ class Stimulus:
     starts: list[int]
 
 
-def noise_lines(rng: np.random.Generator, n_clocks: int, n_lines: int, n_parts: int = 20) -> NDArray[np.uint8]:
+def noise_lines(
+    rng: np.random.Generator, n_clocks: int, n_lines: int, n_parts: int = 20, factor: float = 1
+) -> NDArray[np.uint8]:
     """Levels of lines that change at random, at rates of their own that change now and then."""
-    rate = np.repeat(rng.choice((*_RATES, 0.0), (n_lines, n_parts)), -(-n_clocks // n_parts), axis=1)[:, :n_clocks]
+    rates = [factor * rate for rate in (*_RATES, 0.0)]
+    rate = np.repeat(rng.choice(rates, (n_lines, n_parts)), -(-n_clocks // n_parts), axis=1)[:, :n_clocks]
     changes = np.cumsum(rng.random((n_lines, n_clocks)) < rate, axis=1)
     return ((changes + rng.integers(2, size=(n_lines, 1))) % 2).astype(np.uint8)
 
 
 def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20) -> PinTrace:
     """Such lines."""
-    return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts))
+    cycles = spec.timing.tick_cycles
+    factor = 1 if cycles <= _LONG else float(rng.choice([1, 10 / cycles, 10 / cycles, 30 / cycles]))
+    return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts, factor))
 
 
 def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     """Some edges as fast as the filter lets them, some slow, back and forth, in no order; silences; regular ticks."""
-    cycles, parts = spec.timing.tick_cycles, 40
+    cycles = spec.timing.tick_cycles
+    parts = 40 if cycles <= _LONG else 20
     longest = cycles * spec.timing.max_ticks
     gaps = np.array([1, 1, 2, 3, cycles, 3 * cycles, longest // 2]) * max(1, (1 + spec.filter_clocks) // 2)
     edges = rng.integers(1, rng.choice([12, 100], parts, p=[0.9, 0.1]))
@@ -85,25 +92,34 @@ def _lines(spec: TachometerSpec) -> list[str]:
 
 
 def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
-    """Motions, bursts and noise in turns, at least `n_clocks` of them."""
+    """Motions, bursts and noise in turns, at least `n_clocks` of them, or ten times as many with long ticks."""
     rng = np.random.default_rng(seed)
     pins: list[NDArray[np.uint8]] = []
     traces: list[PinTrace] = []
     starts: list[int] = []
     done = 0
     shaken = False
+    long = spec.timing.tick_cycles > _LONG
+    n_clocks *= 10 if long else 1
+    period = 64 if long else 8  # with more resets between
     longest = spec.longest_tick * spec.timing.max_ticks
+    n_silences = 10 if long else 40
     while done < n_clocks:
         if done > n_clocks // 4 and not shaken:
             trace, shaken = rattle(spec, rng), True
-        elif len(traces) % 8 in (0, 4):
-            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES)
-        elif len(traces) % 8 == 1:
-            trace = noise(spec, rng, 40 * longest)
-        elif len(traces) % 8 == 2:
+        elif len(traces) % period in (0, 4):
+            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES // 2 if long else _EDGES)
+        elif len(traces) % period in ((1, 3, 6) if long else (1,)):
+            trace = noise(spec, rng, n_silences * longest)
+        elif len(traces) % period == 2:
             trace = bursts(spec, rng)
+        elif long and len(traces) % 2:  # within a tick
+            trace = noise(spec, rng, int(rng.integers(4, 60)), 2)
         else:  # soon after a reset
             trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
+            if long:  # about when an update comes
+                update = spec.tick_latency + spec.datapath_latency + int(rng.integers(1, 4)) * spec.timing.tick_cycles
+                trace = trace.until(max(min(update + int(rng.integers(-8, 4)), trace.n_clocks), 1))
         # Some end early: the next reset comes in the middle.
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
