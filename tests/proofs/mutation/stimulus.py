@@ -44,11 +44,16 @@ def noise_lines(
     return ((changes + rng.integers(2, size=(n_lines, 1))) % 2).astype(np.uint8)
 
 
-def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20) -> PinTrace:
-    """Such lines."""
+def noise(
+    spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20, *, still: bool = False
+) -> PinTrace:
+    """Such lines; those of the shaft stand still if wanted."""
     cycles = spec.timing.tick_cycles
     factor = 1 if cycles <= _LONG else float(rng.choice([1, 10 / cycles, 10 / cycles, 30 / cycles]))
-    return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts, factor))
+    lines = noise_lines(rng, n_clocks, len(LINES), n_parts, factor)
+    if still:
+        lines[:2] = lines[:2, :1]
+    return _trace(spec, lines)
 
 
 def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
@@ -70,6 +75,19 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     (z,) = noise_lines(rng, n_clocks, 1)
     tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.longest_tick + 2) == 0
     return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
+
+
+def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
+    """A constant speed of one to two counts per tick, with edges that for a while are off by some share of a count."""
+    n, gap = 400, spec.timing.tick_cycles / rng.uniform(1, 2)
+    off = np.repeat(rng.choice([0, 0, 0, 0.15, 0.25, 0.35], n // 20), 20) + rng.uniform(0, 0.05) * rng.standard_normal(
+        n
+    )
+    clock = np.rint(gap * (np.arange(n) + 2 + off)).astype(np.int64)
+    n_clocks = int(clock[-1]) + 1
+    level = quadrature(np.searchsorted(clock, np.arange(n_clocks), side="right") * rng.choice([-1, 1]))
+    tick = np.arange(n_clocks) % spec.timing.tick_cycles < spec.timing.tick_cycles // 2
+    return _trace(spec, np.array([level & 1, level >> 1, tick, tick], dtype=np.uint8))
 
 
 def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
@@ -113,11 +131,14 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
             trace = noise(spec, rng, n_silences * longest)
         elif len(traces) % period == 2:
             trace = bursts(spec, rng)
+        elif len(traces) % period in (5, 21, 37) and long:
+            trace = steady(spec, rng)
         elif long and len(traces) % 2:  # within a tick
             trace = noise(spec, rng, int(rng.integers(4, 60)), 2)
         else:  # soon after a reset
             trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
-            if long:  # about when an update comes
+            if long:  # until about when an update comes; some without a count
+                trace = noise(spec, rng, trace.n_clocks, 2, still=rng.random() < 0.5)
                 update = spec.tick_latency + spec.datapath_latency + int(rng.integers(1, 4)) * spec.timing.tick_cycles
                 trace = trace.until(max(min(update + int(rng.integers(-8, 4)), trace.n_clocks), 1))
         # Some end early: the next reset comes in the middle.
