@@ -82,7 +82,8 @@ class TickCounts(wiring.Component):
             m.d.sync += [number.eq(counts), times.eq(0), places.eq(Mux(counts, Mux(backward, 1, -1), 0))]
         with m.If(counts & (number == form.max_count)):
             m.d.sync += alone.eq(1)
-        more, quiet = Signal.like(self.elapsed), Signal()
+        more = Signal.like(self.elapsed)
+        quiet = Signal()
         m.d.comb += [quiet.eq(self.elapsed == self._max_ticks), more.eq(self.elapsed + ~quiet)]
         with m.If(self.counted):
             m.d.comb += more.eq(1)

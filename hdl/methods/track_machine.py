@@ -140,14 +140,21 @@ class TrackMachine(wiring.Component):
         )
         known = self._program.memory
         m.submodules.words = words = Memory(shape=width, depth=1 << (len(known) - 1).bit_length(), init=known)
-        fetch, read, write = program.read_port(), words.read_port(), words.write_port()
+        fetch = program.read_port()
+        read = words.read_port()
+        write = words.write_port()
 
         # Four stages: fetch an instruction, read its word, hold both, execute it.
         pc = Signal(address_width)
-        fetched, held, active = Signal(), Signal(), Signal()
+        fetched = Signal()
+        held = Signal()
+        active = Signal()
         fetching = data.View(layout, fetch.data)
-        following, now = Signal(layout, reset_less=True), Signal(layout, reset_less=True)
-        done, taken, stop = Signal(), Signal(), Signal()
+        following = Signal(layout, reset_less=True)
+        now = Signal(layout, reset_less=True)
+        done = Signal()
+        taken = Signal()
+        stop = Signal()
         place = Signal(address_width)
         m.d.comb += [
             done.eq(~active | ~now.more.any()),
@@ -182,10 +189,16 @@ class TrackMachine(wiring.Component):
             with m.If(~(following.reads | following.input)):
                 m.d.sync += x.eq(0)
 
-        ac, mq = Signal(width, reset_less=True), Signal(form.width, reset_less=True)
-        negative, flag, sign = ac[-1], Signal(), Signal()
-        left, right, total = Signal(width), Signal(width), Signal(width)
-        minus, carry = Signal(), Signal()
+        ac = Signal(width, reset_less=True)
+        mq = Signal(form.width, reset_less=True)
+        negative = ac[-1]
+        flag = Signal()
+        sign = Signal()
+        left = Signal(width)
+        right = Signal(width)
+        total = Signal(width)
+        minus = Signal()
+        carry = Signal()
         # Nested as it is, it takes two cells a bit.
         low, high = now.left[0], now.left[1]
         shifted, kept = Mux(low, mq.as_signed(), Cat(mq[-1], ac)[: form.width].as_signed()), Mux(low, ac >> 1, ac)

@@ -348,10 +348,9 @@ class Program:
         """No count: p stays near the position; if v leads beyond it, v falls, and a no longer adds to it."""
         form = self.form
         fall: list[Step] = [
-            *(Do(Op.STORE, "t"), *self._length, Do(Op.MUL, "t", form.unit_bits + 1), Do(Op.STORE, "r")),
-            *(Do(Op.ADD, "r"), Do(Op.ADD, "one"), Do(Op.STORE, "r")),
-            *(Do(Op.LOAD, "t"), Do(Op.TO_MQ), Do(Op.DIV, "r", form.width + form.frac_bits)),
-            *(Do(Op.FROM_MQ), Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, "v")),
+            *(Do(Op.STORE, "t"), Do(Op.LOAD, "one"), Do(Op.TO_MQ), Do(Op.DIV, "gap", form.width + form.unit_bits)),
+            *(Do(Op.FROM_MQ), Do(Op.SUB, "t"), Do(Op.NEGATIVE), Do(Op.ADD, "t"), Do(Op.STORE, "t")),
+            *(Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, "v")),
             *(Do(Op.LOAD_SIGNED, "a"), Do(Op.NEGATIVE), Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.STORE, "a")),
         ]
         return [

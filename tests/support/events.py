@@ -79,6 +79,7 @@ EVENTS = {
         "first count",
         "speed that falls",
         "greatest speed",
+        "tick as early as may be",
         *(event for event in COMMON if event not in ("bounds", "waited for the filter")),
     ],
     "rairan": [
@@ -160,6 +161,7 @@ def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
         "first count": _count(rest[:-1] & ~updates.forced[1:]),
         "speed that falls": _count(updates.forced[1:] & (np.abs(np.diff(updates.velocity)) > 1)),
         "greatest speed": _count(np.abs(updates.velocity) == spec.full_scale),
+        "tick as early as may be": _count(np.diff(run.ticks.clock) == spec.min_tick_cycles),
     }
 
 

@@ -123,9 +123,10 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         spec = replace(spec, adaptive=Fraction(1, 4))
         spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.max_pulse_count))))
     spec = random_output(spec, rng)
+    earliest = spec.min_tick_cycles if method == "track" else 0  # elsewhere ticks are as short anyway
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
     trace = encoding.recording.place(CLOCK_HZ)
-    return spec, encoding, random_ticks(trace, tick_cycles, rng) if spec.max_tick_cycles else trace
+    return spec, encoding, trace if spec.max_tick_cycles is None else random_ticks(trace, tick_cycles, rng, earliest)
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:
@@ -181,12 +182,14 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
     return spec
 
 
-def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator) -> PinTrace:
-    """An external tick about as long as nominal: regular for a while, then not, then missing."""
+def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator, earliest: int = 0) -> PinTrace:
+    """An external tick about as long as nominal: regular for a while, then not, then missing; some are the earliest."""
     n = trace.n_clocks // tick_cycles + 1
     gaps = np.full(n, tick_cycles)
     gaps[n // 2 :] += rng.integers(-tick_cycles // 2, tick_cycles, n - n // 2)
     gaps[rng.random(n) < 0.02] *= 5
+    if earliest:
+        gaps[rng.random(n) < 0.05] = earliest
     return trace.with_tick_in(np.cumsum(np.maximum(gaps, 2)) + int(rng.integers(0, 3)))
 
 
