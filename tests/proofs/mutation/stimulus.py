@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
 from tachometry.spec import TachometerSpec
@@ -78,14 +79,17 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
 
 
 def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """A constant speed of one to two counts per tick, with edges that for a while are off by some share of a count."""
+    """One to two counts per tick for ever, with edges that are off by some of a count for a while, or rattle."""
     n, gap = 400, spec.timing.tick_cycles / rng.uniform(1, 2)
     off = np.repeat(rng.choice([0, 0, 0, 0.15, 0.25, 0.35], n // 20), 20) + rng.uniform(0, 0.05) * rng.standard_normal(
         n
     )
     clock = np.rint(gap * (np.arange(n) + 2 + off)).astype(np.int64)
     n_clocks = int(clock[-1]) + 1
-    level = quadrature(np.searchsorted(clock, np.arange(n_clocks), side="right") * rng.choice([-1, 1]))
+    quarter = np.searchsorted(clock, np.arange(n_clocks), side="right") * rng.choice([-1, 1])
+    for first in rng.integers(0, n_clocks - 8, 20):  # an edge there and back again
+        quarter[first : first + 8 : 2] += 1
+    level = quadrature(quarter)
     tick = np.arange(n_clocks) % spec.timing.tick_cycles < spec.timing.tick_cycles // 2
     return _trace(spec, np.array([level & 1, level >> 1, tick, tick], dtype=np.uint8))
 
@@ -131,7 +135,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
             trace = noise(spec, rng, n_silences * longest)
         elif len(traces) % period == 2:
             trace = bursts(spec, rng)
-        elif len(traces) % period in (5, 21, 37) and long:
+        elif len(traces) % period in (5, 13, 21, 29, 37) and long:
             trace = steady(spec, rng)
         elif long and len(traces) % 2:  # within a tick
             trace = noise(spec, rng, int(rng.integers(4, 60)), 2)
@@ -139,8 +143,9 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
             trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
             if long:  # until about when an update comes; some without a count
                 trace = noise(spec, rng, trace.n_clocks, 2, still=rng.random() < 0.5)
-                update = spec.tick_latency + spec.datapath_latency + int(rng.integers(1, 4)) * spec.timing.tick_cycles
-                trace = trace.until(max(min(update + int(rng.integers(-8, 4)), trace.n_clocks), 1))
+                updates = golden.run(spec, trace).updates.clock
+                if len(updates):
+                    trace = trace.until(min(int(rng.choice(updates) + rng.integers(-6, 4)), trace.n_clocks))
         # Some end early: the next reset comes in the middle.
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
