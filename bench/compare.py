@@ -56,30 +56,32 @@ LinuxCNC's timestamps of 0.5 µs are the best by far.""",
     ),
     Situation(
         "Ramp",
-        """Times in clocks of 0.1 µs are better than a lattice of 100 µs. M/T (T_c is a tick) and T are the best by
-a factor of 20 and more. LinuxCNC's timestamps follow, and then the tracking loops, which lag by a
-constant 2 ms. Of the methods without a divider, S is the best core.""",
+        """Times in clocks of 0.1 µs are better than a lattice of 100 µs. The tracking method does not lag behind a
+ramp, and is the best by a factor of 8. M/T (T_c is a tick) and T follow, then LinuxCNC's timestamps, and then
+the tracking loops, which lag by a constant 2 ms. On a lattice of ticks S is the best.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",
     ),
     Situation(
         "Ramp, real encoder",
         """T measures one count, so its result contains every error of the disc and all jitter. The same is true of
-M/T while its windows are short. With windows of 1 ms it is as good as LinuxCNC's timestamps, and the best
-core. Methods that average over more keep their errors and their delays.""",
+M/T while its windows are short. With windows of 1 ms it is as good as LinuxCNC's timestamps. Methods that
+average over more keep their errors and their delays. The memory of the tracking method grows on a ramp
+as it does at constant speed, so it has a twentieth of their error.""",
         f"--methods {WITH_LONG_MT} "
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),
     Situation(
         "Slow",
         """The speed is 0.04 counts per tick. All methods that measure the time between counts are alike. A filter
-of 5 ms removes the jitter at the price of its delay.""",
+of 5 ms removes the jitter at the price of its delay; so does the tracking method, without a delay.""",
         "--motion constant:1.3rad/s:4s --from 500ms --jitter 0.05 --seed 1",
     ),
     Situation(
         "Fast",
         """The speed is 7 counts per tick, with 5 % jitter. The longest average has the least error, because at
-constant speed delay costs nothing. In the same time of 1 ms, M/T has half the error of S. Rairán's
-estimate is nearly constant, and off by up to eq. (13), 1/13 of the speed.""",
+constant speed delay costs nothing: that of the tracking method, whose memory has grown. In the same time
+of 1 ms, M/T has half the error of S. Rairán's estimate is nearly constant, and off by up to eq. (13), 1/13
+of the speed.""",
         f"--methods {WITH_LONG_MT} --motion constant:217rad/s:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
@@ -91,13 +93,13 @@ whose error is within eq. (18). Methods that average over 1 ms have a finer reso
     Situation(
         "At the unit velocity, with vibration",
         """This is the case of Tsuji's Fig. 9(b). S cancels alternate alterations, and has the least error of the
-cores. Filters and tracking loops average the vibration out, and have less.""",
+cores but tracking. Filters and tracking loops average the vibration out, and have less.""",
         "--motion ramp:31rad/s:32rad/s:1s --from 100ms --vibration 0.2mrad:170Hz --nonuniformity 0.1 --seed 1",
     ),
     Situation(
         "Reversals",
-        """Here delay matters: filters of 5 ms are worse than all others but M. LinuxCNC's timestamps are best, and
-M/T is second. S and the tracking loops are alike.""",
+        """Here delay matters: filters of 5 ms are worse than all others but M. The tracking method has an eighth of
+the error of LinuxCNC's timestamps, which are second; M/T is third. S and the tracking loops are alike.""",
         "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
@@ -129,11 +131,16 @@ for bit, and float models of what other projects use and of estimators in the li
 
 **When to use what**, according to the tables below:
 
-- *S*: use it if there is no timer faster than the tick, or if a divider is unwanted; and around multiples of the unit
-  velocity. Its tick can be as short as a clock. It is then as fine as T at low speeds.
-- *M/T*: use it if a fast timer and a divider are available. It has the least error of the cores on ramps and reversals,
-  and with `--min-time 1ms` also with a real disc at speed. A longer `--min-time` gives less noise and more delay, as
-  averaging does. On a lattice (`--timer tick`) it equals M at high speeds.
+- *Tracking* (`--method track`): use it where its tick and its area are to be had. It has the least error of the cores
+  in nearly all situations, with one setting, and it says the acceleration and the position between counts. It needs a
+  timer, two block RAMs and ticks of about 800 clocks. With a bad disc, tell it so (`--edge-error 0.6`): with the
+  default it takes the disc's errors for changes of the speed.
+- *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 16 µs, down to a clock; it is the
+  smallest, it has no divider, and it is good around multiples of the unit velocity. Ticks should be long: its error
+  at more than a count per tick is a part of the unit velocity.
+- *M/T*: use it if a fast timer and a divider are available, and bounds of the speed are wanted or half of the area of
+  tracking. A longer `--min-time` gives less noise and more delay, as averaging does. On a lattice (`--timer tick`) it
+  equals M at high speeds.
 - *T*: it equals M/T at slow speeds and sudden stops, with less logic. It suffers most from an uneven disc and from
   jitter.
 - *Rairán*: use it if bounds of the speed and a constant value at constant speed matter more than the error, which is up
@@ -143,6 +150,18 @@ for bit, and float models of what other projects use and of estimators in the li
   1 ms is fast enough and software divides.
 - *Tracking loops* (ODrive, moteus): they are smooth, with a delay that is constant and known, 2 ms with their defaults.
 - *Filtered differences, SimpleFOC*: they are good at constant speed, and have 5 ms of delay everywhere else.
+- *Least squares over edges* (float, with a matrix solved for each value): tuned for each situation it has the least
+  error of all in most rows. With one setting for all it is as good as tracking on sines and reversals, and 9 to 500
+  times worse on a ramp and at speed with a real disc.
+
+Where another one beats tracking that is set for all situations: least squares tuned per row, as said; Kalman filters
+tuned per row for sines, a bad disc and an ideal trapezoid; loops and filters tuned for slow constant speeds, where
+50 ms of delay cost nothing; ODrive's loop on an ideal slow sine, 0.11 against 0.13 rad/s; FOAW and LinuxCNC's
+timestamps on a sudden stop, 0.76 and 0.81 against 0.89; M/T and LinuxCNC's timestamps on an ideal trapezoid, 0.49 and
+0.55 against 0.62.
+
+Without `--method`, `generate` makes S all the same: it is the only one that every clock, tick and option suits, so what
+is generated does not depend on whether a tick is long enough.
 
 Tsuji 2009, Fig. 8, agrees for M/T with a timer of 200 ns and S with ticks of 20 µs: M/T is better below about
 130 rad/s with an encoder of 81,000 counts, and S is better above ([figures.md](figures.md)).

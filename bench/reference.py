@@ -16,7 +16,14 @@ from tachometry.spec.registers.page import tables
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 # Cores with all ports that the methods have.
-EVERYTHING: dict[str, str | None] = {"ppr": "500", "index": "yes", "filter": "4", "age": "yes", "bounds": "yes", "velocity-width": "20"}
+EVERYTHING: dict[str, str | None] = {
+    "ppr": "500",
+    "index": "yes",
+    "filter": "4",
+    "age": "yes",
+    "bounds": "yes",
+    "velocity-width": "20",
+}
 EXTERNAL = {"external-tick": "yes"}
 # The core whose registers are shown: that of docs/integration.md.
 SPEED = {

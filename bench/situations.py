@@ -24,7 +24,7 @@ from tachometry.spec import of_texts
 # Columns that are not tuned: one setting for all situations, as `tachometry compare --methods` takes it.
 OURS = ("track", "track:edge-error=0.6", "s", "mt:min-time=1ms")
 RIVALS = (*TUNED, *BASELINES)
-CORE = {"ppr": str(PULSES_PER_REV), "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
+CORE = {"ppr": str(PULSES_PER_REV), "clock": "48MHz", "tick": "20us", "max-time": "10ms", "max-speed": "400rad/s"}
 
 _TICK_S = 1e-4
 _DECODING = 4
@@ -225,6 +225,7 @@ def part(n_seeds: int, jobs: int) -> str:
 {_filled(_ABOUT)}
 
 - {_filled(_SEEDS.format(n_seeds=n_seeds), "  ")}
+- The cores have a clock of {CORE["clock"][:-3]} MHz and ticks of {CORE["tick"][:-2]} µs.
 - {_filled(_ENCODERS.format(lines=PULSES_PER_REV), "  ")}
 
 {error_table([*ours, *RIVALS], best(table, (*OURS, *RIVALS)))}

@@ -208,15 +208,20 @@ class TachometerSpec(Numbers):
         """
         if self.lowpass is not None:
             return None
+        # What counts the ticks of a silence may have to begin anew.
+        silence = ((1 << self.timing.max_ticks.bit_length()) + 1) * self.longest_tick
+        method = self.remembered_clocks + self.tick_to_velocity
+        return self.front_recovery_clocks + max(method, silence) + self.tick_latency
+
+    @property
+    def front_recovery_clocks(self) -> int:
+        """Clocks after which, from any state, a window begins all counts of which are right."""
         # A line that must be known anew has to hold still once more.
         held = 1 << max(self.filter_clocks - 1, 1).bit_length()
         conditioned = 2 + (held + self.filter_clocks if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
-        # What counts the ticks of a silence may have to begin anew.
-        silence = ((1 << self.timing.max_ticks.bit_length()) + 1) * self.longest_tick
-        method = self.remembered_clocks + self.tick_to_velocity
-        return conditioned + 1 + window + max(method, silence) + self.tick_latency
+        return conditioned + 1 + window
 
     @property
     def remembered_clocks(self) -> int:

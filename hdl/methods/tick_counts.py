@@ -60,8 +60,11 @@ class TickCounts(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         form = self._form
-        number, times, places = (Signal.like(port) for port in (self.number, self.times, self.places))
-        alone, fresh = Signal(init=1), Signal()
+        number = Signal.like(self.number, name="open_number")
+        times = Signal.like(self.times, name="open_times")
+        places = Signal.like(self.places, name="open_places")
+        alone = Signal(init=1)
+        fresh = Signal()
         counts, backward = self.step.any(), self.step[-1]
         m.d.sync += fresh.eq(self.tick)
         # A count that replaces those before it, or the beginning of a tick.
@@ -79,7 +82,8 @@ class TickCounts(wiring.Component):
             m.d.sync += [number.eq(counts), times.eq(0), places.eq(Mux(counts, Mux(backward, 1, -1), 0))]
         with m.If(counts & (number == form.max_count)):
             m.d.sync += alone.eq(1)
-        more, quiet = Signal.like(self.elapsed), Signal()
+        more = Signal.like(self.elapsed)
+        quiet = Signal()
         m.d.comb += [quiet.eq(self.elapsed == self._max_ticks), more.eq(self.elapsed + ~quiet)]
         with m.If(self.counted):
             m.d.comb += more.eq(1)
@@ -91,7 +95,7 @@ class TickCounts(wiring.Component):
             ]
         m.d.comb += self.quiet.eq(quiet)
         if form.external:
-            length = Signal.like(self.length, init=1)
+            length = Signal.like(self.length, name="open_length", init=1)
             m.d.sync += length.eq(length + 1)
             with m.If(self.tick):
                 m.d.sync += [self.length.eq(length), length.eq(1)]

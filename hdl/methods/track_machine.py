@@ -8,17 +8,8 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.spec.formats.tracking import LEVELS, STEP_BACK, Tracking
-from tachometry.spec.formats.tracking_program import (
-    MAX_STEPS,
-    STATES,
-    TABLES,
-    Condition,
-    Input,
-    Instruction,
-    Op,
-    Phase,
-    Program,
-)
+from tachometry.spec.formats.tracking_code import MAX_STEPS, Condition, Input, Instruction, Op, Phase
+from tachometry.spec.formats.tracking_program import STATES, TABLES, Program
 
 
 class Left(IntEnum):
@@ -97,7 +88,7 @@ def _word(layout: data.StructLayout, code: Instruction) -> int:
 
 
 class TrackMachine(wiring.Component):
-    """Runs the program once for every tick; `spec.formats.tracking_program` says what each operation does.
+    """Runs the program once for every tick; `spec.formats.tracking_code` says what each operation does.
 
     While an instruction is executed, the word of the next one has been read, that of the one behind is being read, and
     a fourth one is fetched.
@@ -149,14 +140,21 @@ class TrackMachine(wiring.Component):
         )
         known = self._program.memory
         m.submodules.words = words = Memory(shape=width, depth=1 << (len(known) - 1).bit_length(), init=known)
-        fetch, read, write = program.read_port(), words.read_port(), words.write_port()
+        fetch = program.read_port()
+        read = words.read_port()
+        write = words.write_port()
 
         # Four stages: fetch an instruction, read its word, hold both, execute it.
         pc = Signal(address_width)
-        fetched, held, active = Signal(), Signal(), Signal()
+        fetched = Signal()
+        held = Signal()
+        active = Signal()
         fetching = data.View(layout, fetch.data)
-        following, now = Signal(layout, reset_less=True), Signal(layout, reset_less=True)
-        done, taken, stop = Signal(), Signal(), Signal()
+        following = Signal(layout, reset_less=True)
+        now = Signal(layout, reset_less=True)
+        done = Signal()
+        taken = Signal()
+        stop = Signal()
         place = Signal(address_width)
         m.d.comb += [
             done.eq(~active | ~now.more.any()),
@@ -170,7 +168,7 @@ class TrackMachine(wiring.Component):
             m.d.sync += [held.eq(fetched & valid), active.eq(held & valid)]
         with m.Else():
             m.d.sync += now.more.eq(now.more - 1)
-        with m.If(~fetched & ~self.begin):  # at rest it is at the first instruction
+        with m.If(stop | (~fetched & ~self.begin)):  # at rest it is at the first instruction
             m.d.sync += pc.eq(0)
         with m.Elif(done):
             m.d.sync += pc.eq(place + 1)
@@ -191,10 +189,16 @@ class TrackMachine(wiring.Component):
             with m.If(~(following.reads | following.input)):
                 m.d.sync += x.eq(0)
 
-        ac, mq = Signal(width, reset_less=True), Signal(form.width, reset_less=True)
-        negative, flag, sign = ac[-1], Signal(), Signal()
-        left, right, total = Signal(width), Signal(width), Signal(width)
-        minus, carry = Signal(), Signal()
+        ac = Signal(width, reset_less=True)
+        mq = Signal(form.width, reset_less=True)
+        negative = ac[-1]
+        flag = Signal()
+        sign = Signal()
+        left = Signal(width)
+        right = Signal(width)
+        total = Signal(width)
+        minus = Signal()
+        carry = Signal()
         # Nested as it is, it takes two cells a bit.
         low, high = now.left[0], now.left[1]
         shifted, kept = Mux(low, mq.as_signed(), Cat(mq[-1], ac)[: form.width].as_signed()), Mux(low, ac >> 1, ac)
@@ -226,21 +230,21 @@ class TrackMachine(wiring.Component):
         with m.If(work & now.keep):
             m.d.sync += sign.eq(negative)
         phase = Signal(Phase)
-        with m.If(work), m.Switch(now.special):
-            with m.Case(Special.TEST):
-                m.d.sync += flag.eq(~negative)
-            with m.Case(Special.TEST_AND):
-                m.d.sync += flag.eq(flag & ~negative)
-            with m.Case(Special.TEST_OR):
-                m.d.sync += flag.eq(flag | ~negative)
-            with m.Case(Special.JUMP):
-                m.d.comb += taken.eq(self._holds(Cat(now.left, now.by_sign), negative, flag, phase))
-            with m.Case(Special.LEVEL):
-                m.d.sync += level.eq(self._next_level(now.address, level))
-            with m.Case(Special.PHASE):
-                m.d.sync += phase.eq(now.address)
-            with m.Case(Special.OUT):
-                m.d.comb += stop.eq(1)
+        special = Mux(work, now.special, Special.NONE)
+        with m.If(special == Special.TEST):
+            m.d.sync += flag.eq(~negative)
+        with m.Elif(special == Special.TEST_AND):
+            m.d.sync += flag.eq(flag & ~negative)
+        with m.Elif(special == Special.TEST_OR):
+            m.d.sync += flag.eq(flag | ~negative)
+        with m.Elif(special == Special.JUMP):
+            m.d.comb += taken.eq(self._holds(Cat(now.left, now.by_sign), negative, flag, phase))
+        with m.Elif(special == Special.LEVEL):
+            m.d.sync += level.eq(self._next_level(now.address, level))
+        with m.Elif(special == Special.PHASE):
+            m.d.sync += phase.eq(now.address)
+        with m.Elif(special == Special.OUT):
+            m.d.comb += stop.eq(1)
         m.d.comb += [
             self.tracks.eq(phase == Phase.TRACKS),
             self.out.eq(stop),

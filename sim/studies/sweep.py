@@ -103,8 +103,8 @@ COLUMNS = _Columns()
 
 
 def _column(about: Option) -> str:
-    """Name of the column of a method's option; clocks are shown as seconds."""
-    return f"{about.field}_s" if about.unit == "clocks" else about.field
+    """Name of the column of a method's option, with its unit; clocks are shown as seconds."""
+    return about.field + {"clocks": "_s", "rad/s": "_rad_s"}.get(about.unit, "")
 
 
 def _content(about: Option) -> tuple[str, str]:
@@ -285,7 +285,11 @@ def _core(spec: TachometerSpec) -> Row:
     own = {}
     for about in own_options(spec.method):
         value = spec.parameters[about.field]
-        own[_column(about)] = seconds(value) if about.unit == "clocks" else value
+        if about.unit == "clocks":
+            value = seconds(value)
+        elif about.unit == "rad/s":
+            value = float(getattr(spec, about.field))
+        own[_column(about)] = value
     return {
         "ppr": spec.encoder.pulses_per_rev,
         "decoding": spec.encoder.decoding,

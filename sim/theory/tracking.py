@@ -196,7 +196,7 @@ class Recursion:
         elif self.silent >= tuning.max_ticks:
             self._rest()
         else:
-            self._wait(length)
+            self._wait()
         self.phases.append(self.phase)
         greatest = tuning.greatest_velocity
         self.velocity = min(max(self.velocity, -greatest), greatest)
@@ -277,7 +277,7 @@ class Recursion:
         elif self.reaches(self.untroubled, tuning.span(self.level)):
             self.untroubled, self.level = 0.0, self.level + 1
 
-    def _wait(self, length: float) -> None:
+    def _wait(self) -> None:
         """No count: the place stays near the position, and a speed that leads away from it falls."""
         limit = 0.5 + 1.5 * self.tuning.edge_error
         if not self.reaches(abs(self.place), limit):
@@ -285,7 +285,7 @@ class Recursion:
         sign = math.copysign(1, self.place)
         self.place = sign * limit
         if sign * self.velocity >= 0:
-            self.velocity /= 1 + 2 * abs(self.velocity) * length
+            self.velocity = sign * min(abs(self.velocity), 1 / self.gap)
             self.acceleration = sign * min(sign * self.acceleration, 0.0)
 
 

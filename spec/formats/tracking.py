@@ -10,8 +10,8 @@ both go one way with each count, a keeps still only where a constant deviation e
 
     |e| ≤ 2^−F/2 · m/(d²·u) · (1 + m/(d·u·2^S))
 
-S makes the second term as small as the first. This e gives the velocity 3·d/m·|e| in counts per tick; the roundings of v
-add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at most half an LSB of the velocity, and |e| at
+S makes the second term as small as the first. This e gives the velocity 3·d/m·|e| in counts per tick; the roundings of
+v add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at most half an LSB of the velocity, and |e| at
 most half one of the fine position. They are greatest for the least λ, and either for m = 1, for the longest silence, or
 where x = λ·m·T_s has just reached its most.
 
@@ -213,7 +213,11 @@ class Tracking:
             counts * (counts + moved),  # the sum over the counts of a tick
             # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
             self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
-            self.max_error * of_v * 2**self.extra_bits,  # h
+            # What is multiplied: on its way to a product the adder holds nearly twice as much.
+            2 * self.max_error * of_v * 2**self.extra_bits,  # h
+            2 * self.max_acceleration / 2**self.frac_bits,
+            2 * self.max_velocity / 2**self.frac_bits * max(1.125, 2 ** (self.times_bits - 1 - self.unit_bits)),
+            4 * self.max_error,  # e less its mean
             self.max_acceleration / 2**self.frac_bits + self.max_error * of_a * 2**self.extra_bits,
             2 * self.max_error + 2 * moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
@@ -252,8 +256,8 @@ class Tracking:
         for upper, lower in pairwise(RATIOS):
             edges.append(GROWTH * (1 / math.sqrt(upper * lower) - 1) / float(self.bandwidth))
         spans = [round((end - begin) * self.clock_hz) for begin, end in pairwise(edges)]
-        longest = (1 << (self.width - 1)) - 1
-        return (*(min(span, longest - self.max_gap) for span in spans), longest)
+        longest = (1 << (self.width - 1)) - 1 - self.max_gap
+        return (*(min(span, longest) for span in spans), longest)
 
     @property
     def late_limit(self) -> int:

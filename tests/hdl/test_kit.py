@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from support.options import had_by
 
 from tachometry.hdl import export
 from tachometry.sim.engines.verilator import home
@@ -26,12 +27,14 @@ CASES = {
     "t": {"decoding": "2", "index": "yes", "index-reset": "yes"},
     "mt": {"external-tick": "yes", "bounds": "yes"},
     "rairan": {"filter": "100", "bounds": "yes"},
+    "track": {"external-tick": "yes", "unit": "rad/s"},
 }
 
 
 @cache
 def made(method: str, bus: str = "none") -> dict[str, str]:
-    return export(of_texts(method, BASE | CASES[method]), "spindle", bus, 100_000 if bus == "uart" else None)
+    spec = of_texts(method, had_by(method, BASE | CASES[method]))
+    return export(spec, "spindle", bus, 100_000 if bus == "uart" else None)
 
 
 def run(folder: Path, *command: str | Path, **environment: str) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from independent.front import Play
+from independent.front import Play, wrapped
 
 Manifest = dict[str, Any]
 Row = dict[str, int]  # outputs by name, and "clock"
@@ -128,9 +128,19 @@ def _write(folder: Path, manifest: Manifest, play: Play) -> None:
 
 
 def _rows(folder: Path, manifest: Manifest) -> list[Row]:
-    names = ["clock", *(port["name"] for port in outputs_of(manifest))]
-    text = (folder / f"{manifest['module']}.rows").read_text()
-    return [dict(zip(names, map(int, line.split()), strict=True)) for line in text.splitlines()]
+    ports = outputs_of(manifest)
+    rows = []
+    for line in (folder / f"{manifest['module']}.rows").read_text().splitlines():
+        clock, *values = map(int, line.split())
+        shown = {port["name"]: _of_bits(port, value) for port, value in zip(ports, values, strict=True)}
+        rows.append({"clock": clock, **shown})
+    return rows
+
+
+def _of_bits(port: dict[str, Any], value: int) -> int:
+    """A value of a port; Verilator's $fdisplay also shows bits beside it, where the port is part of a wide register."""
+    bits = port["width"]
+    return wrapped(value, bits) if port["signed"] else value % (1 << bits)
 
 
 def in_icarus(folder: Path, manifest: Manifest, play: Play) -> list[Row]:

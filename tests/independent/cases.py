@@ -39,7 +39,8 @@ def _case(
     return Case(name, Settings(name.split("_")[0], {**_PLAIN, **given}), clocks, least, turns, within, seed)
 
 
-_ALL = "decoding=2 unit=rpm bounds=yes index=yes index-reset=yes position-width=8 filter=3 age=yes"
+_PORTS = "decoding=2 unit=rpm index=yes index-reset=yes position-width=8 filter=3 age=yes"
+_ALL = f"{_PORTS} bounds=yes"
 
 CASES = [
     _case("s_native", "tick=50 max-time=500 frac-bits=8 velocity-width=10"),
@@ -100,6 +101,27 @@ CASES = [
     _case("rairan_rev", "tick=20 max-time=1280 unit=rev/s lsb=2^-6 adaptive=10% bounds=yes", 14000),
     _case("rairan_one", "dt=1 max-time=2047 decoding=2 unit=rpm max-speed=1rev/s velocity-width=20", 3000),
     _case("rairan_exact", "tick=17 max-time=340 paper-exact=yes estimate=n1 frac-bits=24", 9000),
+    _case("track_native", "tick=1250 max-time=12500 bandwidth=300rad/s age=yes", 120_000),
+    _case(
+        "track_rpm",
+        "tick=1200 max-time=7200 max-speed=100rpm velocity-width=14 lsb=2^-4 edge-error=0.2 least-memory=0.5 "
+        f"fine-bits=4 bandwidth=200rad/s agile=no growing-memory=no {_PORTS}",
+        *(120_000, 4),
+        seed="track_rpm2",  # with more counts in a tick than may be
+    ),
+    _case(
+        "track_rad",
+        "tick=1100 max-time=11000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes fine-bits=1 bandwidth=50Hz "
+        "least-memory=0.95 growing-memory=no",
+        120_000,
+    ),
+    _case(
+        "track_rev",
+        "tick=1500 max-time=6000 unit=rev/s lsb=2^-10 velocity-width=12 external-tick=yes max-tick-period=2000 "
+        "fine-bits=16 bandwidth=0.2kHz growing-memory=no",
+        120_000,
+        seed="track_rev1",  # with a speed that does not fit, and a rest
+    ),
 ]
 # Cores with a tick of 50 clocks and a maximum time of 10 ticks, which test_silence.py plays more on.
 SILENT = [case for case in CASES if case.name.endswith("_native") or case.name == "mt_lattice"]

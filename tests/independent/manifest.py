@@ -32,14 +32,25 @@ _SHARED = {
 }
 _TIMED = {"timer": "timer", "bound_decay": "bound-decay", "paper_exact": "paper-exact"}
 _RAIRAN = {"estimate": "estimate", "paper_exact": "paper-exact", "bound_decay": "bound-decay", "adaptive": "adaptive"}
+_TRACK = {
+    "bandwidth": "bandwidth",
+    "least_memory": "least-memory",
+    "agile": "agile",
+    "growing_memory": "growing-memory",
+    "fine_bits": "fine-bits",
+}
 WORDS = {
     "s": {**_SHARED, "cancel": "cancel"},
     "m": {**_SHARED, "average": "average"},
     "t": {**_SHARED, **_TIMED},
     "mt": {**_SHARED, **_TIMED, "min_time": "min-time", "whole_cycles": "whole-cycles"},
     "rairan": {**_SHARED, **_RAIRAN},
+    "track": {**_SHARED, **_TRACK},
 }
 _FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles")
+# Entries of the acceleration, and its unit for that of the velocity.
+ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")
+ACCELERATIONS = {"count/tick": "count/tick²", "rad/s": "rad/s²", "rev/s": "rev/s²", "rpm": "rpm/s"}
 
 
 def parameter(settings: Settings, name: str, shown: object) -> object:
@@ -49,11 +60,11 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         return settings.flag(word)
     if name == "bound_decay":
         return settings.decays if settings.method != "rairan" else settings.flag(word, True)
-    if name == "cancel":
+    if name in ("cancel", "agile", "growing_memory"):
         return settings.flag(word, True)
     if name == "min_time":
         return shown  # see `check_manifest`
-    if name in ("max_speed", "lowpass", "adaptive"):
+    if name in ("max_speed", "lowpass", "adaptive", "bandwidth"):
         return _canonical_quantity(settings, name, shown)
     values: dict[str, object] = {
         "pulses_per_rev": settings.ppr,
@@ -62,7 +73,9 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "max_ticks": settings.max_ticks,
         "frac_bits": settings.frac_bits,
         "velocity_width": settings.velocity_bits or shown,  # else that of the port, see `check_manifest`
-        "edge_error": settings.edge_error,
+        "edge_error": float(settings.edge_error),
+        "least_memory": float(settings.least_memory),
+        "fine_bits": settings.fine_bits,
         "position_width": settings.position_bits,
         "filter_clocks": settings.filter,
         "max_tick_cycles": settings.longest_tick if settings.external else None,
@@ -77,7 +90,8 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
 
 def _canonical_quantity(settings: Settings, name: str, shown: object) -> object:
     """The text of a quantity may be written in several ways: if it means the same, it is right."""
-    wanted = {"max_speed": settings.max_speed, "lowpass": settings.lowpass, "adaptive": settings.target}[name]
+    quantities = {"max_speed": settings.max_speed, "lowpass": settings.lowpass, "adaptive": settings.target}
+    wanted = {**quantities, "bandwidth": settings.bandwidth}[name]
     if wanted is None or shown is None:
         return None if wanted is None else wanted
     if isinstance(wanted, tuple):
@@ -106,6 +120,19 @@ class Expected:
         self.settings, self.manifest = settings, manifest
         self.to_velocity = manifest["latency_cycles"]["tick_to_velocity"]
         self.counts = settings.max_count << settings.greatest_shift
+
+    @property
+    def acceleration_bits(self) -> int:
+        """Eight more than the velocity has, and no more than 48."""
+        return min(48, int(self.manifest["velocity"]["width"]) + 8)
+
+    @property
+    def acceleration_lsb(self) -> float:
+        """An LSB of the acceleration in rad/s²."""
+        settings = self.settings
+        a_second = settings.tick_seconds if settings.native else 1
+        one = settings.per_count("rad/s") / settings.per_count(settings.unit) / a_second
+        return float(one) * 2.0 ** -self.manifest["acceleration"]["frac_bits"]
 
     @property
     def division(self) -> int:
@@ -235,6 +262,12 @@ class Expected:
             "velocity.full_scale_rad_per_s": lambda: self.full_scale("rad/s"),
             "max_time_cycles": self.max_time,
             "min_time_cycles": lambda: self.raised(settings.min_time, manifest["min_time_cycles"], spare=1),
+            "acceleration.width": lambda: self.acceleration_bits,
+            # Measured: the acceleration of a motion that is known.
+            "acceleration.frac_bits": lambda: manifest["acceleration"]["frac_bits"],
+            "acceleration.unit": lambda: ACCELERATIONS[settings.unit],
+            "acceleration.rad_per_s2_per_lsb": lambda: pytest.approx(self.acceleration_lsb, rel=1e-13),
+            "position_fine.frac_bits": lambda: settings.fine_bits,
             "bounds.none": self.none,
             "interval_unit_cycles": lambda: settings.period if settings.method in ("t", "mt") else settings.tick,
             "latency_cycles.pin_to_count": lambda: 2 + settings.filter,
@@ -248,13 +281,22 @@ class Expected:
             "external_tick_cycles.max": lambda: settings.longest_tick,
         }
 
+    @property
+    def forgets(self) -> bool:
+        """Whether there is a time after which nothing from before matters; a filter forgets gradually."""
+        settings = self.settings
+        gradually = settings.lowpass is not None or settings.method == "track"
+        return not gradually and not (settings.method == "rairan" and settings.paper_exact)
+
     def optional(self) -> dict[str, bool]:
         """Entries that not every core has, and whether this one has them."""
         settings = self.settings
         return {
             "bounds.none": settings.flag("bounds"),
             "min_time_cycles": settings.method == "mt",
-            "recovery_cycles": settings.lowpass is None and not (settings.method == "rairan" and settings.paper_exact),
+            "recovery_cycles": self.forgets,
+            **dict.fromkeys((f"acceleration.{name}" for name in ACCELERATION), settings.method == "track"),
+            "position_fine.frac_bits": settings.method == "track",
             **dict.fromkeys(
                 ("latency_cycles.tick_in_to_window_end", "external_tick_cycles.min", "external_tick_cycles.max"),
                 settings.external,
@@ -312,6 +354,14 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
         **({"n_ep1": expected.counts.bit_length()} if settings.method == "rairan" else {}),
         **({"n_dt1": settings.max_ticks.bit_length()} if settings.method == "rairan" else {}),
         **({"dt_shift": settings.greatest_shift.bit_length()} if settings.target else {}),
+        **(
+            {
+                "acceleration": expected.acceleration_bits,
+                "position_fine": settings.position_bits + settings.fine_bits,
+            }
+            if settings.method == "track"
+            else {}
+        ),
         **({"index_position": settings.position_bits} if settings.flag("index") else {}),
         **({"swallowed_edges": 16} if settings.filter else {}),
     }

@@ -177,19 +177,40 @@ class Settings:
 
     @cached_property
     def edge_error(self) -> Fraction:
-        """What the distance of two edges may be off by, in counts: whole eighths, the word or more."""
+        """What the distance of two edges may be off by, in counts: whole eighths, the word or more. E of tracking."""
+        if self.method == "track":
+            return Fraction(self.words.get("edge-error", "0.4"))
         return Fraction(math.ceil(8 * Fraction(self.words.get("edge-error", "0"))), 8)
 
     @cached_property
     def lowpass(self) -> Fraction | None:
-        """G in rad/s; a bandwidth in Hz is 2π times as many."""
-        word = self.words.get("lowpass")
+        """G in rad/s."""
+        return self._bandwidth("lowpass")
+
+    @cached_property
+    def bandwidth(self) -> Fraction:
+        """λ0 in rad/s."""
+        return self._bandwidth("bandwidth") or Fraction(1000)
+
+    def _bandwidth(self, name: str) -> Fraction | None:
+        """A bandwidth in rad/s; one in Hz is 2π times as many."""
+        word = self.words.get(name)
         if word is None:
             return None
         for suffix, factor in (("rad/s", Fraction(1)), ("kHz", 2000 * PI), ("Hz", 2 * PI)):
             if word.endswith(suffix):
                 return Fraction(word.removesuffix(suffix)) * factor
         raise AssertionError(word)
+
+    @cached_property
+    def least_memory(self) -> Fraction:
+        """θ_min."""
+        return Fraction(self.words.get("least-memory", "0.7"))
+
+    @cached_property
+    def fine_bits(self) -> int:
+        """Fraction bits of `position_fine`."""
+        return self._whole("fine-bits", 6)
 
     @cached_property
     def average(self) -> int:

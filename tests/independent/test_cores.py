@@ -17,6 +17,7 @@ from independent.settings import arguments
 from independent.show import check_age, check_updates
 from independent.stimulus import Lines, external, motion
 from independent.timed import timed_updates
+from independent.track import check_tracking, track_updates
 
 # Cores that show `bounds.none` at some time, because there is no bound.
 ABSENT = {"t_native": {"velocity_upper"}, "rairan_rpm": {"velocity_lower", "velocity_upper"}}
@@ -73,6 +74,8 @@ def model(case: Case, manifest: Manifest, front: Front) -> tuple[list[Update], l
         rises = [at + late for at in front.rises]
         ends, wrong = external_ends(rises, front.n_clocks, bounds["min"], bounds["max"])
     ticks = ticks_of(settings, front, ends, settings.max_count)
+    if settings.method == "track":
+        return track_updates(settings, ticks), ticks, wrong
     if settings.method in ("s", "m"):
         return (s_updates if settings.method == "s" else m_updates)(settings, ticks), ticks, wrong
     # The update comes a clock after the division; in other units the motion keeps clear of it.
@@ -120,7 +123,11 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
     check_front(case, manifest, front, ticks, rows, wrong)
     shown = [row for row in rows if row["velocity_valid"]]
     updates = [update for update in updates if update.cause + late < front.n_clocks]
-    absent = check_updates(case.settings, manifest, updates, shown, ticks)
+    absent = set[str]()
+    if case.settings.method == "track":
+        check_tracking(case.settings, manifest, updates, shown, ticks)
+    else:
+        absent = check_updates(case.settings, manifest, updates, shown, ticks)
     if case.settings.flag("age"):
         check_age(case.settings, manifest, updates, rows)
     assert absent >= ABSENT.get(case.name, set())

@@ -1,6 +1,7 @@
 """That the cores have every option of every method, every unit, and the ends of every range; and import nothing."""
 
 import ast
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,8 @@ ENDS: dict[str, set[object]] = {
     "position_bits": {8, 48},
     "average": {1, 256},
     "decoding": {1, 2, 4},
+    "least_memory": {Fraction(1, 2), Fraction(19, 20)},
+    "fine_bits": {1, 16},
 }
 
 
@@ -29,9 +32,9 @@ def of(method: str) -> list[Settings]:
 # `check_manifest` holds this list against the manifest of every core, so that a new option needs a case here.
 @pytest.mark.parametrize(("method", "word"), [(method, word) for method in WORDS for word in WORDS[method].values()])
 def test_every_option_of_every_method_has_a_case(method: str, word: str) -> None:
-    own_ticks = word == "external-tick" and method == "rairan"
+    without = (method, word) in (("rairan", "external-tick"), ("track", "bounds"))
     words = {"frac-bits": {"frac-bits", "lsb"}, "tick": {"tick", "dt"}}.get(word, {word})
-    assert own_ticks or any(words & settings.words.keys() for settings in of(method))
+    assert without or any(words & settings.words.keys() for settings in of(method))
 
 
 @pytest.mark.parametrize("method", WORDS)
@@ -47,6 +50,8 @@ def test_every_estimate_and_flag_has_a_case() -> None:
         assert {settings.paper_exact for settings in of(method)} == {True, False}
     assert {settings.lattice for settings in of("mt")} == {settings.lattice for settings in of("t")} == {True, False}
     assert any(not settings.flag("cancel", True) for settings in of("s"))
+    for flag in ("agile", "growing-memory"):
+        assert {settings.flag(flag, True) for settings in of("track")} == {True, False}
 
 
 @pytest.mark.parametrize("name", ENDS)
@@ -69,6 +74,7 @@ def test_nothing_here_imports_what_it_tests(path: Path) -> None:
             "functools",
             "hashlib",
             "importlib",
+            "itertools",
             "json",
             "math",
             "os",

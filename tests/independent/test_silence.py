@@ -31,13 +31,14 @@ def test_core_and_its_silences(case: Case, generated: Generated) -> None:
 
 def check_silence_and_dithering(settings: Settings, rows_of: Callable[[Lines], list[Row]]) -> None:
     """`stalled` rises after the maximum time and falls with a count; dithering on one edge reads 0."""
-    assert (settings.tick, settings.max_ticks) == (TICK, MOST)
-    first, single, last, dithers = 16 * TICK + 7, 50 * TICK + 9, 66 * TICK + 5, 110 * TICK + 3
-    edges = [*steady(first, 31, 12), (single, 1), *steady(last, 47, 20)]
-    gaps = [37] * 6 + [50] * 6 + [111] * 6 + [173] * 6
+    tick, more = settings.tick, settings.tick // TICK
+    assert (tick, settings.max_ticks) == (TICK * more, MOST)
+    first, single, last, dithers = 16 * tick + 7, 50 * tick + 9, 66 * tick + 5, 110 * tick + 3
+    edges = [*steady(first, 31 * more, 12), (single, 1), *steady(last, 47 * more, 20)]
+    gaps = [37 * more] * 6 + [50 * more] * 6 + [111 * more] * 6 + [173 * more] * 6
     edges += [(dithers + sum(gaps[:nth]), 1 - 2 * (nth % 2)) for nth in range(len(gaps))]
     end = dithers + sum(gaps)
-    ticks = [(at, 3, 1) for at in range(TICK - 3, end, TICK)] if settings.external else []
+    ticks = [(at, 3, 1) for at in range(tick - 3, end, tick)] if settings.external else []
     rows = rows_of(Lines(end, 0, edges, pulses=ticks))
     empty, seen = 1, {0: 0, 1: 0}  # what was before reset is empty
     for row in rows:

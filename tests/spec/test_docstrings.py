@@ -30,6 +30,12 @@ def test_parameters_of_the_base_follow_its_own(after: str) -> None:
 
 
 @pytest.mark.parametrize("after", ["", RAISES])
+def test_a_parameter_that_both_have_is_told_as_its_own(after: str) -> None:
+    own = f"{OWN}\ntwo : float\n    Another second."
+    assert with_inherited(own + after, BASE) == f"{own}\none : int\n    The first.{after}"
+
+
+@pytest.mark.parametrize("after", ["", RAISES])
 def test_a_class_without_parameters_has_those_of_the_base(after: str) -> None:
     assert with_inherited(NONE + after, BASE) == f"{NONE}\n\nParameters\n----------\n{OF_BASE}{after}"
 

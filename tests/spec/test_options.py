@@ -6,6 +6,7 @@ import re
 from fractions import Fraction
 
 import pytest
+from support.options import had_by
 
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import (
@@ -36,14 +37,14 @@ def test_defaults_are_those_of_python(method: str) -> None:
         spec = made(encoder=Encoder(500), unit=unit)
         assert of_texts(method, PPR | {"unit": unit}) == spec
         assert spec.frac_bits == (16 if unit == "count/tick" else 10)
-    coarse = Timing(100_000_000, 4, 500)
-    texts = PPR | {"clock": "100MHz", "tick": "4", "max-time": "2000", "unit": "rpm"}
-    assert of_texts(method, texts) == made(encoder=Encoder(500), timing=coarse, unit="rpm")
+    texts = had_by(method, {"ppr": "20", "clock": "100MHz", "tick": "4", "max-time": "2000", "unit": "rpm"})
+    coarse = Timing(100_000_000, int(texts["tick"]), 500)
+    assert of_texts(method, texts) == made(encoder=Encoder(20), timing=coarse, unit="rpm")
     assert of_texts(method, texts).frac_bits < 10  # as many as there can be
     if not made.own_ticks:
-        external = of_texts(method, PPR | {"external-tick": "yes", "clock": "10MHz"})
-        assert external == made(encoder=Encoder(500), timing=Timing(10_000_000), max_tick_cycles=TWO_TICKS)
-        assert external.max_tick_cycles == 400
+        external = of_texts(method, PPR | {"external-tick": "yes", "clock": "50MHz"})
+        assert external == made(encoder=Encoder(500), timing=Timing(50_000_000), max_tick_cycles=TWO_TICKS)
+        assert external.max_tick_cycles == 2000
 
 
 def test_every_option_does_what_it_says() -> None:

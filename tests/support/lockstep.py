@@ -1,6 +1,5 @@
-"""Random motions through hardware and golden model, side by side, and what they covered."""
+"""Random motions through hardware and golden model, side by side."""
 
-import itertools
 from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
@@ -8,125 +7,30 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from support.events import covered
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.golden.front_end import changes, decode, filter_line
-from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep as side_by_side
 from tachometry.spec import (
     METHODS,
     Encoder,
-    MTachometer,
     MTTachometer,
     ParameterError,
     RairanTachometer,
     Speed,
-    STachometer,
     TachometerSpec,
     Timing,
-    TrackTachometer,
 )
 from tachometry.spec.methods.timed import TimedTachometer
 
 PULSES_PER_REV = 100
 CLOCK_HZ = 1_000_000
 MIN_TICKS, MIN_UPDATES = 2000, 200
-
-STATES = ("00", "10", "11", "01")
-LEGAL = [f"{STATES[k]}->{STATES[(k + d) % 4]}" for k in range(4) for d in (1, -1)]
-ILLEGAL = [f"{STATES[k]}->{STATES[(k + 2) % 4]}" for k in range(4)]
-COMMON = [
-    "m_e saturated",
-    "sign change",
-    "stalled",
-    "count after stalled",
-    "position wrapped",
-    "glitch swallowed",
-    "index captured",
-    "position reset",
-    "external tick",
-    "external tick too early",
-    "external tick missing",
-    "velocity saturated",
-    "bounds",
-    "aged",
-    "filtered",
-    "waited for the filter",
-    *LEGAL,
-    *ILLEGAL,
-]
-TIMED = [
-    "times in clocks",
-    "times in ticks",
-    "paper exact",
-    "reversal",
-    "count after a silence",
-    "count at the maximum time",
-    "one after the other",
-    "forced after the maximum time",
-    "forced again",
-    "decay",
-    "decay backward",
-    "decay again",
-    "out of range",
-    "speed beyond the maximum",
-]
-EVENTS = {
-    "s": [
-        "suppressed return",
-        "alteration at max_ticks",
-        "forced, then alteration",
-        "m_s = 1",
-        "reciprocal carried",
-        "update in every clock",
-        *COMMON,
-    ],
-    "m": ["one tick", "a power of two", "another number", "update in every clock", *COMMON],
-    "mt": [
-        "longer than the maximum time",
-        *(event for event in [*TIMED, *COMMON] if event != "out of range"),
-    ],
-    "t": [*TIMED, *COMMON],
-    "track": [
-        "agile",
-        "not agile",
-        "growing memory",
-        "constant memory",
-        "several counts",
-        "counts that cancel",
-        "rest",
-        "first count",
-        "speed that falls",
-        "greatest speed",
-        *(event for event in COMMON if event not in ("bounds", "waited for the filter")),
-    ],
-    "rairan": [
-        "low",
-        "high",
-        "reversal",
-        "speed that fell",
-        "rest",
-        "count after rest",
-        "dt longer than nominal",
-        "to the letter",
-        "dt longer",
-        "dt shorter again",
-        "n1",
-        "n2",
-        "n3",
-        "update in every clock",
-        *(event for event in COMMON if "external" not in event),
-    ],
-}
-
-
-def _count(found: NDArray[Any]) -> int:
-    return int(np.count_nonzero(found))
 
 
 def fewest_ticks(method: str) -> int:
@@ -198,7 +102,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         max_speed=max_speed,
         **(options := random_options(method, rng)),
         position_width=int(rng.choice([8, 16, 32, 48])),
-        filter_clocks=min(int(rng.choice([0, 0, 0, 1, 2, 5])), tick_cycles if method == "rairan" else 5),
+        filter_clocks=filter_of(method, int(rng.choice([0, 0, 0, 1, 2, 5])), tick_cycles),
         index=encoder.index,
         index_reset=encoder.index and bool(rng.random() < 0.5),
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
@@ -219,9 +123,17 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         spec = replace(spec, adaptive=Fraction(1, 4))
         spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.max_pulse_count))))
     spec = random_output(spec, rng)
+    earliest = spec.min_tick_cycles if method == "track" else 0  # elsewhere ticks are as short anyway
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
     trace = encoding.recording.place(CLOCK_HZ)
-    return spec, encoding, random_ticks(trace, tick_cycles, rng) if spec.max_tick_cycles else trace
+    return spec, encoding, trace if spec.max_tick_cycles is None else random_ticks(trace, tick_cycles, rng, earliest)
+
+
+def filter_of(method: str, clocks: int, tick_cycles: int) -> int:
+    """Clocks of the glitch filter that are few or many beside those between two edges."""
+    if method == "track":
+        return 16 * clocks
+    return min(clocks, tick_cycles) if method == "rairan" else clocks
 
 
 def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
@@ -270,130 +182,15 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
     return spec
 
 
-def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator) -> PinTrace:
-    """An external tick about as long as nominal: regular for a while, then not, then missing."""
+def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator, earliest: int = 0) -> PinTrace:
+    """An external tick about as long as nominal: regular for a while, then not, then missing; some are the earliest."""
     n = trace.n_clocks // tick_cycles + 1
     gaps = np.full(n, tick_cycles)
     gaps[n // 2 :] += rng.integers(-tick_cycles // 2, tick_cycles, n - n // 2)
     gaps[rng.random(n) < 0.02] *= 5
+    if earliest:
+        gaps[rng.random(n) < 0.05] = earliest
     return trace.with_tick_in(np.cumsum(np.maximum(gaps, 2)) + int(rng.integers(0, 3)))
-
-
-def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
-    """How often each event that only the method knows happened."""
-    m_e, updates = run.ticks.pulse_count, run.updates
-    if isinstance(spec, MTachometer):
-        n = spec.average
-        kind = "one tick" if n == 1 else "a power of two" if spec.shift is not None else "another number"
-        return {kind: len(updates.clock)}
-    if isinstance(spec, RairanTachometer):
-        rows, rest = len(updates.clock), updates.forced & (updates["n_ep1"] == 0)
-        shift = updates.get("dt_shift")
-        return {
-            "low": _count(updates.interval > 1),
-            "high": _count(updates["n_ep1"] > 1),
-            "reversal": _count((updates["n_ep1"] == 0) & ~rest),
-            "speed that fell": _count(updates.forced & ~rest),
-            "rest": _count(rest),
-            "count after rest": _count(rest[:-1] & (updates["n_ep1"][1:] == 1)),
-            "dt longer than nominal": _count(np.diff(run.ticks.clock) > spec.timing.tick_cycles),
-            "to the letter": rows * spec.paper_exact,
-            "dt longer": _count(shift),
-            "dt shorter again": _count(np.diff(shift) < 0),
-            spec.estimate: rows,
-        }
-    if isinstance(spec, TimedTachometer):
-        return covered_by_timed(spec, run)
-    if isinstance(spec, TrackTachometer):
-        return covered_by_track(spec, run)
-    assert isinstance(spec, STachometer)
-    changed = np.diff(m_e, prepend=0) != 0
-    by_count = ~updates.forced
-    return {
-        "suppressed return": _count(changed & ~alterations(m_e)),
-        "alteration at max_ticks": _count(by_count & (updates.interval == spec.timing.max_ticks)),
-        "forced, then alteration": _count(updates.forced[:-1] & by_count[1:]),
-        "m_s = 1": _count(updates.interval == 1),
-        "reciprocal carried": spec.carried and len(updates.clock),
-    }
-
-
-def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
-    """The same for the tracking method."""
-    m_e, updates = run.ticks.pulse_count, run.updates
-    n = len(updates.clock)
-    rest = updates.forced & (updates.interval == spec.timing.max_ticks)
-    return {
-        "agile": n * spec.agile,
-        "not agile": n * (not spec.agile),
-        "growing memory": n * spec.growing_memory,
-        "constant memory": n * (not spec.growing_memory),
-        "several counts": _count(np.abs(m_e) > 1),
-        "counts that cancel": _count(~updates.forced & (m_e[:n] == 0)),
-        "rest": _count(rest),
-        "first count": _count(rest[:-1] & ~updates.forced[1:]),
-        "speed that falls": _count(updates.forced[1:] & (np.abs(np.diff(updates.velocity)) > 1)),
-        "greatest speed": _count(np.abs(updates.velocity) == spec.full_scale),
-    }
-
-
-def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
-    """The same for the methods that measure times."""
-    updates, n = run.updates, len(run.updates.clock)
-    velocity, forced, interval = updates.velocity, updates.forced, updates.interval
-    decay = forced & (interval < spec.max_periods) & (velocity != 0) if spec.decays else np.zeros(n, dtype=np.bool_)
-    overdue = forced & ~decay
-    flagged = updates.get("out_of_range")
-    return {
-        "times in ticks" if spec.on_lattice else "times in clocks": n,
-        "paper exact": n * spec.paper_exact,
-        "reversal": _count(~forced & (velocity == 0)),
-        "longer than the maximum time": _count(
-            np.abs(velocity) * interval > spec.timer_periods << spec.native_frac_bits + 1
-        ),
-        "count after a silence": _count(overdue[:-1] & ~forced[1:]),
-        "count at the maximum time": _count(~forced & (interval == spec.max_periods)),
-        "one after the other": _count(np.diff(updates.clock) == spec.update_spacing),
-        "forced after the maximum time": _count(overdue),
-        "forced again": _count(overdue[1:] & overdue[:-1]),
-        "decay": _count(decay),
-        "decay backward": _count(decay & (velocity < 0)),
-        "decay again": _count(decay[1:] & decay[:-1]),
-        "out of range": _count(flagged) * spec.on_lattice,
-        "speed beyond the maximum": _count(flagged) * (not spec.on_lattice),
-    }
-
-
-def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
-    """How often each event of the coverage table happened."""
-    updates = run.updates
-    sign = np.sign(updates.velocity)
-    found = Counter(
-        covered_by_method(spec, run)
-        | {
-            "m_e saturated": _count(run.ticks.overflow),
-            "sign change": _count(np.diff(sign[sign != 0])),
-            "stalled": _count(run.ticks.stalled),
-            "count after stalled": _count(np.diff(run.ticks.stalled.astype(np.int64)) < 0),
-            "index captured": len(run.index.clock),
-            "position reset": len(run.index.clock) * spec.index_reset,
-            "external tick": len(run.ticks.clock) * (spec.max_tick_cycles is not None),
-            "external tick too early": _count(~np.isin(run.tick_errors, run.ticks.clock)),
-            "external tick missing": _count(np.isin(run.tick_errors, run.ticks.clock)),
-            "velocity saturated": _count(updates.get("velocity_overflow")),
-            "filtered": len(updates.clock) * (spec.lowpass is not None),
-            "waited for the filter": spec.lowpass is not None
-            and _count(np.diff(updates.clock) == spec.low_pass.latency - 2),
-            "bounds": _count(updates.get("bounds_valid")),
-            "aged": _count(run.ticks.get("age")),
-            "update in every clock": _count(np.diff(updates.clock) == 1),
-            "glitch swallowed": int(run.ticks.get("swallowed_edges")[-1]) // 2,
-            "position wrapped": _count(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
-        }
-    )
-    lines = [f"{a}{b}" for a, b in zip(trace.a, trace.b, strict=True)]
-    found.update(f"{before}->{after}" for before, after in itertools.pairwise(lines))
-    return found
 
 
 def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter[str]]:

@@ -115,7 +115,7 @@ class Recursion:
         elif quiet:
             self._rest()
         else:
-            self._late(length)
+            self._late()
         self.v = max(-most["most_v"], min(self.v, most["most_v"]))
         self.a = max(-most["most_a"], min(self.a, most["most_a"]))
 
@@ -211,7 +211,7 @@ class Recursion:
         elif self.age >= form.spans[self.level]:
             self.age, self.level = 0, min(self.level + 1, LEVELS - 1)
 
-    def _late(self, length: int) -> None:
+    def _late(self) -> None:
         """No count has come: p stays near the position, and a speed that leads away from it falls."""
         form = self._form
         sign = 1 if self.p >= 0 else -1
@@ -219,9 +219,7 @@ class Recursion:
             return
         self.p = sign * form.late_limit
         if sign * self.v >= 0:
-            size = abs(self.v)
-            fall = 2 * rounded(size * length, form.unit_bits) + form.fixed(1)
-            self.v = sign * ((size << form.frac_bits) // fall)
+            self.v = sign * min(abs(self.v), (form.fixed(1) << form.unit_bits) // self.gap)
             self.a = sign * min(sign * self.a, 0)
 
 

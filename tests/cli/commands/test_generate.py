@@ -184,7 +184,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr many", "--ppr must be a whole number, not 'many'"),
         ("", "Missing option '--ppr'."),
         ("--ppr 9 --decoding 3", "--decoding must be 1, 2 or 4, not 3"),
-        ("--ppr 9 --method x", "--method must be one of s, m, t, mt, rairan, not 'x'"),
+        ("--ppr 9 --method x", "--method must be one of s, m, t, mt, rairan, track, not 'x'"),
         ("--ppr 9 --clock 48", "--tick must be a whole number of clocks, not 20us"),
         ("--ppr 9 --clock 48mHz", "--clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48mHz'"),
         ("--ppr 9 --clock 0Hz", "--clock must be a positive whole number of Hz, not '0Hz'"),

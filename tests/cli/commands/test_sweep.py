@@ -107,7 +107,7 @@ def test_what_cannot_be_of_all_methods_is_left_out(scheduler: list[str], capsys:
     told = " ".join(capsys.readouterr().out.split())
     assert "rairan: left out: --method must be another than rairan for an external tick" in told
     assert "(method rairan, tick=1ms)" in told
-    assert "8 points" in told
+    assert "10 points" in told
 
 
 def test_the_hardware_in_lockstep(
@@ -152,7 +152,7 @@ BAD = [
     (["--vary", "jitter=0,0.7"], "--jitter must be "),
     (["--vary", "average=1,2", "--methods", "s"], "--average must be given with a method that has it: m"),
     (["--average", "2", "--methods", "s,t"], "--average must be given with a method that has it: m"),
-    (["--methods", "s,x"], "--methods must be of s, m, t, mt, rairan, or all, not 'x'"),
+    (["--methods", "s,x"], "--methods must be of s, m, t, mt, rairan, track, or all, not 'x'"),
     (["--methods", "m:average=900"], "--average must be from 1 to 256, not 900 (method m:average=900, "),
     (["--vary", "seed=1..2000:2000", "--vary", "ppr=1..1000:1000"], "--vary must give at most 1000000 points, not "),
     (["--vary", "seed=1", "--seed", "2"], "--seed must be given or varied, not both"),

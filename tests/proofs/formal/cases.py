@@ -6,6 +6,7 @@ from unittest.mock import patch
 
 from proofs.formal.buses import ON_BUSES
 from proofs.formal.prove import Proof
+from proofs.formal.tracking import COUNTS_OF_A_TICK
 
 from tachometry.spec import (
     Encoder,
@@ -383,5 +384,6 @@ PROOFS = [
     after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_stalled"),
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
+    *COUNTS_OF_A_TICK,
     *ON_BUSES,
 ]

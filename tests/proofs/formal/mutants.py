@@ -26,6 +26,7 @@ from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.hdl.methods.rairan import RairanMethod
 from tachometry.hdl.methods.rairan_counters import RairanCounters
+from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update_age import UpdateAge
 
@@ -217,6 +218,12 @@ MUTANTS = [
     Mutant(
         "upset, M/T of whole cycles: cycles", "lemma_waived", MTMethod, "cycled.eq(0), waived.eq(0)", "cycled.eq(0)"
     ),
+    Mutant("counts of a tick", "pk_number", TickCounts, "counts & (alone |", "counts & (0 |"),
+    Mutant("counts of a tick", "pk_number", TickCounts, "~number.any() | ~self.tracks", "~number.any()"),
+    Mutant("counts of a tick", "pk_times", TickCounts, "times.eq(times + number)", "times.eq(times + 1)"),
+    Mutant("counts of a tick", "pk_places", TickCounts, "minus.eq(~backward)", "minus.eq(1)"),
+    Mutant("counts of a tick", "pk_elapsed", TickCounts, "self.elapsed + ~quiet", "self.elapsed + 1", 40),
+    Mutant("counts of a tick", "pk_length", TickCounts, "length), length.eq(1)", "length), length.eq(0)"),
     Mutant("wishbone", "pb_error", RegisterBank, "(bus.address >= len(self._map.registers))", "0"),
     Mutant("wishbone", "pb_read", RegisterBank, "init=(1 << len(bus.address)) - 1", "init=0"),
     Mutant("wishbone", "pb_snapshot", RegisterBank, "self.capture | (bus.read", "(bus.read"),

@@ -14,7 +14,37 @@ _NO_COUNT = (
     "velocity is 0, and the speed that the time allows is no less"
 )
 
+_OUTPUT_OF_COUNTS = "a tick sets it before the program reads it"
+_EVEN = (
+    "it is inverted in every clock from a tick to the next; the program reads it an even number of clocks after "
+    "the tick, but where it asks for more than one, and then 2 and 3 are exchanged, and 0 and 1"
+)
+_EACH_TICK = "every tick has an update, so the age is at most 1"
+
 ARGUED = {
+    ("track, age", '"number": Out(form.number_bits),', "S[0] const0"): _OUTPUT_OF_COUNTS,
+    ("track, age", '"places": Out(signed(form.places_bits)),', "B[3] const1"): _OUTPUT_OF_COUNTS,
+    ("track, age", '"number": Out(form.number_bits),', "number[0] inv"): _EVEN,
+    ("track, external tick", '"places": Out(signed(form.places_bits)),', "B[2] const1"): _OUTPUT_OF_COUNTS,
+    ("track, external tick", '"number": Out(form.number_bits),', "A[0] inv"): _EVEN,
+    ("track, external tick", '"number": Out(form.number_bits),', "number[0] cnot1"): _EVEN,
+    ("track, external tick", 'places = Signal.like(self.places, name="open_places")', "B[4] const1"): (
+        "the first count after a reset is alone in its tick and replaces it, and without one it is not read"
+    ),
+    ("track, external tick", "*(fetch.addr.eq(place), fetch.en.eq(done | self.begin)),", "B[0] const0"): (
+        "the program has ended when it begins, and then no instruction takes longer"
+    ),
+    (
+        "track, external tick",
+        "return Cat(met[item] for item in Condition).bit_select(condition, 1)",
+        "A[5] cnot1",
+    ): "whether the phase is rest is asked only of ticks that are not beyond the greatest speed",
+    ("track, age", "with m.If(work & now.keep):", "A[0] const1"): (
+        "an instruction behind a jump keeps a sign that is not its own, which no way that the jump leads to reads "
+        "before it has kept another one"
+    ),
+    ("track, age", '"after": Out(range(max_age + 1)),', "after[1] const0"): _EACH_TICK,
+    ("track, age", '"age": Out(range(max_age + 1)),', "age$49[1] cnot1"): _EACH_TICK,
     ("t, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
     ("t, in clocks", '"was_negative": Out(1),', "B[0] inv"): _NO_COUNT,
     ("t, in ticks", "above.eq(value > Const(limit, value.shape())),", "B[2] inv"): (

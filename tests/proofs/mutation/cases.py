@@ -118,7 +118,8 @@ def _case(
 
 _FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_reset": True}
 
-# Ticks of an odd number of clocks: inverters in a loop would cancel over an even one.
+# Ticks of an odd number of clocks: inverters in a loop would cancel over an even one. With `track` the latency is even,
+# for the same reason.
 CASES = [
     _case("s", "table", 3, 6, 1, 340, age=True),
     _case("s", "carried, serial", 15, 16, 2, 340, max_table=8, frac_bits=6, **_FRONT),
@@ -141,4 +142,7 @@ CASES = [
     _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),
     _case("rairan", "n2", 5, 6, 2, 340, estimate="n2", **_FRONT),
     _case("rairan", "to the letter", 3, 6, 2, 340, estimate="n1", paper_exact=True),
+    _case("track", "age", 761, 6, 2, 340, bandwidth=Fraction(5), age=True, fine_bits=1),
+    _case("track", "external tick", 761, 6, 2, 340, bandwidth=Fraction(5), max_tick_cycles=801, fine_bits=1),
+    _case("track", "index", 761, 6, 2, 340, bandwidth=Fraction(5), fine_bits=1, **_FRONT),
 ]

@@ -83,6 +83,7 @@ abc -dff -script +strash;dprove,-j,-V,0,-T,{seconds};write_status,verdict_{numbe
 _PROVEN = "snl_UNSAT"
 _SECONDS = 20  # for a mutant
 _WATCHED = 20_000  # clocks in which mutants are watched
+_SHARED = 1000  # bits of registers above which nothing is proven unless they are shared
 _TOGETHER = 8  # mutants for one run of Yosys
 
 
@@ -258,7 +259,8 @@ def equivalent(
 ) -> list[bool]:
     """Whether each mutant is proven to show at every output in every clock what the core shows, whatever the inputs."""
     cut = opened(flat, group, folder)
-    differ = watched(case.pins, cut, len(group), pins[:_WATCHED])
+    many = sum(register.width for register in cut.registers) > _SHARED
+    differ = watched(case.pins, cut, len(group), pins[: 10 * _WATCHED if many else _WATCHED])
     text = folder / "cut.il"
     text.write_text(cut.text)
 
@@ -275,7 +277,7 @@ def equivalent(
         return {number for number in numbers if _holds(own / f"verdict_{number}", own / f"left_{number}.il")}
 
     alike: set[int] = set()
-    for together in (_TOGETHER, 1):
+    for together in (_TOGETHER,) if many else (_TOGETHER, 1):
         left = [number for number in range(1, len(group) + 1) if number not in alike]
         parts = [left[first : first + together] for first in range(0, len(left), together)]
         alike = alike.union(*pool.map(proven, parts))

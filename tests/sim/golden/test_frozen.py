@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from support.options import had_by
 
 from tachometry.sim import golden
 from tachometry.sim.golden.registers import Access, GoldenBank
@@ -22,10 +23,10 @@ SMALL = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100", "bounds":
 
 def used() -> None:
     """Something of every module, so that it can be told from others which this test runs."""
-    line = (np.arange(300) // 30 % 2).astype(np.uint8)
-    trace = PinTrace(np.arange(300), line, np.zeros_like(line), 300)
+    line = (np.arange(3000) // 30 % 2).astype(np.uint8)
+    trace = PinTrace(np.arange(3000), line, np.zeros_like(line), 3000)
     for method in METHODS:
-        spec = of_texts(method, SMALL)
+        spec = of_texts(method, had_by(method, SMALL))
         run = golden.run(spec, trace)
         Lockstep(trace, run, run, 0, [])
         registers = RegisterMap(spec)

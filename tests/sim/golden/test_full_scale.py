@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.options import had_by
 
 from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace, quadrature
@@ -9,7 +10,8 @@ from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.manifest import manifest
 
 CORE = {"ppr": "25", "clock": "1MHz", "tick": "16", "max-time": "160"}
-RAD_PER_S = {"count/tick": 2 * np.pi / 100 / 16e-6, "rpm": 2 * np.pi / 60, "rev/s": 2 * np.pi}
+RAD_PER_S = {"rpm": 2 * np.pi / 60, "rev/s": 2 * np.pi}
+UNITS = ("count/tick", *RAD_PER_S)
 OUTPUTS: tuple[dict[str, str], ...] = (
     {},
     {"unit": "rpm"},
@@ -25,27 +27,31 @@ def spec_of(**options: str) -> TachometerSpec:
     return of_texts("s", texts | {name.replace("_", "-"): text for name, text in options.items()})
 
 
-def fastest(sign: int) -> PinTrace:
+def fastest(sign: int, n_clocks: int) -> PinTrace:
     """A count in every clock."""
-    level = quadrature(sign * np.arange(600))
-    return PinTrace(np.arange(600), level & np.uint8(1), level >> np.uint8(1), 600)
+    level = quadrature(sign * np.arange(n_clocks))
+    return PinTrace(np.arange(n_clocks), level & np.uint8(1), level >> np.uint8(1), n_clocks)
 
 
 @pytest.mark.parametrize("options", OUTPUTS, ids=str)
 @pytest.mark.parametrize("method", METHODS)
 def test_full_scale_is_where_the_velocity_saturates(method: str, options: dict[str, str]) -> None:
     limits = {} if "frac-bits" in options else {"max-speed": "60000rpm"}
-    spec = of_texts(method, CORE | limits | options | ({"estimate": "n1"} if method == "rairan" else {}))
+    own = {"estimate": "n1"} if method == "rairan" else {}
+    spec = of_texts(method, had_by(method, CORE | limits | options | own))
     described = manifest(spec)["velocity"]
     for sign in (1, -1):
-        velocity = golden.run(spec, fastest(sign)).updates.velocity
+        velocity = golden.run(spec, fastest(sign, 40 * spec.timing.tick_cycles)).updates.velocity
         greatest = (sign * velocity).max()
         assert greatest == spec.full_scale
         assert greatest * 2.0**-spec.frac_bits == described["full_scale"]
-    assert described["full_scale_rad_per_s"] == pytest.approx(described["full_scale"] * RAD_PER_S[spec.unit])
+    count = 2 * np.pi / 100 / float(spec.timing.tick_seconds)
+    assert described["full_scale_rad_per_s"] == pytest.approx(
+        described["full_scale"] * (RAD_PER_S | {"count/tick": count})[spec.unit]
+    )
 
 
-@pytest.mark.parametrize("unit", RAD_PER_S)
+@pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("width", [12, 18, 27])
 def test_the_default_lsb_is_the_finest_with_which_nothing_saturates(unit: str, width: int) -> None:
     spec = spec_of(unit=unit, velocity_width=str(width), max_speed="300rev/s")

@@ -22,8 +22,8 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.theory.tracking import Recursion, Tuning, track
 from tachometry.spec import Encoder, Timing, TrackTachometer
 
-REAL = {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10}
-BAD = {"jitter": 0.1, "nonuniformity": 0.2, "phase_error_deg": 20}
+REAL: dict[str, object] = {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10}
+BAD: dict[str, object] = {"jitter": 0.1, "nonuniformity": 0.2, "phase_error_deg": 20}
 UP_AND_DOWN = "ramp:0:200rad/s:50ms+constant:200rad/s:50ms+ramp:200rad/s:0:50ms+stop:50ms"
 MOTIONS: dict[str, tuple[str, dict[str, object], float]] = {
     "ramp": ("ramp:0:100rad/s:400ms", {}, 0.4),

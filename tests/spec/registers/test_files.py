@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from support.lockstep import random_case
 from support.mutant import caught
+from support.options import had_by
 from support.rdl import read_rdl
 
 from tachometry.boards.host.client import Client
@@ -31,7 +32,7 @@ WIDE = {"velocity-width": "64", "position-width": "48", "bounds": "yes"}
 @cache
 def maps(method: str) -> list[RegisterMap]:
     specs = [random_case(seed, method)[0] for seed in SEEDS]
-    return [RegisterMap(spec) for spec in (*specs, of_texts(method, BASE | WIDE))]
+    return [RegisterMap(spec) for spec in (*specs, of_texts(method, had_by(method, BASE | WIDE)))]
 
 
 def check_rdl(registers: RegisterMap, text: str, folder: Path) -> None:
@@ -100,6 +101,12 @@ def check_header(registers: RegisterMap, text: str, folder: Path) -> None:
     assert float(macros["RAD_PER_S_PER_LSB"]) == described["velocity"]["rad_per_s_per_lsb"]
     assert float(macros["RAD_PER_COUNT"]) == pytest.approx(2 * math.pi / described["counts_per_rev"], rel=1e-15)
     assert float(macros["UNIT_PER_LSB"]) == 0.5 ** described["velocity"]["frac_bits"]
+    for port in ("acceleration", "position_fine"):
+        assert (f"{port.upper()}_PER_LSB" in macros) == (port in described)
+        if port in described:
+            assert float(macros[f"{port.upper()}_PER_LSB"]) == 0.5 ** described[port]["frac_bits"]
+    if "acceleration" in described:
+        assert float(macros["RAD_PER_S2_PER_LSB"]) == described["acceleration"]["rad_per_s2_per_lsb"]
 
 
 def check_page(registers: RegisterMap, text: str, folder: Path) -> None:
@@ -182,7 +189,7 @@ def test_the_configurations_have_all_kinds() -> None:
     """Values of two words, signed and not, and every option that adds a register."""
     names = {one.name for method in METHODS for registers in maps(method) for one in registers}
     assert {"VELOCITY_HIGH", "POSITION_HIGH", "INDEX_POSITION", "AGE", "VELOCITY_LOWER", "SWALLOWED_EDGES"} <= names
-    assert {"N_EP1", "DT_SHIFT"} <= names
+    assert {"N_EP1", "DT_SHIFT", "ACCELERATION", "ACCELERATION_HIGH", "POSITION_FINE", "POSITION_FINE_HIGH"} <= names
     assert any("tick_errors" in registers.counted for registers in maps("s"))
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from support.command import run
 from support.mutant import caught
+from support.options import had_by
 
 from tachometry.hdl import export
 from tachometry.sim.engines import build
@@ -182,7 +183,7 @@ def test_another_clock_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_offsets_and_ports_are_those_of_the_core(method: str) -> None:
-    core = of_texts(method, BASE)
+    core = of_texts(method, had_by(method, BASE))
     text = export(core, "spindle", target="litex")[FILE]
     compile(text, FILE, "exec")
     tables = re.sub(r"^(from|import) .*\n", "", text, flags=re.MULTILINE).split("\n\nclass")[0]

@@ -14,6 +14,7 @@ from support.command import run as command_line
 from support.compiled import lint
 from support.lockstep import random_case
 from support.mutant import caught
+from support.options import had_by
 from support.rio import component, hal_type, loaded
 
 from tachometry.hdl import export
@@ -34,6 +35,7 @@ EVERY = {
     "t": {"decoding": "2", "index": "yes", "position-width": "8"},
     "mt": {"external-tick": "yes", "bounds": "yes"},
     "rairan": {"filter": "100", "bounds": "yes"},
+    "track": {"external-tick": "yes", "index": "yes", "unit": "rpm", "velocity-width": "24"},
 }
 SCALE, OFFSET = -25.0, 3.5
 WIDE = "must be at most 32 for RIO, whose numbers have no more, not"
@@ -214,14 +216,18 @@ def test_wrong_plugins_are_caught(seed: int, file: str, right: str, wrong: str, 
         check(seed, tmp_path, file, right, wrong)
 
 
+def core(method: str) -> TachometerSpec:
+    return of_texts(method, had_by(method, BASE | EVERY[method]))
+
+
 @cache
 def made(method: str) -> dict[str, str]:
-    return export(of_texts(method, BASE | EVERY[method]), NAME, target="rio")
+    return export(core(method), NAME, target="rio")
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_plugin_fits_its_verilog_and_the_core(method: str, tmp_path: Path) -> None:
-    files, spec = made(method), of_texts(method, BASE | EVERY[method])
+    files, spec = made(method), core(method)
     for file in (WRAPPER, CORE):
         (tmp_path / Path(file).name).write_text(files[file], encoding="utf-8")
     lint(["spindle_rio.v", "spindle.v"], "spindle_rio", tmp_path)
@@ -243,7 +249,7 @@ def test_the_plugin_fits_its_verilog_and_the_core(method: str, tmp_path: Path) -
 
 def test_numbers_come_from_the_spec() -> None:
     """As RIO's test programs show them."""
-    spec = of_texts("m", BASE | EVERY["m"])
+    spec = core("m")
     plugin = loaded(made("m")[PLUGIN], 1_000_000)
     rpm = spec.rad_per_s_per_lsb * 30 / np.pi
     for value in (-5, 0, 1000):
@@ -287,9 +293,7 @@ def test_cores_that_do_not_fit_are_refused(options: dict[str, str], bus: str | N
 
 def test_the_page_has_every_pin_and_its_command_makes_the_plugin(tmp_path: Path) -> None:
     rows = dict(re.findall(r"^\| `([\w-]+)` \| (\w+)", PAGE, re.MULTILINE))
-    found = {
-        name: pin.kind for method in METHODS for name, pin in hal_pins(of_texts(method, BASE | EVERY[method])).items()
-    }
+    found = {name: pin.kind for method in METHODS for name, pin in hal_pins(core(method)).items()}
     found |= {"age": "u32", "tick-errors": "u32", "swallowed-edges": "u32"}
     assert rows == found | {"position-scale": "float", "position-offset": "float"}
     (command,) = re.findall(r"```sh\n(tachometry .*?)```", PAGE, re.DOTALL)

@@ -1,4 +1,4 @@
-"""A method is one object: a sixth one, registered in the three tables, goes through every command."""
+"""A method is one object: a new one, registered in the three tables, goes through every command."""
 
 import csv
 import json
@@ -99,10 +99,10 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
         assert "--doubled / --no-doubled Everything is measured twice, which changes nothing." in text
         assert "[default: no-doubled]" in text
     if command not in ("compare", "verify", "sweep"):
-        assert "[s|m|t|mt|rairan|x]" in text
+        assert "[s|m|t|mt|rairan|track|x]" in text
         assert "x does what m does" in text
     if command == "verify":
-        assert "of s, m, t, mt, rairan, x." in text
+        assert "of s, m, t, mt, rairan, track, x." in text
 
 
 def test_generate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

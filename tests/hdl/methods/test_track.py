@@ -1,0 +1,198 @@
+"""The datapath of the tracking method, with injected steps and ticks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from amaranth import Elaboratable, ResetInserter, Signal
+from numpy.typing import NDArray
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+from support.tracking import hostile
+
+from tachometry.hdl.methods import track
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.methods.track import Model
+from tachometry.sim.signals.run import Table
+from tachometry.spec import Encoder, Speed, Timing, TrackTachometer
+
+SPEC = TrackTachometer(
+    encoder=Encoder(100),
+    timing=Timing(1_000_000, 1000, 10),
+    frac_bits=6,
+    max_speed=Speed.parse("40rad/s"),
+    position_width=12,
+    bandwidth=Fraction(200),
+    least_memory=Fraction(9, 10),
+    fine_bits=3,
+)
+EXTERNAL = replace(SPEC, timing=Timing(1_000_000, 1400, 10), max_tick_cycles=1400)
+NAMES = ["velocity", "acceleration", "position_fine", "interval", "forced"]
+Update = tuple[int, ...]  # clock, and what the update says
+
+
+class Resettable(Elaboratable):
+    """A datapath with a reset."""
+
+    def __init__(self, core: track.TrackMethod) -> None:
+        self.core = core
+        self.rst = Signal()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.core, name)
+
+    def elaborate(self, platform: object) -> Any:
+        return ResetInserter(self.rst)(self.core)
+
+
+def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[dict[str, int]]:
+    """Inputs of every clock, until the last update has come."""
+    rows = [{"step": 0, "tick": 0, "rst": 0} for _ in range(int(last[-1]) + spec.datapath_latency + 1)]
+    for clock, step in zip(steps.clock.tolist(), steps.step.tolist(), strict=True):
+        rows[clock]["step"] = step
+    through = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, last, side="right")]
+    half = 1 << (spec.position_width - 1)
+    for clock, moved, end in zip(last.tolist(), np.diff(through, prepend=0).tolist(), through.tolist(), strict=True):
+        held = max(-spec.max_count, min(moved, spec.max_count))
+        position = (end + half) % (2 * half) - half
+        rows[clock] |= {"tick": 1, "pulse_count": held, "overflow": int(held != moved), "position": position}
+    return rows
+
+
+def updates_of(spec: TrackTachometer, rows: Sequence[Mapping[str, int]]) -> list[Update]:
+    """All updates; from one to the next the outputs stay."""
+    names = [*NAMES, *(["updates.p.stamp"] if spec.stamp_width else [])]
+    seen = clock_by_clock(Resettable(track.TrackMethod(spec)), rows, ["velocity_valid", *names])
+    held = dict.fromkeys(names, 0)
+    for row, given in zip(seen, rows, strict=True):
+        held = row if row["velocity_valid"] else held
+        assert given["rst"] or all(row[name] == held[name] for name in names)
+        held = dict.fromkeys(names, 0) if given["rst"] else held
+    return [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
+
+
+def golden(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[Update]:
+    """The updates of the golden model, `datapath_latency` after every tick."""
+    through = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, last, side="right")]
+    found = Model(spec).updates(Table(last + spec.tick_latency, {"position": through}), steps, int(last[-1]) + 1)
+    columns = [found[name].astype(int).tolist() for name in NAMES]
+    return list(zip((last + spec.datapath_latency).tolist(), *columns, strict=True))
+
+
+def regular(spec: TrackTachometer, speed: float, n_ticks: int, begin: int = 0) -> tuple[Steps, NDArray[np.int64]]:
+    """A constant speed in counts per tick, and ticks as long as nominal."""
+    cycles = spec.timing.tick_cycles
+    last = (np.arange(n_ticks) + 1) * cycles - 1
+    clock = np.round(begin + (0.3 + np.arange(int(abs(speed) * n_ticks) + 1)) * cycles / abs(speed)).astype(np.int64)
+    clock = clock[clock <= last[-1]]
+    none = np.empty(0, dtype=np.int64)
+    return Steps(clock, np.full(len(clock), 1 if speed > 0 else -1), none, none, none), last
+
+
+def check(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> None:
+    """Every update, in its clock, with every output."""
+    assert updates_of(spec, rows_of(spec, steps, last)) == golden(spec, steps, last)
+
+
+def check_speeds() -> None:
+    """Both ways, fast and slow, and a rest behind each."""
+    for speed in (0.3, -1.6):
+        steps, last = regular(SPEC, speed, 24)
+        kept = steps.clock < 11_000
+        check(SPEC, Steps(steps.clock[kept], steps.step[kept], steps.errors, steps.index, steps.swallowed), last)
+
+
+def test_speeds() -> None:
+    check_speeds()
+
+
+def check_hostile() -> None:
+    """Any counts."""
+    for spec in (EXTERNAL, SPEC):
+        check(spec, *hostile(spec, np.random.default_rng(3), 40))
+
+
+def test_hostile_counts() -> None:
+    check_hostile()
+
+
+def check_latency() -> None:
+    """An update comes `datapath_latency` clocks after every tick, whatever was in it, and with the next one."""
+    steps, last = hostile(EXTERNAL, np.random.default_rng(5), 40)
+    last = (np.arange(40) + 1) * EXTERNAL.min_tick_cycles - 1
+    few = steps.clock <= last[-1]
+    steps = Steps(steps.clock[few], steps.step[few], steps.errors, steps.index, steps.swallowed)
+    check(EXTERNAL, steps, last)
+
+
+def test_latency() -> None:
+    check_latency()
+
+
+def check_wrap() -> None:
+    """The fine position wraps as the position does."""
+    narrow = replace(SPEC, position_width=8)
+    steps, last = regular(narrow, 3, 50)
+    check(narrow, steps, last)
+    assert golden(narrow, steps, last) != golden(SPEC, steps, last)
+
+
+def test_position_wraps() -> None:
+    check_wrap()
+
+
+def check_reset(seed: int) -> None:
+    """A reset leaves nothing behind, wherever the program is."""
+    rng = np.random.default_rng(seed)
+    before = rows_of(SPEC, *hostile(SPEC, rng, 10))
+    before = before[: int(rng.integers(7, 10)) * 1000 + int(rng.integers(0, SPEC.datapath_latency))]
+    steps, last = regular(SPEC, float(rng.choice([-1, 1]) * rng.choice([0.4, 1.3, 3.7])), 15, int(rng.integers(2000)))
+    after = rows_of(SPEC, steps, last)
+    reset = [{"step": 0, "tick": 0, "rst": 1}]
+    found = [update for update in updates_of(SPEC, before + reset + after) if update[0] > len(before)]
+    assert [(clock - len(before) - 1, *rest) for clock, *rest in found] == golden(SPEC, steps, last)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_reset(seed: int) -> None:
+    check_reset(seed)
+
+
+def test_stamp() -> None:
+    """For the age, an update has the number of its tick, and not of one that came since."""
+    spec = replace(EXTERNAL, age=True, lowpass=Fraction(100))
+    assert spec.stamp_width
+    steps, last = regular(spec, 1.3, 12)
+    rows = rows_of(spec, steps, last)
+    mask, ticks = (1 << spec.stamp_width) - 1, 0
+    for row in rows:
+        ticks += row["tick"]
+        row["stamp"] = ticks & mask
+    stamps = [update[-1] for update in updates_of(spec, rows)]
+    assert stamps == [(1 + k) & mask for k in range(12)]
+
+
+def check_all() -> None:
+    check_hostile()
+    check_speeds()
+
+
+MUTANTS = {
+    "position of now": ("(position << spec.fine_bits)", "(self.position << spec.fine_bits + 1)"),
+    "down and not to the nearest": (" + machine.p[shift - 1]", ""),
+    "forced with counts": ("new.forced.eq(~counts.counted)", "new.forced.eq(counts.counted)"),
+    "never beyond": ("machine.beyond.eq(self.overflow)", "machine.beyond.eq(0)"),
+    "always a speed": ("counts.tracks.eq(machine.tracks)", "counts.tracks.eq(1)"),
+    "never quiet": ("machine.quiet.eq(counts.quiet)", "machine.quiet.eq(0)"),
+    "in every clock": ("self.updates.valid.eq(machine.out)", "self.updates.valid.eq(machine.out | self.tick)"),
+    "nominal lengths": ("machine.length.eq(counts.length)", "machine.length.eq(spec.timing.tick_cycles)"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(track.TrackMethod, *MUTANTS[name]), caught():
+        check_all()

@@ -1,0 +1,54 @@
+"""What tracking shows whatever its filter does: when, how long after the last count, at rest and beyond its limits."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from independent.bench import Manifest, Row
+from independent.front import Tick, wrapped
+from independent.methods import Update
+from independent.settings import Settings
+from independent.show import check_velocity, limit_of
+
+
+def track_updates(settings: Settings, ticks: Sequence[Tick]) -> list[Update]:
+    """An update for every tick; the speeds are known at rest, and where there are more counts than may be."""
+    found = []
+    silent = settings.max_ticks  # before reset there was no count
+    for tick in ticks:
+        interval = min(silent + 1, settings.max_ticks)
+        silent = silent + 1 if tick.empty else 0
+        found.append(Update(tick.last, Fraction(tick.count), interval, forced=tick.empty))
+    return found
+
+
+def check_tracking(
+    settings: Settings, manifest: Manifest, updates: Sequence[Update], rows: Sequence[Row], ticks: Sequence[Tick]
+) -> None:
+    """Every update with its clock; velocity, acceleration and fine position as far as they need no filter."""
+    latency = manifest["latency_cycles"]
+    late = latency["tick_latency"] + latency["tick_to_velocity"]
+    assert [update.cause + late for update in updates] == [row["clock"] for row in rows]
+    seen = {"rests": 0, "waits": 0, "beyond": 0}
+    one = 1 << settings.fine_bits
+    for tick, update, row in zip(ticks, updates, rows, strict=False):
+        assert row["interval"] == update.interval, (update, row)
+        assert row["forced"] == update.forced, (update, row)
+        most = min(limit_of(settings), float(settings.max_velocity * settings.lsb_per_count) + 1)
+        assert abs(row["velocity"]) <= most, row
+        bits = settings.position_bits + settings.fine_bits
+        off = wrapped(row["position_fine"] - tick.position * one, bits)
+        if tick.empty and update.interval == settings.max_ticks:
+            assert (off, row["acceleration"]) == (0, 0), row
+            assert settings.lowpass is not None or row["velocity"] == 0, row
+            seen["rests"] += 1
+        elif tick.empty:
+            # The place is not further away than a count would be that comes late because of the disc.
+            assert abs(off) <= (Fraction(1, 2) + Fraction(3, 2) * settings.edge_error) * one + 1, row
+            seen["waits"] += 1
+        elif tick.overflow:
+            if settings.lowpass is None:
+                check_velocity(settings, update.speed, row)
+            assert (off, row["acceleration"]) == (0, 0), row
+            seen["beyond"] += 1
+    assert all(seen[name] for name in ("rests", "waits"))
+    assert seen["beyond"] or settings.max_speed is None
