@@ -59,7 +59,8 @@ later ones find them in the cache.""",
     "--engines",
     default="all",
     metavar="LIST",
-    help="Engines to verify, with commas between: pysim, cxxrtl, verilator; all are those that can be used here.",
+    help="Engines to verify, with commas between: pysim, cxxrtl, verilator; all are those that can be used here. With "
+    "cxxrtl-every-clock, which is not among all, CXXRTL skips no clock.",
 )
 @option(
     _VERIFICATION,
@@ -90,10 +91,10 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
     Exit status 1 if any differs: the first motion on which it does is saved as a capture, and the command that replays
     it is printed.
     """
-    from tachometry.sim.engines.pick import ENGINES, pick, present
+    from tachometry.sim.engines.pick import NAMES, pick, present
 
     chosen = _listed("methods", methods, list(METHODS))
-    used = present() if engines.strip() == "all" else _listed("engines", engines, list(ENGINES))
+    used = present() if engines.strip() == "all" else _listed("engines", engines, list(NAMES))
     for engine in used:
         pick(engine)  # what is missing is reported at once
     cores = [

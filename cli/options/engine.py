@@ -16,10 +16,11 @@ _ENGINE_OPTIONS = [
     option(
         _SIMULATION,
         "--engine",
-        type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"]),
+        type=click.Choice(["auto", "pysim", "cxxrtl", "verilator", "cxxrtl-every-clock"]),
         default="auto",
         help="What simulates the hardware: pysim is Amaranth's simulator and runs some 10,000 clocks a second; "
         "cxxrtl is compiled and runs 10,000,000 and more, but needs a C++ compiler and some seconds for a new core; "
+        "it skips clocks in which only a timer counts, which cxxrtl-every-clock does not; "
         "verilator is compiled from the exported Verilog; auto is cxxrtl if there is a compiler, else pysim.",
     ),
     option(

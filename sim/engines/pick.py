@@ -4,6 +4,7 @@ from tachometry.sim.engines.build import compiler, find_compiler
 from tachometry.sim.engines.engine import Engine
 
 ENGINES = ("pysim", "cxxrtl", "verilator")
+NAMES = (*ENGINES, "cxxrtl-every-clock")
 
 
 def pick(name: str = "auto") -> Engine:
@@ -22,18 +23,18 @@ def pick(name: str = "auto") -> Engine:
         from tachometry.sim.engines.pysim import PySim
 
         return PySim()
-    if name == "cxxrtl":
+    if name in ("cxxrtl", "cxxrtl-every-clock"):
         from tachometry.sim.engines.cxxrtl import Cxxrtl
 
         compiler()
-        return Cxxrtl()
+        return Cxxrtl(every_clock=name != "cxxrtl")
     if name == "verilator":
         from tachometry.sim.engines.verilator import Verilator, home
 
         compiler()
         home()
         return Verilator()
-    raise ValueError(f"engine must be one of auto, {', '.join(ENGINES)}, not {name!r}")
+    raise ValueError(f"engine must be one of auto, {', '.join(NAMES)}, not {name!r}")
 
 
 def present() -> list[str]:

@@ -1,0 +1,90 @@
+"""Clocks that CXXRTL skips: every row is that of a simulation which skips none."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.methods.gap_timer import GapTimer
+from tachometry.hdl.methods.mt import MTMethod
+from tachometry.hdl.methods.rairan import RairanMethod
+from tachometry.hdl.tachometer import Tachometer
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import compare
+from tachometry.sim.studies.pairs import configurations, spec_of
+from tachometry.spec import METHODS, TachometerSpec, of_texts
+
+CORES = [words for method in METHODS for words in configurations(method)]
+SKIPPING, EVERY_CLOCK = Cxxrtl(), Cxxrtl(every_clock=True)
+
+
+def turning(distances: list[int], number: int, then: int) -> PinTrace:
+    """So many edges, clocks apart by turns, and what follows the last."""
+    clock = np.cumsum(np.append(0, np.resize(distances, number - 1)))
+    level = np.arange(number) % 4
+    a, b = (np.isin(level, high).astype(np.uint8) for high in ((1, 2), (2, 3)))
+    return PinTrace(clock, a, b, n_clocks=int(clock[-1]) + then)
+
+
+def check(spec: TachometerSpec, trace: PinTrace) -> None:
+    number, first = compare(EVERY_CLOCK.run(spec, trace), SKIPPING.run(spec, trace))
+    assert number == 0, first
+
+
+@pytest.mark.parametrize("words", CORES, ids=" ".join)
+def test_rows_are_those_of_every_clock(words: tuple[str, ...]) -> None:
+    """On every configuration of the matrix; and with edges far apart, so that whole ticks are skipped."""
+    spec = spec_of(words)
+    trace = stress(spec, 3, 50)
+    if trace.n_clocks > 2e7:
+        trace = trace.until(20_000_000)
+    check(spec, trace)
+    cycles = spec.longest_tick
+    slow = turning([3 * cycles + 1, 5, cycles - 1], 12, 5 * cycles)
+    others = {pin.name: np.zeros(12, dtype=np.uint8) for pin in spec.pins if pin.name not in slow.lines}
+    check(spec, replace(slow, **others))
+
+
+def slow_shaft(method: str, **texts: str) -> tuple[TachometerSpec, PinTrace]:
+    """A core with long ticks, and edges with seconds between them."""
+    spec = of_texts(method, {"ppr": "16", "clock": "1MHz", "tick": "1ms", **texts})
+    return spec, turning([1500, 40_000, 150, 2_500_000, 990], 40, 3_000_000)
+
+
+def check_slow(method: str) -> None:
+    check(*slow_shaft(method))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_slow_shafts(method: str) -> None:
+    check_slow(method)
+
+
+@pytest.mark.parametrize(
+    ("box", "right", "wrong", "method"),
+    [
+        (SamplingClock, '("left", -1, (-1,))', '("left", -1, (-2,))', "s"),
+        (SamplingClock, '("left", -1, (-1,))', '("left", -1, (-2,))', "m"),
+        (RairanMethod, '"counters.left", -1, (-1,)', '"counters.left", -1, (-2,)', "rairan"),
+        (GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods - 2", "t"),
+        (MTMethod, "(self._min_periods, self._patient_periods)", "(self._min_periods + 3,)", "mt"),
+    ],
+)
+def test_mutants_are_caught(box: Any, right: str, wrong: str, method: str) -> None:
+    """So clocks are skipped, by each counter."""
+    with mutant(box, right, wrong), caught():
+        number, first = compare(Cxxrtl(every_clock=True).run(*slow_shaft(method)), Cxxrtl().run(*slow_shaft(method)))
+        assert number == 0, first
+
+
+def test_a_counter_that_does_not_exist_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Tachometer, "idle_counters", (IdleCounter("sampling_clock.none", -1, (-1,)),))
+    spec, trace = slow_shaft("m", filter="2")
+    with pytest.raises(AssertionError, match="no such signals: "):
+        Cxxrtl().run(spec, trace)
