@@ -28,7 +28,7 @@ from tachometry.sim.studies.encoder_errors import (
     shifted,
 )
 from tachometry.sim.theory.tracking import Tuning
-from tachometry.spec import of_texts
+from tachometry.spec import Encoder, Speed, Timing, TrackTachometer
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "encoder-errors.md"
 LINES = 500
@@ -52,7 +52,7 @@ MOTIONS = {
 # Where a table for the whole disc comes from: about 32 turns.
 TEACHING = "constant:100rad/s:2s"
 
-TRACK = of_texts("track", {"ppr": "500", "max-speed": "1000rad/s", "clock": "48MHz", "tick": "20us"})
+TRACK = TrackTachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500), max_speed=Speed.parse("1000rad/s"))
 
 Method = Callable[[Counts, FloatArray], Estimate]
 METHODS: Mapping[str, Method] = {
@@ -110,7 +110,7 @@ def gains() -> str:
             for method, (none, cycle, lines, *whole) in gained(disc, text, begin).items():
                 show = [f"{none:.3g}", f"{cycle:.3g} ({cycle / none:.2f})", f"{lines:.3g} ({lines / none:.2f})"]
                 rows.append(
-                    [disc, motion, method, *show, *([f"{one:.3g} ({one / none:.2f})" for one in whole] or [""])]
+                    [disc, motion, method, *show, *([f"{one:.3g} ({one / none:.2f})" for one in whole] or ["–"])]
                 )
                 print(*rows[-1], sep="  ", flush=True)
     columns = ["disc", "motion", "method", "as it is", "cycle learned", "disc learned", "`--whole-cycles`"]

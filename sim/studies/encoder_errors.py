@@ -151,7 +151,7 @@ def by_counts(
 def by_tracking(counts: Counts, coordinate: FloatArray, tuning: Tuning) -> Estimate:
     """The tracking recursion of docs/track.md, with coordinates for counts."""
     steps, offset, state = counts.steps, coordinate - counts.edge, Recursion(tuning)
-    ends = np.arange(1, int(steps.duration / tuning.tick_seconds) + 1) * tuning.tick_seconds
+    ends = np.asarray(tuning.tick_seconds * np.arange(1, int(steps.duration / tuning.tick_seconds) + 1))
     until = np.searchsorted(steps.time, ends, side="right").tolist()
     velocity, begin = [], 0
     for end, now in zip(until, ends.tolist(), strict=True):
@@ -159,7 +159,7 @@ def by_tracking(counts: Counts, coordinate: FloatArray, tuning: Tuning) -> Estim
         state.tick(tuning.tick_seconds, ages, steps.step[begin:end].tolist(), offset[begin:end].tolist())
         velocity.append(state.shown_velocity)
         begin = end
-    return Estimate(ends + tuning.lead_seconds, np.array(velocity) * steps.count_rad)
+    return Estimate(np.asarray(ends + tuning.lead_seconds), np.array(velocity) * steps.count_rad)
 
 
 def shifted(counts: Counts, forward: Sequence[float], backward: Sequence[float]) -> Counts:

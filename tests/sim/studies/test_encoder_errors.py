@@ -21,7 +21,7 @@ from tachometry.sim.studies.encoder_errors import (
     shifted,
 )
 from tachometry.sim.theory.tracking import Tuning
-from tachometry.spec import of_texts
+from tachometry.spec import Encoder, Timing, TrackTachometer, of_texts
 
 PHASE: dict[str, Any] = {"phase_error_deg": 20, "duty_error_deg": 20}
 
@@ -124,7 +124,7 @@ def test_offsets_take_phase_and_duty_errors_out() -> None:
     assert with_them < 1e-3
 
 
-TRACK = of_texts("track", {"ppr": "500", "clock": "48MHz", "tick": "20us", "max-speed": "1000rad/s"})
+TRACK = TrackTachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
 
 
 def check_tracking() -> None:
