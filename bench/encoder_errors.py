@@ -5,6 +5,7 @@
 
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,18 @@ from pages import markdown, write
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.studies.baselines import Estimate
-from tachometry.sim.studies.encoder_errors import CYCLE, Counts, by_counts, learn, perfect_offsets, rms, shifted
+from tachometry.sim.studies.encoder_errors import (
+    CYCLE,
+    Counts,
+    by_counts,
+    by_tracking,
+    learn,
+    perfect_offsets,
+    rms,
+    shifted,
+)
+from tachometry.sim.theory.tracking import Tuning
+from tachometry.spec import Encoder, Speed, Timing, TrackTachometer
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "encoder-errors.md"
 LINES = 500
@@ -40,10 +52,14 @@ MOTIONS = {
 # Where a table for the whole disc comes from: about 32 turns.
 TEACHING = "constant:100rad/s:2s"
 
+TRACK = TrackTachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500), max_speed=Speed.parse("1000rad/s"))
+
 Method = Callable[[Counts, FloatArray], Estimate]
 METHODS: Mapping[str, Method] = {
     "M/T 300 us": partial(by_counts, min_time_s=300e-6),
     "M/T 1 ms": partial(by_counts, min_time_s=1e-3),
+    "track": partial(by_tracking, tuning=Tuning.of(TRACK)),
+    "track, E = 0.8": partial(by_tracking, tuning=replace(Tuning.of(TRACK), edge_error=0.8)),
 }
 # The same with windows of whole cycles, where a method has them.
 WHOLE_CYCLES: Mapping[str, Method] = {
@@ -93,7 +109,9 @@ def gains() -> str:
         for motion, (text, begin) in MOTIONS.items():
             for method, (none, cycle, lines, *whole) in gained(disc, text, begin).items():
                 show = [f"{none:.3g}", f"{cycle:.3g} ({cycle / none:.2f})", f"{lines:.3g} ({lines / none:.2f})"]
-                rows.append([disc, motion, method, *show, *(f"{one:.3g} ({one / none:.2f})" for one in whole)])
+                rows.append(
+                    [disc, motion, method, *show, *([f"{one:.3g} ({one / none:.2f})" for one in whole] or ["–"])]
+                )
                 print(*rows[-1], sep="  ", flush=True)
     columns = ["disc", "motion", "method", "as it is", "cycle learned", "disc learned", "`--whole-cycles`"]
     return markdown(columns, rows, (0, 1, 2))

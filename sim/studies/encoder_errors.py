@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.studies.baselines import Estimate, IntArray, Steps
+from tachometry.sim.theory.tracking import Recursion, Tuning
 
 CYCLE = 4  # edges in a cycle of A and B
 
@@ -145,6 +146,20 @@ def by_counts(
         velocity.append((place[j] - place[opening]) / lasted)
         opening, turned = j, False
     return Estimate(np.array(at), np.array(velocity) * steps.count_rad)
+
+
+def by_tracking(counts: Counts, coordinate: FloatArray, tuning: Tuning) -> Estimate:
+    """The tracking recursion of docs/track.md, with coordinates for counts."""
+    steps, offset, state = counts.steps, coordinate - counts.edge, Recursion(tuning)
+    ends = np.asarray(tuning.tick_seconds * np.arange(1, int(steps.duration / tuning.tick_seconds) + 1))
+    until = np.searchsorted(steps.time, ends, side="right").tolist()
+    velocity, begin = [], 0
+    for end, now in zip(until, ends.tolist(), strict=True):
+        ages = (now - steps.time[begin:end]).tolist()
+        state.tick(tuning.tick_seconds, ages, steps.step[begin:end].tolist(), offset[begin:end].tolist())
+        velocity.append(state.shown_velocity)
+        begin = end
+    return Estimate(np.asarray(ends + tuning.lead_seconds), np.array(velocity) * steps.count_rad)
 
 
 def shifted(counts: Counts, forward: Sequence[float], backward: Sequence[float]) -> Counts:

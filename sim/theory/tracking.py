@@ -175,8 +175,11 @@ class Recursion:
         """Whether a value is as great as a limit: every decision of the recursion that rounding could turn."""
         return value >= limit
 
-    def tick(self, length: float, ages: list[float], steps: list[int]) -> None:
-        """Take a tick of `length` seconds, whose counts `steps` came `ages` seconds before its end."""
+    def tick(self, length: float, ages: list[float], steps: list[int], offsets: list[float] | None = None) -> None:
+        """Take a tick of `length` seconds, whose counts `steps` came `ages` seconds before its end.
+
+        With `offsets` the edges of the counts lie so many counts from where those of a perfect disc lie.
+        """
         tuning = self.tuning
         self.gap += length
         self.place += self.velocity * length + self.acceleration * length**2 / 2
@@ -186,7 +189,7 @@ class Recursion:
         if steps:
             # The edge of a count lies in the middle between the positions before and after it.
             after = np.cumsum(steps[::-1])[::-1] - np.array(steps)
-            edges = (-after - np.array(steps) / 2).tolist()
+            edges = (-after - np.array(steps) / 2 + (0 if offsets is None else offsets)).tolist()
             if alone:
                 ages, edges = ages[-1:], edges[-1:]
             if self.phase is Phase.REST and len(edges) > 1:  # just begun anew: none of them is the first

@@ -10,8 +10,18 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.studies import encoder_errors
-from tachometry.sim.studies.encoder_errors import CYCLE, Counts, by_counts, learn, perfect_offsets, rms, shifted
-from tachometry.spec import of_texts
+from tachometry.sim.studies.encoder_errors import (
+    CYCLE,
+    Counts,
+    by_counts,
+    by_tracking,
+    learn,
+    perfect_offsets,
+    rms,
+    shifted,
+)
+from tachometry.sim.theory.tracking import Tuning
+from tachometry.spec import Encoder, Timing, TrackTachometer, of_texts
 
 PHASE: dict[str, Any] = {"phase_error_deg": 20, "duty_error_deg": 20}
 
@@ -114,6 +124,33 @@ def test_offsets_take_phase_and_duty_errors_out() -> None:
     assert with_them < 1e-3
 
 
+TRACK = TrackTachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
+
+
+def check_tracking() -> None:
+    """By positions alone it is the golden model, but for the clock and the words; offsets take a phase error out."""
+    encoding = recorded("sine:50rad/s:5Hz:200ms", **PHASE)
+    updates = golden.run(TRACK, encoding.recording.place(TRACK.timing.clock_hz)).updates
+    counts, tuning = Counts.of(encoding), Tuning.of(TRACK)
+    without = by_tracking(counts, counts.coordinate(np.zeros(1)), tuning)
+    instants = np.arange(0.05, 0.2, 1e-4)
+    seen = updates.velocity[np.searchsorted(updates.clock, instants * TRACK.timing.clock_hz, side="right") - 1]
+    assert np.sqrt(np.mean(np.square(without.at(instants) - seen * TRACK.rad_per_s_per_lsb))) < 0.05
+    truth = encoding.true_speed(instants)
+    known = by_tracking(counts, counts.coordinate(perfect_offsets(encoding, CYCLE)), tuning)
+    assert rms(known, truth, instants) < 0.8 * rms(without, truth, instants)
+    slow = recorded("constant:1.3rad/s:4s", **PHASE)
+    counts, instants = Counts.of(slow), np.arange(2, 4, 1e-3)
+    truth = slow.true_speed(instants)
+    known = by_tracking(counts, counts.coordinate(perfect_offsets(slow, CYCLE)), tuning)
+    assert rms(known, truth, instants) < 1e-3
+    assert rms(by_tracking(counts, counts.coordinate(np.zeros(1)), tuning), truth, instants) > 0.1
+
+
+def test_tracking() -> None:
+    check_tracking()
+
+
 def test_hysteresis_that_is_alike_is_not_learned() -> None:
     """All edges come later in either direction; where those of A come later than those of B, a sign depends on it."""
     counts = Counts.of(recorded("constant:50rad/s:100ms+constant:-50rad/s:100ms"))
@@ -139,6 +176,8 @@ def test_hysteresis_that_is_alike_is_not_learned() -> None:
             "pass",
             lambda: check_as_the_golden_model("no"),
         ),
+        ("by_tracking", "coordinate - counts.edge", "counts.edge - coordinate", check_tracking),
+        ("by_tracking", "velocity.append(state.shown_velocity)", "velocity.append(state.velocity / 2)", check_tracking),
     ],
 )
 def test_mutants_are_caught(box: str, right: str, wrong: str, check: Any) -> None:

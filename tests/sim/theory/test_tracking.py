@@ -58,9 +58,9 @@ class Decisions(Recursion):
     ticks: int = 0
     closeness: list[tuple[float, int, int]] = field(default_factory=list)  # and the tick, and the decision
 
-    def tick(self, length: float, ages: list[float], steps: list[int]) -> None:
+    def tick(self, length: float, ages: list[float], steps: list[int], offsets: list[float] | None = None) -> None:
         """Take a tick."""
-        super().tick(length, ages, steps)
+        super().tick(length, ages, steps, offsets)
         self.ticks += 1
 
     def reaches(self, value: float, limit: float) -> bool:
