@@ -47,4 +47,4 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
     }
-    return {name: table.rows(table.clock < trace.n_clocks) for name, table in found.items()}
+    return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}
