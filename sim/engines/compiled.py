@@ -114,7 +114,7 @@ class CompiledEngine(ABC):
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
         design = Design(spec, pins, watched)
-        play = _Play(self._kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
+        play = Play(self._kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:
             waveform = None
@@ -132,7 +132,7 @@ class CompiledEngine(ABC):
         return run
 
 
-class _Play:
+class Play:
     """A trace that is played on a compiled design."""
 
     def __init__(
