@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from support.mutant import caught, mutant
 
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.idle import IdleCounter
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.rairan import RairanMethod
