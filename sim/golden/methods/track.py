@@ -177,13 +177,14 @@ class Recursion:
         x = self._reach(form.agile_rate, form.most_x[0]) if agile else self._level_reach
         one, bits = self._one, form.gain_bits
         d = (3 * x << bits) // (rounded((x + 3 * one) ** 2, form.frac_bits + 2) + (3 * one >> 2))
-        r = (d << form.unit_bits) // self.gap
+        of_r = bits - form.ratio_range
+        r = (d << form.unit_bits) // (self.gap << form.ratio_range)
         e1 = rounded(e * d, bits)
         e2 = rounded(e1 * d, bits)
         e3 = rounded(e2 * d, bits)
-        h = rounded(e1 * r, bits)
+        h = rounded(e1 * r, of_r)
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += rounded(h * r, bits - form.extra_bits)
+        self.a += rounded(h * r, of_r - form.extra_bits)
         i = rounded(h * d, bits)
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
