@@ -16,8 +16,8 @@ most half one of the fine position. They are greatest for the least λ, and eith
 where x = λ·m·T_s has just reached its most.
 
 The gain d is less than 1 and has B fraction bits. The gain d·U/m is less than 2^(1 + R) and has B − R; R is 0, except
-where ticks may be much shorter than U. Their relative error is below 2^−(B − R)/d. It only moves the poles. B − R is such
-that a transient of one count per tick is off by at most an eighth of an LSB for it.
+where ticks may be much shorter than U. Their relative error is below 2^−(B − R)/d. It only moves the poles. B − R is
+such that a transient of one count per tick is off by at most an eighth of an LSB for it.
 """
 
 import math

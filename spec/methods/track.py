@@ -104,7 +104,7 @@ class TrackTachometer(TachometerSpec):
             raise ParameterError(
                 "method",
                 f"must not be {self.method} here: its words would have {self.form.width} bits, and {MOST_WIDTH} are "
-                "the most; a shorter max_time or tick, a lower max_speed, fewer frac_bits or another bandwidth needs fewer",
+                "the most; a shorter max_time or tick, a lower max_speed, fewer frac_bits or another bandwidth helps",
             )
         shortest = self.min_tick_cycles
         if self.timing.tick_cycles < shortest:

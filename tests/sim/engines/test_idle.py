@@ -47,7 +47,8 @@ def test_rows_are_those_of_every_clock(words: tuple[str, ...]) -> None:
     check(spec, trace)
     cycles = spec.longest_tick
     slow = turning([3 * cycles + 1, 5, cycles - 1], 12, 5 * cycles)
-    others = {pin.name: np.zeros(12, dtype=np.uint8) for pin in spec.pins if pin.name not in slow.lines}
+    low = np.zeros(12, dtype=np.uint8)
+    others: dict[str, Any] = {pin.name: low for pin in spec.pins if pin.name not in slow.lines}
     check(spec, replace(slow, **others))
 
 
