@@ -45,9 +45,9 @@ _PAGE = """
 The same motion is run through `--engine`: {slow:,} clocks of it by pysim, and {fast:,} by the compiled engines and by
 the bare loop. The bare loop is the fastest C++ loop around the same CXXRTL module that this page knows, "model local
 to the loop" in the table of steps below, compiled with -O2 or -O3, whichever is faster. It plays the same changes, adds
-up the outputs at the strobes, and does nothing else. cxxrtl-every-clock evaluates every clock, as the bare loop does; cxxrtl
-skips idle clocks. The table has the fastest of {repeats} runs of the loop alone; that of pysim includes its start.
-Every run is compared with the golden model, bit by bit. Clocks per second, in processor time:
+up the outputs at the strobes, and does nothing else. cxxrtl-every-clock evaluates every clock, as the bare loop does;
+cxxrtl skips idle clocks. The table has the fastest of {repeats} runs of the loop alone; that of pysim includes its
+start. Every run is compared with the golden model, bit by bit. Clocks per second, in processor time:
 
 {speeds}
 The next table is of all ten seconds, {clocks:,} clocks, run by cxxrtl and compared with the golden model in every
