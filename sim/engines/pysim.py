@@ -35,14 +35,16 @@ async def drive(ctx: Any, trace: PinTrace, pins: Mapping[str, Signal], period: f
     period : float, seconds
         Of the simulated clock, whose edges lie in the middle of each period, as `Simulator.add_clock` has them.
     """
-    now = 0
+    now, before = 0, [-1] * len(pins)
     levels = (trace.lines[name].tolist() for name in pins)
     for clock, *row in zip(trace.clock.tolist(), *levels, strict=True):
         if clock > now:
             await ctx.delay((clock - now) * period)
             now = clock
-        for pin, level in zip(pins.values(), row, strict=True):
-            ctx.set(pin, level)
+        for pin, level, old in zip(pins.values(), row, before, strict=True):
+            if level != old:  # to set a signal takes as long as to simulate a part of a clock
+                ctx.set(pin, level)
+        before = row
 
 
 class PySim:
