@@ -90,8 +90,12 @@ class Recursion:
         self._constants = spec.program.constants
         # What would be worked out for every count: fixed-point numbers of the spec's fractions.
         self._agile = spec.agile
-        self._one, self._error, self._twice_error = map(form.fixed, (1, form.edge_error, 2 * form.edge_error))
-        self._quarter_error, self._max_error = map(form.fixed, (form.edge_error / 4, form.max_error))
+        self._one, self._error, self._twice_error = (
+            form.fixed(1),
+            form.fixed(form.edge_error),
+            form.fixed(2 * form.edge_error),
+        )
+        self._quarter_error, self._max_error = form.fixed(form.edge_error / 4), form.fixed(form.max_error)
         self._rest()
 
     def _anew(self) -> None:
