@@ -53,6 +53,7 @@ def _definitions(spec: TrackTachometer) -> list[str]:
     lines.append("end")
     for stage, back in (("fetching", 1), ("following", 2), ("now", 3)):
         lines += [f"wire [{address - 1}:0] {stage}_at = {{datapath.machine.pc}} - {address}'d{back};"]
+        # In parentheses, as a name in brackets is a register of the mutant.
         lines += [f"wire [{width - 1}:0] {stage}_word = words[({stage}_at)];"]
         lines += [f"wire [9:0] {stage}_begins = begins[({stage}_at)];"]
     left = f"[{width - 1}:{width - more}]"
