@@ -64,11 +64,12 @@ ARGUED = {
     ("track, external tick", "following = Signal(layout, reset_less=True)", "following[26] cnot1"): (
         "that is the address of a `MUL`, and its word has been read before"
     ),
-    (
-        "track, index",
-        _READS,
-        "$185.Y[0] const1",
-    ): ("what is read then is not used: no operation reads two behind one that writes"),
+    ("track, external tick", "special = Mux(work, now.special, Special.NONE)", "$350.S[0] const1"): (
+        "that is for `TEST_OR`, which is never behind a jump; and after a reset nothing reads the flag before a `TEST`"
+    ),
+    ("track, index", _READS, "$185.Y[0] const1"): (
+        "what is read then is not used: no operation that is executed reads two behind one that writes"
+    ),
     ("track, index", "with m.If(self.tick & ~less[-1]):", "$20.B[0] const1"): (
         "if `less` is below 0 the standstill is shown, whatever is left, until a tick with counts sets that anew"
     ),
