@@ -3,7 +3,10 @@
 In Verilog; `{name}` is a register of the core by name, which may be the end of a path, `[name]` that of the mutant.
 """
 
-from tachometry.spec import STachometer, TachometerSpec
+from proofs.mutation import track_lemmas
+from proofs.mutation.inductive import Known
+
+from tachometry.spec import STachometer, TachometerSpec, TrackTachometer
 from tachometry.spec.methods.timed import TimedTachometer
 
 
@@ -14,6 +17,11 @@ def lemmas(spec: TachometerSpec) -> list[str]:
     if isinstance(spec, TimedTachometer):
         return _gap(spec)
     return []
+
+
+def known(spec: TachometerSpec) -> Known | None:
+    """What a step of induction needs; None if that is not known of the method."""
+    return track_lemmas.known(spec) if isinstance(spec, TrackTachometer) else None
 
 
 def _within(name: str, limit: object) -> str:
