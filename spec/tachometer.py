@@ -44,8 +44,6 @@ class TachometerSpec(Numbers):
     last_at_rest: ClassVar[bool] = False
     # Whether its windows can have bounds.
     has_bounds: ClassVar[bool] = True
-    # The clock after the window completes the sum, the next saturates and registers it.
-    tick_latency: ClassVar[int] = 2
     # Whether pairwise tests give all options all of their values.
     pairs_all: ClassVar[bool] = False
     # Tenths of the maximum time after which it shows that the shaft stands, counted from the last count but one.
@@ -175,6 +173,11 @@ class TachometerSpec(Numbers):
         return None
 
     @property
+    def division(self) -> str:
+        """How the reciprocal is found where it is divided; empty: it is not."""
+        return ""
+
+    @property
     def standstill_ticks(self) -> int:
         """Ticks from that of the last count to the update that reads 0, at most."""
         return self.timing.max_ticks
@@ -183,6 +186,11 @@ class TachometerSpec(Numbers):
     def max_tick_shift(self) -> int:
         """Greatest k where a tick may last 2^k nominal ones."""
         return 0
+
+    @property
+    def tick_latency(self) -> int:
+        """Clocks from the last one of a window to `tick`: one completes the sum, one registers it."""
+        return 2
 
     @property
     def stamp_width(self) -> int:

@@ -11,10 +11,10 @@ from tachometry.spec.formats import carried_reciprocal
 class CarriedReciprocal(wiring.Component):
     """Q = ⌊C/m⌋ and R = C mod m, exactly: from a small table, and beyond it carried from m to m + 1 by subtraction.
 
-    From one `enable` to the next, m may count up by one, start over at 1, or go on at `entry`; `enable` may be high in
-    every clock. Why one correction is enough is shown in spec/formats/carried_reciprocal.py.
+    When it moves, m may count up by one, start over at 1, or go on at `entry`; it may do so in every clock. Why one
+    correction is enough is shown in spec/formats/carried_reciprocal.py.
 
-    Latency: the answer is there in the clock after `enable`, and stays until the clock after the next.
+    Latency: the answer is there in the clock after `moves`, and stays until the clock after the next.
 
     Parameters
     ----------
@@ -23,7 +23,8 @@ class CarriedReciprocal(wiring.Component):
     Members
     -------
     m : In(range(max_m + 1))
-    enable : In(1)
+    moves : In(1)
+        This is the last clock with this m, which is answered.
     q : Out(quotient_width)
     r : Out(remainder_width)
     """
@@ -33,7 +34,7 @@ class CarriedReciprocal(wiring.Component):
         super().__init__(
             {
                 "m": In(range(reciprocal.max_m + 1)),
-                "enable": In(1),
+                "moves": In(1),
                 "q": Out(reciprocal.quotient_width),
                 "r": Out(reciprocal.remainder_width),
             }
@@ -45,7 +46,7 @@ class CarriedReciprocal(wiring.Component):
         m.submodules.table = memory = Memory(shape=spec.width, depth=spec.depth, init=spec.table)
         read = memory.read_port()
         address_bits = (spec.depth - 1).bit_length()
-        m.d.comb += [read.addr.eq(self.m[:address_bits]), read.en.eq(self.enable)]
+        m.d.comb += [read.addr.eq(self.m[:address_bits]), read.en.eq(self.moves)]
 
         # Only presets are ever used without a step from a preset before them.
         q = Signal(spec.carried_quotient_width, reset_less=True)
@@ -53,7 +54,7 @@ class CarriedReciprocal(wiring.Component):
         carried = Signal()
         less = Signal(signed(spec.remainder_width + 1))
         m.d.comb += less.eq(r - q)
-        with m.If(self.enable):
+        with m.If(self.moves):
             m.d.sync += [
                 carried.eq(self.m[address_bits:].any()),
                 q.eq(q - less[-1]),

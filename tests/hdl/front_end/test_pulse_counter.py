@@ -10,7 +10,6 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
-from tachometry.spec import TachometerSpec
 
 
 class Held(wiring.Component):
@@ -27,16 +26,20 @@ class Held(wiring.Component):
         return m
 
 
-def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0.5) -> None:
+def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0.5, *, staged: bool = False) -> None:
     rng = np.random.default_rng(seed)
     n_ticks = 200
     steps = rng.choice([-1, 0, 1], size=(n_ticks, tick_cycles), p=[0.9 - forward, 0.1, forward])
     rows = [
         {"step": int(step), "last": int(clock == tick_cycles - 1)} for tick in steps for clock, step in enumerate(tick)
-    ] + [{"step": 0, "last": 0}] * 3
-    seen = clock_by_clock(PulseCounter(tick_cycles, max_count), rows, ["tick", "pulse_count", "overflow"])
+    ] + [{"step": 0, "last": 0}] * 4
+    dut = PulseCounter(tick_cycles, max_count, staged=staged)
+    seen = clock_by_clock(dut, rows, ["tick", "pulse_count", "overflow", "coming", "next_count"])
     strobes = [clock for clock, row in enumerate(seen) if row["tick"]]
-    assert strobes == [(k + 1) * tick_cycles - 1 + TachometerSpec.tick_latency for k in range(n_ticks)], seed
+    assert strobes == [(k + 1) * tick_cycles + 1 + staged for k in range(n_ticks)], seed
+    # What comes is known a clock before it is shown.
+    assert [clock + 1 for clock, row in enumerate(seen) if row["coming"]] == strobes, seed
+    assert all(seen[c - 1]["next_count"] == seen[c]["pulse_count"] for c in strobes), seed
     sums = steps.sum(axis=1)
     assert [seen[c]["pulse_count"] for c in strobes] == np.clip(sums, -max_count, max_count).tolist(), seed
     assert [seen[c]["overflow"] for c in strobes] == (np.abs(sums) > max_count).astype(int).tolist(), seed
@@ -48,6 +51,7 @@ def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0
 @pytest.mark.parametrize(("tick_cycles", "max_count"), [(1, 1), (2, 2), (3, 3), (5, 2), (16, 16), (16, 4), (16, 1)])
 def test_counts_every_step_once(tick_cycles: int, max_count: int) -> None:
     check_counts(tick_cycles, max_count, seed=tick_cycles)
+    check_counts(tick_cycles, max_count, seed=tick_cycles, staged=True)
 
 
 @pytest.mark.parametrize("forward", [0.0, 0.9])
