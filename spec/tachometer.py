@@ -228,7 +228,9 @@ class TachometerSpec(Numbers):
         held = 1 << max(self.filter_clocks - 1, 1).bit_length()
         conditioned = 2 + (held + self.filter_clocks if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
-        window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
+        window = 1 + (
+            1 << (self.longest_tick if self.longest_tick >= 16 else max(self.longest_tick - 2, 0)).bit_length()
+        )
         return conditioned + 1 + window
 
     @property

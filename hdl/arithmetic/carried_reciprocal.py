@@ -1,11 +1,20 @@
 """1/m as quotient and remainder, for long measurements."""
 
-from amaranth import Module, Mux, Signal, signed
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.spec.formats import carried_reciprocal
+
+
+def _less_another(total: Signal, more: Value, q: Signal, borrow: Value) -> Value:
+    """total + more − (q − borrow) with one carry: sums and carries of every bit first, which a LUT forms."""
+    width = len(total)
+    one, two, three = total, Cat(more, Const(0, width))[:width], ~Cat(q, Const(0, width))[:width]
+    sums, carries = one ^ two ^ three, (one & two) | (one & three) | (two & three)
+    # −q is ~q + 1; that 1 is the carry from an additional bit at the end, and the borrow has the place of no carry.
+    return ((Cat(1, sums) + Cat(1, borrow, carries[:-1])) >> 1)[:width].as_signed()
 
 
 class CarriedReciprocal(wiring.Component):
@@ -52,17 +61,20 @@ class CarriedReciprocal(wiring.Component):
         q = Signal(spec.carried_quotient_width, reset_less=True)
         r = Signal(spec.remainder_width, reset_less=True)
         carried = Signal()
-        less = Signal(signed(spec.remainder_width + 1))
-        m.d.comb += less.eq(r - q)
+        # R − Q, of which the next step needs the sign first: it comes with Q and R, so that there is one carry a clock.
+        less = Signal(signed(max(len(q), len(r)) + 1), reset_less=True)
+        borrow = less[-1]
+        corrected = Mux(borrow, self.m, 0)
         with m.If(self.moves):
             m.d.sync += [
                 carried.eq(self.m[address_bits:].any()),
-                q.eq(q - less[-1]),
-                r.eq(less + Mux(less[-1], self.m, 0)),
+                q.eq(q - borrow),
+                r.eq(less + corrected),
+                less.eq(_less_another(less, corrected, q, borrow)),
             ]
             for preset, (quotient, remainder) in sorted(spec.presets.items()):
                 with m.If(self.m == preset):
-                    m.d.sync += [q.eq(quotient), r.eq(remainder)]
+                    m.d.sync += [q.eq(quotient), r.eq(remainder), less.eq(remainder - quotient)]
         table_q, table_r = read.data[: spec.quotient_width], read.data[spec.quotient_width :]
         m.d.comb += [self.q.eq(Mux(carried, q, table_q)), self.r.eq(Mux(carried, r, table_r))]
         return m

@@ -71,8 +71,7 @@ class _Scaler(wiring.Component):
 class SerialScaler(_Scaler):
     """A digit of N a clock.
 
-    `q` and `tag` must stay as they are until the result, and `base` is taken whenever nothing is started: it must be
-    valid in the clock before `start`. `start` may come again as soon as the result has.
+    `q` and `tag` must stay as they are until the result. `start` may come again as soon as the result has.
 
     Latency: a result comes as many clocks after `start` as N has digits, and one more.
     """
@@ -108,10 +107,10 @@ class SerialScaler(_Scaler):
         total = Signal(signed(len(result.quotient) + self._scale_bits))
         part = Signal(signed(len(total) - 2), reset_less=True)
         m.d.comb += total.eq(Cat(carry, Const(shifted_in >> 1, 1), part).as_signed() + addend)
-        with m.If(~self.start):
-            m.d.sync += part.eq(Cat(Const(begin, low_bits), self.base).as_signed())
         with m.If(run[:-1].any()):
             m.d.sync += part.eq(total)
+        with m.If(self.load):
+            m.d.sync += part.eq(Cat(Const(begin, low_bits), self.base).as_signed())
         with m.If(run[-1]):
             m.d.sync += [result.quotient.eq(total >> self._scale_bits), result.tag.eq(self.tag)]
         return m

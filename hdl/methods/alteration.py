@@ -17,6 +17,8 @@ class AlterationDetector(wiring.Component):
     ----------
     count_width : int
         Bits of m_e.
+    seldom : bool
+        `tick` and `coming` are never high together.
 
     Members
     -------
@@ -31,7 +33,8 @@ class AlterationDetector(wiring.Component):
         From `tick` on, until the next.
     """
 
-    def __init__(self, count_width: int) -> None:
+    def __init__(self, count_width: int, *, seldom: bool = False) -> None:
+        self._seldom = seldom
         shape = signed(count_width)
         super().__init__(
             {
@@ -49,8 +52,9 @@ class AlterationDetector(wiring.Component):
         regular = self.tick & ~self.alteration  # b is the number of this tick
         with m.If(regular):
             m.d.sync += offset.eq(self.pulse_count)
+        differs = self.next_count != offset
+        if not self._seldom:
+            differs |= regular
         with m.If(self.coming):
-            m.d.sync += self.alteration.eq(
-                (self.next_count != self.pulse_count) & (regular | (self.next_count != offset))
-            )
+            m.d.sync += self.alteration.eq((self.next_count != self.pulse_count) & differs)
         return m

@@ -48,7 +48,7 @@ class SMethod(wiring.Component):
             }
         )
         self._spec = spec
-        self.alteration = AlterationDetector(spec.count_width)
+        self.alteration = AlterationDetector(spec.count_width, seldom=spec.serial)
         self.interval_accumulator = IntervalAccumulator(
             max_ticks=spec.timing.max_ticks,
             kept_ticks=spec.kept_ticks,

@@ -27,6 +27,10 @@ from itertools import count
 from tachometry.spec.units import signed_width
 
 
+# Up to this many m are tried.
+_MAX_TRIED = 2048
+
+
 @dataclass(frozen=True)
 class Reciprocal:
     """Widths and contents of q(m), here 2^(frac_bits+guard_bits)/m rounded to the nearest, so that |δ| ≤ ½.
@@ -133,12 +137,29 @@ class DividedReciprocal(Reciprocal):
         return 2 * self.max_numerator
 
     @property
+    def guard_bits(self) -> int:
+        return _fewest(self) if self.tried else super().guard_bits
+
+    @property
+    def tried(self) -> bool:
+        """Whether so few m, without ties and bounds, have to come out right that all of them are tried.
+
+        What is tried are the fractions of `NarrowReciprocal`.
+        """
+        return self.max_m <= _MAX_TRIED and not (self.bounds or self.has_ties)
+
+    @property
     def steps(self) -> int:
         """Doublings, f + g."""
         return self.frac_bits + self.guard_bits
 
     def value(self, m: int) -> int:
-        return ((1 << self.steps) // (2 * m) << 1) + 1  # the odd number with −m ≤ R < m
+        return odd_quotient(self.steps, m)
+
+
+def odd_quotient(bits: int, m: int) -> int:
+    """The odd number Q with 2^bits = Q·m + R and −m ≤ R < m."""
+    return ((1 << bits) // (2 * m) << 1) + 1
 
 
 @dataclass(frozen=True)
@@ -167,15 +188,31 @@ class NarrowReciprocal(Reciprocal):
 @cache
 def _narrowest(form: NarrowReciprocal) -> tuple[int, Sequence[int]]:
     """The fewest guard bits, and q(m) for m = 1, 2 …: of all that are right the least."""
-    assert not form.bounds
-    assert not form.has_ties
-    scaled = 1 << (form.frac_bits + 1 - form.halvings)
-    between = [_odd_neighbours(scaled, m, form.max_numerator) for m in range(1, form.max_m + 1)]
+    between = _between(form)
     for half in count(2 * form.digits):
         found = [(a << half) // b + 1 for (a, b), _ in between]
         if all(q * d < c << half for q, (_, (c, d)) in zip(found, between, strict=True)):
             return half + 1 - form.halvings, found
     raise AssertionError
+
+
+@cache
+def _fewest(form: DividedReciprocal) -> int:
+    """The fewest guard bits with which each q(m) lies between its fractions."""
+    between = _between(form)
+    for half in count(2 * form.digits):
+        guard = half + 1 - form.halvings
+        found = (odd_quotient(form.frac_bits + guard, m) for m in range(1, form.max_m + 1))
+        if all(a << half < q * b and q * d < c << half for q, ((a, b), (c, d)) in zip(found, between, strict=True)):
+            return guard
+    raise AssertionError
+
+
+def _between(form: Reciprocal) -> Sequence[tuple[tuple[int, int], tuple[int, int]]]:
+    """The fractions between which 2q/2^k has to lie, for m = 1, 2 …"""
+    assert not (form.bounds or form.has_ties)
+    scaled = 1 << (form.frac_bits + 1 - form.halvings)
+    return [_odd_neighbours(scaled, m, form.max_numerator) for m in range(1, form.max_m + 1)]
 
 
 def _odd_neighbours(numerator: int, denominator: int, most: int) -> tuple[tuple[int, int], tuple[int, int]]:

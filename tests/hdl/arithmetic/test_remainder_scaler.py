@@ -91,11 +91,11 @@ def test_m_starts_over(frac_bits: int) -> None:
 
 
 MUTANTS = {
-    "quotient never corrected": (carried_reciprocal.CarriedReciprocal, "q.eq(q - less[-1])", "q.eq(q)"),
+    "quotient never corrected": (carried_reciprocal.CarriedReciprocal, "q.eq(q - borrow)", "q.eq(q)"),
     "remainder corrected by m + 1": (
         carried_reciprocal.CarriedReciprocal,
-        "less[-1], self.m, 0",
-        "less[-1], self.m + 1, 0",
+        "Mux(borrow, self.m, 0)",
+        "Mux(borrow, self.m + 1, 0)",
     ),
     "no preset at the kept half": (
         carried_reciprocal.CarriedReciprocal,

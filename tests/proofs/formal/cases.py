@@ -63,6 +63,7 @@ _CARRIED_PROBES = {
     "core_carried": "datapath.quotient.reciprocal.carried",
     "core_q": "datapath.quotient.scaler_velocity.q",
     "core_r": "datapath.quotient.scaler_velocity.r",
+    "core_less": "datapath.quotient.reciprocal.less",
 }
 _STANDSTILL_PROBES = {"core_rests": "standstill.shown", "core_empty": "standstill.left"}
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
@@ -340,8 +341,8 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
 
 
 PROOFS = [
-    front("x4, 960 clocks", core(960, max_count=20)),
-    front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
+    front("x4, 15 clocks", core(15, max_count=7)),
+    front("x4, filter 3", core(15, max_count=6, filter_clocks=3)),
     front("x4, 2 clocks", core(2)),
     front("x4, 1 clock", core(1)),
     front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
@@ -355,12 +356,12 @@ PROOFS = [
     m_method("M", small_m(1)),
     m_method("M of 4", small_m(4)),
     m_method("M of 3", small_m(3)),
-    method("table", small(tick_cycles=7, max_ticks=16), depth=14),
-    method("sums", core(40, 8, max_count=7), depth=6, without="p4_* p5_velocity p7_* lemma_since"),
+    method("table", small(tick_cycles=7), depth=14),
+    method("sums", core(12, 8, max_count=7), depth=9, without="p4_* p5_velocity p7_* lemma_since"),
     method(
         "sums of eq. (17)",
-        core(40, 8, max_count=7, cancel=False),
-        depth=6,
+        core(12, 8, max_count=7, cancel=False),
+        depth=9,
         without="p4_* p5_velocity p7_* lemma_since",
     ),
     method("carried", small(max_ticks=16)),

@@ -189,14 +189,17 @@ module method #(
       always @* p8_age: assert (core_age == (all < MAX_TICKS ? all : MAX_TICKS));
     end
     if (CARRIED) begin : carried
+      localparam Q = $clog2(C / CARRIED + 1);
       wire core_carried;
       wire [$clog2(C):0] core_q;
       wire [I-1:0] core_r;
+      wire signed [(I > Q ? I : Q):0] core_less;
       reg [I-1:0] m = 0;  // at the last tick
       wire [I+$clog2(C):0] product = core_q * m;
       always @(posedge clk) m <= rst ? 0 : tick ? m_s : m;
       always @* begin
         lemma_next: assert (m_s == 1 || (m != 0 && m_s == (m == MAX_TICKS ? KEPT : m) + 1));
+        lemma_less: assert (!core_carried || core_less == $signed({1'b0, core_r}) - $signed({1'b0, core_q}));
         lemma_carried: assert (core_carried == (m >= CARRIED));
         lemma_reciprocal: assert (m == 0 || (core_r < m && product + core_r == C));
       end

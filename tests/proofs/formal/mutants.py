@@ -65,7 +65,7 @@ MUTANTS = [
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
     Mutant("x2, 7 clocks", "p3_overflow", saturate, "above.eq(value > ", "above.eq(value >= "),
-    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & (regular | (self.next_count != offset))", ""),
+    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & differs", ""),
     Mutant(
         "eq. (21), 1 clock",
         "p4_interval",
@@ -100,7 +100,7 @@ MUTANTS = [
     Mutant("carried", "p5_velocity", RemainderScaler, "nearest = ~doubled", "nearest = doubled"),
     Mutant("table", "p5_velocity", SerialScaler, "(high ^ low) & ~(low ^ below)", "(high ^ low) & ~below", 32),
     Mutant("M of 3", "pm_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
-    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
+    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "r.eq(less + corrected)", "r.eq(less)"),
     Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
     Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "(clocks_since_reset[-1])", "(clocks_since_reset[-2])"),
