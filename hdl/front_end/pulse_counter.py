@@ -11,7 +11,7 @@ from tachometry.hdl.arithmetic.saturate import saturate
 class PulseCounter(wiring.Component):
     """Adds up the steps of a tick: m_e of Tsuji 2009, Sec. IV-A.
 
-    Latency: `tick` is high two clocks after the window's last clock, or three. A step in the clock of the hand-over
+    Latency: `tick` is high two clocks after the window's last clock, or four. A step in the clock of the hand-over
     belongs to the next window; none is lost.
 
     Parameters
@@ -24,8 +24,8 @@ class PulseCounter(wiring.Component):
         Windows may be longer, and hold any number of steps: once their sum has left ±`max_count`, m_e is saturated,
         whatever comes after.
     staged : bool
-        A register for the sum that has been held within its bound, so that `next_count` comes from a register, and
-        `tick` a clock later.
+        A register for the step, and one for the sum that has been held within its bound, so that `next_count` comes
+        from a register, and `tick` two clocks later.
 
     Members
     -------
@@ -46,7 +46,7 @@ class PulseCounter(wiring.Component):
         What `pulse_count` is then; valid with `coming`.
     open_sum : Out(signed)
         Only if not stretched: sum of the steps after the latest `tick`'s window, up to the clock before; if staged, up
-        to the clock before that.
+        to two clocks before that.
 
     Raises
     ------
@@ -82,8 +82,9 @@ class PulseCounter(wiring.Component):
         count = Signal(signed(most.bit_length() + 1))
         step = Signal.like(count)
         complete = Signal()
-        m.d.comb += step.eq(self.step)
-        m.d.sync += [complete.eq(self.last), self.tick.eq(self.coming), count.eq(count + step)]
+        new, last = delay(m, self.step, self.last, clocks=int(self._staged))
+        m.d.comb += step.eq(new)
+        m.d.sync += [complete.eq(last), self.tick.eq(self.coming), count.eq(count + step)]
         held: Value = count
         overflow: Value = Const(0)
         if self._stretched:

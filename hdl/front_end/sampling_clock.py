@@ -49,7 +49,7 @@ class SamplingClock(wiring.Component):
             return ()
         # That of ones alone does not change; of all others only the last has ones below its highest bit.
         state = last = (1 << (bits - 1)) - 1
-        found = []
+        found: list[int] = []
         while not found or state != last:
             parity = sum(state >> (tap - 1) for tap in _TAPS[bits]) & 1
             state = (state << 1 | parity ^ 1) & ((1 << bits) - 1)

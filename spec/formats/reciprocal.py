@@ -26,7 +26,6 @@ from itertools import count
 
 from tachometry.spec.units import signed_width
 
-
 # Up to this many m are tried.
 _MAX_TRIED = 2048
 
@@ -210,7 +209,8 @@ def _fewest(form: DividedReciprocal) -> int:
 
 def _between(form: Reciprocal) -> Sequence[tuple[tuple[int, int], tuple[int, int]]]:
     """The fractions between which 2q/2^k has to lie, for m = 1, 2 …"""
-    assert not (form.bounds or form.has_ties)
+    assert not (form.bounds)
+    assert not (form.has_ties)
     scaled = 1 << (form.frac_bits + 1 - form.halvings)
     return [_odd_neighbours(scaled, m, form.max_numerator) for m in range(1, form.max_m + 1)]
 

@@ -101,8 +101,8 @@ class STachometer(TachometerSpec):
 
     @property
     def tick_latency(self) -> int:
-        # What saturates has a register of its own.
-        return super().tick_latency + (self.max_count < self.longest_tick)
+        # What saturates has registers of its own: before the sum, and behind it.
+        return super().tick_latency + 2 * (self.max_count < self.longest_tick)
 
     @property
     def reciprocal(self) -> Reciprocal | CarriedReciprocal:

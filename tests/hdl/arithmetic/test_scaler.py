@@ -2,9 +2,11 @@
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from amaranth.lib import data
 from support.mutant import caught, mutant
 from support.quotient import FlatQuotient, every_quotient
 from support.sequences import rounded
@@ -64,7 +66,7 @@ def test_every_bound(tmp_path: Path, source: str, towards: int) -> None:
     assert len(got) == len(n)
 
 
-def base(n: int) -> int:
+def base(n: Any) -> Any:
     return n % 5 - 3
 
 
@@ -131,7 +133,7 @@ def test_every_sum_over_a_constant(tmp_path: Path, average: int, towards: int) -
         spec.reciprocal,
         base_width=6,
         numerator_width=spec.numerator_width,
-        tag=scaler.data.StructLayout({"mark": 1}),
+        tag=data.StructLayout({"mark": 1}),
         towards=towards,
     )
     rows = [

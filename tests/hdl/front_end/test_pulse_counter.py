@@ -32,11 +32,11 @@ def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0
     steps = rng.choice([-1, 0, 1], size=(n_ticks, tick_cycles), p=[0.9 - forward, 0.1, forward])
     rows = [
         {"step": int(step), "last": int(clock == tick_cycles - 1)} for tick in steps for clock, step in enumerate(tick)
-    ] + [{"step": 0, "last": 0}] * 4
+    ] + [{"step": 0, "last": 0}] * 5
     dut = PulseCounter(tick_cycles, max_count, staged=staged)
     seen = clock_by_clock(dut, rows, ["tick", "pulse_count", "overflow", "coming", "next_count"])
     strobes = [clock for clock, row in enumerate(seen) if row["tick"]]
-    assert strobes == [(k + 1) * tick_cycles + 1 + staged for k in range(n_ticks)], seed
+    assert strobes == [(k + 1) * tick_cycles + 1 + 2 * staged for k in range(n_ticks)], seed
     # What comes is known a clock before it is shown.
     assert [clock + 1 for clock, row in enumerate(seen) if row["coming"]] == strobes, seed
     assert all(seen[c - 1]["next_count"] == seen[c]["pulse_count"] for c in strobes), seed

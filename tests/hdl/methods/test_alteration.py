@@ -23,7 +23,7 @@ def literal(m_e: list[int]) -> list[bool]:
 
 def detected(m_e: list[int], pause: int = 0) -> list[bool]:
     """Inject ticks, `pause` idle clocks apart; what is shown until the next."""
-    rows = []
+    rows: list[dict[str, int]] = []
     for number, before in zip(m_e, [0, *m_e], strict=False):
         rows += [{"coming": 1, "next_count": number, "pulse_count": before, "tick": int(not pause and len(rows) > 0)}]
         if pause:

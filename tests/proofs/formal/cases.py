@@ -87,7 +87,7 @@ def front(name: str, spec: STachometer) -> Proof:
     }
     probes = _FRONT_PROBES | within("glitch", _FILTER_PROBES, spec.filter_clocks > 0)
     probes |= within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
-    return Proof(name, spec, "front", parameters, probes, depth=5)
+    return Proof(name, spec, "front", parameters, probes, depth=3 + spec.tick_latency)
 
 
 def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_table: int | None = None) -> Proof:
@@ -107,6 +107,7 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         "FRAC_BITS": spec.frac_bits,
         "CANCEL": int(spec.cancel),
         "SERIAL": int(serial),
+        "TICK_LATENCY": spec.tick_latency,
         "TICK_TO_VELOCITY": latency,
         "AGE": int(spec.age),
     }
@@ -357,11 +358,11 @@ PROOFS = [
     m_method("M of 4", small_m(4)),
     m_method("M of 3", small_m(3)),
     method("table", small(tick_cycles=7), depth=14),
-    method("sums", core(12, 8, max_count=7), depth=9, without="p4_* p5_velocity p7_* lemma_since"),
+    method("sums", core(12, 8, max_count=7), depth=10, without="p4_* p5_velocity p7_* lemma_since"),
     method(
         "sums of eq. (17)",
         core(12, 8, max_count=7, cancel=False),
-        depth=9,
+        depth=10,
         without="p4_* p5_velocity p7_* lemma_since",
     ),
     method("carried", small(max_ticks=16)),

@@ -10,6 +10,7 @@ module method #(
     parameter NUMERATOR_WIDTH = 6,
     parameter FRAC_BITS = 4,
     parameter CANCEL = 1,
+    parameter TICK_LATENCY = 2,
     parameter TICK_TO_VELOCITY = 9,
     parameter CARRIED = 0,        // the table of the carried reciprocal has that many entries; 0: none is carried
     parameter C = 8,              // what it divides
@@ -141,6 +142,9 @@ module method #(
   reg [$clog2(T):0] clock = 0;
   always @(posedge clk) clock <= rst || clock == T - 1 ? 0 : clock + 1;
   wire signed [$clog2(T)+1:0] elapsed = $signed({1'b0, clock}), most = clock == 0 ? T : elapsed;
+  reg signed [$clog2(T)+1:0] most_before = 0;
+  always @(posedge clk) most_before <= rst ? 0 : most;
+  wire signed [$clog2(T)+1:0] bound = TICK_LATENCY > 2 ? most_before : most;  // the step may come a clock later
   generate
     if (T > 1) begin : window
       wire signed [$clog2(T - 1):0] core_left;
@@ -149,7 +153,7 @@ module method #(
   endgenerate
   always @* begin
     lemma_clock: assert (clock < T);
-    lemma_count: assert (core_count <= most && -core_count <= most);
+    lemma_count: assert (core_count <= bound && -core_count <= bound);
     lemma_bounded: assert (bounded && (UPSET || (offset <= MAX_COUNT && -offset <= MAX_COUNT)));
     lemma_core: assert (core_m_s == (pending ? pending_m_s : m_s) && core_longest == (pending ? pending_m_s == MAX_TICKS : full)
         && core_offset == offset);
