@@ -72,9 +72,14 @@ class CarriedReciprocal(wiring.Component):
                 r.eq(less + corrected),
                 less.eq(_less_another(less, corrected, q, borrow)),
             ]
-            for preset, (quotient, remainder) in sorted(spec.presets.items()):
-                with m.If(self.m == preset):
+            if spec.entry in spec.presets:
+                quotient, remainder = spec.presets[spec.entry]
+                with m.If(self.m == spec.entry):
                     m.d.sync += [q.eq(quotient), r.eq(remainder), less.eq(remainder - quotient)]
+            quotient, remainder = spec.presets[spec.depth]
+            with m.If(~self.m[address_bits:].any()):
+                # So the step to where the table ends, which needs no borrow, has the right result.
+                m.d.sync += [q.eq(quotient), less.eq(remainder)]
         table_q, table_r = read.data[: spec.quotient_width], read.data[spec.quotient_width :]
         m.d.comb += [self.q.eq(Mux(carried, q, table_q)), self.r.eq(Mux(carried, r, table_r))]
         return m

@@ -99,13 +99,13 @@ MUTANTS = {
     ),
     "no preset at the kept half": (
         carried_reciprocal.CarriedReciprocal,
-        "sorted(spec.presets.items())",
-        "sorted(spec.presets.items())[:1]",
+        "with m.If(self.m == spec.entry):",
+        "with m.If(0):",
     ),
     "table read one m too far": (
         carried_reciprocal.CarriedReciprocal,
-        "self.m[address_bits:].any()",
-        "self.m[address_bits + 1:].any()",
+        "carried.eq(self.m[address_bits:].any())",
+        "carried.eq(self.m[address_bits + 1:].any())",
     ),
     "the sign bit counts positive": (
         remainder_scaler.RemainderScaler,

@@ -176,7 +176,9 @@ MUTANTS = [
         "self.m_s + Mux(longest, back, 1)",
         "self.m_s + Mux(longest, back, self.m_s <= self._max_ticks)",
     ),
-    Mutant("upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(self.m == preset):", "with m.If(0):"),
+    Mutant(
+        "upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(~self.m[address_bits:].any()):", "with m.If(0):"
+    ),
     Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),
     Mutant("upset, Rairán", "pr_estimate", RairanMethod, "shown = update | at_rest", "shown = update"),
     Mutant("upset, T", "pt_interval", Divider, "steps.eq(steps - 1)", "steps.eq(steps - (steps < self._steps))"),
