@@ -168,17 +168,18 @@ MUTANTS = {
         check_count_at_the_maximum_time,
     ),
     "no sign kept": (gap_timer.GapTimer, "was_negative.eq(self.negative)", "was_negative.eq(0)", check_reversal),
-    "never nearer": (quotient_velocity.QuotientVelocity, "change[-1])", "0)", check_standstill),
-    "always nearer": (
+    "never nearer": (quotient_velocity.QuotientVelocity, "measuring | nearer", "measuring", check_standstill),
+    "always nearer": (quotient_velocity.QuotientVelocity, "measuring | nearer", "1", check_standstill),
+    "compared with what was shown before": (
         quotient_velocity.QuotientVelocity,
-        "~change[-1] & change.any(), change[-1]",
-        "1, 1",
+        "Cat(Mux(passes, bound, divider.digit), copy)",
+        "Cat(copy[-1], copy)",
         check_standstill,
     ),
     "down and not to the nearest": (
         quotient_velocity.QuotientVelocity,
-        "(divider.quotient + 1) >> 1",
-        "divider.quotient >> 1",
+        "nearest=True",
+        "nearest=False",
         check_standstill,
     ),
     "forced as it was before": (
@@ -190,7 +191,7 @@ MUTANTS = {
     "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
     "decaying too early": (
         quotient_velocity.QuotientVelocity,
-        " & ~rounds & ~holds & ~compared",
+        " & ~divider.done",
         "",
         check_turning_tail,
     ),
