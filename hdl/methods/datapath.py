@@ -15,7 +15,7 @@ class Datapath(Protocol):
     """From pulse numbers to updates.
 
     Among its members are `updates`, and those inputs that it needs: `tick` and `pulse_count`, `step` (as late as
-    `tick`), or `step_now` (as early as the decoder has it).
+    `tick`), `step_before` (a clock earlier), or `step_now` (as early as the decoder has it).
     """
 
     signature: wiring.Signature

@@ -134,8 +134,9 @@ class QuotientVelocity(wiring.Component):
     def _bounded(self, m: Module, measuring: Signal, velocity: Value) -> tuple[Value, Value, Value]:
         """The quotient held within a bound: whether it was nearer to 0, or beyond, and what it is then.
 
-        The bound of a measurement is the greatest speed, that of a decay the velocity. The first digits come first: so
-        the first that differs from the bound's decides, and if the quotient is beyond, its other digits are the bound's.
+        The bound of a measurement is the greatest speed, that of a decay the velocity. The digits of highest weight
+        come first: so the first that differs from the bound's decides, and if the quotient is beyond, all that follow
+        are the bound's.
         A copy of the velocity goes around in step with the digits of a decay, and takes up those of the result.
         """
         spec, divider = self._spec, self.divider

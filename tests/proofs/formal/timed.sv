@@ -38,7 +38,7 @@ module timed #(
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
   wire core_running, core_done, core_measuring, core_forced, core_opened, core_nearer;
-  wire [$clog2(MAX_TICKS+1)-1:0] core_empty;
+  wire signed [$clog2(MAX_TICKS):0] core_empty;
   wire core_rests;
   wire core_negative, core_longest;
   wire signed [1:0] core_step;
@@ -251,7 +251,7 @@ module timed #(
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && core_empty == (rested ? 0 : MAX_TICKS - quiet));
+        && core_empty == (rested ? -1 : MAX_TICKS - 1 - $signed({1'b0, quiet})));
     lemma_fresh: assert (fresh && fresh_past);
     lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+1-:V]));
   end
