@@ -282,7 +282,7 @@ def run(options: argparse.Namespace) -> int:
         if target in options.targets
     ]
     with ThreadPoolExecutor(options.jobs) as pool:
-        done = list(with_progress(pool.map(lambda item: measure(*item, options.seeds), work), len(work)))
+        done = list(with_progress(pool.map(lambda item: measure(*item, seeds=options.seeds), work), len(work)))
         split = list(with_progress(pool.map(lambda item: boxes(*item), work), len(work))) if options.boxes else []
     results = {(found.name, target): result for (found, target, *_), result in zip(work, done, strict=True)}
     measured = tables(results)
