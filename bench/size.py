@@ -281,8 +281,9 @@ def run(options: argparse.Namespace) -> int:
         for target in found.targets
         if target in options.targets
     ]
+    asked = [(*item, options.seeds) for item in work]
     with ThreadPoolExecutor(options.jobs) as pool:
-        done = list(with_progress(pool.map(lambda item: measure(*item, seeds=options.seeds), work), len(work)))
+        done = list(with_progress(pool.map(lambda item: measure(*item), asked), len(work)))
         split = list(with_progress(pool.map(lambda item: boxes(*item), work), len(work))) if options.boxes else []
     results = {(found.name, target): result for (found, target, *_), result in zip(work, done, strict=True)}
     measured = tables(results)
