@@ -125,7 +125,7 @@ module rairan #(
     lemma_held: assert (n_ep_ != 0 || velocity == 0);
     lemma_rest: assert (core_forced == was_alone && core_at_rest == was_rest && (!was_rest || n_ep == 0));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && core_empty == (rested ? -1 : MAX_TICKS - 1 - $signed({1'b0, quiet})));
+        && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     lemma_waits: assert (c_dt == MAX_TICKS ? n_ep == 0 : idle <= c_dt * T + clock);
   end
   always @* begin

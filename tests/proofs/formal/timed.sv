@@ -241,7 +241,7 @@ module timed #(
     lemma_compared: assert (!fresh_division || since == 0 || !(measuring ? SATURATES : fresh)
         || (core_nearer == (minus ? found_digits > bound_digits : found_digits < bound_digits)
             && core_passes == (minus ? found_digits < bound_digits : found_digits > bound_digits)));
-    lemma_taken: assert (since == 0 || taken_digits == (core_passes ? bound_digits : found_digits) || (!fresh && core_passes));
+    lemma_taken: assert (!fresh_division || since == 0 || taken_digits == (core_passes ? bound_digits : found_digits) || (!fresh && !measuring && core_passes));
     lemma_copy: assert (!fresh || (since != 0 && measuring)
         || core_copy >> (since == 0 ? 0 : j) == (velocity_digits & ((1 << (since == 0 ? N + 1 : N + 1 - j)) - 1)));
     lemma_decays: assert (!fresh_division || since == 0 || measuring
@@ -251,7 +251,7 @@ module timed #(
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && core_empty == (rested ? -1 : MAX_TICKS - 1 - $signed({1'b0, quiet})));
+        && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     lemma_fresh: assert (fresh && fresh_past);
     lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+1-:V]));
   end
