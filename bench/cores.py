@@ -44,6 +44,8 @@ class Configuration:
         On which its registers are, or `none`.
     demo : bool
         With emulator and telemetry.
+    without_max_speed : str
+        Name of the configuration that differs only in that it has no greatest speed, if there is one.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Configuration:
     targets: tuple[str, ...] = tuple(TARGETS)
     bus: str = "none"
     demo: bool = False
+    without_max_speed: str = ""
 
     @property
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
@@ -68,7 +71,9 @@ class Configuration:
 
 # What methods are compared with: the defaults, and no max_speed.
 COMMON: Any = {"encoder": Encoder(500, 4), "timing": Timing.parse("48MHz", "20us", "10ms")}
-REFERENCE = STachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), frac_bits=16)
+MAX_SPEED = Speed.parse("1000rad/s")
+MAX_TICK = 1920  # 40 us
+REFERENCE = STachometer(**COMMON, max_speed=MAX_SPEED, frac_bits=16)
 BARS = {
     "ECP5": {"COMB": 265, "FF": 260, "DP16KD": 0, "MULT": 0, "Fmax": 190, "latency": 4},
     "HX8K": {"LC": 340, "RAM": 0, "Fmax": 130},
@@ -78,11 +83,13 @@ TABLE_BARS = {
     "ECP5": {"COMB": 235, "FF": 240, "DP16KD": 1, "MULT": 0, "Fmax": 135, "latency": 4},
     "HX8K": {"LC": 305, "RAM": 4, "Fmax": 130},
 }
-DEFAULT_BARS = {"ECP5": {"COMB": 340, "DP16KD": 0, "MULT": 0, "Fmax": 180, "latency": 8}}
-M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
-RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
+# The clock of the reference on the slowest FPGA, and 100 MHz on the others.
+FAST = {"HX8K": {"Fmax": 100}, "UP5K": {"Fmax": 48}}
+DEFAULT_BARS = {"ECP5": {"COMB": 340, "DP16KD": 0, "MULT": 0, "Fmax": 180, "latency": 8}} | FAST
+M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}} | FAST
+RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}} | FAST
 ADAPTIVE_BARS = {"ECP5": {"COMB": 700, "MULT": 0, "Fmax": 100}}
-TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
+TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}} | FAST
 EVERY_CLOCK_BARS = {
     "ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12},
     "HX8K": {"Fmax": 100},
@@ -96,9 +103,44 @@ TRACK_BARS = {
 BUS_BARS = {"ECP5": {"COMB": 265 + 250, "FF": 260 + 100}}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
+
+def variants(
+    name: str, what: str, spec: TachometerSpec, bars: Mapping[str, Mapping[str, float]]
+) -> tuple[Configuration, ...]:
+    """A method with and without a greatest speed, and with ticks from outside if it does not make its own."""
+    found = [Configuration(name, what, spec, bars, is_option=False)]
+    fast = replace(spec, max_speed=MAX_SPEED)
+    found.append(
+        Configuration(f"{name}-max-speed", f"{what}, 1000 rad/s", fast, bars, is_option=False, without_max_speed=name)
+    )
+    if not spec.own_ticks:
+        outside = [(one.name, one.what, one.spec) for one in found]
+        for inner, about, each in outside:
+            without = f"{name}-external-tick" if each.max_speed else ""
+            made = replace(each, max_tick_cycles=MAX_TICK)
+            found.append(
+                Configuration(
+                    f"{inner}-external-tick",
+                    f"{about}, external tick",
+                    made,
+                    FAST,
+                    is_option=False,
+                    without_max_speed=without,
+                )
+            )
+    return tuple(found)
+
+
 # The first is what the others are compared with.
 CONFIGURATIONS = (
-    Configuration("reference", "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits", REFERENCE, BARS, False),
+    Configuration(
+        "reference",
+        "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits",
+        REFERENCE,
+        BARS,
+        False,
+        without_max_speed="default",
+    ),
     Configuration("table", "reciprocal from a table", replace(REFERENCE, source="table"), TABLE_BARS),
     Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None), DEFAULT_BARS),
     Configuration("no-cancel", "eq. (17) instead of eq. (21)", replace(REFERENCE, cancel=False)),
@@ -109,7 +151,19 @@ CONFIGURATIONS = (
     Configuration("filter-4", "glitch filter, 4 clocks", replace(REFERENCE, filter_clocks=4)),
     Configuration("index", "index captures the position", replace(REFERENCE, index=True)),
     Configuration("index-reset", "and resets it", replace(REFERENCE, index=True, index_reset=True)),
-    Configuration("external-tick", "external tick, up to 40 us", replace(REFERENCE, max_tick_cycles=1920)),
+    Configuration(
+        "external-tick",
+        "external tick, up to 40 us",
+        replace(REFERENCE, max_tick_cycles=MAX_TICK),
+        FAST,
+        without_max_speed="default-external-tick",
+    ),
+    Configuration(
+        "default-external-tick",
+        "external tick, no max_speed",
+        replace(REFERENCE, max_speed=None, max_tick_cycles=MAX_TICK),
+        FAST,
+    ),
     Configuration("rad-per-s", "velocity in 2^-10 rad/s", replace(REFERENCE, unit="rad/s", frac_bits=10)),
     Configuration("rpm", "velocity in 2^-6 rpm", replace(REFERENCE, unit="rpm", frac_bits=6)),
     Configuration("velocity-16", "16-bit velocity, saturating", replace(REFERENCE, max_speed=None, velocity_width=16)),
@@ -146,13 +200,13 @@ CONFIGURATIONS = (
         STachometer(encoder=Encoder(500, 4), timing=Timing(48_000_000, 1, 1 << 16), unit="rad/s", frac_bits=-10),
         is_option=False,
     ),
-    Configuration("m", "M method", MTachometer(**COMMON), M_BARS, is_option=False),
+    *variants("m", "M method", MTachometer(**COMMON), M_BARS),
     Configuration("m-10", "M method, mean of 10 ticks", MTachometer(**COMMON, average=10), M_BARS, is_option=False),
-    Configuration("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS, is_option=False),
+    *variants("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS),
     Configuration(
         "rairan-adaptive",
         "adaptive dt, 1 %, 1000 rad/s",
-        RairanTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), adaptive=Fraction(1, 100)),
+        RairanTachometer(**COMMON, max_speed=MAX_SPEED, adaptive=Fraction(1, 100)),
         ADAPTIVE_BARS,
         is_option=False,
     ),
@@ -162,16 +216,30 @@ CONFIGURATIONS = (
         RairanTachometer(**COMMON, paper_exact=True),
         is_option=False,
     ),
-    Configuration("t", "T method", TTachometer(**COMMON), TIMED_BARS, is_option=False),
-    Configuration("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS, is_option=False),
+    *variants("t", "T method", TTachometer(**COMMON), TIMED_BARS),
+    *variants("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS),
     Configuration(
         "mt-whole-cycles", "M/T method, whole cycles", MTTachometer(**COMMON, whole_cycles=True), is_option=False
     ),
     Configuration(
         "track",
         "tracking, 1000 rad/s, 16 bits",
-        TrackTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), velocity_width=16),
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16),
         TRACK_BARS,
+        is_option=False,
+        without_max_speed="track-wide",
+    ),
+    Configuration(
+        "track-external-tick",
+        "tracking, external tick",
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16, max_tick_cycles=MAX_TICK),
+        is_option=False,
+        without_max_speed="track-wide-external-tick",
+    ),
+    Configuration(
+        "track-wide-external-tick",
+        "tracking, no max_speed, external tick",
+        TrackTachometer(**COMMON, max_tick_cycles=MAX_TICK),
         is_option=False,
     ),
     Configuration("track-wide", "tracking, no max_speed", TrackTachometer(**COMMON), is_option=False),

@@ -124,6 +124,8 @@ class Tachometer(wiring.Component):
         if "step" in inputs:
             # As late as `tick`: with it, all steps of the window have come.
             (taken["step"],) = delay(m, decoder.step, clocks=self._spec.tick_latency)
+        if "step_before" in inputs:
+            (taken["step_before"],) = delay(m, decoder.step, clocks=self._spec.tick_latency - 1)
         m.d.comb += [getattr(datapath, name).eq(value) for name, value in taken.items() if name in inputs]
         if isinstance(datapath, OwnTicks):
             m.d.comb += pulse_counter.beyond.eq(datapath.beyond)

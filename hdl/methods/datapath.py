@@ -15,7 +15,8 @@ class Datapath(Protocol):
     """From pulse numbers to updates.
 
     Among its members are `updates`, and those inputs that it needs: `tick` and `pulse_count`, `coming` and `next_count`
-    (the same a clock earlier), `step` (as late as `tick`), or `step_now` (as early as the decoder has it).
+    (the same a clock earlier), `step` (as late as `tick`), `step_before` (a clock earlier), or `step_now` (as early as
+    the decoder has it).
     """
 
     signature: wiring.Signature

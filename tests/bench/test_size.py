@@ -8,7 +8,7 @@ from support.script import load
 
 from tachometry.hdl import export
 from tachometry.sim.studies import size as synthesis
-from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec import METHODS, Encoder, STachometer, Timing
 
 size = load("size")
 SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
@@ -208,6 +208,43 @@ def test_target_table_has_units_and_a_row_per_configuration() -> None:
     assert [[row[0], *row[2:]] for row in table.rows] == [["reference", "340", "0", "130.0", "4", "a → b"]]
 
 
+def test_fmax_has_its_spread() -> None:
+    found = size.Measurement({"Fmax": 126.94, "LC": 400}, "a → b", (115.2, 139.4))
+    assert [size.text_of(figure, found) for figure in ("Fmax", "LC")] == ["126.9 (115–139)", "400"]
+
+
+def test_fmax_is_the_median_of_the_seeds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what limits it is of the seed that has the median; nine seeds, if no others are asked for."""
+    asked = []
+
+    def made(files: object, commands: object, results: list[str], tools: object) -> list[Any]:
+        asked.append(results[1:])
+        speeds = [100.0, 140.0, 120.0, 90.0, 130.0, 110.0, 150.0, 95.0, 145.0][: len(results) - 1]
+        return [REPORT, *({**REPORT, "fmax": {"clk": {"achieved": speed}}} for speed in speeds)]
+
+    monkeypatch.setattr(synthesis, "made", made)
+    nine = synthesis.measure_core(SPEC, size.TARGETS["ECP5"], "", {})
+    three = synthesis.measure_core(SPEC, size.TARGETS["ECP5"], "", {}, seeds=(1, 2, 3))
+    assert [len(names) for names in asked] == [9, 3]
+    assert (nine.figures["Fmax"], nine.spread) == (120.0, (90.0, 150.0))
+    assert (three.figures["Fmax"], three.spread) == (120.0, (100.0, 140.0))
+
+
+def test_what_a_greatest_speed_changes() -> None:
+    """Rows in pairs, each of which differs in nothing else."""
+    specs = {configuration.name: configuration.spec for configuration in size.CONFIGURATIONS}
+    pairs = {one.name: one.without_max_speed for one in size.CONFIGURATIONS if one.without_max_speed}
+    assert {specs[name].method for name in pairs} == set(METHODS)
+    for name, without in pairs.items():
+        with_, base = specs[name], specs[without]
+        assert (with_.max_speed, base.max_speed) == (size.CONFIGURATIONS[0].spec.max_speed, None)
+        assert (with_.method, with_.timing, with_.max_tick_cycles) == (base.method, base.timing, base.max_tick_cycles)
+    found = results()
+    base = dict(found["reference", "HX8K"].figures)
+    found["default", "HX8K"] = size.Measurement(base | {"LC": 390, "Fmax": 120.5}, "")
+    assert size.speed_table(found).rows == [["reference", "default", "HX8K", "+10", "-5.5"]]
+
+
 @pytest.mark.parametrize(
     ("changed", "missed"), [({}, []), ({"LC": 341}, ["LC (cells)"]), ({"Fmax": 129.9}, ["Fmax (MHz)"])]
 )
@@ -246,7 +283,7 @@ def test_every_table_is_rectangular() -> None:
     [
         ("", size.PAGE),
         ("--only x1 paper", None),
-        ("--seeds 9", None),
+        ("--seeds 3", None),
         ("--targets ECP5", None),
         ("--only x1 -o a.md", Path("a.md")),
     ],

@@ -221,15 +221,15 @@ _TIMED_PROBES = {
     "core_opened": "datapath.gap_timer.opened",
     "core_negative": "datapath.gap_timer.was_negative",
     "core_measuring": "datapath.quotient_velocity.measuring",
-    "core_rounds": "datapath.quotient_velocity.rounds",
-    "core_compared": "datapath.quotient_velocity.compared",
+    "core_done": "datapath.quotient_velocity.divider.done",
     "core_forced": "datapath.quotient_velocity.forced",
-    "core_rounded": "datapath.quotient_velocity.rounded",
+    "core_copy": "datapath.quotient_velocity.copy",
+    "core_nearer": "datapath.quotient_velocity.nearer",
+    "core_passes": "datapath.quotient_velocity.farther",
     "core_running": "datapath.quotient_velocity.divider.running",
     "core_remainder": "datapath.quotient_velocity.divider.remainder",
-    "core_left": "datapath.quotient_velocity.divider.left",
     "core_digits": "datapath.quotient_velocity.divider.digits",
-    "core_steps": "datapath.quotient_velocity.divider.steps",
+    "core_steps": "datapath.quotient_velocity.divider.left",
     "core_by": "datapath.quotient_velocity.divider.by",
 }
 _WINDOW_OF_MT_PROBES = {
@@ -288,7 +288,7 @@ def timed(
     probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
-    held = {"core_holds": "holds", "core_shown": "shown", "core_saturated": "saturated"}
+    held = {"core_back": "negative", "core_most": "most"}
     probes |= within("holds", {name: f"datapath.quotient_velocity.{at}" for name, at in held.items()}, spec.saturates)
     probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
     return Proof(name, spec, "timed", parameters, probes, depth=4)
@@ -311,7 +311,7 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
 # What can be said of M/T without what is divided; "travelled" takes as long as all the others.
 _MT_GIVEN = {
     "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
-    "lemma_left lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
+    "lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
     "lemma_window_free pt_update pt_held pt_spacing pt_rest",
     "travelled": "lemma_travelled",
 }

@@ -26,43 +26,46 @@ def s(tick: int = 20, max_ticks: int = 10, **options: Any) -> STachometer:
     return STachometer(encoder=Encoder(8), timing=timing(tick, max_ticks), **({"frac_bits": 4} | options))
 
 
-def test_a_division_takes_a_clock_a_digit_its_sign_included_one_to_round_and_one_to_compare() -> None:
-    """By default 30 clocks, as docs/timed.md says: 960 counts a tick are 10 bits, 16 follow, and one to round with."""
-    assert [one(encoder=Encoder(500)).division_clocks for one in (TTachometer, MTTachometer)] == [30, 30]
+def test_a_division_takes_a_clock_a_digit_its_sign_included_and_one_for_the_dividend() -> None:
+    """By default 28 clocks, as docs/timed.md says: 960 counts a tick are 10 bits, and 16 follow."""
+    assert [one(encoder=Encoder(500)).division_clocks for one in (TTachometer, MTTachometer)] == [28, 28]
     # Twenty counts have 5 bits; on the lattice T has one count a tick, and M/T twenty.
-    assert [t().division_clocks, mt().division_clocks] == [5 + 4 + 1 + 3] * 2
-    assert [t(timer="tick").division_clocks, mt(timer="tick").division_clocks] == [1 + 4 + 1 + 3, 5 + 4 + 1 + 3]
-    assert t().datapath_latency == 13 + 1
+    assert [t().division_clocks, mt().division_clocks] == [5 + 4 + 2] * 2
+    assert [t(timer="tick").division_clocks, mt(timer="tick").division_clocks] == [1 + 4 + 2, 5 + 4 + 2]
+    assert t().datapath_latency == 11 + 1
+    # A bound may be 41 counts. A greatest speed changes nothing.
+    assert t(bounds=True).division_clocks == 6 + 4 + 2
+    assert t(max_speed=Speed(Fraction(1000), "rev/s")).division_clocks == 11
 
 
 def test_updates_are_a_division_apart() -> None:
-    """On the lattice they come with ticks: a division of 13 clocks takes three ticks of 6, two of 12, one of 13."""
-    assert [t().update_spacing, mt().update_spacing] == [13, 13]
-    assert [mt(tick, timer="tick").update_spacing for tick in (16, 13, 12, 6)] == [16, 13, 12, 12]
-    assert [mt(tick, timer="tick").division_clocks for tick in (16, 13, 12, 6)] == [13, 12, 12, 11]
-    assert t(timer="tick", max_tick_cycles=40).update_spacing == 9
+    """On the lattice they come with ticks: a division of 11 clocks takes two ticks of 10, one of 11."""
+    assert [t().update_spacing, mt().update_spacing] == [11, 11]
+    assert [mt(tick, timer="tick").update_spacing for tick in (16, 11, 9, 6)] == [16, 11, 18, 12]
+    assert [mt(tick, timer="tick").division_clocks for tick in (16, 11, 9, 6)] == [11, 10, 10, 9]
+    assert t(timer="tick", max_tick_cycles=40).update_spacing == 7
 
 
 def test_the_maximum_time_is_a_division_at_least() -> None:
-    assert [t(20, 10).max_periods, t(2, 2, frac_bits=4).max_periods] == [200, 2 + 4 + 1 + 3]
-    assert [mt(20, 10, timer="tick").max_periods, mt(5, 2, timer="tick").max_periods] == [10, 3]
-    assert [mt(5, 2, timer="tick").division_clocks, mt(5, 2, timer="tick").division_periods] == [11, 3]
+    assert [t(20, 10).max_periods, t(2, 2, frac_bits=4).max_periods] == [200, 2 + 4 + 2]
+    assert [mt(20, 10, timer="tick").max_periods, mt(4, 2, timer="tick").max_periods] == [10, 3]
+    assert [mt(4, 2, timer="tick").division_clocks, mt(4, 2, timer="tick").division_periods] == [9, 3]
     short = t(3, 2)
-    assert (short.division_clocks, short.max_time_cycles, short.standstill_ticks) == (10, 10, 4)
-    assert (mt(5, 2, timer="tick").max_time_cycles, mt(5, 2, timer="tick").standstill_ticks) == (15, 3)
+    assert (short.division_clocks, short.max_time_cycles, short.standstill_ticks) == (8, 8, 3)
+    assert (mt(4, 2, timer="tick").max_time_cycles, mt(4, 2, timer="tick").standstill_ticks) == (12, 3)
     assert t(20, 10).notes == ()
-    assert short.notes == ("maximum time raised from 6 clocks to 10: a division takes 10",)
+    assert short.notes == ("maximum time raised from 6 clocks to 8: a division takes 8",)
 
 
 def test_the_minimum_time() -> None:
     """A tick by default; a measurement that is longer than B − 1 finds the divider free."""
-    assert [mt().min_periods, mt(min_time=77).min_periods, mt(min_time=3).min_periods] == [20, 77, 12]
+    assert [mt().min_periods, mt(min_time=77).min_periods, mt(min_time=3).min_periods] == [20, 77, 10]
     assert [mt(timer="tick").min_periods, mt(timer="tick", min_time=60).min_periods] == [1, 3]
-    assert mt(3, 9, timer="tick").min_periods == 3  # ten clocks are four ticks
+    assert mt(3, 9, timer="tick").min_periods == 2  # eight clocks are three ticks
     assert [mt(min_time=77).min_time_cycles, mt(timer="tick", min_time=60).min_time_cycles] == [77, 60]
     assert mt(min_time=77).parameters["min_time"] == 77
     assert mt().parameters["min_time"] == 20
-    assert mt(min_time=3).notes == ("minimum time raised from 3 clocks to 12: a division takes 13",)
+    assert mt(min_time=3).notes == ("minimum time raised from 3 clocks to 10: a division takes 11",)
     for wrong, message in ((0, "from 1 to 200 clocks"), (201, "from 1 to 200 clocks")):
         with pytest.raises(ValueError, match=f"^min_time must be {message}, the maximum time, not {wrong}$"):
             mt(min_time=wrong)
@@ -75,7 +78,7 @@ def test_the_longest_measurement() -> None:
     """T: a maximum time. M/T: the count that closes comes a maximum time after T_c at most; or a late division."""
     assert [t().max_interval, t().interval_width] == [200, 8]
     assert [mt().max_interval, mt(min_time=77).max_interval] == [220, 277]
-    assert [mt(timer="tick").max_interval, mt(timer="tick", max_tick_cycles=20).max_interval] == [1 + 10, 7 + 10]
+    assert [mt(timer="tick").max_interval, mt(timer="tick", max_tick_cycles=20).max_interval] == [1 + 10, 6 + 10]
     # With whole cycles it comes after twice T_c; at x1 each count is one.
     assert mt(whole_cycles=True, min_time=77).max_interval == 2 * 77 + 200
     assert [(one.cycle_counts, one.patient_periods) for one in (mt(), mt(whole_cycles=True))] == [(1, 20), (4, 40)]
@@ -88,10 +91,10 @@ def test_the_longest_measurement() -> None:
 
 def test_what_is_remembered() -> None:
     """T: the time since the last count, which may wrap, and that to the next; then a division."""
-    assert t().remembered_clocks == (256 + 200 + 1) + 13
-    assert t(timer="tick").remembered_clocks == (16 + 10 + 1) * 20 + 9
-    assert t(timer="tick", max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30 + 9
-    assert mt().remembered_clocks == (256 + 200 + 220 + 2) + 13
+    assert t().remembered_clocks == (256 + 200 + 1) + 11
+    assert t(timer="tick").remembered_clocks == (16 + 10 + 1) * 20 + 7
+    assert t(timer="tick", max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30 + 7
+    assert mt().remembered_clocks == (256 + 200 + 220 + 2) + 11
 
 
 def test_speeds_beyond_the_range() -> None:
