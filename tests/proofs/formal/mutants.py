@@ -56,9 +56,9 @@ RECURSIVE_SUM = (
 )
 
 MUTANTS = [
-    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
+    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(level_a ^ past_b)", "~(level_b ^ past_a)"),
     Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
-    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~self.level_b", "~change_b & self.level_b"),
+    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~level_b", "~change_b & level_b"),
     Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
     Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
@@ -98,7 +98,7 @@ MUTANTS = [
     Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
     Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
     Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
-    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
+    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "backward, change_a & change_b", "backward, change_a | change_b"),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
     Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "(clocks_since_reset[-1])", "(clocks_since_reset[-2])"),
     Mutant(
