@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +12,7 @@ from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.methods.s import MAX_TABLE, STachometer
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import INDEX, TICK, UPDATE, Port, held, pin, strobe, strobes_of
+from tachometry.spec.tachometer import TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed
 
@@ -84,7 +86,8 @@ class AxesSpec:
         if spec.carried:
             longest = max(MAX_TABLE, spec.reciprocal.depth)
             raise ParameterError(
-                "max_ticks", f"must be at most {longest} with axes, where 1/m_s is looked up, not {spec.timing.max_ticks}"
+                "max_ticks",
+                f"must be at most {longest} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
             )
         self._check_slots()
         self._check_room()
@@ -143,14 +146,43 @@ class AxesSpec:
         # The next axis begins while the velocity of this one is shown.
         return DECIDE + self.axis.datapath_latency - READ
 
-    def look(self, axis: int, number: int) -> int:
-        """The clock in which the level of an axis is looked at for the `number`-th time."""
+    def look(self, axis: int, number: Any) -> Any:
+        """The clock in which the level of an axis is looked at for the `number`-th time, of a number or an array."""
         return number * self.slots + axis
 
-    def tick_clock(self, axis: int, tick: int) -> int:
-        """The clock in which `tick` is high for a tick of an axis."""
+    def tick_clock(self, axis: int, tick: Any) -> Any:
+        """The clock in which `tick` is high for the `tick`-th tick of an axis, of a number or an array."""
         begun = self.look(0, (tick + 1) * self.rounds - 1) + HAND_OVER_LATENCY
         return begun + axis * self.turn_cycles + self.turn_cycles + READ + self.parallel
+
+    def seconds(self, clocks: int) -> Fraction:
+        """A number of clocks in seconds, exactly."""
+        return self.tachometer.seconds(clocks)
+
+    @property
+    def pin_to_count(self) -> int:
+        """Most clocks from the sampling of a level to its look: the synchroniser, and a round."""
+        return self.axis.pin_to_count + self.slots - 1
+
+    @property
+    def longest_tick(self) -> int:
+        """Clocks in a tick."""
+        return self.timing.tick_cycles
+
+    @property
+    def max_tick_cycles(self) -> None:
+        """There is no external tick."""
+        return
+
+    @property
+    def tick_latency(self) -> int:
+        """Clocks from the last one of a tick to the one in which it is shown of the last axis."""
+        return int(self.tick_clock(self.axes - 1, 0)) - (self.longest_tick - 1)
+
+    @property
+    def tick_to_velocity(self) -> int:
+        """Clocks from `tick` to `velocity_valid`: they come together."""
+        return 0
 
     @property
     def index_latency(self) -> int:
@@ -212,3 +244,6 @@ class AxesSpec:
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults included."""
         return {**self.tachometer.parameters, "axes": self.axes, "parallel": self.parallel}
+
+
+CoreSpec = TachometerSpec | AxesSpec

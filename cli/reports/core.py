@@ -21,7 +21,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     """Rows of the table: a name and its value."""
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
-    greatest = f"{_speed(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
+    greatest = f"{speed_text(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
     latencies = manifest(spec)["latency_cycles"]
     memory = spec.memory
     return [
@@ -30,7 +30,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ("clock", f"{timing.clock_hz:,} Hz"),
         ("tick", f"{short_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
         ("maximum time", f"{short_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
-        ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
+        ("unit velocity", f"{speed_text(spec.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
         ("full scale", _full_scale(spec)),
         (
@@ -91,7 +91,8 @@ def _standstill(spec: TachometerSpec) -> str:
     return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
 
 
-def _speed(rad_per_s: float) -> str:
+def speed_text(rad_per_s: float) -> str:
+    """A speed in all units."""
     return " = ".join(f"{SpeedUnit(unit).of(rad_per_s):.6g} {unit}" for unit in SPEED)
 
 

@@ -40,7 +40,7 @@ template <class Counter> static inline void count_on(Counter &counter, int step,
 }}
 struct Model {{
   p_top top;
-  void pins(uint8_t level) {{ {pins} }}
+  {pins}
   void settle() {{
     top.p_rst = value<1>{{0u}};
     top.prev_p_clk = value<1>{{0u}};
@@ -133,7 +133,7 @@ class State:
     """
 
     def __init__(self, text: str) -> None:
-        wires = re.findall(r"^\twire<(\d+)> (\w+);", text, re.MULTILINE)
+        wires = re.findall(r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);", text, re.MULTILINE)
         memories = re.findall(r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};", text, re.MULTILINE)
         self.flip_flops = {name: int(width) for width, name in wires}
         self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
@@ -167,7 +167,7 @@ def model_of(design: Design, text: str) -> str:
     state = State(text)
     pins = [mangled(pin.name) for pin in design.pins]
     return _MODEL.format(
-        pins=" ".join(f"top.{pin} = value<1>{{unsigned(level >> {bit} & 1)}};" for bit, pin in enumerate(pins)),
+        pins=design.pins_text(lambda pin, level: f"top.{mangled(pin)}.set<uint64_t>({level});"),
         strobes=" || ".join(f"now(top.{mangled(name)}).get<bool>()" for name in design.strobes),
         outputs=" ".join(
             f"row[{k}] = extended(now(top.{mangled(port.name)}).get<uint64_t>(), {port.width}, {int(port.signed)});"

@@ -1,8 +1,9 @@
 """Golden model of many axes: each is a core of its own, on what it sees of its pins."""
 
+from collections.abc import Callable
+
 import numpy as np
 
-from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
@@ -10,12 +11,8 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.axes import COUNT_LATENCY, AxesSpec
 from tachometry.spec.port import INDEX, TICK, UPDATE
 
-from collections.abc import Callable
 
-
-def run_axes(
-    spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]]
-) -> Run:
+def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]]) -> Run:
     """What the core of `spec` must show at its ports for these pins; `tables` is the golden model of a single core."""
     found: dict[str, list[Table]] = {name: [] for name in spec.axis.strobes}
     for axis, pins in enumerate(trace.each):
@@ -23,14 +20,14 @@ def run_axes(
         ticks, updates = rows[TICK], rows[UPDATE]
         number = (updates["cause"] - ticks.clock[0]) // spec.rounds
         clocks = {
-            TICK: _ticks(spec, axis, np.arange(len(ticks))),
-            UPDATE: _ticks(spec, axis, number),
+            TICK: spec.tick_clock(axis, np.arange(len(ticks))),
+            UPDATE: spec.tick_clock(axis, number),
             "decode_error": spec.look(axis, rows["decode_error"].clock) + COUNT_LATENCY,
             INDEX: spec.look(axis, rows[INDEX].clock - spec.axis.tick_latency) + spec.index_latency,
         }
         for name, tables_of_name in found.items():
-            ours = np.full(len(rows[name]), axis)
-            tables_of_name.append(rows[name].having(clock=clocks[name], axis=ours))
+            own = {"clock": clocks[name], "axis": np.full(len(rows[name]), axis)}
+            tables_of_name.append(rows[name].having(**own))
     every = {name: _merged(each, trace.n_clocks) for name, each in found.items()}
     if spec.parallel:
         every = {name: _held(table, spec.axis.strobes[name], spec.axes) for name, table in every.items()}
@@ -53,10 +50,6 @@ def seen(spec: AxesSpec, pins: PinTrace, axis: int) -> PinTrace:
     # So long that all that is shown within the trace has come.
     n_clocks = pins.n_clocks // spec.slots + core.datapath_latency + 2 * spec.rounds
     return PinTrace(look[last], n_clocks=n_clocks, **lines)
-
-
-def _ticks(spec: AxesSpec, axis: int, number: Ints) -> Ints:
-    return spec.tick_clock(axis, number)
 
 
 def _merged(tables: list[Table], n_clocks: int) -> Table:

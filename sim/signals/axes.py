@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.recording import PinTrace, merged
@@ -48,7 +49,7 @@ class AxesTrace:
         return merged(*(trace.clock for trace in self.each))
 
     @cached_property
-    def lines(self) -> dict[str, np.ndarray]:
+    def lines(self) -> dict[str, NDArray[np.uint64]]:
         """The lines by name, each as a number with a bit for every axis."""
         found = {name: np.zeros(len(self.clock), dtype=np.uint64) for name in self.each[0].lines}
         for axis, trace in enumerate(self.each):
@@ -56,6 +57,17 @@ class AxesTrace:
             for name, line in trace.lines.items():
                 found[name] |= line[held].astype(np.uint64) << np.uint64(axis)
         return found
+
+    @property
+    def names(self) -> list[tuple[int, str]]:
+        """Every line by its axis and its name: those of axis 0, of axis 1 …."""
+        return [(axis, name) for axis, trace in enumerate(self.each) for name in trace.lines]
+
+    @property
+    def levels(self) -> NDArray[np.uint8]:
+        """A row of bytes for each clock of `clock`, with a bit for each of `names`, the first lowest."""
+        bits = [self.lines[name] >> np.uint64(axis) & np.uint64(1) for axis, name in self.names]
+        return np.packbits(np.stack(bits, axis=1).astype(np.uint8), axis=1, bitorder="little")
 
     def until(self, n_clocks: int) -> AxesTrace:
         """The first clocks of the trace."""

@@ -98,7 +98,9 @@ MUTANTS = [
     Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
     Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
     Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
-    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "backward, change_a & change_b", "backward, change_a | change_b"),
+    Mutant(
+        "x4, 2 clocks", "p6_error", QuadratureDecoder, "backward, change_a & change_b", "backward, change_a | change_b"
+    ),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
     Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "(clocks_since_reset[-1])", "(clocks_since_reset[-2])"),
     Mutant(
