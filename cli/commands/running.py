@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,10 +59,7 @@ def run_axes_and_report(
     from tachometry.sim.signals.axes import AxesTrace
     from tachometry.sim.signals.recording import PinTrace
 
-    # Where a recording ends early, its levels stay.
-    longest = max(recording.duration for recording in recordings)
-    whole = [replace(recording, duration=longest) for recording in recordings]
-    trace = AxesTrace.of([PinTrace.of(recording, spec.tachometer) for recording in whole])
+    trace = AxesTrace.of([PinTrace.of(recording, spec.tachometer) for recording in recordings])
     found, used = _played(spec, source, trace, None, outputs, engine, window)
     print_axes_summary(spec, found, recordings, truths, used)
     return _status(found, trace.n_clocks)

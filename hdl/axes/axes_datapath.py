@@ -90,8 +90,10 @@ class AxesDatapath(wiring.Component):
         m.submodules.handed_over = handed = Memory(shape=self.count.shape(), depth=spec.slots, init=[])
         kept = data.StructLayout({"position": self.position.shape(), "window": window.state.shape()})
         m.submodules.state = state = Memory(shape=kept, depth=spec.axes, init=[])
-        read_count, write_count = handed.read_port(), handed.write_port()
-        read, write = state.read_port(), state.write_port()
+        read_count = handed.read_port()
+        write_count = handed.write_port()
+        read = state.read_port()
+        write = state.write_port()
         # What is read stays for the turn.
         m.d.comb += [
             turns.begin.eq(self.complete & (self.slot == 0)),
@@ -106,7 +108,8 @@ class AxesDatapath(wiring.Component):
 
         count = Signal.like(self.count)
         m.d.comb += count.eq(read_count.data)
-        m_e, overflow = count, Signal()
+        overflow = Signal()
+        m_e = count
         if spec.axis.max_count < spec.rounds:
             m_e, overflow = saturate(m, count, spec.axis.max_count)
         with m.If(turns.step[READ]):
@@ -138,7 +141,8 @@ class AxesDatapath(wiring.Component):
             quotient.numerator.eq(window.numerator),
             quotient.tag.forced.eq(window.forced),
         ]
-        found, ended = quotient.results, Signal()
+        found = quotient.results
+        ended = Signal()
         m.d.sync += [ended.eq(turns.step[-1] & ~turns.clears), self.tick.eq(ended)]
         m.d.comb += [
             self.velocity_valid.eq(found.valid),

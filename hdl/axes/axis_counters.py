@@ -65,7 +65,8 @@ class AxisCounters(wiring.Component):
         m = Module()
         kept = data.StructLayout({"a": 1, "b": 1, "count": self.count.shape()})
         m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
-        read, write = memory.read_port(), memory.write_port()
+        read = memory.read_port()
+        write = memory.write_port()
         level_a, level_b = (of_slot(line, self.slot) for line in (self.level_a, self.level_b))
         a, b, slot, first, last, ready = delay(m, level_a, level_b, self.slot, self.first, self.last, self.ready)
         before = read.data

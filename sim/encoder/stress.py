@@ -52,5 +52,5 @@ def stress_of(spec: CoreSpec, seed: int, n_edges: int = 300) -> Trace:
     if not isinstance(spec, AxesSpec):
         return stress(spec, seed, n_edges)
     # Of different lengths, so that not all axes stand when one does.
-    each = [stress(spec.tachometer, seed * spec.axes + axis, n_edges + 29 * axis) for axis in range(spec.axes)]
+    each = [stress(spec.tachometer, seed * spec.axes + axis, n_edges + 7 * axis) for axis in range(spec.axes)]
     return AxesTrace.of(each)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,9 +34,9 @@ class AxesTrace:
 
     @classmethod
     def of(cls, each: Sequence[PinTrace]) -> AxesTrace:
-        """Traces up to where the first of them ends, with the lines that all of them have."""
-        n_clocks = min(trace.n_clocks for trace in each)
-        return cls(tuple(trace.until(n_clocks) for trace in each))
+        """Traces up to where the last of them ends: where another ends earlier, its levels stay."""
+        n_clocks = max(trace.n_clocks for trace in each)
+        return cls(tuple(replace(trace, n_clocks=n_clocks) for trace in each))
 
     @property
     def n_clocks(self) -> int:

@@ -1,0 +1,38 @@
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.axes.turns import Turns
+
+
+def check(axes: int, cycles: int) -> None:
+    """Turns after reset, and of two ticks, the second as early as it may be and the third later."""
+    whole = axes * cycles
+    begins = [whole - 1, 2 * whole - 1, 3 * whole + 4]
+    rows = [{"begin": int(clock in begins)} for clock in range(5 * whole)]
+    seen = clock_by_clock(Turns(axes, cycles), rows, ["axis", "clears", "step"])
+    starts = {0} | {clock + 1 for clock in begins}
+    for clock, row in enumerate(seen):
+        since = clock - max(start for start in starts if start <= clock)
+        step = 1 << since % cycles if since < whole else 0
+        assert row["step"] == step, clock
+        assert not step or row["axis"] == since // cycles, clock
+        assert row["clears"] == (clock < whole), clock
+
+
+@pytest.mark.parametrize(("axes", "cycles"), [(1, 3), (2, 4), (3, 7), (8, 3)])
+def test_each_axis_has_its_turn(axes: int, cycles: int) -> None:
+    check(axes, cycles)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("self.axis == self._axes - 1", "self.axis == self._axes - 2"),
+        ("self.clears.eq(0)", "self.clears.eq(1)"),
+        ("self.begin | (ends & ~final)", "self.begin"),
+    ],
+)
+def test_mutants_are_caught(right: str, wrong: str) -> None:
+    with mutant(Turns, right, wrong), caught():
+        check(3, 7)
