@@ -8,6 +8,8 @@ from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.axes.axis_counters import AxisCounters
+from tachometry.hdl.axes.rounds import Rounds
 from tachometry.hdl.bus.axi_lite import AxiLiteBridge
 from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.bus.tick_position import TickPosition
@@ -253,4 +255,10 @@ MUTANTS = [
     Mutant("axi-lite", "pa_stable", AxiLiteBridge, "self.s_axi_rvalid & self.s_axi_rready", "self.s_axi_rvalid"),
     Mutant("axi-lite", "pa_written", AxiLiteBridge, "bresp.eq(slave_error)", "bresp.eq(0)"),
     Mutant("axi-lite", "pa_data", AxiLiteBridge, "rdata.eq(native.read_data)", "rdata.eq(native.read_data >> 1)"),
+    Mutant("two axes", "pa_axis", AxisCounters, "self.axis.eq(slot)", "self.axis.eq(self.slot)"),
+    Mutant("two axes", "pa_step", AxisCounters, "write.data.b.eq(new_b)", "write.data.b.eq(b)"),
+    Mutant("two axes", "pa_count", AxisCounters, "write.addr.eq(self.axis)", "write.addr.eq(slot)"),
+    Mutant("two axes", "pa_count", AxisCounters, "Mux(first, 0, before.count)", "before.count", 32),
+    Mutant("three axes of four slots", "pa_error", AxisCounters, "ready & illegal", "illegal"),
+    Mutant("three axes of four slots", "pa_complete", Rounds, "self.last.eq(clock.last)", "self.last.eq(self.first)"),
 ]
