@@ -18,13 +18,13 @@ from tachometry.spec.units import Speed
 
 MAX_AXES = 64
 # What is counted is back in memory before the same axis is looked at again.
-MIN_SLOTS = 3
+MIN_SLOTS = 4
 WARM_UP = 3  # rounds after reset: two until the levels are those of the pins, one for the level before
 # Clocks from a look at an axis: the count is in its register, is handed over, and the datapath begins.
-COUNT_LATENCY = 2
-HAND_OVER_LATENCY = 3
-# Of a turn of the datapath: its memories have been read, m_e is in its register.
-READ, DECIDE = 1, 2
+COUNT_LATENCY = 3
+HAND_OVER_LATENCY = 4
+# Clocks of a turn of the datapath: what its memories have is in registers, and m_e is.
+READ, DECIDE = 2, 3
 
 _FOR_ONE = "is for one axis"
 # Options of the core of one axis, the value that leaves them out, and why many axes do not have them.

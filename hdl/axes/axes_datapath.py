@@ -5,6 +5,7 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.axes.axis_window import AxisWindow
@@ -18,8 +19,8 @@ class AxesDatapath(wiring.Component):
     The counts of all axes are handed over in one round; then each axis has its turn. In a turn the state of the axis is
     read, m_e and position are made, the window is followed, and the velocity is computed, as `SMethod` does it.
 
-    Latency: the outputs of an axis are new `spec.turn_cycles` and a clock after its turn has begun, in the turn of the
-    next.
+    Latency: the outputs of an axis are new `spec.turn_cycles` and `READ` clocks after its turn has begun, in the turn
+    of the next.
 
     Parameters
     ----------
@@ -94,7 +95,6 @@ class AxesDatapath(wiring.Component):
         write_count = handed.write_port()
         read = state.read_port()
         write = state.write_port()
-        # What is read stays for the turn.
         m.d.comb += [
             turns.begin.eq(self.complete & (self.slot == 0)),
             write_count.addr.eq(self.slot),
@@ -102,12 +102,12 @@ class AxesDatapath(wiring.Component):
             write_count.en.eq(self.complete),
             read_count.addr.eq(turns.axis),
             read.addr.eq(turns.axis),
-            read_count.en.eq(turns.step[0]),
-            read.en.eq(turns.step[0]),
         ]
-
+        # Block RAM is slow.
         count = Signal.like(self.count)
-        m.d.comb += count.eq(read_count.data)
+        before = Signal(kept)
+        m.d.sync += [count.eq(read_count.data), before.eq(read.data)]
+
         overflow = Signal()
         m_e = count
         if spec.axis.max_count < spec.rounds:
@@ -117,7 +117,7 @@ class AxesDatapath(wiring.Component):
                 self.axis.eq(turns.axis),
                 self.pulse_count.eq(m_e),
                 self.overflow.eq(overflow),
-                self.position.eq(read.data.position + count),
+                self.position.eq(before.position + count),
             ]
             with m.If(turns.clears):
                 m.d.sync += [self.pulse_count.eq(0), self.overflow.eq(0), self.position.eq(0)]
@@ -127,7 +127,7 @@ class AxesDatapath(wiring.Component):
             m.d.sync += self.stalled.eq(window.next.rests)
         m.d.comb += [
             window.clears.eq(turns.clears),
-            window.state.eq(read.data.window),
+            window.state.eq(before.window),
             window.m_e.eq(self.pulse_count),
             write.addr.eq(turns.axis),
             write.data.position.eq(self.position),
@@ -142,9 +142,11 @@ class AxesDatapath(wiring.Component):
             quotient.tag.forced.eq(window.forced),
         ]
         found = quotient.results
-        ended = Signal()
-        m.d.sync += [ended.eq(turns.step[-1] & ~turns.clears), self.tick.eq(ended)]
+        # As late as the velocity: what the next turn has by then does not show yet.
+        ended = turns.step[-1] & ~turns.clears
+        (tick,) = delay(m, ended, clocks=READ + 1)
         m.d.comb += [
+            self.tick.eq(tick),
             self.velocity_valid.eq(found.valid),
             self.velocity.eq(found.p.velocity),
             self.interval.eq(found.p.m),

@@ -12,8 +12,8 @@ from tachometry.hdl.front_end.decoder import transition
 class AxisCounters(wiring.Component):
     """Decodes the lines of an axis in its slot, and adds up the steps of its tick; levels and sums are in a memory.
 
-    Latency: what is seen in a slot is at the outputs two clocks later. It is back in the memory a clock after that,
-    before the axis has its next slot: a round has three at least.
+    Latency: what is seen in a slot is at the outputs three clocks later. It is back in the memory a clock after that,
+    when the axis has its next slot at the earliest: a round has four at least.
 
     Parameters
     ----------
@@ -68,8 +68,11 @@ class AxisCounters(wiring.Component):
         read = memory.read_port()
         write = memory.write_port()
         level_a, level_b = (of_slot(line, self.slot) for line in (self.level_a, self.level_b))
-        a, b, slot, first, last, ready = delay(m, level_a, level_b, self.slot, self.first, self.last, self.ready)
-        before = read.data
+        seen = level_a, level_b, self.slot, self.first, self.last, self.ready
+        a, b, slot, first, last, ready = delay(m, *seen, clocks=2)
+        # Block RAM is slow.
+        before = Signal(kept)
+        m.d.sync += before.eq(read.data)
         counted, backward, illegal = transition(self._decoding, a, b, before.a, before.b)
         count = Signal()
         step = Signal.like(self.step)

@@ -14,7 +14,7 @@ class AxisIndex(wiring.Component):
 
     It adds up all steps once more: the positions of the datapath are those of ticks.
 
-    Latency: a rise that is seen in a slot is at the outputs three clocks later.
+    Latency: a rise that is seen in a slot is at the outputs four clocks later.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class AxisIndex(wiring.Component):
     level_z : In(axes)
         Levels in this clock, bit k of axis k.
     step : In(signed(2))
-        Of the slot two clocks ago.
+        Of the slot three clocks ago.
     axis : Out(range(slots))
         Of the other outputs.
     index_valid : Out(1)
@@ -61,8 +61,10 @@ class AxisIndex(wiring.Component):
         write = memory.write_port()
         level, slot, ready = delay(m, of_slot(self.level_z, self.slot), self.slot, self.ready)
         m.d.comb += read.addr.eq(slot)
-        level, slot, ready = delay(m, level, slot, ready)
-        before = read.data
+        level, slot, ready = delay(m, level, slot, ready, clocks=2)
+        # Block RAM is slow.
+        before = Signal(kept)
+        m.d.sync += before.eq(read.data)
         z = Signal()
         m.d.sync += [
             z.eq(level),

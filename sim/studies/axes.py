@@ -15,7 +15,7 @@ def _words(axes: int, tick: int, max_ticks: int, *more: str) -> Words:
 AXES: tuple[Words, ...] = (
     _words(8, 960, 20, "--max-speed", "1000rad/s"),
     (*_words(5, 120, 3, "--max-speed", "10000rad/s", "--index"), "--parallel"),
-    _words(3, 36, 2, "--decoding", "2", "--position-width", "8"),
+    _words(3, 40, 2, "--decoding", "2", "--position-width", "8"),
     _words(1, 63, 2048, "--no-cancel", "--index"),
     _words(64, 960, 5, "--max-speed", "500rad/s", "--decoding", "1", "--frac-bits", "4", "--position-width", "48"),
     (*_words(17, 1000, 4, "--frac-bits", "24", "--index"), "--parallel"),

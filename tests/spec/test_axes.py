@@ -25,7 +25,7 @@ def spec_of(axes: int = 8, *, tick: int = 960, parallel: bool = False, **options
 
 @pytest.mark.parametrize(
     ("axes", "tick", "slots"),
-    [(1, 960, 3), (3, 960, 3), (7, 960, 8), (8, 960, 8), (33, 960, 40), (64, 960, 64), (5, 341, 11)],
+    [(1, 960, 4), (4, 960, 4), (7, 960, 8), (8, 960, 8), (33, 960, 40), (64, 960, 64), (5, 341, 11)],
 )
 def test_a_round_is_the_least_divisor_of_the_tick_that_has_a_slot_for_every_axis(
     axes: int, tick: int, slots: int
@@ -104,7 +104,7 @@ def test_manifest() -> None:
         (8, {"max_ticks": 4096}, "max_ticks must be at most 2048 with axes, not 4096: 1/m_s is looked up"),
         (8, {"tick": 67 * 16}, ""),
         (8, {"tick": 997}, "tick_cycles must be a multiple of a number from 8 to 64 with axes, not 997"),
-        (2, {"tick": 998}, "tick_cycles must be a multiple of a number from 3 to 64 with axes, not 998"),
+        (2, {"tick": 998}, "tick_cycles must be a multiple of a number from 4 to 64 with axes, not 998"),
     ],
 )
 def test_what_is_refused(axes: int, options: dict[str, Any], told: str) -> None:

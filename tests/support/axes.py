@@ -11,12 +11,12 @@ from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import AxesSpec, Encoder, Speed, STachometer, Timing
 
 CLOCK_HZ = 1_000_000
-TICK_CYCLES = 36
+TICK_CYCLES = 40
 MAX_TICKS = 4
 
 
 def small(axes: int = 3, *, parallel: bool = False, most: int | None = 2, **options: Any) -> AxesSpec:
-    """A tick of 36 clocks, in which `most` counts are the most that are measured."""
+    """A tick of 40 clocks, in which `most` counts are the most that are measured."""
     timing = Timing(CLOCK_HZ, TICK_CYCLES, MAX_TICKS)
     speed = None if most is None else Speed(Fraction(most * CLOCK_HZ, 100 * TICK_CYCLES), "rev/s")
     alone = STachometer(encoder=Encoder(25), timing=timing, frac_bits=8, max_speed=speed, **options)

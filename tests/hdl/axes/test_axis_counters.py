@@ -36,7 +36,7 @@ def check() -> None:
         )
     seen = clock_by_clock(AxisCounters(axes=AXES, slots=SLOTS, rounds=ROUNDS, decoding=4), rows, OUTPUTS)
     counts = [0] * AXES
-    for clock, row in enumerate(seen[2:]):
+    for clock, row in enumerate(seen[3:]):
         round_, slot = divmod(clock, SLOTS)
         assert row["axis"] == slot
         assert row["complete"] == (round_ % ROUNDS == ROUNDS - 1)

@@ -60,11 +60,11 @@ def _counts(name: str, axes: int, slots: int, n_rounds: int) -> Proof:
     }
     made = partial(Counted, axes, slots, n_rounds)
     # In two rounds all that is in memory has been written and seen, and in those of a tick its last one has come.
-    return Proof(name, _SPEC, "axes", parameters, probes, depth=max(2, n_rounds + 1) * slots + 3, box=made)
+    return Proof(name, _SPEC, "axes", parameters, probes, depth=max(2, n_rounds + 1) * slots + 4, box=made)
 
 
 COUNTS_OF_AXES = [
-    _counts("two axes", 2, 3, 3),
-    _counts("three axes", 3, 3, 1),
-    _counts("three axes of four slots", 3, 4, 2),
+    _counts("four axes", 4, 4, 1),
+    _counts("two axes of four slots", 2, 4, 3),
+    _counts("three axes of five slots", 3, 5, 2),
 ]

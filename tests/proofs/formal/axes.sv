@@ -1,7 +1,7 @@
 // Counts of many axes: each step that an axis takes between two looks is in its own sum and in no other.
 module axes #(
     parameter AXES = 2,
-    parameter SLOTS = 3,
+    parameter SLOTS = 4,
     parameter ROUNDS = 2,
     parameter COUNT_WIDTH = 3
 ) (
@@ -32,15 +32,10 @@ module axes #(
     warm <= rst ? 0 : ends && warm < 3 ? warm + 1 : warm;
   end
 
-  // What was two clocks ago.
-  reg [S-1:0] slot_1 = 0, slot_2 = 0;
-  reg last_1 = 0, last_2 = 0;
-  reg [1:0] seen = 0;
-  always @(posedge clk) begin
-    {slot_2, slot_1} <= rst ? 0 : {slot_1, slot};
-    {last_2, last_1} <= rst ? 0 : {last_1, last};
-    seen <= rst ? 0 : {seen[0], 1'b1};
-  end
+  // What was three clocks ago.
+  wire [S-1:0] slot_;
+  wire last_, seen;
+  delay #(S + 2, 3) delays (clk, rst, {slot, last, 1'b1}, {slot_, last_, seen});
 
   // Every axis by the Gray phase 00, 10, 11, 01 = 0, 1, 2, 3 of its lines, with counters of its own.
   wire [AXES-1:0] wrong_step, wrong_count, wrong_error;
@@ -63,18 +58,18 @@ module axes #(
           illegal <= warm == 3 && turned == 2;
         end
       end
-      wire mine = seen[1] && slot_2 == k;
+      wire mine = seen && slot_ == k;
       assign wrong_step[k] = mine && step != moved;
       assign wrong_count[k] = mine && count != sum;
       assign wrong_error[k] = mine && decode_error != illegal;
     end
   endgenerate
   always @* begin
-    pa_axis: assert (!seen[1] || axis == slot_2);
+    pa_axis: assert (!seen || axis == slot_);
     pa_step: assert (wrong_step == 0);
     pa_count: assert (wrong_count == 0);
     pa_error: assert (wrong_error == 0);
-    pa_complete: assert (!seen[1] || complete == last_2);
+    pa_complete: assert (!seen || complete == last_);
     lemma_slot: assert (slot < SLOTS && round < ROUNDS && core_slot == slot && core_warmed == (1 << warm) - 1);
     lemma_round: assert (core_first == (round == 0) && core_last == last);
   end
