@@ -65,11 +65,11 @@ module axes #(
     end
   endgenerate
   always @* begin
-    pa_axis: assert (!seen || axis == slot_);
-    pa_step: assert (wrong_step == 0);
-    pa_count: assert (wrong_count == 0);
-    pa_error: assert (wrong_error == 0);
-    pa_complete: assert (!seen || complete == last_);
+    px_axis: assert (!seen || axis == slot_);
+    px_step: assert (wrong_step == 0);
+    px_count: assert (wrong_count == 0);
+    px_error: assert (wrong_error == 0);
+    px_complete: assert (!seen || complete == last_);
     lemma_slot: assert (slot < SLOTS && round < ROUNDS && core_slot == slot && core_warmed == (1 << warm) - 1);
     lemma_round: assert (core_first == (round == 0) && core_last == last);
   end
