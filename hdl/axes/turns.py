@@ -44,9 +44,12 @@ class Turns(wiring.Component):
         final = Signal()
         ends = self.step[-1]
         m.d.comb += final.eq(self.axis == self._axes - 1)
-        m.d.sync += self.step.eq(Cat(self.begin | (ends & ~final), self.step))
+        m.d.sync += self.step.eq(Cat(ends & ~final, self.step))
         with m.If(ends):
             m.d.sync += self.axis.eq(self.axis + 1)
             with m.If(final):
                 m.d.sync += [self.axis.eq(0), self.clears.eq(0)]
+        # Whatever an upset has left ends here.
+        with m.If(self.begin):
+            m.d.sync += [self.step.eq(1), self.axis.eq(0)]
         return m

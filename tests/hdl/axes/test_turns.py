@@ -30,9 +30,19 @@ def test_each_axis_has_its_turn(axes: int, cycles: int) -> None:
     [
         ("self.axis == self._axes - 1", "self.axis == self._axes - 2"),
         ("self.clears.eq(0)", "self.clears.eq(1)"),
-        ("self.begin | (ends & ~final)", "self.begin"),
+        ("ends & ~final", "ends & final"),
     ],
 )
 def test_mutants_are_caught(right: str, wrong: str) -> None:
     with mutant(Turns, right, wrong), caught():
         check(3, 7)
+
+
+def test_what_an_upset_leaves_ends_with_the_next_tick() -> None:
+    """A turn that has begun in the middle of nowhere, of an axis that is not the first."""
+    early, begin, whole = 5, 11, 3 * 7
+    rows = [{"begin": int(clock in (30 + early, 30 + begin))} for clock in range(90)]
+    seen = clock_by_clock(Turns(3, 7), rows, ["axis", "step"])
+    steps = [(row["axis"], row["step"]) for row in seen[31 + begin :]]
+    assert steps[:whole] == [(clock // 7, 1 << clock % 7) for clock in range(whole)]
+    assert not any(step for _, step in steps[whole:])

@@ -258,7 +258,7 @@ MUTANTS = [
     Mutant("axi-lite", "pa_written", AxiLiteBridge, "bresp.eq(slave_error)", "bresp.eq(0)"),
     Mutant("axi-lite", "pa_data", AxiLiteBridge, "rdata.eq(native.read_data)", "rdata.eq(native.read_data >> 1)"),
     Mutant("positions of two axes", "px_position", AxesDatapath, "before.position + count", "before.position", 60),
-    Mutant("positions of two axes", "px_once", Turns, "self.begin | (ends & ~final)", "self.begin", 40),
+    Mutant("positions of two axes", "px_once", Turns, "ends & ~final", "ends & final", 40),
     Mutant("two axes of four slots", "px_axis", AxisCounters, "self.axis.eq(slot)", "self.axis.eq(self.slot)"),
     Mutant("two axes of four slots", "px_step", AxisCounters, "write.data.b.eq(new_b)", "write.data.b.eq(b)"),
     Mutant("two axes of four slots", "px_count", AxisCounters, "write.addr.eq(self.axis)", "write.addr.eq(slot)"),
