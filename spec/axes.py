@@ -146,6 +146,11 @@ class AxesSpec:
         # The next axis begins while the velocity of this one is shown.
         return DECIDE + self.axis.datapath_latency - READ
 
+    @property
+    def memory(self) -> tuple[str, int, int]:
+        """The memory of the reciprocal: its kind, entries, bits of an entry."""
+        return "table", self.axis.reciprocal.depth, self.axis.reciprocal.width
+
     def look(self, axis: int, number: Any) -> Any:
         """The clock in which the level of an axis is looked at for the `number`-th time, of a number or an array."""
         return number * self.slots + axis
