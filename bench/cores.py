@@ -10,6 +10,8 @@ from tachometry.hdl.demo.demo import Demo
 from tachometry.hdl.export import verilog_of
 from tachometry.sim.studies.size import CORE, TARGETS
 from tachometry.spec import (
+    AxesSpec,
+    CoreSpec,
     Encoder,
     MTachometer,
     MTTachometer,
@@ -17,7 +19,6 @@ from tachometry.spec import (
     RairanTachometer,
     Speed,
     STachometer,
-    TachometerSpec,
     Timing,
     TrackTachometer,
     TTachometer,
@@ -34,7 +35,7 @@ class Configuration:
     ----------
     name, what : str
         Its name, and what distinguishes it, for the tables.
-    spec : TachometerSpec
+    spec : TachometerSpec or AxesSpec
     bars : dict
         Limits by target and figure: Fmax must reach its bar, everything else must not exceed it.
     is_option : bool
@@ -50,7 +51,7 @@ class Configuration:
 
     name: str
     what: str
-    spec: TachometerSpec
+    spec: CoreSpec
     bars: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_option: bool = True
     targets: tuple[str, ...] = tuple(TARGETS)
@@ -62,6 +63,8 @@ class Configuration:
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
         """Verilog and ports."""
         bus = bus_of(self.bus)
+        if isinstance(self.spec, AxesSpec):
+            return export(self.spec, CORE)[f"{CORE}.v"], self.spec.ports
         if self.demo and bus is not None:
             registers = DemoMap(self.spec)
             described = {"generator": "", "license": "", **demo_manifest(registers, bus, CORE)}
@@ -101,6 +104,12 @@ TRACK_BARS = {
 }
 # The reference core, and 250 COMB and 100 FF for the bank.
 BUS_BARS = {"ECP5": {"COMB": 265 + 250, "FF": 260 + 100}}
+# Of 8 axes 60 COMB and 65 FF for each, of 32 axes 26 and 22.
+AXES_BARS: dict[int, Mapping[str, Mapping[str, float]]] = {
+    1: {},
+    8: {"ECP5": {"COMB": 8 * 60, "FF": 8 * 65, "MULT": 0, "Fmax": 140}},
+    32: {"ECP5": {"COMB": 32 * 26, "FF": 32 * 22, "MULT": 0, "Fmax": 140}},
+}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
 
@@ -253,6 +262,12 @@ CONFIGURATIONS = (
             ("t", "T method", TTachometer),
             ("mt", "M/T method", MTTachometer),
         )
+    ),
+    *(
+        Configuration(
+            f"axes-{axes}", f"axes of the reference: {axes}", AxesSpec(tachometer=REFERENCE, axes=axes), bars, False
+        )
+        for axes, bars in AXES_BARS.items()
     ),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )

@@ -9,7 +9,7 @@ from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
 from tachometry.spec.numbers import Numbers
 from tachometry.spec.option import ParameterError, is_derived, options_of, settle
-from tachometry.spec.port import UPDATE, Port, held, ports_of
+from tachometry.spec.port import UPDATE, Port, held, ports_of, strobes_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
 from tachometry.spec.units import PI, SpeedUnit, plural, signed_width
 
@@ -287,14 +287,7 @@ class TachometerSpec(Numbers):
     @property
     def strobes(self) -> dict[str, tuple[str, ...]]:
         """Outputs that strobe, each with the names of the outputs that are new with it."""
-        outputs = self.outputs
-        return {
-            strobe.name: tuple(
-                port.name for port in outputs if port.held_by == strobe.name and port.name != strobe.name
-            )
-            for strobe in outputs
-            if strobe.is_strobe
-        }
+        return strobes_of(self.outputs)
 
     @property
     def parameters(self) -> dict[str, Any]:

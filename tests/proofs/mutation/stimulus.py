@@ -1,5 +1,6 @@
 """What is played on the mutants: many short motions with a reset before each, in the middle of the one before."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
 from tachometry.spec import TachometerSpec
 
@@ -24,14 +26,14 @@ class Stimulus:
     ----------
     pins : uint64 array, shape (clocks, words)
         Bit 0 is `rst`, above it the other inputs in the order of the ports.
-    traces : list of PinTrace
+    traces : sequence of PinTrace or AxesTrace
         One after each reset.
     starts : list of int
         Clock in which each of them begins, the first one after a reset.
     """
 
     pins: NDArray[np.uint64]
-    traces: list[PinTrace]
+    traces: Sequence[Trace]
     starts: list[int]
 
 
