@@ -4,6 +4,7 @@ from amaranth import Module, Signal
 from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.idle import HasIdleCounters, IdleCounter
 from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
@@ -12,7 +13,6 @@ from tachometry.hdl.front_end.index_capture import IndexCapture
 from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.idle import HasIdleCounters, IdleCounter
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
 from tachometry.hdl.output.low_pass import LowPass

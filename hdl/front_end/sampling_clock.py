@@ -4,7 +4,7 @@ from amaranth import Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter
 
 
 class SamplingClock(wiring.Component):

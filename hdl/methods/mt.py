@@ -2,7 +2,7 @@
 
 from amaranth import Module, Mux, Signal, Value, ValueLike
 
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
 

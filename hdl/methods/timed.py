@@ -4,7 +4,7 @@ from amaranth import Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity

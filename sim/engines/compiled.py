@@ -18,7 +18,7 @@ from amaranth.lib import wiring
 from numpy.typing import NDArray
 
 from tachometry.hdl import Tachometer
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform

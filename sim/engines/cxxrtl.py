@@ -107,7 +107,7 @@ class Cxxrtl(CompiledEngine):
     Parameters
     ----------
     every_clock : bool
-        Whether clocks are simulated in which only idle counters count, see `hdl.idle`. It only takes longer.
+        Whether clocks are simulated in which only idle counters count, see `hdl.arithmetic.idle`. It only takes longer.
     """
 
     def __init__(self, every_clock: bool = False) -> None:

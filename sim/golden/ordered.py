@@ -21,7 +21,7 @@ def places(ordered: Ints, values: Ints, side: str) -> Ints:
     n = len(ordered)
     step = int(ordered[1] - ordered[0]) if n > 1 else 0
     if step < 1 or np.any(np.diff(ordered) != step):
-        return np.searchsorted(ordered, values, side=side)  # type: ignore[call-overload, no-any-return]
+        return np.searchsorted(ordered, values, side=side)  # type: ignore[call-overload]
     within = values - int(ordered[0]) + (step if side == "right" else step - 1)
     return np.clip(within // step, 0, n)
 

@@ -15,8 +15,9 @@ v add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at 
 most half one of the fine position. They are greatest for the least λ, and either for m = 1, for the longest silence, or
 where x = λ·m·T_s has just reached its most.
 
-The gains d and d·U/m are less than 2 and have B fraction bits. Their relative error is below 2^−B/d. It only moves the
-poles. B is such that a transient of one count per tick is off by at most an eighth of an LSB for it.
+The gain d is less than 1 and has B fraction bits. The gain d·U/m is less than 2^(1 + R) and has B − R; R is 0, except
+where ticks may be much shorter than U. Their relative error is below 2^−(B − R)/d. It only moves the poles. B − R is
+such that a transient of one count per tick is off by at most an eighth of an LSB for it.
 """
 
 import math
@@ -129,10 +130,19 @@ class Tracking:
         return max((4.5 * u / m) * 2**self.extra_bits + 1.5 / d for m, d in self._gains())
 
     @cached_property
+    def ratio_range(self) -> int:
+        """R, of the range of the gain d·U/m."""
+        shortest = 1 << LEAST_TICK_BITS if self.external else self.tick_cycles
+        x = min((AGILE if self.agile else 1) * self.rate(0) * shortest, self.most(0))
+        greatest = (1 - math.exp(-x)) * (1 << self.unit_bits) / shortest
+        return max(math.floor(math.log2(greatest * (1 + 2.0**-10))), 0)
+
+    @cached_property
     def gain_bits(self) -> int:
         """B: fraction bits of the multipliers."""
         d = self._gains()[0][1]
-        return max(20, self.velocity_bits + 3 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks)))))
+        least = self.velocity_bits + 3 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks))))
+        return max(20, least) + self.ratio_range
 
     @cached_property
     def max_velocity(self) -> int:
@@ -214,7 +224,8 @@ class Tracking:
             # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
             self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
             # What is multiplied: on its way to a product the adder holds nearly twice as much.
-            2 * self.max_error * of_v * 2**self.extra_bits,  # h
+            2 * self.max_error * d * 2**self.ratio_range,  # e·d
+            2 * self.max_error * of_v * 2 ** (self.extra_bits + self.ratio_range),  # h
             2 * self.max_acceleration / 2**self.frac_bits,
             2 * self.max_velocity / 2**self.frac_bits * max(1.125, 2 ** (self.times_bits - 1 - self.unit_bits)),
             4 * self.max_error,  # e less its mean

@@ -90,13 +90,19 @@ class Measurements:
     known: NDArray[np.bool_]
 
     def __getitem__(self, rows: Any) -> "Measurements":
-        return Measurements(*(None if column is None else column[rows] for column in vars(self).values()))
+        columns: dict[str, Any] = {
+            name: None if column is None else column[rows] for name, column in vars(self).items()
+        }
+        return Measurements(**columns)
 
     def with_more(self, more: "Measurements") -> "Measurements":
         """The rows of both in order of their clocks; `more`, of which there are few, after those of the same clock."""
         at = np.searchsorted(self.clock, more.clock, side="right")
-        pairs = zip(vars(self).values(), vars(more).values(), strict=True)
-        return Measurements(*(None if own is None else np.insert(own, at, new, axis=0) for own, new in pairs))
+        columns: dict[str, Any] = {
+            name: None if own is None else np.insert(own, at, vars(more)[name], axis=0)
+            for name, own in vars(self).items()
+        }
+        return Measurements(**columns)
 
 
 def eighths(spec: TimedTachometer, counts: Any, side: int) -> Any:

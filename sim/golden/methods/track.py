@@ -90,8 +90,12 @@ class Recursion:
         self._constants = spec.program.constants
         # What would be worked out for every count: fixed-point numbers of the spec's fractions.
         self._agile = spec.agile
-        self._one, self._error, self._twice_error = map(form.fixed, (1, form.edge_error, 2 * form.edge_error))
-        self._quarter_error, self._max_error = map(form.fixed, (form.edge_error / 4, form.max_error))
+        self._one, self._error, self._twice_error = (
+            form.fixed(1),
+            form.fixed(form.edge_error),
+            form.fixed(2 * form.edge_error),
+        )
+        self._quarter_error, self._max_error = form.fixed(form.edge_error / 4), form.fixed(form.max_error)
         self._rest()
 
     def _anew(self) -> None:
@@ -177,13 +181,14 @@ class Recursion:
         x = self._reach(form.agile_rate, form.most_x[0]) if agile else self._level_reach
         one, bits = self._one, form.gain_bits
         d = (3 * x << bits) // (rounded((x + 3 * one) ** 2, form.frac_bits + 2) + (3 * one >> 2))
-        r = (d << form.unit_bits) // self.gap
+        of_r = bits - form.ratio_range
+        r = (d << form.unit_bits) // (self.gap << form.ratio_range)
         e1 = rounded(e * d, bits)
         e2 = rounded(e1 * d, bits)
         e3 = rounded(e2 * d, bits)
-        h = rounded(e1 * r, bits)
+        h = rounded(e1 * r, of_r)
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += rounded(h * r, bits - form.extra_bits)
+        self.a += rounded(h * r, of_r - form.extra_bits)
         i = rounded(h * d, bits)
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0

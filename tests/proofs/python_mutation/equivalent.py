@@ -208,8 +208,8 @@ _argue(
 )
 _argue(
     f"{_TIMED}: Measurements.with_more",
-    "Both are of one class, with as many columns; and no silence ends in the period of a count.",
-    *("True → False", "'right' → 'left'"),
+    "No silence ends in the period of a count.",
+    "'right' → 'left'",
 )
 _argue(f"{_TIMED}: _bounds", "There are two bounds, and two ends of the enclosure.", "True → False")
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from support.mutant import caught, mutant
 
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.idle import IdleCounter
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.rairan import RairanMethod
@@ -66,7 +66,8 @@ def check_core(spec: TachometerSpec) -> None:
     check(spec, trace)
     cycles = spec.longest_tick
     slow = turning([3 * cycles + 1, 5, max(cycles - 1, 1)], 12, 5 * cycles)
-    others = {pin.name: np.zeros(12, dtype=np.uint8) for pin in spec.pins if pin.name not in slow.lines}
+    low = np.zeros(12, dtype=np.uint8)
+    others: dict[str, Any] = {pin.name: low for pin in spec.pins if pin.name not in slow.lines}
     check(spec, replace(slow, **others))
 
 
