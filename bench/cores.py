@@ -19,6 +19,7 @@ from tachometry.spec import (
     RairanTachometer,
     Speed,
     STachometer,
+    TachometerSpec,
     Timing,
     TrackTachometer,
     TTachometer,
@@ -123,8 +124,8 @@ def variants(
         Configuration(f"{name}-max-speed", f"{what}, 1000 rad/s", fast, bars, is_option=False, without_max_speed=name)
     )
     if not spec.own_ticks:
-        outside = [(one.name, one.what, one.spec) for one in found]
-        for inner, about, each in outside:
+        inside = (found[0].name, what, spec), (found[1].name, found[1].what, fast)
+        for inner, about, each in inside:
             without = f"{name}-external-tick" if each.max_speed else ""
             made = replace(each, max_tick_cycles=MAX_TICK)
             found.append(
