@@ -23,7 +23,6 @@ from golden import BEGIN, MOTION, part_of
 from pages import markdown, write_from
 
 from tachometry.cli.reports.terminal import print_table
-from tachometry.hdl import Tachometer
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -152,9 +151,9 @@ def loops(spec: TachometerSpec, trace: PinTrace, *options: str, debug: bool = Fa
     design = Design(spec, driven_pins(spec, trace))
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
         text = (
-            amaranth_cxxrtl.convert(Tachometer(spec), name="top", emit_src=False)
+            amaranth_cxxrtl.convert(design.component, name="top", emit_src=False)
             if debug
-            else translate(rtlil.convert(Tachometer(spec), name="top", emit_src=False))
+            else translate(rtlil.convert(design.component, name="top", emit_src=False))
         )
     source = design.source(text + model_of(design, text)) + _LOOPS
     key = build.digest("bench", source, build.compiler(), build.version(build.compiler()), build.FLAGS, options)
@@ -172,24 +171,23 @@ def strobes(library: Any, name: str, trace: PinTrace) -> int:
     return found
 
 
-def checked(run: Run, name: str, spec: TachometerSpec, trace: PinTrace) -> Run:
-    """What an engine gave; RuntimeError if the golden model disagrees."""
-    wrong, first = compare(golden.run(spec, trace), run)
+def checked(expected: Run, run: Run, name: str, spec: TachometerSpec) -> None:
+    """See that an engine gave what is expected; RuntimeError if not."""
+    wrong, first = compare(expected, run)
     if wrong:
         raise RuntimeError(f"{name}, {spec.method}: hardware and golden model disagree: {first[0]}")
-    return run
 
 
-def loop_alone(name: str, spec: TachometerSpec, trace: PinTrace) -> float:
+def loop_alone(name: str, spec: TachometerSpec, trace: PinTrace, expected: Run, repeats: int = REPEATS) -> float:
     """The shortest processor time in which an engine runs all clocks, without what it does before and after."""
     engine = pick(name)
     assert isinstance(engine, CompiledEngine)
     design = Design(spec, driven_pins(spec, trace))
     library, times = engine.library(design), []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         play = Play(library, design, trace, (0, trace.n_clocks), engine.every_clock)
         times.append(seconds(lambda: play.to_the_end(None, None), 1))  # noqa: B023
-        checked(observed(spec, trace.n_clocks, play.rows()), name, spec, trace)
+        checked(expected, observed(spec, trace.n_clocks, play.rows()), name, spec)
     return min(times)
 
 
@@ -199,10 +197,10 @@ def speed(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW, fa
     begun = time.process_time()
     run = pick("pysim").run(spec, part)
     rates = {"pysim": slow / (time.process_time() - begun)}
-    checked(run, "pysim", spec, part)
+    checked(golden.run(spec, part), run, "pysim", spec)
     part = part_of(trace, BEGIN, fast)
-    rates |= {engine: fast / loop_alone(engine, spec, part) for engine in ENGINES}
     run = golden.run(spec, part)
+    rates |= {engine: fast / loop_alone(engine, spec, part, run) for engine in ENGINES}
     clocks = [run.ticks.clock, run.updates.clock, run.index.clock, run.errors, run.tick_errors]
     bare = []
     for level in ("-O2", "-O3"):
@@ -227,10 +225,11 @@ def process(method: str, name: str) -> float:
 
 def whole(name: str, spec: TachometerSpec, trace: PinTrace) -> list[str]:
     """All of the motion on cxxrtl and on the golden model."""
-    run = checked(pick("cxxrtl").run(spec, trace), "cxxrtl", spec, trace)
+    run = golden.run(spec, trace)
     engines = ("cxxrtl-every-clock", "cxxrtl")
+    loop = [loop_alone(each, spec, trace, run, 1) for each in engines]
     cells = [name]
-    for slow, fast in ([loop_alone(each, spec, trace) for each in engines], [process(name, each) for each in engines]):
+    for slow, fast in (loop, [process(name, each) for each in engines]):
         cells += [f"{slow:.2g} s", f"{fast:.2g} s", f"{slow / fast:.3g}"]
     model = seconds(lambda: golden.run(spec, trace))
     return [*cells, f"{model * 1e3:.0f} ms", f"{len(run.updates.clock):,}", "0"]
@@ -250,8 +249,9 @@ def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[l
     if len({strobes(library, loop, part) for _, library, loop in rows}) > 1:
         raise RuntimeError("the loops do not see the same strobes")
     took = {name: seconds(lambda: strobes(library, loop, part)) for name, library, loop in rows}  # noqa: B023
-    took["the engine, which stores rows"] = loop_alone("cxxrtl-every-clock", spec, part)
-    took["idle clocks skipped"] = loop_alone("cxxrtl", spec, part)
+    run = golden.run(spec, part)
+    took["the engine, which stores rows"] = loop_alone("cxxrtl-every-clock", spec, part, run)
+    took["idle clocks skipped"] = loop_alone("cxxrtl", spec, part, run)
     return [[name, f"{part.n_clocks / each:.3g}"] for name, each in took.items()]
 
 
@@ -268,7 +268,7 @@ def main() -> None:
     cores = {name: method(**common) for name, method in METHODS.items()}
     if options.alone:
         method, engine = options.alone
-        checked(pick(engine).run(cores[method], trace), engine, cores[method], trace)
+        checked(golden.run(cores[method], trace), pick(engine).run(cores[method], trace), engine, cores[method])
         return
     speeds = [speed(name, spec, trace).cells for name, spec in cores.items()]
     print_table(SPEED_COLUMNS, speeds)
