@@ -297,14 +297,8 @@ class Program:
             reach = [Choice(Condition.FLAG, self._reach("agile_rate", "most_x0"), usual)]
         return [
             *(*reach, Do(Op.STORE, "x"), Do(Op.ADD, "three"), Do(Op.STORE, "t"), Do(Op.TO_MQ)),
-            *(
-                Do(Op.MUL, "t", form.frac_bits + 3),
-                Do(Op.ADD, "three_quarters"),
-                Do(Op.STORE, "t"),
-                _ZERO,
-                Do(Op.TO_MQ),
-            ),
-            *(Do(Op.LOAD, "x"), *[Do(Op.ADD, "x")] * 2, Do(Op.FRACTION, "t", form.gain_bits)),
+            *(Do(Op.MUL, "t", form.frac_bits + 3), Do(Op.ADD, "three_quarters"), Do(Op.STORE, "t")),
+            *(_ZERO, Do(Op.TO_MQ), Do(Op.LOAD, "x"), *[Do(Op.ADD, "x")] * 2, Do(Op.FRACTION, "t", form.gain_bits)),
             *(Do(Op.FROM_MQ), Do(Op.STORE, "d"), _ZERO, Do(Op.TO_MQ), Do(Op.LOAD, "d")),
             *(Do(Op.FRACTION, "gap_shifted", steps), Do(Op.FROM_MQ), Do(Op.STORE, "r")),
         ]
