@@ -58,7 +58,7 @@ class CarriedReciprocal(wiring.Component):
         m.d.comb += [read.addr.eq(self.m[:address_bits]), read.en.eq(self.moves)]
 
         # Only presets are ever used without a step from a preset before them.
-        q = Signal(spec.carried_quotient_width, reset_less=True)
+        q = Signal(spec.carried_quotient_width, name="carried_q", reset_less=True)
         r = Signal(spec.remainder_width, reset_less=True)
         carried = Signal()
         # R − Q, of which the next step needs the sign first: it comes with Q and R, so that there is one carry a clock.

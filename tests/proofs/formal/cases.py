@@ -65,6 +65,7 @@ _CARRIED_PROBES = {
     "core_q": "datapath.quotient.scaler_velocity.q",
     "core_r": "datapath.quotient.scaler_velocity.r",
     "core_less": "datapath.quotient.reciprocal.less",
+    "core_carried_q": "datapath.quotient.reciprocal.carried_q",
 }
 _STANDSTILL_PROBES = {"core_rests": "standstill.shown", "core_empty": "standstill.left"}
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES

@@ -198,12 +198,15 @@ module method #(
       wire [$clog2(C):0] core_q;
       wire [I-1:0] core_r;
       wire signed [(I > Q ? I : Q):0] core_less;
+      wire [Q-1:0] core_carried_q;
       reg [I-1:0] m = 0;  // at the last tick
       wire [I+$clog2(C):0] product = core_q * m;
       always @(posedge clk) m <= rst ? 0 : tick ? m_s : m;
       always @* begin
         lemma_next: assert (m_s == 1 || (m != 0 && m_s == (m == MAX_TICKS ? KEPT : m) + 1));
         lemma_less: assert (!core_carried || core_less == $signed({1'b0, core_r}) - $signed({1'b0, core_q}));
+        // What the last of the table leaves there.
+        lemma_ready: assert (m == 0 || m >= CARRIED || (core_less == C % CARRIED && core_carried_q == C / CARRIED));
         lemma_carried: assert (core_carried == (m >= CARRIED));
         lemma_reciprocal: assert (m == 0 || (core_r < m && product + core_r == C));
       end
