@@ -73,22 +73,30 @@ class Configuration:
 COMMON: Any = {"encoder": Encoder(500, 4), "timing": Timing.parse("48MHz", "20us", "10ms")}
 REFERENCE = STachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), frac_bits=16)
 BARS = {
-    "ECP5": {"COMB": 330, "FF": 300, "DP16KD": 1, "MULT": 0, "Fmax": 130, "latency": 12},
-    "HX8K": {"LC": 400, "RAM": 4, "Fmax": 115},
-    "UP5K": {"Fmax": 48},
+    "ECP5": {"COMB": 265, "FF": 260, "DP16KD": 0, "MULT": 0, "Fmax": 190, "latency": 4},
+    "HX8K": {"LC": 340, "RAM": 0, "Fmax": 130},
+    "UP5K": {"Fmax": 52},
 }
+TABLE_BARS = {
+    "ECP5": {"COMB": 235, "FF": 240, "DP16KD": 1, "MULT": 0, "Fmax": 135, "latency": 4},
+    "HX8K": {"LC": 305, "RAM": 4, "Fmax": 130},
+}
+DEFAULT_BARS = {"ECP5": {"COMB": 340, "DP16KD": 0, "MULT": 0, "Fmax": 180, "latency": 8}}
 M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
 RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
 ADAPTIVE_BARS = {"ECP5": {"COMB": 700, "MULT": 0, "Fmax": 100}}
 TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
-EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
+EVERY_CLOCK_BARS = {
+    "ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12},
+    "HX8K": {"Fmax": 100},
+}
 TRACK_BARS = {
     "ECP5": {"COMB": 700, "FF": 600, "DP16KD": 2, "MULT": 0, "Fmax": 100},
     "HX8K": {"LC": 900},
     "UP5K": {"Fmax": 24},
 }
 # The reference core, and 250 COMB and 100 FF for the bank.
-BUS_BARS = {"ECP5": {"COMB": 273 + 250, "FF": 220 + 100}}
+BUS_BARS = {"ECP5": {"COMB": 265 + 250, "FF": 260 + 100}}
 # Of 8 axes 60 COMB and 65 FF for each, of 32 axes 26 and 22.
 AXES_BARS: dict[int, Mapping[str, Mapping[str, float]]] = {
     1: {},
@@ -100,7 +108,8 @@ PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms",
 # The first is what the others are compared with.
 CONFIGURATIONS = (
     Configuration("reference", "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits", REFERENCE, BARS, False),
-    Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None)),
+    Configuration("table", "reciprocal from a table", replace(REFERENCE, source="table"), TABLE_BARS),
+    Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None), DEFAULT_BARS),
     Configuration("no-cancel", "eq. (17) instead of eq. (21)", replace(REFERENCE, cancel=False)),
     Configuration("frac-bits-8", "8 fraction bits", replace(REFERENCE, frac_bits=8)),
     Configuration("frac-bits-24", "24 fraction bits", replace(REFERENCE, frac_bits=24)),

@@ -1,7 +1,8 @@
 """Size and speed of the cores on three FPGAs, measured with open tools: writes docs/size.md.
 
 Area is that of the core alone, packed but not placed. Fmax is that of the core in a wrapper of registers, routed, the
-median over three seeds. A second run repeats only what depends on changed Verilog or changed tools.
+median over three seeds, or as many as are asked for. A second run repeats only what depends on changed Verilog or
+changed tools.
 
 Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
 """
@@ -23,6 +24,7 @@ from rich.progress import track
 
 from tachometry.sim.studies.size import (
     CORE,
+    SEEDS,
     TARGETS,
     Measurement,
     made,
@@ -101,9 +103,12 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 Results = Mapping[tuple[str, str], Measurement]
 
 
-def measure(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Measurement:
+def measure(
+    configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str], seeds: int = len(SEEDS)
+) -> Measurement:
     """Synthesise, pack and route a core for a target."""
-    return measure_core(configuration.spec, TARGETS[target_name], verilog, tools, configuration.hardware[1])
+    ports = configuration.hardware[1]
+    return measure_core(configuration.spec, TARGETS[target_name], verilog, tools, ports, range(1, seeds + 1))
 
 
 def box_name(cell: str) -> str:
@@ -217,12 +222,19 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     names = [configuration.name for configuration in CONFIGURATIONS]
     parser.add_argument("--only", nargs="+", choices=names, metavar="NAME", help=f"some of: {', '.join(names)}")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="targets at a time (%(default)s)")
+    parser.add_argument(
+        "--seeds", type=int, default=len(SEEDS), metavar="N", help="routings whose median Fmax is (%(default)s)"
+    )
+    parser.add_argument("--targets", nargs="+", choices=TARGETS, default=tuple(TARGETS), help="FPGAs (all)")
     parser.add_argument("--boxes", action="store_true", help="also print the area of each box")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="page (docs/size.md; with --only: none)")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="page (docs/size.md; of a part: none)")
     options = parser.parse_args(words)
     if options.jobs < 1:
         parser.error(f"--jobs must be at least 1, not {options.jobs}")
-    if options.output is None and options.only is None:
+    if options.seeds < 1:
+        parser.error(f"--seeds must be at least 1, not {options.seeds}")
+    everything = (options.only, options.seeds, options.targets) == (None, len(SEEDS), tuple(TARGETS))
+    if options.output is None and everything:
         options.output = PAGE
     return options
 
@@ -231,9 +243,14 @@ def run(options: argparse.Namespace) -> int:
     """Measure, print, and write the page; 1 if a bar is missed."""
     tools = versions()
     chosen = [found for found in CONFIGURATIONS if options.only is None or found.name in options.only]
-    work = [(found, target, found.hardware[0], tools) for found in chosen for target in found.targets]
+    work = [
+        (found, target, found.hardware[0], tools)
+        for found in chosen
+        for target in found.targets
+        if target in options.targets
+    ]
     with ThreadPoolExecutor(options.jobs) as pool:
-        done = list(with_progress(pool.map(lambda item: measure(*item), work), len(work)))
+        done = list(with_progress(pool.map(lambda item: measure(*item, options.seeds), work), len(work)))
         split = list(with_progress(pool.map(lambda item: boxes(*item), work), len(work))) if options.boxes else []
     results = {(found.name, target): result for (found, target, *_), result in zip(work, done, strict=True)}
     measured = tables(results)

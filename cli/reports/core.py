@@ -40,6 +40,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.outputs if port.width > 1)),
         *([] if memory is None else [("reciprocal", _memory(*memory))]),
+        *([("reciprocal", spec.division)] if spec.division else []),
         *((name, f"{plural(n, 'clock')} ({short_time(spec.seconds(n))})") for name, n in latencies.items()),
         ("standstill", _standstill(spec)),
         *(("note", note) for note in spec.notes),

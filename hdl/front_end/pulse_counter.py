@@ -4,14 +4,15 @@ from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.saturate import saturate
 
 
 class PulseCounter(wiring.Component):
     """Adds up the steps of a tick: m_e of Tsuji 2009, Sec. IV-A.
 
-    Latency: `tick` is high two clocks after the window's last clock. A step in the clock of the hand-over belongs to
-    the next window; none is lost.
+    Latency: `tick` is high two clocks after the window's last clock, or three. A step in the clock of the hand-over
+    belongs to the next window; none is lost.
 
     Parameters
     ----------
@@ -22,6 +23,9 @@ class PulseCounter(wiring.Component):
     stretched : bool
         Windows may be longer, and hold any number of steps: once their sum has left ±`max_count`, m_e is saturated,
         whatever comes after.
+    staged : bool
+        A register for the sum that has been held within its bound, so that `next_count` comes from a register, and
+        `tick` a clock later.
 
     Members
     -------
@@ -36,8 +40,13 @@ class PulseCounter(wiring.Component):
         m_e, held until the next tick.
     overflow : Out(1)
         m_e was saturated; held as long as m_e.
+    coming : Out(1)
+        `tick` is high in the next clock.
+    next_count : Out(signed)
+        What `pulse_count` is then; valid with `coming`.
     open_sum : Out(signed)
-        Only if not stretched: sum of the steps after the latest `tick`'s window, up to the clock before.
+        Only if not stretched: sum of the steps after the latest `tick`'s window, up to the clock before; if staged, up
+        to the clock before that.
 
     Raises
     ------
@@ -45,20 +54,24 @@ class PulseCounter(wiring.Component):
         If `max_count` is not in 1 … `tick_cycles`.
     """
 
-    def __init__(self, tick_cycles: int, max_count: int, *, stretched: bool = False) -> None:
+    def __init__(self, tick_cycles: int, max_count: int, *, stretched: bool = False, staged: bool = False) -> None:
         if not 1 <= max_count <= tick_cycles:
             raise ValueError(f"max_count must be from 1 to {tick_cycles}, not {max_count}")
         self._tick_cycles = tick_cycles
         self._max_count = max_count
         self._stretched = stretched
+        self._staged = staged
+        count = signed(max_count.bit_length() + 1)
         super().__init__(
             {
                 "step": In(signed(2)),
                 "last": In(1),
                 **({"beyond": In(1)} if stretched else {}),
                 "tick": Out(1),
-                "pulse_count": Out(signed(max_count.bit_length() + 1)),
+                "pulse_count": Out(count),
                 "overflow": Out(1),
+                "coming": Out(1),
+                "next_count": Out(count),
                 **({} if stretched else {"open_sum": Out(signed(tick_cycles.bit_length() + 1))}),
             }
         )
@@ -70,9 +83,7 @@ class PulseCounter(wiring.Component):
         step = Signal.like(count)
         complete = Signal()
         m.d.comb += step.eq(self.step)
-        m.d.sync += [complete.eq(self.last), self.tick.eq(complete), count.eq(count + step)]
-        if not self._stretched:
-            m.d.comb += self.open_sum.eq(count)
+        m.d.sync += [complete.eq(self.last), self.tick.eq(self.coming), count.eq(count + step)]
         held: Value = count
         overflow: Value = Const(0)
         if self._stretched:
@@ -88,5 +99,13 @@ class PulseCounter(wiring.Component):
             held, overflow = saturate(m, count, self._max_count)
         with m.If(complete):
             m.d.sync += count.eq(step)
+        coming: Value = complete
+        open_sum: Value = count
+        if self._staged:
+            coming, open_sum, held, overflow = delay(m, complete, count, held, overflow)
+        if not self._stretched:
+            m.d.comb += self.open_sum.eq(open_sum)
+        m.d.comb += [self.coming.eq(coming), self.next_count.eq(held)]
+        with m.If(coming):
             m.d.sync += [self.pulse_count.eq(held), self.overflow.eq(overflow)]
         return m

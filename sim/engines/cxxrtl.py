@@ -38,6 +38,21 @@ template <class Counter> static inline void count_on(Counter &counter, int step,
   counter.curr.set(counter.curr.template get<uint64_t>() + uint64_t(step * clocks));
   counter.next = counter.curr;
 }}
+// The same of one that goes through states in an order of its own, to the last of them.
+template <class Counter, size_t n> static inline int64_t follows(const Counter &counter, const uint16_t (&order)[n],
+                                                                 const uint16_t *place) {{
+  if (counter.next == counter.curr) return INT64_MAX;
+  size_t now = place[counter.curr.template get<uint16_t>()];
+  if (now + 1 >= n || order[now + 1] != counter.next.template get<uint16_t>()) return 0;
+  return int64_t(n - 1 - now);
+}}
+template <class Counter>
+static inline void follow_on(Counter &counter, const uint16_t *order, const uint16_t *place, int64_t clocks) {{
+  if (counter.next == counter.curr) return;
+  counter.curr.set(order[place[counter.curr.template get<uint16_t>()] + clocks]);
+  counter.next = counter.curr;
+}}
+{orders}
 struct Model {{
   p_top top;
   {pins}
@@ -146,15 +161,26 @@ class State:
 
 
 def _idle(design: Design, state: State) -> dict[str, str]:
-    """`idle` and `move_on` of the struct `Model`."""
+    """`idle` and `move_on` of the struct `Model`, and the orders of states that they need."""
     counters = {mangled(counter.path): counter for counter in design.idle_counters}
     assert counters.keys() <= state.flip_flops.keys(), f"no such signals: {counters.keys() - state.flip_flops.keys()}"
     if not counters or state.written:
-        return {"idle": "return 0;", "move_on": ""}
+        return {"idle": "return 0;", "move_on": "", "orders": ""}
     still = " || ".join(f"top.{wire}.next != top.{wire}.curr" for wire in state.flip_flops if wire not in counters)
     idle = [f"if (strobe() || {still}) return 0;", "int64_t clocks = INT64_MAX;"]
-    move = []
+    move, orders = [], []
     for wire, counter in counters.items():
+        if counter.order:
+            name = f"{wire}_order, {wire}_place"
+            places = [0] * (1 << state.flip_flops[wire])
+            for place, value in enumerate(counter.order):
+                places[value] = place
+            for kind, numbers in (("order", counter.order), ("place", tuple(places))):
+                listed = ", ".join(map(str, numbers))
+                orders.append(f"static const uint16_t {wire}_{kind}[] = {{{listed}}};")
+            idle.append(f"clocks = std::min(clocks, follows(top.{wire}, {name}));")
+            move.append(f"follow_on(top.{wire}, {name}, clocks);")
+            continue
         width, is_signed = state.flip_flops[wire], min(counter.stops) < 0
         # It must not wrap either.
         ends = 1 << (width - is_signed)
@@ -162,7 +188,7 @@ def _idle(design: Design, state: State) -> dict[str, str]:
         kind = f"{width}, {int(is_signed)}, {counter.step}, {{{stops}}}"
         idle.append(f"clocks = std::min(clocks, counts(top.{wire}, {kind}));")
         move.append(f"count_on(top.{wire}, {counter.step}, clocks);")
-    return {"idle": " ".join([*idle, "return clocks;"]), "move_on": " ".join(move)}
+    return {"idle": " ".join([*idle, "return clocks;"]), "move_on": " ".join(move), "orders": "\n".join(orders)}
 
 
 def model_of(design: Design, text: str) -> str:

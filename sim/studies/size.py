@@ -1,7 +1,7 @@
 """Size and speed of a core, measured with open tools: Yosys and nextpnr, of the extra `size`.
 
 Area is that of the core alone, packed but not placed. Fmax is that of the core in a wrapper of registers, routed, the
-median over three seeds.
+median over some seeds.
 """
 
 import importlib.metadata
@@ -172,7 +172,12 @@ def synthesis(sources: str, passes: str, name: str) -> list[str]:
 
 
 def measure_core(
-    spec: CoreSpec, target: Target, verilog: str, tools: Mapping[str, str], ports: Iterable[Port] = ()
+    spec: CoreSpec,
+    target: Target,
+    verilog: str,
+    tools: Mapping[str, str],
+    ports: Iterable[Port] = (),
+    seeds: Sequence[int] = SEEDS,
 ) -> Measurement:
     """Synthesise, pack and route a core for a target; what has been measured is not measured again.
 
@@ -188,12 +193,12 @@ def measure_core(
         [*target.route, "-q", "--json", "core.json", "--pack-only", "--report", "area.json", "-l", "area.log"],
         synthesis("core.v wrapper.v", f"{target.synth} -top wrapper", "wrapper"),
     ]
-    for seed in SEEDS:
+    for seed in seeds:
         outputs = ["--report", f"route{seed}.json", "-l", f"route{seed}.log"]
         commands.append(
             [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
         )
-    reports = ["area.json", *(f"route{seed}.json" for seed in SEEDS)]
+    reports = ["area.json", *(f"route{seed}.json" for seed in seeds)]
     packed, *routed = made(
         {"core.v": verilog, "wrapper.v": wrapper(tuple(ports) or spec.ports)}, commands, reports, tools
     )

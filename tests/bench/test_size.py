@@ -242,13 +242,20 @@ def test_every_table_is_rectangular() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "output"), [("", size.PAGE), ("--only x1 paper", None), ("--only x1 -o a.md", Path("a.md"))]
+    ("words", "output"),
+    [
+        ("", size.PAGE),
+        ("--only x1 paper", None),
+        ("--seeds 9", None),
+        ("--targets ECP5", None),
+        ("--only x1 -o a.md", Path("a.md")),
+    ],
 )
 def test_a_part_does_not_replace_the_page(words: str, output: Path | None) -> None:
     assert size.arguments(words.split()).output == output
 
 
-@pytest.mark.parametrize("words", ["--only nothing", "--jobs 0"])
+@pytest.mark.parametrize("words", ["--only nothing", "--jobs 0", "--seeds 0", "--targets none"])
 def test_refused_options(words: str) -> None:
     with pytest.raises(SystemExit, match="2"):
         size.arguments(words.split())

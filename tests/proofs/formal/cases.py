@@ -54,19 +54,17 @@ _METHOD_PROBES = {
     "core_longest": "datapath.interval.longest",
     "core_opening": "datapath.interval.opening",
     "core_numerator": "datapath.interval.numerator",
-    "core_previous": "datapath.alteration.previous",
+    "core_alteration": "datapath.alteration.alteration",
     "core_offset": "datapath.alteration.offset",
     "core_rests": "datapath.interval.rests",
     "core_nearly": "datapath.interval.nearly",
 }
-_SERIAL_PROBES = {
-    "core_running": "datapath.quotient.scaler_velocity.running",
-    "core_step": "datapath.quotient.scaler_velocity.step",
-}
+_SERIAL_PROBES = {"core_known": "datapath.interval.known"}
 _CARRIED_PROBES = {
     "core_carried": "datapath.quotient.reciprocal.carried",
     "core_q": "datapath.quotient.scaler_velocity.q",
     "core_r": "datapath.quotient.scaler_velocity.r",
+    "core_less": "datapath.quotient.reciprocal.less",
 }
 _STANDSTILL_PROBES = {"core_rests": "standstill.shown", "core_empty": "standstill.left"}
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
@@ -99,7 +97,7 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         latency, serial, used = spec.tick_to_velocity, spec.serial, spec.reciprocal
     carried = {}
     if isinstance(used, CarriedSpec):
-        carried = {"CARRIED": used.depth, "C": used.scale, "SERIAL": int(serial)}
+        carried = {"CARRIED": used.depth, "C": used.scale}
     parameters = {
         "T": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
@@ -109,13 +107,14 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         "NUMERATOR_WIDTH": spec.numerator_width,
         "FRAC_BITS": spec.frac_bits,
         "CANCEL": int(spec.cancel),
+        "SERIAL": int(serial),
         "TICK_TO_VELOCITY": latency,
         "AGE": int(spec.age),
     }
     probes = _METHOD_PROBES | within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
     probes |= within("aged", {"core_age": "age"}, spec.age)
     probes |= within("carried", _CARRIED_PROBES, bool(carried))
-    probes |= within("serial", _SERIAL_PROBES, bool(carried) and serial)
+    probes |= within("serial", _SERIAL_PROBES, serial)
     return Proof(
         name, spec, "method", parameters | carried, probes, depth or latency + 2, without=without, max_table=max_table
     )
@@ -343,8 +342,8 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
 
 
 PROOFS = [
-    front("x4, 960 clocks", core(960, max_count=20)),
-    front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
+    front("x4, 15 clocks", core(15, max_count=7)),
+    front("x4, filter 3", core(15, max_count=6, filter_clocks=3)),
     front("x4, 2 clocks", core(2)),
     front("x4, 1 clock", core(1)),
     front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
@@ -358,16 +357,15 @@ PROOFS = [
     m_method("M", small_m(1)),
     m_method("M of 4", small_m(4)),
     m_method("M of 3", small_m(3)),
-    method("serial", small(tick_cycles=7, max_ticks=16), depth=14),
-    method("sums", core(40, 8, max_count=7), depth=2, without="p4_* p5_velocity p7_* lemma_since"),
+    method("table", small(tick_cycles=7), depth=14),
+    method("sums", core(12, 8, max_count=7), depth=9, without="p4_* p5_velocity p7_* lemma_since"),
     method(
         "sums of eq. (17)",
-        core(40, 8, max_count=7, cancel=False),
-        depth=2,
+        core(12, 8, max_count=7, cancel=False),
+        depth=9,
         without="p4_* p5_velocity p7_* lemma_since",
     ),
-    method("carried", small(max_ticks=16), max_table=4),
-    method("serial, carried", small(tick_cycles=12, max_ticks=6), max_table=4),
+    method("carried", small(max_ticks=16)),
     reciprocal("2049 ticks", core(5, 2049, max_count=1)),
     reciprocal("6 ticks", small(max_ticks=6), max_table=4),
     rairan("Rairán", 3, 4, 2),

@@ -5,7 +5,7 @@ from typing import Any
 
 from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.arithmetic.divider import Divider
-from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
 from tachometry.hdl.axes.axes_datapath import AxesDatapath
@@ -69,8 +69,14 @@ MUTANTS = [
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
     Mutant("x2, 7 clocks", "p3_overflow", saturate, "above.eq(value > ", "above.eq(value >= "),
-    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
-    Mutant("eq. (21), 1 clock", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
+    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & differs", ""),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p4_interval",
+        IntervalAccumulator,
+        "(after_forced - self._max_ticks)",
+        "(after_forced - 1 - self._max_ticks)",
+    ),
     Mutant(
         "eq. (21), 1 clock",
         "p4_range",
@@ -78,30 +84,27 @@ MUTANTS = [
         "self.m_s == self._max_ticks - 1",
         "self.m_s == self._max_ticks",
     ),
-    Mutant("eq. (21), 1 clock", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
-    Mutant("eq. (21), 1 clock", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p4_latest",
+        IntervalAccumulator,
+        "closes.eq(self.alteration | longest)",
+        "closes.eq(self.alteration)",
+    ),
+    Mutant("eq. (21), 1 clock", "p4_held", RemainderScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
     Mutant(
         "eq. (21), 1 clock",
         "p5_numerator",
         IntervalAccumulator,
-        "opening - self.previous + d1",
-        "opening - self.previous",
+        "- 2 * last if",
+        "- last if",
     ),
-    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
-    Mutant("eq. (21), 1 clock", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
-    Mutant(
-        "eq. (17)",
-        "p5_velocity",
-        PipelinedScaler,
-        "= reciprocal.rounding(towards)",
-        "= reciprocal.rounding(towards) >> 1",
-    ),
-    Mutant(
-        "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
-    ),
-    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
-    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
-    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
+    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else -last", "else -2 * last"),
+    Mutant("eq. (21), 1 clock", "p5_velocity", RemainderScaler, "total - (step_q << step)", "total + (step_q << step)"),
+    Mutant("carried", "p5_velocity", RemainderScaler, "nearest = ~doubled", "nearest = doubled"),
+    Mutant("table", "p5_velocity", SerialScaler, "(high ^ low) & ~(low ^ below)", "(high ^ low) & ~below", 32),
+    Mutant("M of 3", "pm_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
+    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "r.eq(less + corrected)", "r.eq(less)"),
     Mutant(
         "x4, 2 clocks", "p6_error", QuadratureDecoder, "backward, change_a & change_b", "backward, change_a | change_b"
     ),
@@ -111,8 +114,8 @@ MUTANTS = [
         "eq. (21), 1 clock",
         "p7_stalled",
         IntervalAccumulator,
-        "~(opening | self.previous).any()",
-        "~self.previous.any()",
+        "~opening.any() & was_silent",
+        "was_silent",
     ),
     Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
     Mutant("age", "p8_age", UpdateAge, "Mux(self.update, fresh, self.before)", "Mux(self.update, 0, self.before)"),
@@ -176,8 +179,8 @@ MUTANTS = [
         "upset, eq. (21)",
         "p4_latest",
         IntervalAccumulator,
-        "self.m_s.eq(self.m_s + 1)",
-        "self.m_s.eq(self.m_s + (self.m_s <= self._max_ticks))",
+        "self.m_s + Mux(longest, back, 1)",
+        "self.m_s + Mux(longest, back, self.m_s <= self._max_ticks)",
     ),
     Mutant("upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(self.m == preset):", "with m.If(0):"),
     Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),

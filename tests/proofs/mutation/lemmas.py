@@ -35,10 +35,9 @@ def _tick(spec: STachometer) -> list[str]:
 def _window(spec: STachometer) -> list[str]:
     """Inside a window all pulse numbers but the first and the last are equal."""
     longest = spec.timing.max_ticks
-    counts = ("pulse_counter.pulse_count", "alteration.previous", "alteration.offset", "interval.opening")
+    counts = ("pulse_counter.pulse_count", "alteration.offset", "interval.opening")
     return [
         f"{{m_s}} >= 1 && {{m_s}} <= {longest} && {{longest}} == ({{m_s}} == {longest})",
-        "{m_s} == 1 || {alteration.offset} == {alteration.previous}",
         *(_within(name, spec.max_count) for name in counts),
     ]
 

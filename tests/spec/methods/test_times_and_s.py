@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 
 from tachometry.spec import Encoder, MTTachometer, Speed, STachometer, Timing, TTachometer
+from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
+from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
 
 
 def timing(tick: int, max_ticks: int) -> Timing:
@@ -145,26 +147,62 @@ def test_the_numerator_of_s() -> None:
     assert (s(bounds=True, cancel=False).numerator_per_count, s(bounds=True, cancel=False).max_numerator) == (1, 41)
 
 
+def kind(spec: STachometer) -> type:
+    return type(spec.reciprocal)
+
+
 def test_the_reciprocal_of_s() -> None:
-    """Up to 2048 ticks it is looked up; beyond, it is carried, if the table that this needs is not longer."""
-    assert [s(1, ticks).carried for ticks in (500, 2048, 2049, 5000)] == [False, False, True, True]
-    assert [s(1, 5000, frac_bits=24).carried, s(1, 4096, frac_bits=24).carried] == [True, False]
+    """Divided where a tick leaves the time, or from a table of up to 2048 ticks; otherwise it is carried along."""
+    assert [kind(s(tick)) for tick in (960, 21, 20, 7, 6, 1)] == [
+        *(
+            DividedReciprocal,
+            DividedReciprocal,
+            NarrowReciprocal,
+            NarrowReciprocal,
+            CarriedReciprocal,
+            CarriedReciprocal,
+        )
+    ]
+    assert [kind(s(tick, source="table")) for tick in (960, 7, 6)] == [
+        NarrowReciprocal,
+        NarrowReciprocal,
+        CarriedReciprocal,
+    ]
+    # Ties and bounds take a general one.
+    assert [kind(s(20, ticks)) for ticks in (15, 16)] == [NarrowReciprocal, Reciprocal]
+    assert kind(s(20, bounds=True)) is Reciprocal
+    assert [kind(s(960, ticks, source="table")) for ticks in (2048, 2049)] == [Reciprocal, DividedReciprocal]
+    assert kind(s(20, 2049)) is CarriedReciprocal
     assert s(1, 5001).reciprocal.entry == 2501  # type: ignore[union-attr]
-    assert [s().memory[0], s(1, 5000).memory[0]] == ["table", "table and carried on"]
-    assert [s().memory[1], s(1, 5000).memory[1]] == [16, 4]
+    assert [one.memory and one.memory[:2] for one in (s(960), s(20), s(1, 5000))] == [
+        *(None, ("table", 16), ("table and carried on", 4))
+    ]
+
+
+def test_what_is_told_of_the_reciprocal() -> None:
+    assert [one.division for one in (s(20), s(21))] == ["", "divided in 15 clocks between two ticks"]
+    assert [one.notes for one in (s(21), s(20, source="table"), s(960, 2048, source="table"))] == [()] * 3
+    short = "a tick of {} is too short to divide between two"
+    assert s(20).notes == (f"reciprocal from a table: {short.format('20 clocks')}",)
+    assert s(1, source="table").notes == (f"reciprocal carried along: {short.format('1 clock')}",)
+    assert s(960, 2049, source="table").notes == ("reciprocal divided: a table has at most 2048 entries",)
+    with pytest.raises(ValueError, match=r"^reciprocal must be serial or table, not 'none'$"):
+        s(source="none")
 
 
 def test_latencies_of_s() -> None:
-    """80 has 7 bits, so N has 8: one clock each, one for the table, one for its register, one to add b."""
-    assert [s(tick).serial for tick in (11, 20)] == [True, True]
-    assert [s(10).serial, s(9).serial] == [True, False]
-    assert [s(20).datapath_latency, s(1).datapath_latency, s(9).datapath_latency] == [8 + 3, 4 + 3, 7 + 3]
-    # One more for every digit of N·R/m, and one to round.
-    slow = s(40, 5000, max_speed=Speed(Fraction(1000), "rev/s"))
-    assert (slow.carried, slow.max_numerator, slow.serial) == (True, 8, True)
-    assert slow.datapath_latency == 2 * 5 + 4
+    """80 has 7 bits, so N has 8: four digits, one clock each, and one to start."""
+    assert [s(tick).serial for tick in (7, 20)] == [True, True]
+    assert [s(6).serial, s(20, 2049).serial] == [False, False]
+    assert [s(20).datapath_latency, s(7).datapath_latency, s(21).datapath_latency] == [4 + 1, 3 + 1, 4 + 1]
+    # A table takes three clocks more: m_s, the table, its register. A division one more for every bit.
+    assert [s(20).busy_clocks, s(21).busy_clocks] == [5 + 3, 5 + 1 + 15]
+    # One for each bit of N and each digit of N·R/m, and one each for the table, its register, and to round.
     fast = s(1, 5000)
     assert (fast.max_numerator, fast.datapath_latency) == (4, 4 + 2 + 3)
+    # What saturates has a register of its own.
+    slow: dict[str, Any] = {"max_speed": Speed(Fraction(1000), "rev/s")}
+    assert [one.tick_latency for one in (s(), s(**slow), s(1, **slow), t(), t(**slow))] == [2, 3, 2, 2, 2]
 
 
 def test_windows_of_s() -> None:
