@@ -1,4 +1,4 @@
-"""The window with its state outside, against the two boxes whose registers it is."""
+"""The window with its state outside, in a register, against the golden model of the S method."""
 
 import numpy as np
 import pytest
@@ -11,58 +11,55 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl.axes import axis_window
 from tachometry.hdl.axes.axis_window import AxisWindow
-from tachometry.hdl.methods.alteration import AlterationDetector
-from tachometry.hdl.methods.interval import IntervalAccumulator
+from tachometry.sim.golden.methods.s import alterations, windows
 
-OUTPUTS = ["m_s", "numerator", "update", "forced", "stalled"]
-SHAPE = {"count_width": 4, "numerator_width": 6}
+OUTPUTS = ["m_s", "base", "numerator", "update", "forced", "stalled"]
 
 
-class Pair(wiring.Component):
-    """Both, with the state of the first in a register."""
+class Followed(wiring.Component):
+    """A window of one axis, a tick in every clock."""
 
     def __init__(self, max_ticks: int, cancel: bool) -> None:
-        given = {"max_ticks": max_ticks, "kept_ticks": max_ticks // 2, "cancel": cancel, **SHAPE}
-        self.window = axis_window.AxisWindow(**given)  # type: ignore[arg-type]
-        self.alteration = AlterationDetector(SHAPE["count_width"])
-        self.interval = IntervalAccumulator(**given)  # type: ignore[arg-type]
-        outputs = {f"{box}_{name}": Out(signed(12)) for box in ("window", "interval") for name in OUTPUTS}
-        super().__init__({"tick": In(1), "clears": In(1), "m_e": In(signed(4)), **outputs})
+        given = {"max_ticks": max_ticks, "kept_ticks": max_ticks // 2, "count_width": 4, "numerator_width": 6}
+        # By the name in its module, where a mutant takes its place.
+        self.window = axis_window.AxisWindow(**given, cancel=cancel)
+        super().__init__({"clears": In(1), "m_e": In(signed(4)), **{name: Out(signed(12)) for name in OUTPUTS}})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         m.submodules.window = window = self.window
-        m.submodules.alteration = alteration = self.alteration
-        m.submodules.interval = interval = self.interval
         kept = Signal(window.state.shape())
-        with m.If(self.tick | self.clears):
-            m.d.sync += kept.eq(window.next)
+        m.d.sync += kept.eq(window.next)
         m.d.comb += [
             window.clears.eq(self.clears),
             window.state.eq(kept),
             window.m_e.eq(self.m_e),
-            alteration.tick.eq(self.tick),
-            alteration.m_e.eq(self.m_e),
-            interval.tick.eq(self.tick),
-            interval.m_e.eq(self.m_e),
-            interval.previous.eq(alteration.previous),
-            interval.alteration.eq(alteration.alteration),
-            self.window_m_s.eq(window.state.m_s),
-            self.window_stalled.eq(window.next.rests),
-            *(getattr(self, f"window_{name}").eq(getattr(window, name)) for name in ("numerator", "update", "forced")),
-            *(getattr(self, f"interval_{name}").eq(getattr(interval, name)) for name in OUTPUTS),
+            self.m_s.eq(kept.m_s),
+            self.base.eq(kept.previous),
+            self.stalled.eq(window.next.rests),
+            *(getattr(self, name).eq(getattr(window, name)) for name in ("numerator", "update", "forced")),
         ]
         return m
 
 
 def check(m_e: list[int], *, max_ticks: int = 4, cancel: bool = True) -> None:
     # What is in the register before it is cleared is not the state of a reset.
-    first = [{"clears": 1, "m_e": 0}]
-    rows = [*first, *({"clears": 0, "tick": 1, "m_e": number} for number in m_e)]
-    names = [f"{box}_{name}" for box in ("window", "interval") for name in OUTPUTS]
-    for tick, row in enumerate(clock_by_clock(Pair(max_ticks, cancel), rows, names)[len(first) :]):
-        for name in OUTPUTS:
-            assert row[f"window_{name}"] == row[f"interval_{name}"], (tick, name)
+    rows = [{"clears": 1, "m_e": 0}, *({"clears": 0, "m_e": number} for number in m_e)]
+    seen = clock_by_clock(Followed(max_ticks, cancel), rows, OUTPUTS)[1:]
+    numbers = [0, *m_e]  # m_e(−1) = 0 comes first
+    at, m_s, forced = (column.tolist() for column in windows(alterations(np.array(m_e)), max_ticks))
+    assert [tick for tick, row in enumerate(seen) if row["update"]] == at
+    for tick, length, by_force in zip(at, m_s, forced, strict=True):
+        row, inside = seen[tick], numbers[tick + 2 - length : tick + 2]
+        assert (row["m_s"], bool(-row["forced"])) == (length, by_force), tick
+        if cancel:
+            doubled = numbers[tick + 1 - length] + 2 * sum(inside[:-1]) + inside[-1]
+            assert 2 * length * row["base"] + row["numerator"] == doubled, tick
+        else:
+            assert length * row["base"] + row["numerator"] == sum(inside), tick
+    for tick, row in enumerate(seen):
+        latest = numbers[tick + 1 - max_ticks : tick + 2] if tick + 1 >= max_ticks else [1]
+        assert bool(-row["stalled"]) == (not any(latest)), tick
 
 
 def random(seed: int) -> list[int]:
@@ -79,9 +76,9 @@ def random(seed: int) -> list[int]:
 
 @pytest.mark.parametrize("cancel", [True, False])
 @pytest.mark.parametrize("max_ticks", [2, 3, 8])
-def test_it_is_what_the_boxes_of_one_axis_are(max_ticks: int, cancel: bool) -> None:
+def test_windows_of_the_paper_and_of_random_numbers(max_ticks: int, cancel: bool) -> None:
     for m_e, _ in PAPER.values():
-        check([max(-8, min(7, number)) for number in m_e], max_ticks=max_ticks, cancel=cancel)
+        check([max(-7, min(7, number)) for number in m_e], max_ticks=max_ticks, cancel=cancel)
     check(random(max_ticks), max_ticks=max_ticks, cancel=cancel)
 
 
