@@ -29,6 +29,7 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
         return sorted(configurations(method), key=lambda words: spec_of(words).timing.tick_cycles)[:number]
 
     monkeypatch.setattr(command, "configurations", short)
+    monkeypatch.setattr(command, "AXES", ())
     return number
 
 
