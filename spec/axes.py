@@ -151,6 +151,11 @@ class AxesSpec:
         """The reciprocal of m_s, which is always looked up: there is no time between two axes to divide."""
         return self.axis.looked_up
 
+    @property
+    def memory(self) -> tuple[str, int, int]:
+        """The memory of the reciprocal: its kind, entries, bits of an entry."""
+        return "table", self.reciprocal.depth, self.reciprocal.width
+
     def look(self, axis: int, number: Any) -> Any:
         """The clock in which the level of an axis is looked at for the `number`-th time, of a number or an array."""
         return number * self.slots + axis

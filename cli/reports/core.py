@@ -39,7 +39,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
             f"{spec.rounding_lsb} of it",
         ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.outputs if port.width > 1)),
-        *([] if memory is None else [("reciprocal", _memory(*memory))]),
+        *([] if memory is None else [("reciprocal", memory_text(*memory))]),
         *([("reciprocal", spec.division)] if spec.division else []),
         *((name, f"{plural(n, 'clock')} ({short_time(spec.seconds(n))})") for name, n in latencies.items()),
         ("standstill", _standstill(spec)),
@@ -82,7 +82,8 @@ def _registers(spec: TachometerSpec, bus: str) -> tuple[str, str]:
     return "registers", f"{number} of {WORD} bits on {bus}, configuration 0x{registers.configuration:08x}"
 
 
-def _memory(kind: str, entries: int, width: int) -> str:
+def memory_text(kind: str, entries: int, width: int) -> str:
+    """A memory, and how many bits it has."""
     return f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"
 
 
