@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.methods.s import MAX_TABLE, STachometer
 from tachometry.spec.option import ParameterError
@@ -83,11 +84,10 @@ class AxesSpec:
             raise ParameterError(
                 "velocity_width", "must not be given together with axes: it is what the greatest speed needs"
             )
-        if spec.carried:
-            longest = max(MAX_TABLE, spec.reciprocal.depth)
+        if spec.timing.max_ticks > MAX_TABLE:
             raise ParameterError(
                 "max_ticks",
-                f"must be at most {longest} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
+                f"must be at most {MAX_TABLE} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
             )
         self._check_slots()
         self._check_room()
@@ -143,13 +143,18 @@ class AxesSpec:
     @property
     def turn_cycles(self) -> int:
         """Clocks for which an axis has the datapath."""
-        # The next axis begins while the velocity of this one is shown.
-        return DECIDE + self.axis.datapath_latency - READ
+        # The next axis begins while the velocity of this one is shown. One clock starts the scaler, one takes its sum.
+        return DECIDE + 1 + self.reciprocal.digits + 1 - READ
+
+    @property
+    def reciprocal(self) -> Reciprocal:
+        """The reciprocal of m_s, which is always looked up: there is no time between two axes to divide."""
+        return self.axis.looked_up
 
     @property
     def memory(self) -> tuple[str, int, int]:
         """The memory of the reciprocal: its kind, entries, bits of an entry."""
-        return "table", self.axis.reciprocal.depth, self.axis.reciprocal.width
+        return "table", self.reciprocal.depth, self.reciprocal.width
 
     def look(self, axis: int, number: Any) -> Any:
         """The clock in which the level of an axis is looked at for the `number`-th time, of a number or an array."""

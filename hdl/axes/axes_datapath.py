@@ -53,7 +53,7 @@ class AxesDatapath(wiring.Component):
             cancel=axis.cancel,
         )
         self.quotient = Quotient(
-            axis.reciprocal,
+            spec.reciprocal,
             quotients={"velocity": (axis.native_width, 0)},
             numerator_width=axis.numerator_width,
             tag=data.StructLayout({"forced": 1}),
@@ -106,7 +106,8 @@ class AxesDatapath(wiring.Component):
         # Block RAM is slow.
         count = Signal.like(self.count)
         before = Signal(kept)
-        m.d.sync += [count.eq(read_count.data), before.eq(read.data)]
+        with m.If(turns.step[READ - 1]):
+            m.d.sync += [count.eq(read_count.data), before.eq(read.data)]
 
         overflow = Signal()
         m_e = count
@@ -123,8 +124,11 @@ class AxesDatapath(wiring.Component):
                 m.d.sync += [self.pulse_count.eq(0), self.overflow.eq(0), self.position.eq(0)]
 
         decides = turns.step[DECIDE]
+        updates = Signal()
+        forced = Signal()
+        m.d.sync += updates.eq(decides & window.update)
         with m.If(decides):
-            m.d.sync += self.stalled.eq(window.next.rests)
+            m.d.sync += [self.stalled.eq(window.next.rests), forced.eq(window.forced)]
         m.d.comb += [
             window.clears.eq(turns.clears),
             window.state.eq(before.window),
@@ -134,12 +138,11 @@ class AxesDatapath(wiring.Component):
             write.data.window.eq(window.next),
             write.en.eq(decides),
             quotient.m.eq(window.state.m_s),
-            quotient.enable.eq(turns.step[READ]),
             quotient.load.eq(decides),
-            quotient.start.eq(window.update),
+            quotient.start.eq(updates),
             quotient.base.eq(window.state.previous),
             quotient.numerator.eq(window.numerator),
-            quotient.tag.forced.eq(window.forced),
+            quotient.tag.forced.eq(forced),
         ]
         found = quotient.results
         # As late as the velocity: what the next turn has by then does not show yet.

@@ -108,14 +108,19 @@ class STachometer(TachometerSpec):
     def reciprocal(self) -> Reciprocal | CarriedReciprocal:
         """The reciprocal of m_s: the first that there is room for, as `source` says; else carried along."""
         shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
-        found: Reciprocal = Reciprocal(*shape, self.bounds)
-        if not (found.bounds or found.has_ties):
-            found = NarrowReciprocal(*shape)
+        found = self.looked_up
         fitting = [found] if self.timing.max_ticks <= MAX_TABLE and self.has_room(self._busy_clocks(found)) else []
         divided = DividedReciprocal(*shape, self.bounds)
         if self.has_room(self._busy_clocks(divided)):
             fitting.insert(0 if self.source == "serial" else len(fitting), divided)
         return fitting[0] if fitting else CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
+
+    @property
+    def looked_up(self) -> Reciprocal:
+        """The reciprocal of m_s as a table, whether there is room for it or not."""
+        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
+        found = Reciprocal(*shape, self.bounds)
+        return found if found.bounds or found.has_ties else NarrowReciprocal(*shape)
 
     def _busy_clocks(self, reciprocal: Reciprocal) -> int:
         # One clock to start over with a new m_s, then a table takes two, and a division as many as its bits.

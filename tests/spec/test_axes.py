@@ -131,4 +131,4 @@ def test_a_tick_has_a_turn_for_every_axis() -> None:
             short += 1
         else:
             assert 8 * spec.turn_cycles + 8 <= tick
-    assert 5 < short < 15
+    assert 3 < short < 15

@@ -50,7 +50,7 @@ MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
     "tick after reset": (AxesDatapath, "turns.step[-1] & ~turns.clears", "turns.step[-1]", {}),
     "no saturation": (AxesDatapath, "spec.axis.max_count < spec.rounds", "False", {}),
     "velocity upon this count": (AxesDatapath, "base.eq(window.state.previous)", "base.eq(self.pulse_count)", {}),
-    "always forced": (AxesDatapath, "tag.forced.eq(window.forced)", "tag.forced.eq(1)", {}),
+    "always forced": (AxesDatapath, "tag.forced.eq(forced)", "tag.forced.eq(1)", {}),
     "stalled for ever": (AxesDatapath, "stalled.eq(window.next.rests)", "stalled.eq(1)", {}),
     "index of a level": (AxisIndex, "ready & level & ~before.z", "ready & level", {"index": True}),
     "index before there are levels": (AxisIndex, "ready & level & ~before.z", "level & ~before.z", {"index": True}),

@@ -105,7 +105,9 @@ MUTANTS = [
     Mutant("table", "p5_velocity", SerialScaler, "(high ^ low) & ~(low ^ below)", "(high ^ low) & ~below", 32),
     Mutant("M of 3", "pm_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
     Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "r.eq(less + corrected)", "r.eq(less)"),
-    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
+    Mutant(
+        "x4, 2 clocks", "p6_error", QuadratureDecoder, "backward, change_a & change_b", "backward, change_a | change_b"
+    ),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
     Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "(clocks_since_reset[-1])", "(clocks_since_reset[-2])"),
     Mutant(
