@@ -177,13 +177,14 @@ module timed #(
       {was_distance, was_times} <= {shown_distance, shown_times};
     end
 
-  // Which of them began, after an upset, when what is given held; after a reset those too that there are not.
+  // Which of them began, after an upset, when what is given held; after a reset those too that there are not. A decay is
+  // of use only if what it is compared with is.
   reg [7:0] fresh_clocks = 0;
   reg fresh_division = SETTLED < 0, fresh_due = SETTLED < 0, fresh_before = SETTLED < 0, fresh_past = SETTLED < 0;
   wire fresh_now = fresh_clocks == SETTLED, fresh = due ? fresh_due : fresh_before;
   always @(posedge clk) begin
     if (!fresh_now) fresh_clocks <= fresh_clocks + 1;
-    if (fresh_now && (rst || overdue || measured || decays)) fresh_division <= 1;
+    if (fresh_now && (rst || overdue || measured || (decays && fresh))) fresh_division <= 1;
     fresh_due <= fresh_division;
     if (fresh_now && rst) {fresh_before, fresh_past} <= 2'b11;
     else begin
@@ -252,7 +253,7 @@ module timed #(
       assign core_holding = core_holds;
       always @* begin
         lemma_holds: assert (core_holds == (since == N + 3));
-        lemma_held: assert (since < N + 3 || (core_shown == shown && core_saturated == (shown != core_rounded)));
+        lemma_held: assert (!fresh_division || since < N + 3 || (core_shown == shown && core_saturated == (shown != core_rounded)));
       end
     end else assign core_holding = 0;
     if (FLAGS) begin : flag
