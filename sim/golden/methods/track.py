@@ -90,12 +90,9 @@ class Recursion:
         self._constants = spec.program.constants
         # What would be worked out for every count: fixed-point numbers of the spec's fractions.
         self._agile = spec.agile
-        self._one, self._error, self._twice_error = (
-            form.fixed(1),
-            form.fixed(form.edge_error),
-            form.fixed(2 * form.edge_error),
-        )
-        self._quarter_error, self._max_error = form.fixed(form.edge_error / 4), form.fixed(form.max_error)
+        self._one, self._max_error = form.fixed(1), form.fixed(form.max_error)
+        self._error, self._twice_error = form.fixed(form.edge_error), form.fixed(2 * form.edge_error)
+        self._quarter_error = form.fixed(form.edge_error / 4)
         self._rest()
 
     def _anew(self) -> None:

@@ -1,8 +1,7 @@
 """Survivors that are equivalent to the core by an argument made by hand, where the proof does not reach.
 
 The keys are the core, the line of the HDL, and what the mutant changes in the cell that Yosys made of that line, with
-the cell where the line has several of a kind. B is
-the value that a reset gives, and S is whether there is a reset.
+the cell where the line has several of a kind. B is the value that a reset gives, and S is whether there is a reset.
 """
 
 from pathlib import Path
@@ -53,11 +52,9 @@ ARGUED = {
     ("track, age", "pc = Signal(address_width)", "B[2] inv"): (
         "a clock after a reset it is 0, as always at rest, and no tick comes as early"
     ),
-    (
-        "track, age",
-        _AT_REST,
-        "$247.A[0] const0",
-    ): "it is 0 a clock later, as always at rest, and no tick comes as early",
+    ("track, age", _AT_REST, "$247.A[0] const0"): (
+        "it is 0 a clock later, as always at rest, and no tick comes as early"
+    ),
     ("track, age", "following = Signal(layout, reset_less=True)", "following[23] cnot1"): (
         "that is the address of a `TO_MQ`, which has none"
     ),
