@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 from support.mutant import caught, mutant
-from support.timed import SILENCE, TICK, decay, run, silence, spec_of, speed
+from support.timed import FRAC_BITS, SILENCE, TICK, decay, run, silence, spec_of, speed
 
 from tachometry.hdl.methods import count_way, gap_timer, quotient_velocity
-from tachometry.spec import Timing
+from tachometry.spec import Speed, Timing
 from tachometry.spec.methods.timed import TimedTachometer
 
 METHODS = ["t", "mt"]
@@ -58,6 +58,23 @@ def check_standstill(method: str, sign: int = 1) -> None:
 @pytest.mark.parametrize("sign", [1, -1])
 def test_standstill(method: str, sign: int) -> None:
     check_standstill(method, sign)
+
+
+def check_greatest_speed(method: str, sign: int = 1) -> None:
+    """What is too fast is held there, whichever way; what is slower is not."""
+    spec = timed(method, bound_decay=False, max_speed=Speed.parse("2rev/s"))
+    assert spec.saturates
+    fast = {5, 9} if method == "t" else range(5, 24)  # two counts; a tick full of them
+    got = run(spec, dict.fromkeys([*fast, 139], sign), 180)
+    last, first = max(fast), min(fast)
+    velocities = [(last, 2 << FRAC_BITS, last - first), (139, speed(1, 139 - last), 139 - last)]
+    assert [row[:3] for row in got] == [(clock, sign * velocity, time) for clock, velocity, time in velocities]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_greatest_speed(method: str, sign: int) -> None:
+    check_greatest_speed(method, sign)
 
 
 def check_one_count(method: str) -> None:
@@ -206,6 +223,12 @@ MUTANTS = {
         "forced.eq(self.forced_in)",
         "forced.eq(forced)",
         check_standstill,
+    ),
+    "beyond the greatest speed": (
+        quotient_velocity.QuotientVelocity,
+        "bounded & (farther",
+        "~measuring & (farther",
+        check_greatest_speed,
     ),
     "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
     "decaying too early": (
