@@ -151,7 +151,7 @@ CONFIGURATIONS = (
         False,
         without_max_speed="default",
     ),
-    Configuration("table", "reciprocal from a table", replace(REFERENCE, source="table"), TABLE_BARS),
+    Configuration("table", "reciprocal from a table", replace(REFERENCE, reciprocal_source="table"), TABLE_BARS),
     Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None), DEFAULT_BARS),
     Configuration("no-cancel", "eq. (17) instead of eq. (21)", replace(REFERENCE, cancel=False)),
     Configuration("frac-bits-8", "8 fraction bits", replace(REFERENCE, frac_bits=8)),

@@ -112,8 +112,10 @@ class PulseCounter(wiring.Component):
         return m
 
     def _narrow(self, m: Module, count: Signal) -> Signal:
-        """The count in two bits more than its bound has: beyond these it is only beyond the bound, with its sign."""
+        """The count in at most two bits more than its bound has: beyond these it is only beyond the bound, with its sign."""
         bits = self._max_count.bit_length()
+        if len(count) <= bits + 2:
+            return count
         upper, sign = count[bits:], count[-1]
         narrow = Signal(signed(bits + 2))
         # The upper bits are all the sign if none of them differs from the next one.

@@ -118,7 +118,7 @@ class IntervalAccumulator(wiring.Component):
         m.d.comb += opens.eq(Mux(self.update, last, opening))
         m.d.sync += opening.eq(opens)
         domain = m.d.sync if self._seldom else m.d.comb
-        domain += known.eq((opening if self._seldom else opens) - 2 * last if self._cancel else -last)
+        domain += known.eq((opening if self._seldom else opens) - (last << 1) if self._cancel else -last)
         m.d.comb += self.numerator.eq(known + self.next_count)
 
         silent = ~last.any()

@@ -23,7 +23,7 @@ class STachometer(TachometerSpec):
     ----------
     cancel : bool
         Cancel alternate pulse alterations: eq. (21) instead of eq. (17).
-    source : str
+    reciprocal_source : str
         Where 1/m_s comes from if ticks leave the time: `serial`, a division, or `table`, a block RAM. Otherwise from
         the other; and where ticks are too short for both, it is carried along.
 
@@ -35,7 +35,7 @@ class STachometer(TachometerSpec):
 
     cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).")
 
-    source: str = option(
+    reciprocal_source: str = option(
         "serial",
         "Where the reciprocal of the measurement time comes from: divided serially between two ticks, or looked up in "
         "a table of block RAM. Where ticks are too short for the one, or windows too long, the other is taken.",
@@ -50,8 +50,8 @@ class STachometer(TachometerSpec):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.source not in _SOURCES:
-            raise ParameterError("reciprocal", f"must be serial or table, not {self.source!r}")
+        if self.reciprocal_source not in _SOURCES:
+            raise ParameterError("reciprocal", f"must be serial or table, not {self.reciprocal_source!r}")
 
     @property
     def description(self) -> str:
@@ -106,13 +106,13 @@ class STachometer(TachometerSpec):
 
     @property
     def reciprocal(self) -> Reciprocal | CarriedReciprocal:
-        """The reciprocal of m_s: the first that there is room for, as `source` says; else carried along."""
+        """The reciprocal of m_s: the first that there is room for, as `reciprocal_source` says; else carried along."""
         shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
         found = self.looked_up
         fitting = [found] if self.timing.max_ticks <= MAX_TABLE and self.has_room(self._busy_clocks(found)) else []
         divided = DividedReciprocal(*shape, self.bounds)
         if self.has_room(self._busy_clocks(divided)):
-            fitting.insert(0 if self.source == "serial" else len(fitting), divided)
+            fitting.insert(0 if self.reciprocal_source == "serial" else len(fitting), divided)
         return fitting[0] if fitting else CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
 
     @property
@@ -149,7 +149,7 @@ class STachometer(TachometerSpec):
     @property
     def notes(self) -> tuple[str, ...]:
         divided = isinstance(self.reciprocal, DividedReciprocal)
-        if divided == (self.source == "serial") and not self.carried:
+        if divided == (self.reciprocal_source == "serial") and not self.carried:
             return super().notes
         found = "carried along" if self.carried else "divided" if divided else "from a table"
         reason = f"a tick of {plural(self.timing.tick_cycles, 'clock')} is too short to divide between two"

@@ -40,7 +40,7 @@ _TRACK = {
     "fine_bits": "fine-bits",
 }
 WORDS = {
-    "s": {**_SHARED, "cancel": "cancel"},
+    "s": {**_SHARED, "cancel": "cancel", "reciprocal_source": "reciprocal"},
     "m": {**_SHARED, "average": "average"},
     "t": {**_SHARED, **_TIMED},
     "mt": {**_SHARED, **_TIMED, "min_time": "min-time", "whole_cycles": "whole-cycles"},
@@ -84,6 +84,7 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "decoding": settings.decoding,
         "average": settings.average,
         "estimate": settings.estimate,
+        "reciprocal_source": settings.words.get("reciprocal", "serial"),
     }
     return values[name]
 
@@ -118,7 +119,8 @@ class Expected:
 
     def __init__(self, settings: Settings, manifest: Manifest) -> None:
         self.settings, self.manifest = settings, manifest
-        self.to_velocity = manifest["latency_cycles"]["tick_to_velocity"]
+        self.to_tick = int(manifest["latency_cycles"]["tick_latency"])
+        self.to_velocity = int(manifest["latency_cycles"]["tick_to_velocity"])
         self.counts = settings.max_count << settings.greatest_shift
 
     @property
@@ -137,7 +139,7 @@ class Expected:
     @property
     def division(self) -> int:
         """Clocks of a division: it ends a clock before the update, where that is in counts per tick."""
-        return int(self.to_velocity) - 1
+        return self.to_velocity - 1
 
     @property
     def silence(self) -> int:
@@ -215,7 +217,9 @@ class Expected:
         settings = self.settings
         held = 1 << max(settings.filter - 1, 1).bit_length()
         lines = 2 + (held + settings.filter if settings.filter else 0) + 1
-        tick = 1 + (1 << max(settings.longest_tick - 2, 0).bit_length())
+        longest = settings.longest_tick
+        # From 16 clocks on the tick is counted by a shift register, whose period is that of all its bits.
+        tick = 1 + (1 << (longest if longest >= 16 else max(longest - 2, 0)).bit_length())
         most = settings.max_ticks
         periods = {
             "s": lambda: (1 << most.bit_length()) + most + 1,
@@ -229,7 +233,7 @@ class Expected:
         clocks = periods * (1 if timed and not settings.lattice else settings.longest_tick)
         if timed:
             shown = int(self.manifest["recovery_cycles"])
-            least = lines + tick + clocks + 2 + self.to_velocity
+            least = lines + tick + clocks + self.to_tick + self.to_velocity
             # In other units a division is shorter than the way to the velocity, by how much is not told.
             if (
                 not settings.native
@@ -238,7 +242,7 @@ class Expected:
             ):
                 return shown
             clocks += self.division
-        return lines + tick + max(clocks + int(self.to_velocity), silence) + 2
+        return lines + tick + max(clocks + self.to_velocity, silence) + self.to_tick
 
     def entries(self) -> dict[str, Callable[[], object]]:
         """What each entry must be."""

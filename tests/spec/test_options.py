@@ -69,7 +69,7 @@ def test_every_option_does_what_it_says() -> None:
         edge_error=Fraction(1, 4),
         lowpass=Fraction(50),
         cancel=False,
-        source="table",
+        reciprocal_source="table",
     )
     assert {about.name for about in (*common_options(), *own_options("s"))} - {"dt", "frac-bits"} == {
         word.split("=")[0] for word in texts.split()

@@ -109,7 +109,7 @@ def test_speed_in_rad_per_s(text: str) -> None:
 
 def test_memory_is_the_table() -> None:
     assert STachometer(encoder=Encoder(500), timing=TIMING).memory is None  # the reciprocal is divided
-    spec = STachometer(encoder=Encoder(500), timing=TIMING, source="table")
+    spec = STachometer(encoder=Encoder(500), timing=TIMING, reciprocal_source="table")
     assert spec.memory is not None
     kind, entries, width = spec.memory
     assert kind == "table"

@@ -23,6 +23,8 @@ words = sys.argv[1:]
 files = [word for word in words if word.startswith("top.") and not Path(word).exists()]
 for file in files:
     Path(file).write_text(name + " " + file)
+if "top.ys" in words:
+    Path("top.json").write_text(json.dumps({{"modules": {{}}}}))
 if "--report" in words:
     seed = words[words.index("--seed") + 1]
     wanted = float(words[words.index("--freq") + 1])

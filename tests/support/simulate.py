@@ -51,3 +51,18 @@ def clock_by_clock(
         for name, field in layout
     ]
     return [{name: (bits >> low & mask ^ sign) - sign for name, low, mask, sign in fields} for bits in seen]
+
+
+def ticks(box: wiring.Component, m_e: Sequence[int], clocks: int) -> list[dict[str, int]]:
+    """Rows for a datapath that works on ticks: these pulse numbers at ticks so many clocks apart, the first at clock 1.
+
+    A datapath that is told of a tick in the clock before it is told so.
+    """
+    told = hasattr(box, "coming")
+    rows: list[dict[str, int]] = [{"tick": 0} for _ in range(1 + len(m_e) * clocks)]
+    for i, number in enumerate(m_e):
+        rows[1 + i * clocks] |= {"tick": 1, "pulse_count": number}
+        if told:
+            rows[1 + i * clocks] |= {"coming": 0}
+            rows[i * clocks] |= {"coming": 1, "next_count": number}
+    return rows

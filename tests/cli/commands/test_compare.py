@@ -38,7 +38,7 @@ def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
     [
         (["--methods", "x"], "--methods must be of s, m, "),
         (["--methods", ""], "or all, not ''"),
-        (["--methods", "s:foo=1"], "options of method s must be of cancel, not 'foo'"),
+        (["--methods", "s:foo=1"], "options of method s must be of cancel, reciprocal, not 'foo'"),
         (["--methods", "m:average=q"], "--average must be a whole number, not 'q'"),
         (["--methods", "m:average=900"], "--average must be from 1 to 256, not 900"),
         (["--motion", "stop:1us"], "--motion must last at least two control periods of difference, not 1e-06 s"),

@@ -119,6 +119,7 @@ def test_defaults(tmp_path: Path) -> None:
         "edge_error": 0.0,
         "lowpass": None,
         "cancel": True,
+        "reciprocal_source": "serial",
     }
 
 

@@ -16,7 +16,7 @@ from tachometry.hdl.front_end.decoder import QuadratureDecoder
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
 from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
-from tachometry.hdl.methods import mt as mt_method
+from tachometry.hdl.methods import count_way
 from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.sim.testbench.vectors import usual_motion
 from tachometry.spec import Encoder, STachometer, Timing
@@ -81,14 +81,14 @@ def test_passes_in_pytest(tmp_path: Path) -> None:
 
 
 MUTANTS: dict[str, tuple[Any, str, str, str]] = {
-    "every alteration": (AlterationDetector, " & (self.m_e != offset)", "", "s"),
+    "every alteration": (AlterationDetector, " & differs)", ")", "s"),
     "count lost": (PulseCounter, "m.d.sync += count.eq(step)", "m.d.sync += count.eq(0)", "s"),
-    "tick lost": (PulseCounter, "self.tick.eq(complete)", "self.tick.eq(complete & ~self.step[0])", "m"),
+    "tick lost": (PulseCounter, "self.tick.eq(self.coming)", "self.tick.eq(self.coming & ~self.step[0])", "m"),
     "glitch believed": (GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2", "s"),
     "index forgotten": (PositionCounter, "self.position.eq(0)", "self.position.eq(1)", "s"),
     "no error": (QuadratureDecoder, "self.ready & illegal", "0", "s in rpm"),
     "error too often": (QuadratureDecoder, "self.ready & illegal", "counted & past_b", "s in rpm"),
-    "no sign rule": (mt_method.MTMethod, "Mux(self._same, self._one, 0)", "self._one", "mt"),
+    "no sign rule": (count_way.CountWay, "negative == last if self._reversals else 1", "1", "mt"),
 }
 
 

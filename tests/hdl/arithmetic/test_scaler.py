@@ -27,7 +27,7 @@ def default_spec(frac_bits: int = 16, **options: object) -> STachometer:
 @pytest.mark.parametrize("source", ["serial", "table"])
 @pytest.mark.parametrize(("frac_bits", "cancel"), [(16, True), (4, True), (4, False)])
 def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bool, source: str) -> None:
-    spec = default_spec(frac_bits, cancel=cancel, source=source)
+    spec = default_spec(frac_bits, cancel=cancel, reciprocal_source=source)
     assert type(spec.reciprocal) is (
         DividedReciprocal if source == "serial" else Reciprocal if frac_bits == 4 else NarrowReciprocal
     )
@@ -48,7 +48,7 @@ def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bo
 @pytest.mark.parametrize("max_speed", ["1000rad/s", "150rad/s", "2000rad/s"])
 def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source: str) -> None:
     """All m_s and N, which have 6 bits, 3 and 7: an odd number of bits is a digit more."""
-    spec = default_spec(max_speed=Speed.parse(max_speed), source=source)
+    spec = default_spec(max_speed=Speed.parse(max_speed), reciprocal_source=source)
     assert spec.numerator_width == {"1000rad/s": 6, "150rad/s": 4, "2000rad/s": 7}[max_speed]
     numerators = range(-spec.max_numerator, spec.max_numerator + 1)
     base, n, m, got = every_quotient(spec, numerators, tmp_path)
@@ -59,7 +59,7 @@ def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source:
 @pytest.mark.parametrize("towards", [-1, 1])
 def test_every_bound(tmp_path: Path, source: str, towards: int) -> None:
     """Rounded down and up: at 4 fraction bits many quotients need no rounding at all."""
-    spec = default_spec(4, source=source, bounds=True, max_speed=Speed.parse("2000rad/s"))
+    spec = default_spec(4, reciprocal_source=source, bounds=True, max_speed=Speed.parse("2000rad/s"))
     numerators = range(-spec.max_numerator, spec.max_numerator + 1)
     base, n, m, got = every_quotient(spec, numerators, tmp_path, towards)
     assert np.count_nonzero(got != (base << 4) + round_quotient(n, 2 * m, 4, towards)) == 0
@@ -72,7 +72,7 @@ def base(n: Any) -> Any:
 
 def check_ties() -> None:
     """Ties of both signs, between other values, at 4 fraction bits."""
-    spec = default_spec(4, source="table")
+    spec = default_spec(4, reciprocal_source="table")
     pairs = [(n, m) for m in (32, 96, 160, 480) for n in range(-18, 19)] + [(7, 3), (-7, 3), (1920, 1), (-3840, 500)]
     assert isinstance(spec.reciprocal, Reciprocal)
     pause = spec.reciprocal.digits + 4
@@ -113,7 +113,7 @@ def test_mutants_are_caught(name: str) -> None:
 
 
 def check_narrow(tmp_path: Path) -> None:
-    spec = default_spec(max_speed=Speed.parse("1000rad/s"), source="table")
+    spec = default_spec(max_speed=Speed.parse("1000rad/s"), reciprocal_source="table")
     base, n, m, got = every_quotient(spec, range(-28, 29), tmp_path)
     assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
 

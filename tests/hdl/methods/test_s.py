@@ -73,7 +73,7 @@ def test_outputs_are_held_from_update_to_update(serial: bool) -> None:
 MUTANTS = {
     "eq. (17) for eq. (21)": (
         IntervalAccumulator,
-        "- 2 * last if self._cancel else -last",
+        "- (last << 1) if self._cancel else -last",
         "- last if self._cancel else -last",
     ),
     "m_s off by one": (IntervalAccumulator, "self.m_s.eq(1)", "self.m_s.eq(2)"),

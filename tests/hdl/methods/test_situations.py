@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from support.mutant import caught, mutant
-from support.simulate import clock_by_clock
+from support.simulate import clock_by_clock, ticks
 
 from tachometry.hdl.methods import DATAPATHS, interval
 from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
@@ -35,11 +35,9 @@ class Update:
 
 def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
     """Updates of these pulse numbers."""
-    rows: list[dict[str, int]] = []
-    for number in m_e:
-        rows += [{"tick": 1, "pulse_count": number}, *[{"tick": 0}] * (T - 1)]
     names = ["velocity_valid", "velocity", "velocity_lower", "velocity_upper", "interval", "bounds_valid"]
-    seen = clock_by_clock(DATAPATHS[spec.method](spec), rows, names)
+    box = DATAPATHS[spec.method](spec)
+    seen = clock_by_clock(box, ticks(box, m_e, T), names)[1:]
     found = []
     for clock, row in enumerate(seen):
         if row["velocity_valid"]:
@@ -127,8 +125,8 @@ def test_burst_after_standstill(spec: TachometerSpec) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("m_s.eq(after_forced)", "m_s.eq(1)"),  # a spike after a silence
-        ("(self.alteration | longest)", "self.alteration"),  # frozen
+        ("self._kept_ticks + 1", "1"),  # a spike after a silence
+        ("closes.eq(self.alteration | longest)", "closes.eq(self.alteration)"),  # frozen
     ],
 )
 def test_mutants_are_caught(right: str, wrong: str) -> None:

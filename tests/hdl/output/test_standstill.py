@@ -5,7 +5,7 @@ import pytest
 from amaranth.lib import wiring
 from support.mutant import caught, mutant
 from support.options import had_by
-from support.simulate import clock_by_clock
+from support.simulate import clock_by_clock, ticks
 
 from tachometry.hdl.methods.interval import IntervalAccumulator
 from tachometry.hdl.methods.s import SMethod
@@ -58,8 +58,11 @@ def check_box(max_ticks: int = 5) -> None:
 
 
 def check_s(max_ticks: int = 5) -> None:
-    spec = STachometer(encoder=Encoder(25), timing=Timing(1_000_000, 3, max_ticks))
-    check(SMethod(spec), max_ticks, "pulse_count", 2)
+    for clocks in (3, 40):
+        box = SMethod(STachometer(encoder=Encoder(25), timing=Timing(1_000_000, clocks, max_ticks)))
+        m_e = numbers(max_ticks)
+        seen = [row["stalled"] for row in clock_by_clock(box, ticks(box, m_e, clocks), ["stalled"])][1:]
+        assert seen == [value for value in expected(m_e, max_ticks, [1] * len(m_e)) for _ in range(clocks)]
 
 
 @pytest.mark.parametrize("max_ticks", [2, 3, 4, 5, 8])
@@ -93,8 +96,8 @@ MUTANTS = {
     "not held": (Standstill, "none), shown)", "none), 0)", check_box),
     "S: without the opening tick": (
         IntervalAccumulator,
-        "(opening | self.previous).any()",
-        "self.previous.any()",
+        "longest & ~opening.any() & was_silent",
+        "longest & was_silent",
         check_s,
     ),
     "S: only with a forced update": (IntervalAccumulator, "rests | nearly |", "rests |", check_s),

@@ -166,7 +166,7 @@ def test_the_reciprocal_of_s() -> None:
             CarriedReciprocal,
         )
     ]
-    assert [kind(s(tick, source="table")) for tick in (960, 7, 6)] == [
+    assert [kind(s(tick, reciprocal_source="table")) for tick in (960, 7, 6)] == [
         NarrowReciprocal,
         NarrowReciprocal,
         CarriedReciprocal,
@@ -174,7 +174,7 @@ def test_the_reciprocal_of_s() -> None:
     # Ties and bounds take a general one.
     assert [kind(s(18, ticks)) for ticks in (15, 16)] == [NarrowReciprocal, Reciprocal]
     assert kind(s(18, bounds=True)) is Reciprocal
-    assert [kind(s(960, ticks, source="table")) for ticks in (2048, 2049)] == [Reciprocal, DividedReciprocal]
+    assert [kind(s(960, ticks, reciprocal_source="table")) for ticks in (2048, 2049)] == [Reciprocal, DividedReciprocal]
     assert kind(s(18, 2049)) is CarriedReciprocal
     assert s(1, 5001).reciprocal.entry == 2501  # type: ignore[union-attr]
     assert [one.memory and one.memory[:2] for one in (s(960), s(18), s(1, 5000))] == [
@@ -184,13 +184,13 @@ def test_the_reciprocal_of_s() -> None:
 
 def test_what_is_told_of_the_reciprocal() -> None:
     assert [one.division for one in (s(18), s(19))] == ["", "divided in 13 clocks between two ticks"]
-    assert [one.notes for one in (s(19), s(18, source="table"), s(960, 2048, source="table"))] == [()] * 3
+    assert [one.notes for one in (s(19), s(18, reciprocal_source="table"), s(960, 2048, reciprocal_source="table"))] == [()] * 3
     short = "a tick of {} is too short to divide between two"
     assert s(18).notes == (f"reciprocal from a table: {short.format('18 clocks')}",)
-    assert s(1, source="table").notes == (f"reciprocal carried along: {short.format('1 clock')}",)
-    assert s(960, 2049, source="table").notes == ("reciprocal divided: a table has at most 2048 entries",)
+    assert s(1, reciprocal_source="table").notes == (f"reciprocal carried along: {short.format('1 clock')}",)
+    assert s(960, 2049, reciprocal_source="table").notes == ("reciprocal divided: a table has at most 2048 entries",)
     with pytest.raises(ValueError, match=r"^reciprocal must be serial or table, not 'none'$"):
-        s(source="none")
+        s(reciprocal_source="none")
 
 
 def test_latencies_of_s() -> None:
