@@ -112,7 +112,7 @@ class PulseCounter(wiring.Component):
         return m
 
     def _narrow(self, m: Module, count: Signal) -> Signal:
-        """The count in at most two bits more than its bound has: beyond these it is only beyond the bound, with its sign."""
+        """The count in at most two bits more than its bound has; what needs others is only beyond it, with its sign."""
         bits = self._max_count.bit_length()
         if len(count) <= bits + 2:
             return count

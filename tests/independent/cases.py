@@ -45,7 +45,9 @@ _ALL = f"{_PORTS} bounds=yes"
 CASES = [
     _case("s_native", "tick=50 max-time=500 frac-bits=8 velocity-width=10"),
     _case("s_rpm", f"tick=20 max-time=300 max-speed=500rpm velocity-width=18 lsb=2^-8 cancel=no {_ALL}", least=4),
-    _case("s_rad", "tick=160 max-time=1600 decoding=1 unit=rad/s lowpass=1kHz external-tick=yes reciprocal=table", 14000),
+    _case(
+        "s_rad", "tick=160 max-time=1600 decoding=1 unit=rad/s lowpass=1kHz external-tick=yes reciprocal=table", 14000
+    ),
     _case("s_rev", "tick=1 max-time=2 unit=rev/s lsb=2^-4 bounds=yes", 2000),
     _case(
         "s_two", "tick=2 max-time=6 frac-bits=24 position-width=48 bounds=yes edge-error=0.3 max-speed=50000rad/s", 2500

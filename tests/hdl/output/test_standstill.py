@@ -34,8 +34,8 @@ def numbers(max_ticks: int) -> list[int]:
 def expected(m_e: list[int], max_ticks: int, length: list[int]) -> list[int]:
     """Tick by tick: the silence so far, with the tick before the first, is longer than the maximum time."""
     silence, found = 1, []
-    for number, ticks in zip(m_e, length, strict=True):
-        silence = 0 if number else silence + ticks
+    for number, n_ticks in zip(m_e, length, strict=True):
+        silence = 0 if number else silence + n_ticks
         found.append(int(silence > max_ticks))
     return found
 

@@ -184,7 +184,9 @@ def test_the_reciprocal_of_s() -> None:
 
 def test_what_is_told_of_the_reciprocal() -> None:
     assert [one.division for one in (s(18), s(19))] == ["", "divided in 13 clocks between two ticks"]
-    assert [one.notes for one in (s(19), s(18, reciprocal_source="table"), s(960, 2048, reciprocal_source="table"))] == [()] * 3
+    assert [
+        one.notes for one in (s(19), s(18, reciprocal_source="table"), s(960, 2048, reciprocal_source="table"))
+    ] == [()] * 3
     short = "a tick of {} is too short to divide between two"
     assert s(18).notes == (f"reciprocal from a table: {short.format('18 clocks')}",)
     assert s(1, reciprocal_source="table").notes == (f"reciprocal carried along: {short.format('1 clock')}",)
