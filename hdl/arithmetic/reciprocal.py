@@ -46,7 +46,7 @@ class LookedUpReciprocal(wiring.Component):
 class DividedReciprocal(wiring.Component):
     """q(m) found by a subtraction a clock.
 
-    Latency: q is there `reciprocal.steps` and two clocks after `moves`, or after the reset, and stays until it moves.
+    Latency: q is there `reciprocal.steps` and three clocks after `moves`, or after the reset, and stays until it moves.
 
     Parameters
     ----------
@@ -80,7 +80,10 @@ class DividedReciprocal(wiring.Component):
                 # −m is ~m + 1.
                 remainder.eq((Cat(~adds, first, remainder).as_signed() + Cat(~adds, multiple).as_signed()) >> 1),
             ]
-        with m.If(self.moves):
+        # A clock later: what tells that m moves comes late in its clock.
+        moved = Signal()
+        m.d.sync += moved.eq(self.moves)
+        with m.If(moved):
             m.d.sync += [digits.eq(0), remainder.eq(0), first.eq(1)]
         m.d.comb += self.q.eq(Cat(Const(1, 1), digits[:-1]))
         return m

@@ -37,7 +37,8 @@ class TimedDatapath(wiring.Component):
         self._spec = spec
         self.gap_timer = GapTimer(spec.max_periods, on_lattice=spec.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
-        self.count_way = CountWay(reversals=not spec.paper_exact)
+        if not spec.on_lattice:
+            self.count_way = CountWay(reversals=not spec.paper_exact)
         super().__init__(
             {
                 **datapath_members(spec),

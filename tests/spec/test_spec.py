@@ -151,7 +151,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "edge_error": 0.0,
         "lowpass": None,
         "cancel": False,
-        "source": "serial",
+        "reciprocal_source": "serial",
     }
     assert described["counts_per_rev"] == 2000
     assert described["interval_unit_cycles"] == 960

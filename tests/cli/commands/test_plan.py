@@ -49,8 +49,8 @@ def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[st
         port["name"]: port["width"] for port in described["ports"] if port["width"] > 1
     }
     assert isinstance(spec.reciprocal, DividedReciprocal)
-    # All of its bits but the last, which is 1, and the first digit.
-    assert rows["reciprocal"] == f"divided in {spec.reciprocal.width} clocks between two ticks"
+    # All of its bits but the last, which is 1, the first digit, and a clock to begin.
+    assert rows["reciprocal"] == f"divided in {spec.reciprocal.width + 1} clocks between two ticks"
     for name, clocks in described["latency_cycles"].items():
         assert rows[name].startswith(f"{clocks} clocks (")
     assert rows["pin_to_count"] == "5 clocks (104.2ns)"

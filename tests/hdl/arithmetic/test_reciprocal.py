@@ -19,7 +19,7 @@ def test_every_reciprocal_two_clocks_after_m(max_m: int) -> None:
 def check_division(max_m: int) -> None:
     """From the reset on, and then from each move on; a move in the midst of a division begins anew."""
     described = spec.DividedReciprocal(max_m, max_numerator=7, frac_bits=4, halvings=1)
-    clocks = described.steps + 2
+    clocks = described.steps + 3
     rows: list[dict[str, int]] = [{"m": 1, "moves": 0}] * (clocks - 1)
     for m in range(1, max_m + 1):
         rows += [{"moves": 1}, *[{"m": m, "moves": 0}] * (clocks - 1)]
