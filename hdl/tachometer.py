@@ -50,7 +50,7 @@ class Tachometer(wiring.Component):
             max(spec.longest_tick, spec.max_pulse_count),
             spec.max_pulse_count,
             stretched=spec.own_ticks,
-            staged=spec.tick_latency > 2,
+            staged=spec.tick_latency - spec.registers_steps > 2,
         )
         self.position_counter = PositionCounter(spec.position_width, spec.tick_latency)
         self.index_capture = IndexCapture(spec.position_width, spec.tick_latency) if spec.index else None
@@ -101,6 +101,7 @@ class Tachometer(wiring.Component):
         sampling_clock = self.sampling_clock
         if not self._spec.own_ticks:
             m.submodules.sampling_clock = sampling_clock
+        (step,) = delay(m, decoder.step, clocks=int(self._spec.registers_steps))
         m.d.comb += [
             conditioner.a.eq(self.a),
             conditioner.b.eq(self.b),
@@ -110,7 +111,7 @@ class Tachometer(wiring.Component):
             self.decode_error.eq(decoder.decode_error),
             position_counter.step.eq(decoder.step),
             self.position.eq(position_counter.position),
-            pulse_counter.step.eq(decoder.step),
+            pulse_counter.step.eq(step),
             pulse_counter.last.eq(sampling_clock.last),
             self.tick.eq(pulse_counter.tick),
             self.pulse_count.eq(pulse_counter.pulse_count),
@@ -119,7 +120,7 @@ class Tachometer(wiring.Component):
         ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
         taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")}
         taken |= {name: getattr(pulse_counter, name) for name in ("coming", "next_count")}
-        taken |= {"step_now": decoder.step, "stamp": ticks}
+        taken |= {"step_now": step, "stamp": ticks}
         inputs = datapath.signature.members
         if "step" in inputs:
             # As late as `tick`: with it, all steps of the window have come.

@@ -193,6 +193,11 @@ class TachometerSpec(Numbers):
         return 2
 
     @property
+    def registers_steps(self) -> bool:
+        """Whether a step is in a register before it counts for the tick: a clock of `tick_latency`."""
+        return False
+
+    @property
     def stamp_width(self) -> int:
         """Bits of the number of ticks that may fall between the cause of an update and the update; 0 without an age."""
         # An update may have to wait for the filter as long as this works.

@@ -85,7 +85,7 @@ class RairanMethod(wiring.Component):
             read.addr.eq(counters.n[: len(read.addr)]),
         ]
         if counters.dt is not None:
-            m.d.comb += self.tick_shift.eq(*delay(m, counters.dt.shift, clocks=spec.tick_latency))
+            m.d.comb += self.tick_shift.eq(*delay(m, counters.dt.shift, clocks=2))
         m.d.sync += self.updates.valid.eq(update)
         shift = more[0] if spec.adaptive else 0
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())

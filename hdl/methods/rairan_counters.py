@@ -128,7 +128,8 @@ class RairanCounters(wiring.Component):
             return Const(1)
         # Counts down to −1, as the sampling clock does.
         start = cycles - 2
-        left = Signal(signed(start.bit_length() + 1), init=start)
+        # The first step comes a clock after the reset.
+        left = Signal(signed((start + 1).bit_length() + 1), init=start + self._spec.registers_steps)
         m.d.sync += left.eq(left - Const(1, left.shape()))
         with m.If(left[-1] | opens):
             m.d.sync += left.eq(start)

@@ -56,8 +56,7 @@ class Standstill(wiring.Component):
             self.stalled.eq(Mux(self.tick, silent & (shown | none), shown)),
         ]
         m.d.sync += shown.eq(self.stalled)
-        with m.If(self.tick & ~none):
-            m.d.sync += left.eq(less)
-        with m.If(self.tick & ~silent):
-            m.d.sync += left.eq(most)
+        # m_e decides nothing but what is loaded: an enable would come too late.
+        with m.If(self.tick):
+            m.d.sync += left.eq(Mux(silent, Mux(none, left, less), most))
         return m

@@ -292,5 +292,14 @@ class RairanTachometer(TachometerSpec):
     @property
     def datapath_latency(self) -> int:
         # From the end of dt or a count: a clock for the decision, one for the address, one for the table, one for the
-        # sum; `tick` takes two as well.
-        return 4 - self.tick_latency
+        # sum; of these `tick` takes two as well.
+        return 4 - super().tick_latency
+
+    @property
+    def tick_latency(self) -> int:
+        # Where it can, a step waits in a register before it decides what a window is.
+        return super().tick_latency + self.registers_steps
+
+    @property
+    def registers_steps(self) -> bool:
+        return self.timing.tick_cycles > 1

@@ -12,7 +12,7 @@ from tachometry.sim.golden.methods.rairan import Model
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, RairanTachometer, Timing
 
-DELAY = 4  # clocks from a step to `velocity_valid`
+DELAY = 4  # clocks from a step at the datapath to `velocity_valid`
 
 
 def make_spec(dt: int, max_ticks: int = 10, **options: Any) -> RairanTachometer:
@@ -30,8 +30,9 @@ def steps_of(step: np.ndarray) -> Steps:
 
 def golden_updates(spec: RairanTachometer, step: np.ndarray) -> Table:
     """Updates that are caused in the clocks of these steps; `clock` is that of the cause."""
-    updates = Model(spec).updates(None, steps_of(step), len(step) + DELAY)  # type: ignore[arg-type]
-    updates.clock[:] -= DELAY
+    delay = spec.registers_steps + DELAY
+    updates = Model(spec).updates(None, steps_of(step), len(step) + delay)  # type: ignore[arg-type]
+    updates.clock[:] -= delay
     return updates
 
 

@@ -22,9 +22,10 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
     """Every update, in its clock, with every output; and every end of dt."""
     spec = make_spec(dt, max_ticks, **options)
     names = NAMES + [*BOUNDS, "bounds_valid"] * spec.bounds + ["dt_shift"] * (spec.adaptive is not None)
-    rows = [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
+    rows = [{"step_now": 0}] * spec.registers_steps + [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
     lengths = ["tick_shift"] * (spec.adaptive is not None)
     seen = clock_by_clock(rairan.RairanMethod(spec), rows, ["velocity_valid", "last", "beyond", *lengths, *names])
+    del seen[: spec.registers_steps]
     got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
     updates = golden_updates(spec, step)
     columns = [updates[name].astype(int).tolist() for name in names]
@@ -33,7 +34,7 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
     assert [clock for clock, row in enumerate(seen[: len(step)]) if row["last"]] == ends.tolist()
     assert [row["beyond"] for row in seen[: len(step)] if row["last"]] == beyond.astype(int).tolist()
     for name in lengths:
-        assert [1 << seen[end + spec.tick_latency][name] for end in ends] == nominal.tolist()
+        assert [1 << seen[end + 2][name] for end in ends] == nominal.tolist()
 
 
 def steps(dt: int = 6, n: int = 2500) -> np.ndarray:

@@ -91,7 +91,7 @@ def test_every_method(method: str) -> None:
 
 MUTANTS = {
     "a tick late": (Standstill, "init=most - 1", "init=most", check_box),
-    "a tick early": (Standstill, "left.eq(most)", "left.eq(most - 1)", check_box),
+    "a tick early": (Standstill, "less), most)", "less), most - 1)", check_box),
     "in spite of a count": (Standstill, "silent & (shown", "(shown", check_box),
     "not held": (Standstill, "none), shown)", "none), 0)", check_box),
     "S: without the opening tick": (

@@ -177,7 +177,7 @@ def small_m(average: int) -> MTachometer:
 
 
 _RAIRAN_PROBES = {
-    "core_step": "decoder.step",
+    "core_step": "step_late",
     "core_left": "datapath.counters.left",
     "core_more": "datapath.counters.c_more",
     "core_any": "datapath.counters.any",

@@ -134,7 +134,7 @@ MUTANTS = [
     Mutant("Rairán", "pr_update", RairanCounters, "(~moved | self.rest)", "~moved", 32),
     Mutant("Rairán", "pr_velocity", RairanMethod, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
     Mutant("Rairán", "pr_rest", RairanCounters, "set_(0, update=~self.rest", "set_(1, update=~self.rest", 32),
-    Mutant("Rairán", "pr_stalled", Standstill, "left.eq(most)", "left.eq(most - 1)", 32),
+    Mutant("Rairán", "pr_stalled", Standstill, "less), most)", "less), most - 1)", 32),
     Mutant("Rairán", "pr_range", RairanCounters, "with m.If(full):", "with m.If(0):"),
     Mutant("Rairán", "pr_flag", RairanCounters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
     Mutant("T", "pt_update", QuotientVelocity, "measuring | nearer", "nearer"),

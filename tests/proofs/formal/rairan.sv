@@ -23,7 +23,7 @@ module rairan #(
       .forced(forced), .stalled(stalled), .overflow(overflow), .n_ep1(n_ep1), .n_dt1(n_dt1)
   );
   wire signed [1:0] core_step;
-  wire signed [$clog2(T-1):0] core_left;
+  wire signed [$clog2(T):0] core_left;
   wire [$clog2(MAX_COUNT<3?2:MAX_COUNT)-1:0] core_more;
   wire [$clog2(MAX_TICKS+1)-1:0] core_dt;
   wire [$clog2((MAX_TICKS>MAX_COUNT?MAX_TICKS:MAX_COUNT)+1)-1:0] core_n;
@@ -36,10 +36,11 @@ module rairan #(
 
   reg [W-1:0] clock = 0, c_ep = 0, c_dt = 0, n_ep = 0, n_dt = 1, idle = 0;
   reg moved = 0, back = 0, in_step = 0;
+  reg first = 1;                  // the clock after the reset, in which no step can have come
   wire count = core_step != 0, backward = core_step < 0;
   wire has_moved = UPSET ? core_moved : moved, was_back = UPSET ? core_backward : back;
   wire signed [W:0] shown_clock = T - 2 - core_left;
-  wire [W-1:0] elapsing = UPSET ? $unsigned(shown_clock) : clock;
+  wire [W-1:0] elapsing = UPSET ? $unsigned(shown_clock) : clock - first;
   wire turns = count && has_moved && backward != was_back;
   wire late = count && !turns && (c_dt != 0 || !has_moved), fresh = !has_moved || c_dt == MAX_TICKS;
   wire ends = !turns && !late && elapsing == T - 1;
@@ -82,7 +83,9 @@ module rairan #(
     if (rst) begin
       {clock, c_ep, c_dt, n_ep, idle, moved, back, in_step, was_alone, was_rest} <= 0;
       n_dt <= 1;
+      first <= 1;
     end else begin
+      first <= 0;
       clock <= turns || late || ends ? 0 : elapsing + 1;
       c_ep <= turns || late || (ends && count) ? 1 : ends ? 0 : c_ep + count;
       c_dt <= count ? 0 : !ends ? c_dt : c_dt < MAX_TICKS ? c_dt + 1 : MAX_TICKS;
@@ -91,7 +94,7 @@ module rairan #(
       n_ep <= ep;
       n_dt <= dt;
       {was_alone, was_rest} <= {alone, rests};
-      idle <= count ? 0 : idle < MAX_TICKS * T ? idle + 1 : MAX_TICKS * T;
+      idle <= count || first ? 0 : idle < MAX_TICKS * T ? idle + 1 : MAX_TICKS * T;
     end
 
   // As late as the core shows them.
@@ -111,7 +114,8 @@ module rairan #(
   // Lemmas: what the induction needs to know of the state.
   wire signed [W:0] elapsed = $signed({1'b0, clock});
   always @* begin
-    lemma_left: assert (core_left == T - 2 - elapsed);
+    lemma_left: assert (core_left == T - 2 - elapsed + $signed({1'b0, first}));
+    lemma_first: assert (!first || (clock == 0 && core_step == 0));
     lemma_clock: assert (clock < T && c_ep <= clock + 1);
     lemma_count: assert (core_any == (c_ep != 0) && core_more == (held == 0 ? 0 : held - 1));
     lemma_dt: assert (core_dt == c_dt && core_late == (c_dt != 0 || !moved) && core_rest == (c_dt == MAX_TICKS));
