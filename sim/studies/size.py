@@ -12,7 +12,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -93,16 +93,16 @@ class Measurement:
     spread: tuple[float, float] | None = None
 
 
-def wrapper(ports: Iterable[Port]) -> str:
-    """Verilog of a core with these ports between registers, with three pins.
+def wrapper(ports: Iterable[Port], top: str = CORE, clock: str = "clk") -> str:
+    """Verilog of a module with these ports between registers, with three pins.
 
     A shift register feeds the inputs; the outputs are registered, then loaded into a shift register that ends in a
     pin. So every path of the core lies between flip-flops, and no package has too few pins.
     """
-    connections, widths = [".clk(clk)"], {"input": 0, "output": 0}
+    connections, widths = [f".{clock}(clk)"], {"input": 0, "output": 0}
     buses = {"input": "feed", "output": "result"}
     for port in ports:
-        if port.name != "clk":
+        if port.name != clock:
             connections.append(f".{port.name}({buses[port.direction]}[{widths[port.direction]} +: {port.width}])")
             widths[port.direction] += port.width
     n_in, n_out = widths["input"], widths["output"]
@@ -118,7 +118,7 @@ module wrapper(input clk, input serial_in, output serial_out);
     shift <= feed[{n_in}] ? held : shift >> 1;
   end
   assign serial_out = shift[0];
-  {CORE} core(
+  {top} core(
     {joined});
 endmodule
 """
@@ -190,7 +190,7 @@ def measure_core(
     ports: Iterable[Port] = (),
     seeds: Sequence[int] = SEEDS,
 ) -> Measurement:
-    """Synthesise, pack and route a core for a target; what has been measured is not measured again.
+    """Synthesise, pack and route a core for a target, and add its latency.
 
     `ports` are those of the module, if it has others than the core.
 
@@ -199,8 +199,25 @@ def measure_core(
     RuntimeError
         If a tool fails.
     """
+    between = wrapper(tuple(ports) or spec.ports)
+    found = measure_verilog(verilog, CORE, between, target, tools, seeds)
+    return replace(found, figures={**found.figures, "latency": spec.tick_to_velocity})
+
+
+def measure_verilog(
+    verilog: str, top: str, between: str, target: Target, tools: Mapping[str, str], seeds: Sequence[int] = SEEDS
+) -> Measurement:
+    """Synthesise, pack and route a module for a target; what has been measured is not measured again.
+
+    `between` is its wrapper.
+
+    Raises
+    ------
+    RuntimeError
+        If a tool fails.
+    """
     commands = [
-        synthesis("core.v", f"{target.synth} -top {CORE}", "core"),
+        synthesis("core.v", f"{target.synth} -top {top}", "core"),
         [*target.route, "-q", "--json", "core.json", "--pack-only", "--report", "area.json", "-l", "area.log"],
         synthesis("core.v wrapper.v", f"{target.synth} -top wrapper", "wrapper"),
     ]
@@ -210,14 +227,11 @@ def measure_core(
             [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
         )
     reports = ["area.json", *(f"route{seed}.json" for seed in seeds)]
-    packed, *routed = made(
-        {"core.v": verilog, "wrapper.v": wrapper(tuple(ports) or spec.ports)}, commands, reports, tools
-    )
+    packed, *routed = made({"core.v": verilog, "wrapper.v": between}, commands, reports, tools)
     reached = [achieved(report) for report in routed]
     fmax = statistics.median_low(reached)
     median = next(report for report in routed if achieved(report) == fmax)
-    figures: dict[str, float] = {**area(packed, target.cells)}
-    figures |= {"Fmax": fmax, "latency": spec.tick_to_velocity}
+    figures: dict[str, float] = {**area(packed, target.cells), "Fmax": fmax}
     return Measurement(figures, limit(critical_path(median)), (min(reached), max(reached)))
 
 

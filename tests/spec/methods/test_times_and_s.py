@@ -200,7 +200,7 @@ def test_latencies_of_s() -> None:
     assert [s(tick).serial for tick in (7, 18)] == [True, True]
     assert [s(6).serial, s(18, 2049).serial] == [False, False]
     assert [s(18).datapath_latency, s(7).datapath_latency, s(20).datapath_latency] == [4 + 1, 3 + 1, 4 + 1]
-    # A table takes three clocks more: m_s, the table, its register. A division one more for every bit, and one to begin.
+    # A table takes three clocks more: m_s, the table, its register. A division one for every bit, and one to begin.
     assert [s(19).busy_clocks, s(20).busy_clocks] == [5 + 3, 5 + 1 + 14]
     # One for each bit of N and each digit of N·R/m, and one each for the table, its register, and to round.
     fast = s(1, 5000)

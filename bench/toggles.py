@@ -1,0 +1,96 @@
+"""Flip-flop changes per tick of the reference core and of others, box by box: what its dynamic power follows.
+
+The shaft turns at a constant speed, and the changes of all flip-flops are counted in every clock (Amaranth's
+simulator), from the third tick on. Clock tree and wires are not counted.
+
+    python bench/toggles.py --speed 100rad/s --ticks 60
+"""
+
+import argparse
+import math
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+from amaranth import Cat, Fragment, Module, Signal
+from amaranth.sim import Simulator
+from cores import CONFIGURATIONS
+from pages import markdown
+
+from tachometry.hdl import Tachometer
+from tachometry.spec import Speed, TachometerSpec
+
+LEVELS = ((0, 0), (1, 0), (1, 1), (0, 1))
+
+
+def registers(fragment: Any, box: str = "") -> Iterator[tuple[str, Signal]]:
+    """All signals that flip-flops drive, with the box of the core that they are in."""
+    for domain, statements in fragment.statements.items():
+        if domain != "comb":
+            for signal in statements._lhs_signals():
+                yield box or "tachometer", signal
+    for inner, name, *_ in fragment.subfragments:
+        within = f"{box}.{name}" if box else str(name)
+        yield from registers(inner, within.removeprefix("datapath."))
+
+
+def changes(spec: TachometerSpec, rad_per_s: float, ticks: int) -> Counter[str]:
+    """Flip-flop changes by box in so many ticks."""
+    core = Tachometer(spec)
+    fragment = Fragment.get(core, None)
+    found = list(registers(fragment))
+    top = Module()
+    top.submodules.core = fragment
+    state = Signal(sum(len(signal) for _, signal in found))
+    top.d.comb += state.eq(Cat(signal for _, signal in found))
+    per_clock = rad_per_s / (2 * math.pi) * 4 * spec.encoder.pulses_per_rev / spec.timing.clock_hz
+    begin = 2 * spec.timing.tick_cycles
+    masks, low = [], 0
+    for box, signal in found:
+        masks.append((box, ((1 << len(signal)) - 1) << low))
+        low += len(signal)
+    counted: Counter[str] = Counter()
+
+    async def bench(ctx: Any) -> None:
+        before = 0
+        for clock in range(begin + ticks * spec.timing.tick_cycles):
+            a, b = LEVELS[int(clock * per_clock) % 4]
+            ctx.set(core.a, a)
+            ctx.set(core.b, b)
+            await ctx.tick()
+            now = ctx.get(state)
+            if clock >= begin and (changed := now ^ before):
+                for box, mask in masks:
+                    if hit := changed & mask:
+                        counted[box] += hit.bit_count()
+            before = now
+
+    simulator = Simulator(top)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    return counted
+
+
+def main() -> None:
+    """Print a table: a row for each box, a column for each core."""
+    names = [configuration.name for configuration in CONFIGURATIONS]
+    parser = argparse.ArgumentParser(description="Flip-flop changes per tick, box by box.")
+    parser.add_argument(
+        "--only", nargs="+", choices=names, default=["reference", "table", "m", "t", "mt"], metavar="NAME"
+    )
+    parser.add_argument("--speed", type=Speed.parse, default=Speed.parse("100rad/s"), help="of the shaft (100rad/s)")
+    parser.add_argument("--ticks", type=int, default=60, help="in which they are counted (%(default)s)")
+    options = parser.parse_args()
+    if options.ticks < 1:
+        parser.error(f"--ticks must be at least 1, not {options.ticks}")
+    chosen = [configuration for configuration in CONFIGURATIONS if configuration.name in options.only]
+    columns = [changes(one.spec, options.speed.rad_per_s, options.ticks) for one in chosen]  # type: ignore[arg-type]
+    boxes = sorted({box for column in columns for box in column}, key=lambda box: -max(c[box] for c in columns))
+    rows = [[box, *(f"{column[box] / options.ticks:.1f}" for column in columns)] for box in boxes]
+    rows.append(["total", *(f"{column.total() / options.ticks:.1f}" for column in columns)])
+    print(markdown(["box", *(one.name for one in chosen)], rows, [0]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""bench/peers.py: what it makes of other people's sources, and what it says of those that it cannot measure."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.script import load
+
+from tachometry.sim.studies.size import Measurement
+
+peers = load("peers")
+COUNTER = """\
+module counter #(parameter W = 8) (input clock, input up, output reg [W-1:0] count);
+  always @(posedge clock) count <= up ? count + 1 : count - 1;
+endmodule
+"""
+GHDL = """\
+#!/bin/sh
+[ "$1" = -a ] && exit {status}
+printf 'module chosen(input clk, input [1:0] at, output reg q);\\n  always @*\\n    case (at)\\n'
+printf "      2'b10: q <= clk;\\n      2'b01: q <= 1'b0;\\n    endcase\\nendmodule\\n"
+"""
+
+
+@pytest.fixture
+def counter(tmp_path: Path) -> str:
+    file = tmp_path / "counter.v"
+    file.write_text(COUNTER)
+    return str(file)
+
+
+def ghdl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int = 0) -> str:
+    """A VHDL file, and a program that stands for GHDL; it writes a choice as GHDL 2.0 does."""
+    program, file = tmp_path / "ghdl", tmp_path / "chosen.vhd"
+    program.write_text(GHDL.format(status=status))
+    program.chmod(0o755)
+    file.write_text("entity chosen is end;")
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    return str(file)
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What was to be measured: nextpnr is not needed."""
+    asked: list[Any] = []
+
+    def measure(flat: str, top: str, between: str, target: Any, tools: object, seeds: range) -> Measurement:
+        asked.append((flat, top, between, list(seeds)))
+        return Measurement({**dict.fromkeys(target.cells, 7), "Fmax": 99.5}, "a → b", (98.0, 101.0))
+
+    monkeypatch.setattr(peers, "measure_verilog", measure)
+    monkeypatch.setattr(peers, "versions", dict)
+    return asked
+
+
+def test_verilog_with_a_parameter(counter: str, measured: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+    words = [counter, "--top", "counter", "--clock", "clock", "--set", "W=13", "--targets", "HX8K", "--seeds", "2"]
+    assert peers.main(words) == 0
+    assert "| counter | 7 | 7 | 99.5 (98–101) | a → b |" in capsys.readouterr().out
+    ((flat, top, between, seeds),) = measured
+    assert (top, seeds) == ("counter", [1, 2])
+    assert "[12:0] count" in flat
+    assert "counter core(" in between
+    for port in (".clock(clk)", ".up(feed[0 +: 1])", ".count(result[0 +: 13])"):
+        assert port in between
+
+
+def test_vhdl_has_no_latches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: list[Any]) -> None:
+    assert peers.main([ghdl(tmp_path, monkeypatch), "--top", "chosen", "--targets", "ECP5"]) == 0
+    assert "always" not in measured[0][0]  # a latch would be
+
+
+def test_what_cannot_be_measured_is_told_in_a_line(
+    counter: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(peers, "versions", dict)
+    assert peers.main([counter, "--top", "counter"]) == 2
+    assert capsys.readouterr().err == "--clock must be one of clock, up, not 'clk'\n"
+    assert peers.main([counter, "--top", "other"]) == 2
+    assert "other" in capsys.readouterr().err
+    assert peers.main([ghdl(tmp_path, monkeypatch, status=1), "--top", "chosen"]) == 2
+    assert capsys.readouterr().err == "ghdl: no message\n"
+    monkeypatch.setenv("PATH", "")
+    assert peers.main([str(tmp_path / "chosen.vhd"), "--top", "chosen"]) == 2
+    assert capsys.readouterr().err == "GHDL is needed for VHDL: apt-get install ghdl\n"
+    for words, told in (
+        (["none.v", "--top", "x"], "FILE must be there, not 'none.v'"),
+        ([counter, "--top", "x", "--set", "W"], "--set must be NAME=VALUE, not 'W'"),
+        ([counter, "--top", "x", "--seeds", "0"], "--seeds must be at least 1, not 0"),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            peers.main(words)
+        assert stop.value.code == 2
+        assert told in capsys.readouterr().err
