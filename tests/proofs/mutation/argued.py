@@ -33,8 +33,18 @@ _MET = "return Cat(met[item] for item in Condition).bit_select(condition, 1)"
 _AT_REST = "with m.If(stop | (~fetched & ~self.begin)):  # at rest it is at the first instruction"
 _READS = "read.en.eq(done & ~write.en),  # the program never reads while it writes"
 _CLEAR = "(done & following.clear & ~taken) | (work & now.positive & negative) | (work & now.negative & ~negative)"
+_GOES_ON = (
+    "the division of a bound only goes on for longer, and the bound is taken when that of the velocity has come to its "
+    "end"
+)
+_LEFT = 'self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)'
 
 ARGUED = {
+    ("t, in clocks", '"running": Out(1),', "running[0] const1"): _GOES_ON,
+    **{("t, in clocks", _LEFT, f"left[{bit}] const1"): _GOES_ON for bit in range(3)},
+    ("t, in clocks", "left.eq(left - 1),", "$40.Y[1] const1"): _GOES_ON,
+    **{("mt, in clocks", _LEFT, f"left[{bit}] const1"): _GOES_ON for bit in (1, 2)},
+    ("mt, in clocks", "left.eq(left - 1),", "$40.A[0] const1"): _GOES_ON,
     ("track, age", '"number": Out(form.number_bits),', "S[0] const0"): _OUTPUT_OF_COUNTS,
     ("track, age", '"places": Out(signed(form.places_bits)),', "B[3] const1"): _OUTPUT_OF_COUNTS,
     ("track, age", '"number": Out(form.number_bits),', "number[0] inv"): _EVEN,

@@ -123,6 +123,7 @@ _FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_reset": True
 CASES = [
     _case("s", "carried", 3, 6, 1, 340, age=True),
     _case("s", "table", 15, 16, 2, 340, frac_bits=6, reciprocal_source="table", **_FRONT),
+    _case("s", "divided", 31, 16, 2, 340, frac_bits=6),
     _case("s", "carried, bounds", 3, 9, 1, 340, max_table=4, bounds=True, cancel=False),
     _case("m", "of 3", 3, 2, 2, average=3, bounds=True, age=True),
     _case(

@@ -19,7 +19,7 @@ WIDTH = GROUP.bit_length()
 _FLATTEN = """\
 read_rtlil core.il
 hierarchy -check -top top
-proc
+proc -norom
 flatten
 opt_expr
 opt_clean
