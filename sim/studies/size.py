@@ -205,11 +205,17 @@ def measure_core(
 
 
 def measure_verilog(
-    verilog: str, top: str, between: str, target: Target, tools: Mapping[str, str], seeds: Sequence[int] = SEEDS
+    verilog: str,
+    top: str,
+    between: str,
+    target: Target,
+    tools: Mapping[str, str],
+    seeds: Sequence[int] = SEEDS,
+    prepare: str = "",
 ) -> Measurement:
     """Synthesise, pack and route a module for a target; what has been measured is not measured again.
 
-    `between` is its wrapper.
+    `between` is its wrapper, and `prepare` are passes of Yosys before the synthesis.
 
     Raises
     ------
@@ -217,9 +223,9 @@ def measure_verilog(
         If a tool fails.
     """
     commands = [
-        synthesis("core.v", f"{target.synth} -top {top}", "core"),
+        synthesis("core.v", f"{prepare}{target.synth} -top {top}", "core"),
         [*target.route, "-q", "--json", "core.json", "--pack-only", "--report", "area.json", "-l", "area.log"],
-        synthesis("core.v wrapper.v", f"{target.synth} -top wrapper", "wrapper"),
+        synthesis("core.v wrapper.v", f"{prepare}{target.synth} -top wrapper", "wrapper"),
     ]
     for seed in seeds:
         outputs = ["--report", f"route{seed}.json", "-l", f"route{seed}.log"]
