@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 template <class Integer>
 static inline int64_t extended(Integer raw, int width, bool is_signed) {
@@ -14,14 +13,14 @@ static inline int64_t extended(Integer raw, int width, bool is_signed) {
 struct Motor {
   double inertia, torque_constant, driver_seconds, current_limit;
   double viscous, coulomb;  // Nm/(rad/s), Nm
-  double noise;  // of the torque: Nm rms, a new value in every period of the tables
 };
 
 struct Encoder {
   double pitch;  // of edges
   const double *offset;  // of each edge of the disc, in pitches
   int64_t n_edges;
-  double jitter;  // standard deviation of the place of an edge, in pitches
+  const double *jitter;  // of each passage, in pitches; used again when all have been
+  int64_t n_jitter;
 };
 
 struct Controller {
@@ -52,7 +51,6 @@ struct Loop {
   Core core;
   Tables tables;
   int64_t step, end, log;  // clocks: of the plant, of the run, between two rows of the log
-  int64_t seed;
   double *rows;
   int64_t n_rows;
 };
@@ -66,29 +64,28 @@ struct Loop {
 struct Shaft {
   const Motor &motor;
   const Encoder &encoder;
-  std::mt19937_64 random;
-  std::normal_distribution<double> normal;
+  const double seconds;  // of a step
+  const double kept;  // of the difference between current and command
   double angle = 0, speed = 0, current = 0;
   int64_t edge = 0;  // edges passed, so the quarter
+  int64_t passages = 0;
   double shift = 0, shift_above = 0;  // of the edges below and above it, by jitter
-  double noise = 0;
 
-  Shaft(const Loop &loop) : motor(loop.motor), encoder(loop.encoder), random(uint64_t(loop.seed)) {
-    angle = encoder.pitch / 2;
+  Shaft(const Loop &loop)
+      : motor(loop.motor), encoder(loop.encoder), seconds(double(loop.step) * loop.core.clock_seconds),
+        kept(motor.driver_seconds > 0 ? std::exp(-seconds / motor.driver_seconds) : 0), angle(encoder.pitch / 2) {
     shift_above = jitter();
   }
-  double jitter() { return encoder.jitter ? encoder.jitter * normal(random) : 0; }
+  double jitter() { return encoder.jitter[passages++ % encoder.n_jitter]; }
   double place(int64_t number) const {
     int64_t within = number % encoder.n_edges;
     return (double(number) + encoder.offset[within < 0 ? within + encoder.n_edges : within]) * encoder.pitch;
   }
-  // Goes on by so many seconds under a commanded current and a load.
-  void move(double seconds, double command, double load) {
-    double kept = motor.driver_seconds > 0 ? std::exp(-seconds / motor.driver_seconds) : 0;
-    double mean = command;
-    if (motor.driver_seconds > 0) mean += (current - command) * (1 - kept) * motor.driver_seconds / seconds;
+  // Goes on by a step under a commanded current and a load.
+  void move(double command, double load) {
+    double mean = command + (current - command) * (1 - kept) * motor.driver_seconds / seconds;
     current = command + (current - command) * kept;
-    double torque = motor.torque_constant * mean - load + noise - motor.viscous * speed;
+    double torque = motor.torque_constant * mean - load - motor.viscous * speed;
     double before = speed;
     // Coulomb friction brakes, and holds a shaft that rests.
     double friction = motor.coulomb;
@@ -158,7 +155,6 @@ ENTRY __attribute__((flatten)) void loop_run(Loop *loop) {
     double within = double(clock - at * tables.clocks) * core.clock_seconds;
     double slope = (tables.speed[at + 1] - tables.speed[at]) / (double(tables.clocks) * core.clock_seconds);
     double speed = tables.speed[at] + slope * within;
-    if (clock % tables.clocks == 0 && shaft.motor.noise) shaft.noise = shaft.motor.noise * shaft.normal(shaft.random);
     if (clock % loop->controller.clocks == 0) {
       model.settle();
       model.outputs(outputs);
@@ -173,7 +169,7 @@ ENTRY __attribute__((flatten)) void loop_run(Loop *loop) {
       loop->n_rows++;
     }
     double before = shaft.angle;
-    shaft.move(double(loop->step) * core.clock_seconds, control.command, tables.load[at]);
+    shaft.move(control.command, tables.load[at]);
     // Edges on the way, in order; each changes a line in the clock in which it is passed.
     int64_t now = clock, until = clock + loop->step;
     bool more = true;

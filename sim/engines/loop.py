@@ -30,8 +30,6 @@ class Motor:
     current_limit : float, A
     viscous : float, Nm/(rad/s)
     coulomb : float, Nm
-    noise : float, Nm rms
-        Of the torque, a new value every millisecond.
     """
 
     inertia: float = 0.003
@@ -40,7 +38,6 @@ class Motor:
     current_limit: float = 20.0
     viscous: float = 0.0
     coulomb: float = 0.0
-    noise: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +99,7 @@ def _struct(name: str, **members: Any) -> type[ctypes.Structure]:
 
 _D, _I, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 _MOTOR = _struct("Motor", **{field.name: _D for field in fields(Motor)})
-_ENCODER = _struct("Encoder", pitch=_D, offset=_P, n_edges=_I, jitter=_D)
+_ENCODER = _struct("Encoder", pitch=_D, offset=_P, n_edges=_I, jitter=_P, n_jitter=_I)
 _CONTROLLER = _struct(
     "Controller",
     **dict.fromkeys(("position", "velocity", "observer", "filter", "inertia", "torque_constant", "current_limit"), _D),
@@ -118,18 +115,26 @@ _TABLES = _struct("Tables", speed=_P, angle=_P, load=_P, n=_I, clocks=_I)
 _LOOP = _struct(
     "Loop",
     **{"motor": _MOTOR, "encoder": _ENCODER, "controller": _CONTROLLER, "core": _CORE, "tables": _TABLES},
-    **dict.fromkeys(("step", "end", "log", "seed"), _I),
+    **dict.fromkeys(("step", "end", "log"), _I),
     rows=_P,
     n_rows=_I,
 )
 
 
 @dataclass(frozen=True, eq=False)
-class Disc:
-    """Places of the edges: offsets in pitches, shape (edges,), and the standard deviation of each passage."""
+class Edges:
+    """Where a disc's edges are met.
+
+    Parameters
+    ----------
+    offset : float64 array, shape (k,)
+        Of each edge, in pitches; the k-th after the last is the first again.
+    jitter : float64 array, shape (n,)
+        Of each passage, in pitches, one after the other; after the last comes the first again.
+    """
 
     offset: FloatArray
-    jitter: float = 0.0
+    jitter: FloatArray
 
 
 class LoopSimulation:
@@ -141,7 +146,7 @@ class LoopSimulation:
         self._library = ctypes.CDLL(str(Cxxrtl().library(self._design)))
 
     def run(
-        self, motor: Motor, disc: Disc, gains: Gains, course: Course, *, log: float, seed: int, step: float = 1e-6
+        self, motor: Motor, edges: Edges, gains: Gains, course: Course, *, log: float, step: float = 1e-6
     ) -> dict[str, FloatArray]:
         """A run as long as the course, from rest: a column of values at times `log` seconds apart for each name."""
         spec, hz = self._spec, self._spec.timing.clock_hz
@@ -158,13 +163,17 @@ class LoopSimulation:
             step_clocks -= 1
         end = clocks(course.seconds) * (len(course.speed) - 1)
         log_clocks = max(clocks(log) // step_clocks, 1) * step_clocks
-        offset, speed, angle, load = (
-            np.ascontiguousarray(one, dtype=np.float64) for one in (disc.offset, course.speed, course.angle, course.load)
+        offset, jitter, speed, angle, load = (
+            np.ascontiguousarray(one, dtype=np.float64)
+            for one in (edges.offset, edges.jitter, course.speed, course.angle, course.load)
         )
         rows = np.zeros((end // log_clocks + 2, len(COLUMNS)))
         loop = _LOOP(
             motor=_MOTOR(**{field.name: getattr(motor, field.name) for field in fields(Motor)}),
-            encoder=_ENCODER(2 * np.pi / (4 * spec.encoder.pulses_per_rev), offset.ctypes.data, len(offset), disc.jitter),
+            encoder=_ENCODER(
+                2 * np.pi / (4 * spec.encoder.pulses_per_rev),
+                *(offset.ctypes.data, len(offset), jitter.ctypes.data, len(jitter)),
+            ),
             controller=_CONTROLLER(
                 *(gains.position, gains.velocity, gains.observer, gains.filter),
                 *(gains.inertia, gains.torque_constant, gains.current_limit),
@@ -178,7 +187,7 @@ class LoopSimulation:
             tables=_TABLES(
                 *(one.ctypes.data for one in (speed, angle, load)), len(course.speed), clocks(course.seconds)
             ),
-            **{"step": step_clocks, "end": end, "log": log_clocks, "seed": seed, "rows": rows.ctypes.data},
+            **{"step": step_clocks, "end": end, "log": log_clocks, "rows": rows.ctypes.data},
         )
         self._library.loop_run(ctypes.byref(loop))
         return dict(zip(COLUMNS, rows[: loop.n_rows].T, strict=True))
