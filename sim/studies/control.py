@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
-from tachometry.sim.encoder.motion import FloatArray, Motion
+from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Course, Edges, Gains, LoopSimulation, Motor
 
@@ -14,13 +15,21 @@ _PASSAGES = 1 << 16
 _SOUND_HZ = 50.0
 
 
+class Command(Protocol):
+    """A commanded speed: any `Motion` is one."""
+
+    @property
+    def duration(self) -> float: ...
+    def speed(self, t: FloatArray) -> FloatArray: ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class Task:
     """What the shaft is to do, and what disturbs it.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Command
         The commanded speed, and by its integral the commanded angle.
     load : float, Nm
         Against the motion, for `load_seconds` from `load_from` on.
@@ -29,7 +38,7 @@ class Task:
         Of the torque: Gaussian, a new value every millisecond.
     """
 
-    motion: Motion
+    motion: Command
     load: float = 0.0
     load_from: float = 0.0
     load_seconds: float = 0.0
