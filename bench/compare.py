@@ -57,8 +57,8 @@ LinuxCNC's timestamps of 0.5 µs are the best by far.""",
     Situation(
         "Ramp",
         """Times in clocks of 0.1 µs are better than a lattice of 100 µs. The tracking method does not lag behind a
-ramp, and is the best by a factor of 8. M/T (T_c is a tick) and T follow, then LinuxCNC's timestamps, and then
-the tracking loops, which lag by a constant 2 ms. On a lattice of ticks S is the best.""",
+ramp. It has half of the error of least squares and an eighth of that of M/T (T_c is a tick), which follow, then
+T and LinuxCNC's timestamps. The tracking loops lag by a constant 2 ms. On a lattice of ticks S is the best.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",
     ),
     Situation(
@@ -98,8 +98,9 @@ cores but tracking. Filters and tracking loops average the vibration out, and ha
     ),
     Situation(
         "Reversals",
-        """Here delay matters: filters of 5 ms are worse than all others but M. The tracking method has an eighth of
-the error of LinuxCNC's timestamps, which are second; M/T is third. S and the tracking loops are alike.""",
+        """Here delay matters: filters of 5 ms are worse than all others but M. The tracking method has less than
+half of the error of least squares, which is second. LinuxCNC's timestamps and M/T follow with eight and ten times its
+error.""",
         "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
     ),
     Situation(
@@ -135,9 +136,9 @@ for bit, and float models of what other projects use and of estimators in the li
   in nearly all situations, with one setting, and it says the acceleration and the position between counts. It needs a
   timer, two block RAMs and ticks of about 800 clocks. With a bad disc, tell it so (`--edge-error 0.6`): with the
   default it takes the disc's errors for changes of the speed.
-- *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 16 µs, down to a clock; it is the
-  smallest, it has no divider, and it is good around multiples of the unit velocity. Ticks should be long: its error
-  at more than a count per tick is a part of the unit velocity.
+- *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 18 µs, down to a clock; it is the
+  smallest but for M, it has no divider, and it is good around multiples of the unit velocity. Ticks should be long: its
+  error at more than a count per tick is a part of the unit velocity.
 - *M/T*: use it if a fast timer and a divider are available, and bounds of the speed are wanted or half of the area of
   tracking. A longer `--min-time` gives less noise and more delay, as averaging does. On a lattice (`--timer tick`) it
   equals M at high speeds.

@@ -10,6 +10,8 @@ from tachometry.hdl.demo.demo import Demo
 from tachometry.hdl.export import verilog_of
 from tachometry.sim.studies.size import CORE, TARGETS
 from tachometry.spec import (
+    AxesSpec,
+    CoreSpec,
     Encoder,
     MTachometer,
     MTTachometer,
@@ -34,7 +36,7 @@ class Configuration:
     ----------
     name, what : str
         Its name, and what distinguishes it, for the tables.
-    spec : TachometerSpec
+    spec : TachometerSpec or AxesSpec
     bars : dict
         Limits by target and figure: Fmax must reach its bar, everything else must not exceed it.
     is_option : bool
@@ -44,21 +46,26 @@ class Configuration:
         On which its registers are, or `none`.
     demo : bool
         With emulator and telemetry.
+    without_max_speed : str
+        Name of the configuration that differs only in that it has no greatest speed, if there is one.
     """
 
     name: str
     what: str
-    spec: TachometerSpec
+    spec: CoreSpec
     bars: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_option: bool = True
     targets: tuple[str, ...] = tuple(TARGETS)
     bus: str = "none"
     demo: bool = False
+    without_max_speed: str = ""
 
     @property
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
         """Verilog and ports."""
         bus = bus_of(self.bus)
+        if isinstance(self.spec, AxesSpec):
+            return export(self.spec, CORE)[f"{CORE}.v"], self.spec.ports
         if self.demo and bus is not None:
             registers = DemoMap(self.spec)
             described = {"generator": "", "license": "", **demo_manifest(registers, bus, CORE)}
@@ -68,30 +75,84 @@ class Configuration:
 
 # What methods are compared with: the defaults, and no max_speed.
 COMMON: Any = {"encoder": Encoder(500, 4), "timing": Timing.parse("48MHz", "20us", "10ms")}
-REFERENCE = STachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), frac_bits=16)
+MAX_SPEED = Speed.parse("1000rad/s")
+MAX_TICK = 1920  # 40 us
+REFERENCE = STachometer(**COMMON, max_speed=MAX_SPEED, frac_bits=16)
 BARS = {
-    "ECP5": {"COMB": 330, "FF": 300, "DP16KD": 1, "MULT": 0, "Fmax": 130, "latency": 12},
-    "HX8K": {"LC": 400, "RAM": 4, "Fmax": 115},
-    "UP5K": {"Fmax": 48},
+    "ECP5": {"COMB": 265, "FF": 260, "DP16KD": 0, "MULT": 0, "Fmax": 190, "latency": 4},
+    "HX8K": {"LC": 340, "RAM": 0, "Fmax": 130},
+    "UP5K": {"Fmax": 52},
 }
-M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}}
-RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}}
+TABLE_BARS = {
+    "ECP5": {"COMB": 235, "FF": 240, "DP16KD": 1, "MULT": 0, "Fmax": 135, "latency": 4},
+    "HX8K": {"LC": 305, "RAM": 4, "Fmax": 130},
+}
+# The clock of the reference on the slowest FPGA, and 100 MHz on the others.
+FAST = {"HX8K": {"Fmax": 100}, "UP5K": {"Fmax": 48}}
+DEFAULT_BARS = {"ECP5": {"COMB": 340, "DP16KD": 0, "MULT": 0, "Fmax": 180, "latency": 8}} | FAST
+M_BARS = {"ECP5": {"COMB": 300, "MULT": 0, "Fmax": 100}} | FAST
+RAIRAN_BARS = {"ECP5": {"COMB": 450, "MULT": 0, "Fmax": 100}} | FAST
 ADAPTIVE_BARS = {"ECP5": {"COMB": 700, "MULT": 0, "Fmax": 100}}
-TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}}
-EVERY_CLOCK_BARS = {"ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12}}
+TIMED_BARS = {"ECP5": {"COMB": 600, "MULT": 0, "Fmax": 100}} | FAST
+EVERY_CLOCK_BARS = {
+    "ECP5": {"COMB": 700, "DP16KD": 8, "MULT": 4, "Fmax": 100, "latency": 12},
+    "HX8K": {"Fmax": 100},
+}
 TRACK_BARS = {
     "ECP5": {"COMB": 700, "FF": 600, "DP16KD": 2, "MULT": 0, "Fmax": 100},
     "HX8K": {"LC": 900},
     "UP5K": {"Fmax": 24},
 }
 # The reference core, and 250 COMB and 100 FF for the bank.
-BUS_BARS = {"ECP5": {"COMB": 273 + 250, "FF": 220 + 100}}
+BUS_BARS = {"ECP5": {"COMB": 265 + 250, "FF": 260 + 100}}
+# Of 8 axes 60 COMB and 65 FF for each, of 32 axes 26 and 22.
+AXES_BARS: dict[int, Mapping[str, Mapping[str, float]]] = {
+    1: {},
+    8: {"ECP5": {"COMB": 8 * 60, "FF": 8 * 65, "MULT": 0, "Fmax": 140}},
+    32: {"ECP5": {"COMB": 32 * 26, "FF": 32 * 22, "MULT": 0, "Fmax": 140}},
+}
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
+
+
+def variants(
+    name: str, what: str, spec: TachometerSpec, bars: Mapping[str, Mapping[str, float]]
+) -> tuple[Configuration, ...]:
+    """A method with and without a greatest speed, and with ticks from outside if it does not make its own."""
+    found = [Configuration(name, what, spec, bars, is_option=False)]
+    fast = replace(spec, max_speed=MAX_SPEED)
+    found.append(
+        Configuration(f"{name}-max-speed", f"{what}, 1000 rad/s", fast, bars, is_option=False, without_max_speed=name)
+    )
+    if not spec.own_ticks:
+        inside = (found[0].name, what, spec), (found[1].name, found[1].what, fast)
+        for inner, about, each in inside:
+            without = f"{name}-external-tick" if each.max_speed else ""
+            made = replace(each, max_tick_cycles=MAX_TICK)
+            found.append(
+                Configuration(
+                    f"{inner}-external-tick",
+                    f"{about}, external tick",
+                    made,
+                    FAST,
+                    is_option=False,
+                    without_max_speed=without,
+                )
+            )
+    return tuple(found)
+
 
 # The first is what the others are compared with.
 CONFIGURATIONS = (
-    Configuration("reference", "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits", REFERENCE, BARS, False),
-    Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None)),
+    Configuration(
+        "reference",
+        "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits",
+        REFERENCE,
+        BARS,
+        False,
+        without_max_speed="default",
+    ),
+    Configuration("table", "reciprocal from a table", replace(REFERENCE, source="table"), TABLE_BARS),
+    Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None), DEFAULT_BARS),
     Configuration("no-cancel", "eq. (17) instead of eq. (21)", replace(REFERENCE, cancel=False)),
     Configuration("frac-bits-8", "8 fraction bits", replace(REFERENCE, frac_bits=8)),
     Configuration("frac-bits-24", "24 fraction bits", replace(REFERENCE, frac_bits=24)),
@@ -100,7 +161,19 @@ CONFIGURATIONS = (
     Configuration("filter-4", "glitch filter, 4 clocks", replace(REFERENCE, filter_clocks=4)),
     Configuration("index", "index captures the position", replace(REFERENCE, index=True)),
     Configuration("index-reset", "and resets it", replace(REFERENCE, index=True, index_reset=True)),
-    Configuration("external-tick", "external tick, up to 40 us", replace(REFERENCE, max_tick_cycles=1920)),
+    Configuration(
+        "external-tick",
+        "external tick, up to 40 us",
+        replace(REFERENCE, max_tick_cycles=MAX_TICK),
+        FAST,
+        without_max_speed="default-external-tick",
+    ),
+    Configuration(
+        "default-external-tick",
+        "external tick, no max_speed",
+        replace(REFERENCE, max_speed=None, max_tick_cycles=MAX_TICK),
+        FAST,
+    ),
     Configuration("rad-per-s", "velocity in 2^-10 rad/s", replace(REFERENCE, unit="rad/s", frac_bits=10)),
     Configuration("rpm", "velocity in 2^-6 rpm", replace(REFERENCE, unit="rpm", frac_bits=6)),
     Configuration("velocity-16", "16-bit velocity, saturating", replace(REFERENCE, max_speed=None, velocity_width=16)),
@@ -137,13 +210,13 @@ CONFIGURATIONS = (
         STachometer(encoder=Encoder(500, 4), timing=Timing(48_000_000, 1, 1 << 16), unit="rad/s", frac_bits=-10),
         is_option=False,
     ),
-    Configuration("m", "M method", MTachometer(**COMMON), M_BARS, is_option=False),
+    *variants("m", "M method", MTachometer(**COMMON), M_BARS),
     Configuration("m-10", "M method, mean of 10 ticks", MTachometer(**COMMON, average=10), M_BARS, is_option=False),
-    Configuration("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS, is_option=False),
+    *variants("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS),
     Configuration(
         "rairan-adaptive",
         "adaptive dt, 1 %, 1000 rad/s",
-        RairanTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), adaptive=Fraction(1, 100)),
+        RairanTachometer(**COMMON, max_speed=MAX_SPEED, adaptive=Fraction(1, 100)),
         ADAPTIVE_BARS,
         is_option=False,
     ),
@@ -153,16 +226,30 @@ CONFIGURATIONS = (
         RairanTachometer(**COMMON, paper_exact=True),
         is_option=False,
     ),
-    Configuration("t", "T method", TTachometer(**COMMON), TIMED_BARS, is_option=False),
-    Configuration("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS, is_option=False),
+    *variants("t", "T method", TTachometer(**COMMON), TIMED_BARS),
+    *variants("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS),
     Configuration(
         "mt-whole-cycles", "M/T method, whole cycles", MTTachometer(**COMMON, whole_cycles=True), is_option=False
     ),
     Configuration(
         "track",
         "tracking, 1000 rad/s, 16 bits",
-        TrackTachometer(**COMMON, max_speed=Speed.parse("1000rad/s"), velocity_width=16),
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16),
         TRACK_BARS,
+        is_option=False,
+        without_max_speed="track-wide",
+    ),
+    Configuration(
+        "track-external-tick",
+        "tracking, external tick",
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16, max_tick_cycles=MAX_TICK),
+        is_option=False,
+        without_max_speed="track-wide-external-tick",
+    ),
+    Configuration(
+        "track-wide-external-tick",
+        "tracking, no max_speed, external tick",
+        TrackTachometer(**COMMON, max_tick_cycles=MAX_TICK),
         is_option=False,
     ),
     Configuration("track-wide", "tracking, no max_speed", TrackTachometer(**COMMON), is_option=False),
@@ -176,6 +263,12 @@ CONFIGURATIONS = (
             ("t", "T method", TTachometer),
             ("mt", "M/T method", MTTachometer),
         )
+    ),
+    *(
+        Configuration(
+            f"axes-{axes}", f"axes of the reference: {axes}", AxesSpec(tachometer=REFERENCE, axes=axes), bars, False
+        )
+        for axes, bars in AXES_BARS.items()
     ),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )

@@ -6,6 +6,9 @@ Times are processor time, so that what else runs on the machine matters little; 
 import argparse
 import ctypes
 import os
+import resource
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,17 +23,16 @@ from golden import BEGIN, MOTION, part_of
 from pages import markdown, write_from
 
 from tachometry.cli.reports.terminal import print_table
-from tachometry.hdl import Tachometer
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines import build
-from tachometry.sim.engines.compiled import Design
+from tachometry.sim.engines.compiled import CompiledEngine, Design, Play
 from tachometry.sim.engines.cxxrtl import headers, model_of, translate
-from tachometry.sim.engines.engine import Engine, driven_pins
+from tachometry.sim.engines.engine import driven_pins
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import Run, compare
+from tachometry.sim.signals.run import Run, compare, observed
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
 
 SLOW = 30_000  # clocks of pysim
@@ -40,22 +42,28 @@ REPEATS = 2
 _HEADING = "## Engines"
 _PAGE = """
 The same motion is run through `--engine`: {slow:,} clocks of it by pysim, and {fast:,} by the compiled engines and by
-the bare loop. The bare loop is a C++ loop around the same CXXRTL module, without debug information. It plays the same
-changes with `step()` on both levels of the clock, adds up the outputs at the strobes, and does nothing else.
-The table has the fastest of {repeats} runs. The first run of a new core takes some seconds more, for its compilation.
-Every run is compared with the golden model, bit by bit. Clocks per second, in processor time:
+the bare loop. The bare loop is the fastest C++ loop around the same CXXRTL module that this page knows, "model local
+to the loop" in the table of steps below, compiled with -O2 or -O3, whichever is faster. It plays the same changes, adds
+up the outputs at the strobes, and does nothing else. cxxrtl-every-clock evaluates every clock, as the bare loop does;
+cxxrtl skips idle clocks. The table has the fastest of {repeats} runs of the loop alone; that of pysim includes its
+start. Every run is compared with the golden model, bit by bit. Clocks per second, in processor time:
 
 {speeds}
 The next table is of all ten seconds, {clocks:,} clocks, run by cxxrtl and compared with the golden model in every
-bit of every update:
+bit of every update. *Loop* is the loop alone; *process* is all of a process, from its start to its end, which also
+makes the motion and the golden model:
 
 {whole}
-A golden model's time depends on the numbers of edges, ticks and updates, not on clocks. It is a hundredth and less of
-the engine's time where updates are made of whole ticks. With T, M/T and Rairán's method every count is processed, and
-most counts make an update. Each window begins where the previous one ended, so the windows have to be followed in
-order.
+In an idle clock no strobe is high, and no flip-flop changes but counters on which nothing depends before they come to
+a stop, such as the one that waits for the end of the tick. CXXRTL finds that out by comparing all flip-flops with
+what they would become, and then moves the counters on to the next stop or to the next change of a pin at once. What is
+gained depends on the motion: with an edge in every hundredth clock there is little to be skipped. The program of the
+tracking method is at work in most clocks of a tick of 20 us.
 
-The next table shows what makes cxxrtl fast, on the S method. Each row includes the changes of the rows above it:
+A golden model's time depends on the numbers of edges, ticks and updates, not on clocks. That of the tracking method
+follows its recursion tick by tick.
+
+The next table shows what makes a clock fast, on the S method. Each row includes the changes of the rows above it:
 
 {steps}
 - Debug information keeps every value of every clock in memory. Without it the compiler keeps only what it needs.
@@ -66,10 +74,8 @@ The next table shows what makes cxxrtl fast, on the S method. Each row includes 
 - The core has no black boxes, so none has to be called. Values of more than 32 bits remain pairs of words.
 - Memory for rows is requested between clocks, never within one. If a clock could be left half done, the compiler would
   have to keep its intermediate values, which cost a third of the speed.
-- The engine is slower than the fastest loop, whose model exists only within the loop. A call of the engine ends every
-  50 ms, for progress and Ctrl-C, so its state must outlive the call. The engine also stores rows. Each run needs about
-  a tenth of a second to elaborate the core and look it up in the cache. That is half of the time of the short runs in
-  the tables, so compare with the clocks/s of all ten seconds.
+- The engine stores rows, and a call of it ends every 50 ms, for progress and Ctrl-C. Each run needs about a tenth of a
+  second more to elaborate the core and look it up in the cache.
 """
 
 # The loops that are measured; each counts the clocks with a strobe.
@@ -111,18 +117,22 @@ class Speed:
     pysim: float
     verilator: float
     bare: float
+    every_clock: float
     cxxrtl: float
 
     @property
     def cells(self) -> list[str]:
         """The row of the table."""
-        rates = (self.pysim, self.verilator, self.bare, self.cxxrtl)
-        ratios = (self.cxxrtl / self.pysim, self.cxxrtl / self.verilator, self.cxxrtl / self.bare)
+        rates = (self.pysim, self.verilator, self.bare, self.every_clock, self.cxxrtl)
+        ratios = (self.cxxrtl / rate for rate in rates[:-1])
         return [self.core, *(f"{rate:.3g}" for rate in rates), *(f"{ratio:.3g}" for ratio in ratios)]
 
 
-SPEED_COLUMNS = ["core", "pysim", "verilator", "bare loop", "cxxrtl", "÷ pysim", "÷ verilator", "÷ bare loop"]
-WHOLE_COLUMNS = ["core", "cxxrtl", "clocks/s", "golden model", "ratio", "updates", "mismatches"]
+ENGINES = ("verilator", "cxxrtl-every-clock", "cxxrtl")
+_OF_CXXRTL = ("pysim", "verilator", "bare loop", "cxxrtl-every-clock")
+SPEED_COLUMNS = ["core", *_OF_CXXRTL, "cxxrtl", *(f"÷ {name}" for name in _OF_CXXRTL)]
+WHOLE_COLUMNS = ["core", "loop, every clock", "loop", "ratio", "process, every clock", "process", "ratio"]
+WHOLE_COLUMNS += ["golden model", "updates", "mismatches"]
 STEP_COLUMNS = ["loop", "clocks/s"]
 
 
@@ -136,18 +146,18 @@ def seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
     return min(times)
 
 
-def loops(spec: TachometerSpec, trace: PinTrace, *, debug: bool = False) -> Any:
+def loops(spec: TachometerSpec, trace: PinTrace, *options: str, debug: bool = False) -> Any:
     """The library with the loops; `debug` with what Amaranth's `cxxrtl.convert` writes as it stands."""
     design = Design(spec, driven_pins(spec, trace))
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
         text = (
-            amaranth_cxxrtl.convert(Tachometer(spec), name="top", emit_src=False)
+            amaranth_cxxrtl.convert(design.component, name="top", emit_src=False)
             if debug
-            else translate(rtlil.convert(Tachometer(spec), name="top", emit_src=False))
+            else translate(rtlil.convert(design.component, name="top", emit_src=False))
         )
     source = design.source(text + model_of(design, text)) + _LOOPS
-    key = build.digest("bench", source, build.compiler(), build.version(build.compiler()), build.FLAGS)
-    made = build.cached(key, ".so", lambda folder: build.compile_library(source, folder, f"-I{headers()}"))
+    key = build.digest("bench", source, build.compiler(), build.version(build.compiler()), build.FLAGS, options)
+    made = build.cached(key, ".so", lambda folder: build.compile_library(source, folder, f"-I{headers()}", *options))
     return ctypes.CDLL(str(made))
 
 
@@ -161,50 +171,68 @@ def strobes(library: Any, name: str, trace: PinTrace) -> int:
     return found
 
 
-def checked(engine: Engine, spec: TachometerSpec, trace: PinTrace) -> tuple[Run, float]:
-    """Run an engine: what it gave, and its processor time; RuntimeError if the golden model disagrees."""
-    begun = time.process_time()
-    run = engine.run(spec, trace)
-    took = time.process_time() - begun
-    wrong, first = compare(golden.run(spec, trace), run)
+def checked(expected: Run, run: Run, name: str, spec: TachometerSpec) -> None:
+    """See that an engine gave what is expected; RuntimeError if not."""
+    wrong, first = compare(expected, run)
     if wrong:
-        raise RuntimeError(f"{engine.name}, {spec.method}: hardware and golden model disagree: {first[0]}")
-    return run, took
+        raise RuntimeError(f"{name}, {spec.method}: hardware and golden model disagree: {first[0]}")
+
+
+def loop_alone(name: str, spec: TachometerSpec, trace: PinTrace, expected: Run, repeats: int = REPEATS) -> float:
+    """The shortest processor time in which an engine runs all clocks, without what it does before and after."""
+    engine = pick(name)
+    assert isinstance(engine, CompiledEngine)
+    design = Design(spec, driven_pins(spec, trace))
+    library, times = engine.library(design), []
+    for _ in range(repeats):
+        play = Play(library, design, trace, (0, trace.n_clocks), engine.every_clock)
+        times.append(seconds(lambda: play.to_the_end(None, None), 1))  # noqa: B023
+        checked(expected, observed(spec, trace.n_clocks, play.rows()), name, spec)
+    return min(times)
 
 
 def speed(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW, fast: int = FAST) -> Speed:
     """Measure one core on all engines."""
-    parts = {engine: part_of(trace, BEGIN, slow if engine == "pysim" else fast) for engine in ENGINES}
-    rates = {}
-    for engine, part in parts.items():
-        chosen = pick(engine)
-        run, took = checked(chosen, spec, part)
-        if engine != "pysim":  # the first run may have built the core
-            took = seconds(lambda: chosen.run(spec, part))  # noqa: B023
-        rates[engine] = part.n_clocks / took
-    library, part = loops(spec, trace), parts["cxxrtl"]
-    ticks = strobes(library, "twice", part) & 0xFFFFFFFF
+    part = part_of(trace, BEGIN, slow)
+    begun = time.process_time()
+    run = pick("pysim").run(spec, part)
+    rates = {"pysim": slow / (time.process_time() - begun)}
+    checked(golden.run(spec, part), run, "pysim", spec)
+    part = part_of(trace, BEGIN, fast)
+    run = golden.run(spec, part)
+    rates |= {engine: fast / loop_alone(engine, spec, part, run) for engine in ENGINES}
     clocks = [run.ticks.clock, run.updates.clock, run.index.clock, run.errors, run.tick_errors]
-    if ticks != len(np.unique(np.concatenate(clocks))):
-        raise RuntimeError(f"{name}: the bare loop sees {ticks} strobes, which are not those of cxxrtl")
-    bare = part.n_clocks / seconds(lambda: strobes(library, "twice", part))
-    return Speed(name, rates["pysim"], rates["verilator"], bare, rates["cxxrtl"])
+    bare = []
+    for level in ("-O2", "-O3"):
+        library = loops(spec, part, level)
+        ticks = strobes(library, "bare", part) & 0xFFFFFFFF
+        if ticks != len(np.unique(np.concatenate(clocks))):
+            raise RuntimeError(f"{name}: the bare loop sees {ticks} strobes, which are not those of the golden model")
+        bare.append(seconds(lambda: strobes(library, "bare", part)))  # noqa: B023
+    return Speed(
+        name, rates["pysim"], rates["verilator"], fast / min(bare), rates["cxxrtl-every-clock"], rates["cxxrtl"]
+    )
 
 
-ENGINES = ("pysim", "verilator", "cxxrtl")
+def process(method: str, name: str) -> float:
+    """Processor time of a process that simulates the motion and compares it with the golden model."""
+    command = [sys.executable, __file__, "--alone", method, name]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def whole(name: str, spec: TachometerSpec, trace: PinTrace) -> list[str]:
     """All of the motion on cxxrtl and on the golden model."""
-    engine = pick("cxxrtl")
-    engine.run(spec, part_of(trace, BEGIN, 1000))  # the core is built
-    begun = time.process_time()
-    run = engine.run(spec, trace)
-    took = time.process_time() - begun
+    run = golden.run(spec, trace)
+    engines = ("cxxrtl-every-clock", "cxxrtl")
+    loop = [loop_alone(each, spec, trace, run, 1) for each in engines]
+    cells = [name]
+    for slow, fast in (loop, [process(name, each) for each in engines]):
+        cells += [f"{slow:.2g} s", f"{fast:.2g} s", f"{slow / fast:.3g}"]
     model = seconds(lambda: golden.run(spec, trace))
-    wrong, _ = compare(golden.run(spec, trace), run)
-    cells = (f"{took:.2g} s", f"{trace.n_clocks / took:.2g}", f"{model * 1e3:.0f} ms", f"{took / model:.3g}")
-    return [name, *cells, f"{len(run.updates.clock):,}", str(wrong)]
+    return [*cells, f"{model * 1e3:.0f} ms", f"{len(run.updates.clock):,}", "0"]
 
 
 def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[list[str]]:
@@ -220,10 +248,10 @@ def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[l
     ]
     if len({strobes(library, loop, part) for _, library, loop in rows}) > 1:
         raise RuntimeError("the loops do not see the same strobes")
-    engine = pick("cxxrtl")
-    engine.run(spec, part)
     took = {name: seconds(lambda: strobes(library, loop, part)) for name, library, loop in rows}  # noqa: B023
-    took["the engine through its interface"] = seconds(lambda: engine.run(spec, part))
+    run = golden.run(spec, part)
+    took["the engine, which stores rows"] = loop_alone("cxxrtl-every-clock", spec, part, run)
+    took["idle clocks skipped"] = loop_alone("cxxrtl", spec, part, run)
     return [[name, f"{part.n_clocks / each:.3g}"] for name, each in took.items()]
 
 
@@ -231,11 +259,17 @@ def main() -> None:
     """Measure, print, and replace this part of the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/bench.md")
-    output = parser.parse_args().output
+    parser.add_argument("--alone", nargs=2, metavar=("METHOD", "ENGINE"), help="only simulate, to be measured")
+    options = parser.parse_args()
+    output = options.output
     encoder = VirtualEncoder(500, jitter=0.02, vibration=Vibration(1e-3, 50), seed=1)
     trace = encoder.record(parse_motion(MOTION)).recording.place(48_000_000)
     common: dict[str, Any] = {"encoder": Encoder(500), "timing": Timing.parse("48MHz", "20us", "10ms")}
     cores = {name: method(**common) for name, method in METHODS.items()}
+    if options.alone:
+        method, engine = options.alone
+        checked(golden.run(cores[method], trace), pick(engine).run(cores[method], trace), engine, cores[method])
+        return
     speeds = [speed(name, spec, trace).cells for name, spec in cores.items()]
     print_table(SPEED_COLUMNS, speeds)
     print()

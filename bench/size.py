@@ -1,7 +1,8 @@
 """Size and speed of the cores on three FPGAs, measured with open tools: writes docs/size.md.
 
 Area is that of the core alone, packed but not placed. Fmax is that of the core in a wrapper of registers, routed, the
-median over three seeds. A second run repeats only what depends on changed Verilog or changed tools.
+median over nine seeds, or as many as are asked for. A second run repeats only what depends on changed Verilog or
+changed tools.
 
 Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
 """
@@ -23,6 +24,7 @@ from rich.progress import track
 
 from tachometry.sim.studies.size import (
     CORE,
+    SEEDS,
     TARGETS,
     Measurement,
     made,
@@ -38,7 +40,19 @@ Item = TypeVar("Item")
 
 
 COSTS = (("ECP5", "COMB"), ("ECP5", "FF"), ("ECP5", "DP16KD"), ("HX8K", "LC"), ("HX8K", "RAM"), ("ECP5", "latency"))
-WORDS = ("configuration", "what", "what limits Fmax", "option", "box", "core", "gives", "target", "figure", "verdict")
+WORDS = (
+    "configuration",
+    "what",
+    "what limits Fmax",
+    "option",
+    "box",
+    "core",
+    "gives",
+    "target",
+    "figure",
+    "verdict",
+    "without",
+)
 UNITS = {"Fmax": "MHz", "latency": "clocks"}
 
 
@@ -90,8 +104,9 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 - Area is that of the core alone, as nextpnr packs it. COMB, FF, DP16KD and MULT are the ECP5 cells TRELLIS_COMB,
   TRELLIS_FF, DP16KD (block RAM) and MULT18X18D. LC, RAM and DSP are the iCE40 cells ICESTORM_LC, ICESTORM_RAM and
   ICESTORM_DSP.
-- Fmax is that of the core in a wrapper, routed. It is the median over seeds 1, 2 and 3. The inputs come from a shift
-  register. The outputs are registered, and then loaded into a shift register that ends in one pin.
+- Fmax is that of the core in a wrapper, routed. It is the median over seeds 1 to 9; in brackets are the slowest and the
+  fastest of them. A bar is met if the median meets it. The inputs come from a shift register. The outputs are
+  registered, and then loaded into a shift register that ends in one pin.
 - Latency is from `tick` to `velocity_valid`.
 - The column "what limits Fmax" has the longest path of the median seed, from register to register, as `box.signal`.
 
@@ -101,9 +116,12 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 Results = Mapping[tuple[str, str], Measurement]
 
 
-def measure(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Measurement:
+def measure(
+    configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str], seeds: int = len(SEEDS)
+) -> Measurement:
     """Synthesise, pack and route a core for a target."""
-    return measure_core(configuration.spec, TARGETS[target_name], verilog, tools, configuration.hardware[1])
+    ports = configuration.hardware[1]
+    return measure_core(configuration.spec, TARGETS[target_name], verilog, tools, ports, range(1, seeds + 1))
 
 
 def box_name(cell: str) -> str:
@@ -139,9 +157,12 @@ def boxes_table(title: str, cells: Mapping[str, Mapping[str, Any]], counted: Map
     return Table(title, ["box", *counted], [[box, *map(str, row)] for row, box in [*rows, (total, "total")]])
 
 
-def text_of(figure: str, value: float) -> str:
-    """A figure as the tables show it."""
-    return f"{value:.1f}" if figure == "Fmax" else str(value)
+def text_of(figure: str, found: Measurement) -> str:
+    """A figure as the tables show it: Fmax with its spread."""
+    value = found.figures[figure]
+    if figure != "Fmax":
+        return str(value)
+    return f"{value:.1f}" + (f" ({found.spread[0]:.0f}–{found.spread[1]:.0f})" if found.spread else "")
 
 
 def heading(figure: str) -> str:
@@ -154,7 +175,7 @@ def target_table(target_name: str, results: Results) -> Table:
     figures = [*TARGETS[target_name].cells, *UNITS]
     described = {configuration.name: configuration.what for configuration in CONFIGURATIONS}
     rows = [
-        [name, described[name], *(text_of(figure, found.figures[figure]) for figure in figures), found.limit]
+        [name, described[name], *(text_of(figure, found) for figure in figures), found.limit]
         for (name, target), found in results.items()
         if target == target_name
     ]
@@ -178,6 +199,21 @@ def cost_table(results: Results) -> Table:
     return Table(f"What each option costs: difference from {base}", header, rows)
 
 
+def speed_table(results: Results) -> Table:
+    """What a greatest speed changes: differences from the same core without one."""
+    rows = []
+    for configuration in CONFIGURATIONS:
+        without = configuration.without_max_speed
+        for target, device in TARGETS.items():
+            if (configuration.name, target) in results and (without, target) in results:
+                figures, base = (results[name, target].figures for name in (configuration.name, without))
+                cells = next(iter(device.cells))
+                row = [f"{figures[figure] - base[figure]:+.{digits}f}" for figure, digits in ((cells, 0), ("Fmax", 1))]
+                rows.append([configuration.name, without, target, *row])
+    header = ["configuration", "without", "target", "COMB or LC (cells)", heading("Fmax")]
+    return Table("What --max-speed 1000rad/s changes: difference from the core without", header, rows)
+
+
 def bar_table(results: Results) -> Table:
     """Every bar, and whether it is met."""
     rows = []
@@ -185,21 +221,22 @@ def bar_table(results: Results) -> Table:
         for target, bars in configuration.bars.items():
             for figure, bar in bars.items():
                 if (configuration.name, target) in results:
-                    value = results[configuration.name, target].figures[figure]
-                    rows.append([configuration.name, target, *bar_texts(figure, bar, value)])
+                    found = results[configuration.name, target]
+                    rows.append([configuration.name, target, *bar_texts(figure, bar, found)])
     return Table("Bars", ["configuration", "target", "figure", "bar", "measured", "verdict"], rows)
 
 
-def bar_texts(figure: str, bar: float, value: float) -> tuple[str, str, str, str]:
+def bar_texts(figure: str, bar: float, found: Measurement) -> tuple[str, str, str, str]:
     """Figure, bar, measured value and verdict."""
+    value = found.figures[figure]
     met = value >= bar if figure == "Fmax" else value <= bar
     relation = "at least" if figure == "Fmax" else "at most"
-    return heading(figure), f"{relation} {bar}", text_of(figure, value), "met" if met else "missed"
+    return heading(figure), f"{relation} {bar}", text_of(figure, found), "met" if met else "missed"
 
 
 def tables(results: Results) -> list[Table]:
     """All tables of measured figures that are not empty."""
-    made = [*(target_table(target, results) for target in TARGETS), bar_table(results)]
+    made = [*(target_table(target, results) for target in TARGETS), bar_table(results), speed_table(results)]
     if CONFIGURATIONS[0].name in {name for name, _ in results}:
         made.append(cost_table(results))
     return [table for table in made if table.rows]
@@ -217,12 +254,19 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     names = [configuration.name for configuration in CONFIGURATIONS]
     parser.add_argument("--only", nargs="+", choices=names, metavar="NAME", help=f"some of: {', '.join(names)}")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="targets at a time (%(default)s)")
+    parser.add_argument(
+        "--seeds", type=int, default=len(SEEDS), metavar="N", help="routings whose median Fmax is (%(default)s)"
+    )
+    parser.add_argument("--targets", nargs="+", choices=TARGETS, default=tuple(TARGETS), help="FPGAs (all)")
     parser.add_argument("--boxes", action="store_true", help="also print the area of each box")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="page (docs/size.md; with --only: none)")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="page (docs/size.md; of a part: none)")
     options = parser.parse_args(words)
     if options.jobs < 1:
         parser.error(f"--jobs must be at least 1, not {options.jobs}")
-    if options.output is None and options.only is None:
+    if options.seeds < 1:
+        parser.error(f"--seeds must be at least 1, not {options.seeds}")
+    everything = (options.only, options.seeds, options.targets) == (None, len(SEEDS), tuple(TARGETS))
+    if options.output is None and everything:
         options.output = PAGE
     return options
 
@@ -231,9 +275,15 @@ def run(options: argparse.Namespace) -> int:
     """Measure, print, and write the page; 1 if a bar is missed."""
     tools = versions()
     chosen = [found for found in CONFIGURATIONS if options.only is None or found.name in options.only]
-    work = [(found, target, found.hardware[0], tools) for found in chosen for target in found.targets]
+    work = [
+        (found, target, found.hardware[0], tools)
+        for found in chosen
+        for target in found.targets
+        if target in options.targets
+    ]
+    asked = [(*item, options.seeds) for item in work]
     with ThreadPoolExecutor(options.jobs) as pool:
-        done = list(with_progress(pool.map(lambda item: measure(*item), work), len(work)))
+        done = list(with_progress(pool.map(lambda item: measure(*item), asked), len(work)))
         split = list(with_progress(pool.map(lambda item: boxes(*item), work), len(work))) if options.boxes else []
     results = {(found.name, target): result for (found, target, *_), result in zip(work, done, strict=True)}
     measured = tables(results)

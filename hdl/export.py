@@ -11,12 +11,12 @@ from amaranth.back import verilog
 from amaranth.lib import wiring
 
 from tachometry.hdl.bus_tachometer import BusTachometer
+from tachometry.hdl.core import core_of
 from tachometry.hdl.kit import kit
-from tachometry.hdl.tachometer import Tachometer
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec, ParameterError
 from tachometry.spec.manifest import manifest
 from tachometry.spec.provenance import LICENSE, generator, notice
-from tachometry.spec.registers.buses import bus_of, manifest_on
+from tachometry.spec.registers.buses import Bus, bus_of, manifest_on
 from tachometry.spec.registers.files import register_files
 from tachometry.spec.registers.map import RegisterMap
 from tachometry.spec.targets.target import TARGETS, bus_for
@@ -37,7 +37,7 @@ _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
 
 
 def export(
-    spec: TachometerSpec,
+    spec: CoreSpec,
     name: str = "tachometer",
     bus: str | None = None,
     baud: int | None = None,
@@ -53,7 +53,7 @@ def export(
 
     Parameters
     ----------
-    spec : TachometerSpec
+    spec : TachometerSpec or AxesSpec
     name : str
         Name of the module and of the files.
     bus : str or None
@@ -68,29 +68,41 @@ def export(
     ------
     ValueError
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
-        the target needs another bus or another core.
+        the target needs another bus or another core; if a core of many axes is to have either.
     """
     bus = bus_for(target, bus)
     on = bus_of(bus, baud)
+    if isinstance(spec, AxesSpec):
+        if on is not None or target in TARGETS:
+            what = "target" if target in TARGETS else "bus"
+            raise ParameterError(what, "must not be given together with axes: registers and targets are for one axis")
+        return _files(spec, name, core_of(spec), manifest(spec, name), None, {})
     described = manifest(spec, name)
     files: dict[str, str] = {}
     top: wiring.Component
     if on is None:
-        top = Tachometer(spec)
+        top = core_of(spec)
     else:
         registers = RegisterMap(spec)
         described = manifest_on(registers, on, name)
         top = BusTachometer(registers, on)
         files = register_files(registers, name)
-    described = {"generator": generator(), "license": LICENSE, **described}
-    text = verilog_of(top, described)
+    texts = _files(spec, name, top, described, on, files)
     if target in TARGETS:
-        files |= TARGETS[target].texts(spec, name, text)
+        texts |= TARGETS[target].texts(spec, name, texts[f"{name}.v"])
+    return texts
+
+
+def _files(
+    spec: CoreSpec, name: str, top: wiring.Component, described: dict[str, Any], on: Bus | None, more: dict[str, str]
+) -> dict[str, str]:
+    """The core, its manifest, and what lies beside them."""
+    described = {"generator": generator(), "license": LICENSE, **described}
     return {
-        f"{name}.v": text,
+        f"{name}.v": verilog_of(top, described),
         f"{name}.json": json.dumps(described, indent=2) + "\n",
         **kit(spec, name, on),
-        **files,
+        **more,
     }
 
 

@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Sequence
 
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.port import Port
 from tachometry.spec.provenance import notice, version
 from tachometry.spec.registers.buses import Bus, ports_on
@@ -89,8 +89,8 @@ _XDC = """\
 """
 _XDC_PIN = """
 # @PIN@
-set_false_path -to [get_pins -hierarchical -filter {NAME =~ *@PATH_SLASH@/stage0_reg/D}]
-set_property ASYNC_REG TRUE [get_cells -hierarchical -filter {NAME =~ *@PATH_SLASH@/stage*_reg}]
+set_false_path -to [get_pins -hierarchical -filter {NAME =~ *@PATH_SLASH@/stage0_reg@BITS@/D}]
+set_property ASYNC_REG TRUE [get_cells -hierarchical -filter {NAME =~ *@PATH_SLASH@/stage*_reg@BITS@}]
 """
 
 _SDC = """\
@@ -102,7 +102,7 @@ _SDC = """\
 _SDC_PIN = """
 # @PIN@
 if {[llength [info commands get_registers]]} {
-    set_false_path -to [get_registers {*@PATH_STAR@|stage0}]
+    set_false_path -to [get_registers {*@PATH_STAR@|stage0@BITS@}]
 } else {
     set_false_path -to [get_cells -hierarchical {*@PATH_STAR@*stage0*}]
 }
@@ -130,7 +130,7 @@ module NAME_tb;
   always @(posedge clk) if (!rst) begin
     if (velocity_valid) begin
       updates <= updates + 1;
-      if (^velocity === 1'bx) errors <= errors + 1;
+      if (^@VELOCITY@ === 1'bx) errors <= errors + 1;
     end
     if (decode_error !== 1'b0) errors <= errors + 1;
   end
@@ -138,8 +138,8 @@ module NAME_tb;
   task turn(input integer steps, input forward);
     repeat (steps) begin
       quarter = forward ? quarter + 2'd1 : quarter - 2'd1;
-      a = quarter[1] ^ quarter[0];
-      b = quarter[1];
+      a = @A@;
+      b = @B@;
       repeat (HOLD) @(negedge clk);
     end
   endtask
@@ -150,9 +150,7 @@ module NAME_tb;
     repeat (HOLD) @(negedge clk);
     turn(40, 1'b1);
     turn(16, 1'b0);
-    if (errors != 0 || position !== @EXPECTED@)
-      $fatal(1, "FAIL: position %0d instead of @EXPECTED@, %0d errors", position, errors);
-    $display("PASS: position %0d, %0d updates, velocity %0d", position, updates, velocity);
+@CHECK@
     $finish;
   end
 endmodule
@@ -164,23 +162,38 @@ _TICKS = """
     tick_in <= clocks < (@TICK_CYCLES@ + 1) / 2;
   end
 """
+_CHECK = """\
+    if (errors != 0 || position !== @EXPECTED@)
+      $fatal(1, "FAIL: position %0d instead of @EXPECTED@, %0d errors", position, errors);
+    $display("PASS: position %0d, %0d updates, velocity %0d", position, updates, velocity);"""
+_CHECK_AXES = """\
+    repeat (2 * @TICK_CYCLES@) @(negedge clk);  // until the positions are those of a tick
+    for (integer k = 0; k < @AXES@; k = k + 1)
+      if (errors != 0 || found[k] !== (k % 2 ? -@EXPECTED@ : @EXPECTED@))
+        $fatal(1, "FAIL: position %0d of axis %0d instead of +-@EXPECTED@, %0d errors", found[k], k, errors);
+    $display("PASS: position %0d of axis 0, and of every other; %0d updates", found[0], updates);"""
+# The latest position of every axis.
+_FOUND = """
+  reg signed [@WIDTH@:0] found [0:@LAST@];
+
+  always @(posedge clk) if (tick) @FOUND@
+"""
 _STEPS_PER_TICK, _LONGEST_HOLD = 4, 5000
-# Where the synchroniser of a pin is in the core.
-_BOX = {"tick_in": "sampling_clock"}
+Boxes = dict[str, tuple[str, ...]]
 
 
-def kit(spec: TachometerSpec, name: str, bus: Bus | None = None) -> dict[str, str]:
+def kit(spec: CoreSpec, name: str, bus: Bus | None = None) -> dict[str, str]:
     """Texts by file name: `NAME.core`, `NAME_inst.v`, `NAME_tb.sv`, `NAME.xdc`, `NAME.sdc`.
 
     Parameters
     ----------
-    spec : TachometerSpec
+    spec : TachometerSpec or AxesSpec
     name : str
         Of the module.
     bus : Bus or None
         On which its registers are.
     """
-    ports = ports_on(spec, bus)
+    ports = spec.ports if isinstance(spec, AxesSpec) else ports_on(spec, bus)
     idle = bus.idle if bus else {}
 
     def filled(text: str, **parts: object) -> str:
@@ -192,25 +205,25 @@ def kit(spec: TachometerSpec, name: str, bus: Bus | None = None) -> dict[str, st
         return text.replace("NAME", name)
 
     def constraints(head: str, each: str) -> str:
-        paths = [(pin, [boxes[pin], f"sync_{pin}"]) for pin in boxes]
-        parts = [filled(each, PIN=pin, PATH_SLASH="/".join(path), PATH_STAR="*".join(path)) for pin, path in paths]
+        paths = [(pin, [*boxes[pin], f"sync_{pin}"]) for pin in boxes]
+        bits = "*" * isinstance(spec, AxesSpec)
+        parts = [
+            filled(each, PIN=pin, PATH_SLASH="/".join(path), PATH_STAR="*".join(path), BITS=bits) for pin, path in paths
+        ]
         # In a filter NAME is a property of Vivado.
         return filled(head) + "".join(part.replace(f"{{{name} =~", "{NAME =~") for part in parts)
 
-    boxes = {pin.name: _BOX.get(pin.name, "conditioner") for pin in spec.pins}
-    boxes |= dict.fromkeys(bus.asynchronous if bus else (), "bridge")
-    cycles = spec.timing.tick_cycles
-    hold = max(min(-(-cycles // _STEPS_PER_TICK), _LONGEST_HOLD), 2 * (spec.filter_clocks + 8))
+    of_pins, turning = _of_axes(spec) if isinstance(spec, AxesSpec) else _of_one(spec)
+    boxes: dict[str, tuple[str, ...]] = {pin.name: of_pins.get(pin.name, of_pins[""]) for pin in spec.pins}
+    boxes |= dict.fromkeys(bus.asynchronous if bus else (), ("bridge",))
     bench = filled(
         _BENCH,
-        HOLD=hold,
         PINS="\n  ".join(
             f"reg {_kind(port)}{port.name} = {port.width}'d{idle.get(port.name, 0)};"
             for port in ports
             if port.direction == "input" and port.name not in ("clk", "rst")
         ),
-        TICKS=_TICKS.replace("@TICK_CYCLES@", str(cycles)) if spec.max_tick_cycles else "",
-        EXPECTED=(40 - 16) * spec.encoder.decoding // 4,
+        **turning,
     )
     return {
         f"{name}.core": filled(
@@ -221,6 +234,48 @@ def kit(spec: TachometerSpec, name: str, bus: Bus | None = None) -> dict[str, st
         f"{name}.xdc": constraints(_XDC, _XDC_PIN),
         f"{name}.sdc": constraints(_SDC, _SDC_PIN),
     }
+
+
+def _of_one(spec: TachometerSpec) -> tuple[Boxes, dict[str, object]]:
+    """Where the synchronisers of pins are in the core, the others' by an empty name; and how the bench turns it."""
+    cycles = spec.timing.tick_cycles
+    parts: dict[str, object] = {
+        "HOLD": max(min(-(-cycles // _STEPS_PER_TICK), _LONGEST_HOLD), 2 * (spec.filter_clocks + 8)),
+        "TICKS": _TICKS if spec.max_tick_cycles else "",
+        "A": "quarter[1] ^ quarter[0]",
+        "B": "quarter[1]",
+        "CHECK": _CHECK,
+        "VELOCITY": "velocity",
+        "TICK_CYCLES": cycles,
+        "EXPECTED": (40 - 16) * spec.encoder.decoding // 4,
+    }
+    return {"": ("conditioner",), "tick_in": ("sampling_clock",)}, parts
+
+
+def _of_axes(spec: AxesSpec) -> tuple[Boxes, dict[str, object]]:
+    """The same of many axes, of which every other turns the other way."""
+    lines = ["quarter[1] ^ quarter[0]", "quarter[1]"]
+    of_a, of_b = ([lines[(axis + line) % 2] for axis in reversed(range(spec.axes))] for line in range(2))
+    taken = "found[axis] <= position;"
+    if spec.parallel:
+        each = " ".join(f"found[{axis}] <= position_{axis};" for axis in range(spec.axes))
+        taken = f"begin {each} end"
+    parts: dict[str, object] = {
+        # Before the first edge there are rounds in which no axis is counted.
+        "HOLD": max(min(-(-spec.timing.tick_cycles // _STEPS_PER_TICK), _LONGEST_HOLD), 4 * spec.slots),
+        "TICKS": _FOUND,
+        "A": f"{{{', '.join(of_a)}}}",
+        "B": f"{{{', '.join(of_b)}}}",
+        "CHECK": _CHECK_AXES,
+        "VELOCITY": "velocity_0" if spec.parallel else "velocity",
+        "WIDTH": spec.axis.position_width - 1,
+        "LAST": spec.axes - 1,
+        "FOUND": taken,
+        "AXES": spec.axes,
+        "TICK_CYCLES": spec.timing.tick_cycles,
+        "EXPECTED": (40 - 16) * spec.axis.encoder.decoding // 4,
+    }
+    return {"": ()}, parts
 
 
 def _instance(ports: Sequence[Port], name: str) -> str:

@@ -4,6 +4,7 @@ from amaranth import Module, Signal
 from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.idle import HasIdleCounters, IdleCounter
 from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
@@ -12,7 +13,6 @@ from tachometry.hdl.front_end.index_capture import IndexCapture
 from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.idle import HasIdleCounters, IdleCounter
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
 from tachometry.hdl.output.low_pass import LowPass
@@ -47,16 +47,19 @@ class Tachometer(wiring.Component):
         self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
         self.pulse_counter = PulseCounter(
-            max(spec.longest_tick, spec.max_pulse_count), spec.max_pulse_count, stretched=spec.own_ticks
+            max(spec.longest_tick, spec.max_pulse_count),
+            spec.max_pulse_count,
+            stretched=spec.own_ticks,
+            staged=spec.tick_latency > 2,
         )
-        self.position_counter = PositionCounter(spec.position_width)
-        self.index_capture = IndexCapture(spec.position_width) if spec.index else None
+        self.position_counter = PositionCounter(spec.position_width, spec.tick_latency)
+        self.index_capture = IndexCapture(spec.position_width, spec.tick_latency) if spec.index else None
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
         if isinstance(self.datapath, OwnTicks):
             self.sampling_clock = self.datapath
         elif spec.max_tick_cycles:
-            self.sampling_clock = ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles)
+            self.sampling_clock = ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles, spec.tick_latency)
         else:
             self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
         layout = update_layout(spec)
@@ -115,11 +118,14 @@ class Tachometer(wiring.Component):
         ]
         ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
         taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")}
+        taken |= {name: getattr(pulse_counter, name) for name in ("coming", "next_count")}
         taken |= {"step_now": decoder.step, "stamp": ticks}
         inputs = datapath.signature.members
         if "step" in inputs:
             # As late as `tick`: with it, all steps of the window have come.
             (taken["step"],) = delay(m, decoder.step, clocks=self._spec.tick_latency)
+        if "step_before" in inputs:
+            (taken["step_before"],) = delay(m, decoder.step, clocks=self._spec.tick_latency - 1)
         m.d.comb += [getattr(datapath, name).eq(value) for name, value in taken.items() if name in inputs]
         if isinstance(datapath, OwnTicks):
             m.d.comb += pulse_counter.beyond.eq(datapath.beyond)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from itertools import chain, combinations
 from typing import Any
 
+from tachometry.spec.axes import AxesSpec, CoreSpec
 from tachometry.spec.encoder import Encoder
 from tachometry.spec.methods.m import MTachometer
 from tachometry.spec.methods.mt import MTTachometer
@@ -117,6 +118,8 @@ def of_parameters(parameters: Mapping[str, Any]) -> TachometerSpec:
 __all__ = [
     "METHODS",
     "TWO_TICKS",
+    "AxesSpec",
+    "CoreSpec",
     "Encoder",
     "MTTachometer",
     "MTachometer",

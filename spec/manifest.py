@@ -3,9 +3,10 @@
 import re
 from typing import Any
 
+from tachometry.spec.axes import AxesSpec, CoreSpec
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import Port
-from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END, TachometerSpec
+from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
 
 _OF_PORTS = ("name", "direction", "width", "signed")
 _KEYWORDS = frozenset(
@@ -53,7 +54,7 @@ def described_port(port: Port) -> dict[str, Any]:
     return {key: getattr(port, key) for key in _OF_PORTS}
 
 
-def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
+def manifest(spec: CoreSpec, name: str = "tachometer") -> dict[str, Any]:
     """All that a program or a driver must know of the exported core.
 
     Raises
@@ -61,6 +62,8 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
     ValueError
         If `name` cannot be the name of a module.
     """
+    if isinstance(spec, AxesSpec):
+        return _of_axes(spec, name)
     if name in {port.name for port in spec.ports}:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     recovery = spec.recovery_clocks
@@ -98,6 +101,37 @@ def manifest(spec: TachometerSpec, name: str = "tachometer") -> dict[str, Any]:
             if spec.max_tick_cycles
             else {}
         ),
+        "ports": [described_port(port) for port in spec.ports],
+        "parameters": spec.parameters,
+    }
+
+
+def _of_axes(spec: AxesSpec, name: str) -> dict[str, Any]:
+    """What a core of many axes says otherwise than one of one axis."""
+    if name in {port.name for port in spec.ports}:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    alone, axis = spec.tachometer, spec.axis
+    found = manifest(alone, name)
+    del found["recovery_cycles"]
+    of_velocity = {
+        "width": axis.velocity_width,
+        "full_scale": axis.full_scale * 2.0**-axis.frac_bits,
+        "full_scale_rad_per_s": axis.full_scale * alone.rad_per_s_per_lsb,
+    }
+    return found | {
+        "velocity": found["velocity"] | of_velocity,
+        "axes": {
+            "axes": spec.axes,
+            "parallel": spec.parallel,
+            "round_cycles": spec.slots,
+            "turn_cycles": spec.turn_cycles,
+            "first_tick": spec.tick_clock(0, 0),
+        },
+        "latency_cycles": {
+            "pin_to_count": spec.pin_to_count,
+            "tick_latency": spec.tick_latency,
+            "tick_to_velocity": spec.tick_to_velocity,
+        },
         "ports": [described_port(port) for port in spec.ports],
         "parameters": spec.parameters,
     }

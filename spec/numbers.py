@@ -169,7 +169,7 @@ class Numbers(Parameters):
     def min_tick_cycles(self) -> int:
         """Fewest clocks between two external ticks: all work that is done step by step must be finished."""
         output = self.output_latency if self.output_serial else 0
-        return max(2, self.datapath_latency if self.serial else 0, output)
+        return max(2, self.busy_clocks if self.serial else 0, output)
 
     def has_room(self, clocks: int) -> bool:
         """Whether a tick is long enough for work of so many clocks; external ones may come in half the time."""
@@ -227,6 +227,11 @@ class Numbers(Parameters):
     def datapath_latency(self) -> int:
         """Clocks from `tick` to the native velocity."""
         raise NotImplementedError
+
+    @property
+    def busy_clocks(self) -> int:
+        """Clocks that a serial datapath needs from tick to tick."""
+        return self.datapath_latency
 
     @property
     def output_serial(self) -> bool:

@@ -6,7 +6,7 @@ documents. A port that is added here, and driven by hardware and golden model, a
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -50,9 +50,9 @@ class Port:
         return self.held_by == self.name
 
 
-def pin(name: str, help: str) -> Port:
-    """An input of one bit."""
-    return Port(name, "input", help=help)
+def pin(name: str, help: str, width: int = 1) -> Port:
+    """An input, of one bit as a rule."""
+    return Port(name, "input", width, help=help)
 
 
 def strobe(name: str, help: str) -> Port:
@@ -63,6 +63,15 @@ def strobe(name: str, help: str) -> Port:
 def held(by: str, name: str, width: int = 1, *, signed: bool = False, unit: str = "", help: str) -> Port:
     """An output that is read in the clocks of the strobe `by`."""
     return Port(name, "output", width, signed, by, unit, help)
+
+
+def strobes_of(outputs: Sequence[Port]) -> dict[str, tuple[str, ...]]:
+    """Outputs that strobe, each with the names of the outputs that are new with it."""
+    return {
+        strobe.name: tuple(port.name for port in outputs if port.held_by == strobe.name and port.name != strobe.name)
+        for strobe in outputs
+        if strobe.is_strobe
+    }
 
 
 def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:

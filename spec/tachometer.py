@@ -9,7 +9,7 @@ from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
 from tachometry.spec.numbers import Numbers
 from tachometry.spec.option import ParameterError, is_derived, options_of, settle
-from tachometry.spec.port import UPDATE, Port, held, ports_of
+from tachometry.spec.port import UPDATE, Port, held, ports_of, strobes_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
 from tachometry.spec.units import PI, SpeedUnit, plural, signed_width
 
@@ -44,8 +44,6 @@ class TachometerSpec(Numbers):
     last_at_rest: ClassVar[bool] = False
     # Whether its windows can have bounds.
     has_bounds: ClassVar[bool] = True
-    # The clock after the window completes the sum, the next saturates and registers it.
-    tick_latency: ClassVar[int] = 2
     # Whether pairwise tests give all options all of their values.
     pairs_all: ClassVar[bool] = False
     # Tenths of the maximum time after which it shows that the shaft stands, counted from the last count but one.
@@ -175,6 +173,11 @@ class TachometerSpec(Numbers):
         return None
 
     @property
+    def division(self) -> str:
+        """How the reciprocal is found where it is divided; empty: it is not."""
+        return ""
+
+    @property
     def standstill_ticks(self) -> int:
         """Ticks from that of the last count to the update that reads 0, at most."""
         return self.timing.max_ticks
@@ -183,6 +186,11 @@ class TachometerSpec(Numbers):
     def max_tick_shift(self) -> int:
         """Greatest k where a tick may last 2^k nominal ones."""
         return 0
+
+    @property
+    def tick_latency(self) -> int:
+        """Clocks from the last one of a window to `tick`: one completes the sum, one registers it."""
+        return 2
 
     @property
     def stamp_width(self) -> int:
@@ -220,7 +228,9 @@ class TachometerSpec(Numbers):
         held = 1 << max(self.filter_clocks - 1, 1).bit_length()
         conditioned = 2 + (held + self.filter_clocks if self.filter_clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
-        window = 1 + (1 << max(self.longest_tick - 2, 0).bit_length())
+        window = 1 + (
+            1 << (self.longest_tick if self.longest_tick >= 16 else max(self.longest_tick - 2, 0)).bit_length()
+        )
         return conditioned + 1 + window
 
     @property
@@ -277,14 +287,7 @@ class TachometerSpec(Numbers):
     @property
     def strobes(self) -> dict[str, tuple[str, ...]]:
         """Outputs that strobe, each with the names of the outputs that are new with it."""
-        outputs = self.outputs
-        return {
-            strobe.name: tuple(
-                port.name for port in outputs if port.held_by == strobe.name and port.name != strobe.name
-            )
-            for strobe in outputs
-            if strobe.is_strobe
-        }
+        return strobes_of(self.outputs)
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -13,6 +13,7 @@ ALLOWED = {
     "spec": {"spec"},
     "hdl": {"hdl", "spec"},
     "hdl/front_end": {"hdl/arithmetic", "spec"},
+    "hdl/axes": {"hdl/arithmetic", "hdl/front_end", "spec"},
     "hdl/arithmetic": {"spec"},
     "hdl/bus": {"hdl/arithmetic", "hdl/front_end", "spec"},
     "hdl/output": {"hdl/arithmetic", "spec"},

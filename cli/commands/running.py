@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tachometry.cli.files import Outputs
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.units import format_time
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.sim.encoder.virtual import Encoding
-    from tachometry.sim.signals.recording import PinTrace, Recording
+    from tachometry.sim.signals.axes import Trace
+    from tachometry.sim.signals.recording import Recording
     from tachometry.sim.signals.run import Run
+    from tachometry.sim.studies.lockstep import Lockstep
 
-Window = Callable[[TachometerSpec, int], tuple[int, int]]
+Window = Callable[[CoreSpec, int], tuple[int, int]]
 
 
 def run_and_report(
@@ -27,34 +30,81 @@ def run_and_report(
     window: Window,
 ) -> int:
     """Run hardware and golden model, write what is wanted, print the summary; the exit status."""
-    from tachometry.cli.reports.run import interrupted, print_summary
-    from tachometry.cli.reports.terminal import clocks_progress
-    from tachometry.sim.engines.pick import pick
+    from tachometry.cli.reports.run import print_summary
     from tachometry.sim.signals.recording import PinTrace
-    from tachometry.sim.studies.lockstep import lockstep
 
     trace = PinTrace.of(recording, spec)
+    found, used = _played(spec, source, trace, truth, outputs, engine, window)
+    print_summary(spec, found.actual, recording, truth, found.n_mismatches, found.first, used)
+    return _status(found, trace.n_clocks)
+
+
+def refuse_plot(targets: Mapping[str, Path]) -> None:
+    """See that no figure is wanted of many axes."""
+    if "--plot" in targets:
+        raise ValueError("--plot must not be given together with --axes: a figure is of one axis")
+
+
+def run_axes_and_report(
+    spec: AxesSpec,
+    source: str,
+    recordings: Sequence[Recording],
+    truths: Sequence[Encoding] | None,
+    outputs: Outputs,
+    engine: str,
+    window: Window,
+) -> int:
+    """The same for many axes, with a recording, and what the shaft truly did, of each."""
+    from tachometry.cli.reports.axes import print_axes_summary
+    from tachometry.sim.signals.axes import AxesTrace
+    from tachometry.sim.signals.recording import PinTrace
+
+    trace = AxesTrace.of([PinTrace.of(recording, spec.tachometer) for recording in recordings])
+    found, used = _played(spec, source, trace, None, outputs, engine, window)
+    print_axes_summary(spec, found, recordings, truths, used)
+    return _status(found, trace.n_clocks)
+
+
+def _played(
+    spec: CoreSpec,
+    source: str,
+    trace: Trace,
+    truth: Encoding | None,
+    outputs: Outputs,
+    engine: str,
+    window: Window,
+) -> tuple[Lockstep, str]:
+    """What came of a trace, and what has simulated it; what is wanted is written."""
+    from tachometry.cli.reports.terminal import clocks_progress
+    from tachometry.sim.engines.pick import pick
+    from tachometry.sim.studies.lockstep import lockstep
+
     _require_a_tick(spec, source, trace)
-    shown, chosen, wanted = window(spec, trace.n_clocks), pick(engine), trace.n_clocks
+    shown, chosen = window(spec, trace.n_clocks), pick(engine)
     with outputs:
         with clocks_progress(trace.n_clocks) as progress:
             vcd, fewest = outputs.get("--vcd"), _least(spec)
             found = lockstep(spec, trace, chosen, vcd=vcd, window=shown, progress=progress, fewest=fewest)
         _write(spec, found.trace, found.actual, truth, outputs)
-    actual = found.actual
     missing = " (there is no C++ compiler)" if (engine, chosen.name) == ("auto", "pysim") else ""
-    print_summary(spec, actual, recording, truth, found.n_mismatches, found.first, chosen.name + missing)
+    return found, chosen.name + missing
+
+
+def _status(found: Lockstep, wanted: int) -> int:
+    from tachometry.cli.reports.run import interrupted
+
     if found.n_mismatches:
         return 1
-    return interrupted(actual.n_clocks, wanted) if actual.n_clocks < wanted else 0
+    done = found.actual.n_clocks
+    return interrupted(done, wanted) if done < wanted else 0
 
 
-def _least(spec: TachometerSpec) -> int:
+def _least(spec: CoreSpec) -> int:
     """Fewest clocks after which there is something to report."""
     return spec.longest_tick + spec.tick_latency
 
 
-def _require_a_tick(spec: TachometerSpec, source: str, trace: PinTrace) -> None:
+def _require_a_tick(spec: CoreSpec, source: str, trace: Trace) -> None:
     needed = _least(spec)
     if trace.n_clocks < needed:
         raise ValueError(
@@ -63,7 +113,7 @@ def _require_a_tick(spec: TachometerSpec, source: str, trace: PinTrace) -> None:
         )
 
 
-def _write(spec: TachometerSpec, trace: PinTrace, run: Run, truth: Encoding | None, outputs: Outputs) -> None:
+def _write(spec: CoreSpec, trace: Trace, run: Run, truth: Encoding | None, outputs: Outputs) -> None:
     if path := outputs.get("--trace"):
         from tachometry.sim.signals.tables import write_trace
 
@@ -83,4 +133,5 @@ def _write(spec: TachometerSpec, trace: PinTrace, run: Run, truth: Encoding | No
     if path := outputs.get("--plot"):
         from tachometry.sim.plots.run import save_plot
 
+        assert not isinstance(spec, AxesSpec), "a figure is of one axis"
         save_plot(path, spec, run, None if truth is None else truth.true_speed)

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tachometry.cli.commands.running import run_and_report
+from tachometry.cli.commands.running import refuse_plot, run_and_report, run_axes_and_report
 from tachometry.cli.files import Outputs
+from tachometry.cli.options.axes import axes_options
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import engine_options
 from tachometry.cli.options.motion import FORMS, motion_options
 from tachometry.cli.options.option import GroupedCommand, output_options
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.cli.commands.running import Window
@@ -40,12 +41,13 @@ Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
 a --clock that is a few times the edge rate then.""",
 )
 @core_options
+@axes_options
 @motion_options
 @output_options
 @engine_options
 def simulate(
-    spec: TachometerSpec,
-    record: Callable[[TachometerSpec], Encoding],
+    spec: CoreSpec,
+    record: Callable[..., Encoding],
     tables: list[Path],
     targets: dict[str, Path],
     engine: str,
@@ -60,5 +62,10 @@ def simulate(
     Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=tables)
+    if isinstance(spec, AxesSpec):
+        refuse_plot(targets)
+        truths = [record(spec.tachometer, axis) for axis in range(spec.axes)]
+        recordings = [truth.recording for truth in truths]
+        return run_axes_and_report(spec, "--motion", recordings, truths, outputs, engine, window)
     truth = record(spec)
     return run_and_report(spec, "--motion", truth.recording, truth, outputs, engine, window)

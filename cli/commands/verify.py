@@ -18,7 +18,8 @@ import click
 
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
 from tachometry.cli.reports.streams import INTERRUPTED
-from tachometry.sim.studies.pairs import configurations, spec_of
+from tachometry.sim.studies.axes import AXES, core_of
+from tachometry.sim.studies.pairs import configurations
 from tachometry.spec import METHODS
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
@@ -84,9 +85,9 @@ later ones find them in the cache.""",
 def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None, directory: Path) -> int:
     """Hold all engines against the golden models, in many configurations.
 
-    Every two options of a method meet in some configuration. Seeded motions visit what a core must survive: speeds
-    about the unit velocity and its multiples, reversals, illegal transitions, creeping, standstill. Every bit of every
-    tick and update is compared.
+    Every two options of a method meet in some configuration; method s is also that of many axes. Seeded motions visit
+    what a core must survive: speeds about the unit velocity and its multiples, reversals, illegal transitions,
+    creeping, standstill. Every bit of every tick and update is compared.
 
     Exit status 1 if any differs: the first motion on which it does is saved as a capture, and the command that replays
     it is printed.
@@ -100,7 +101,7 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
     cores = [
         _Configuration(f"{method}{number}", method, words)
         for method in chosen
-        for number, words in enumerate(configurations(method), 1)
+        for number, words in enumerate([*configurations(method), *(AXES if method == "s" else ())], 1)
     ]
     check = functools.partial(_check, engines=used, clocks=-(-clocks // len(cores)), seed=seed, directory=directory)
     found: list[_Result] = []
@@ -142,7 +143,7 @@ def _check(core: _Configuration, *, engines: list[str], clocks: int, seed: int, 
     from tachometry.sim.captures.sigrok import write_sr
     from tachometry.sim.studies.verify import verify
 
-    spec = spec_of(core.words)
+    spec = core_of(core.words)
     outcomes = verify(spec, engines, clocks, seed)
     failures = []
     for engine, outcome in outcomes.items():

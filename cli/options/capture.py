@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tachometry.cli.options.option import all_of, option, refuse_without
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.units import parse_frequency
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
@@ -19,7 +19,13 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 _CAPTURE = "Capture"
 
 _OPTIONS = [
-    option(_CAPTURE, "--a", metavar="CHANNEL", help="Channel of line A: its name, or its number from 0."),
+    option(
+        _CAPTURE,
+        "--a",
+        metavar="CHANNEL",
+        help="Channel of line A: its name, or its number from 0. With --axes one for each axis, with commas between, "
+        "as of --b and --z; then these are a0, a1 and so on, b0, z0, if they are not given.",
+    ),
     option(
         _CAPTURE,
         "--b",
@@ -61,7 +67,7 @@ _OPTIONS = [
 
 
 def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: handed to the command as `read`, which reads a capture for a spec."""
+    """Decorator: handed to the command as `read`, which reads a capture for a spec, or for an axis of so many."""
 
     @functools.wraps(command)
     def build(
@@ -75,22 +81,36 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
         sensor: str,
         **others: Any,
     ) -> Any:
-        def read(capture: Path, spec: TachometerSpec) -> Recording:
+        def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
             from tachometry.sim.captures.file import SAME, OptionError
             from tachometry.sim.captures.other_sensors import converted
             from tachometry.sim.captures.read import read_capture, with_last_tick
 
-            index = "z" if z is None and spec.index else z
-            tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
-            rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
+            alone, axes = (spec.tachometer, spec.axes) if isinstance(spec, AxesSpec) else (spec, None)
             if sensor == "pulses" and b is not None:
                 raise OptionError("b", "must not be given together with --sensor pulses")
-            line_b = SAME if sensor == "pulses" else b
-            recording = read_capture(capture, a, line_b, rate, index, tick, time)
-            return with_last_tick(converted(recording, sensor, spec), spec)
+            line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
+            index = _of_axis("z", z, axis, axes) if z is not None or alone.index else None
+            tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
+            rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
+            second = SAME if sensor == "pulses" else line_b
+            recording = read_capture(capture, line_a, second, rate, index, tick, time)
+            return with_last_tick(converted(recording, sensor, alone), spec)
 
         if others.get("capture") is None:
             refuse_without("--replay", _OPTIONS)
         return command(read=read, **others)
 
     return all_of(_OPTIONS, build)
+
+
+def _of_axis(line: str, text: str | None, axis: int, axes: int | None) -> str | None:
+    """The channel of a line, or that of one of many axes; None: the reader's default."""
+    if axes is None:
+        return line if text is None and line == "z" else text
+    if text is None:
+        return f"{line}{axis}"
+    found = [word.strip() for word in text.split(",")]
+    if len(found) != axes:
+        raise ValueError(f"--{line} must be {axes} channels with commas between, one for each axis, not {text!r}")
+    return found[axis]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +53,8 @@ def _motion(required: bool) -> Callable[[Any], Any]:
         "--motion",
         required=required,
         metavar="MOTION",
-        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below.",
+        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below. With --axes several, with "
+        "commas between: each axis has its own, the last one those that are left, and the next seed.",
     )
 
 
@@ -138,7 +140,8 @@ _OPTIONS = [
 def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator: the options of the virtual encoder, handed to the command as two arguments.
 
-    `record` gives what the encoder of a spec records of the motion; `tables` are the files that it reads.
+    `record` gives what the encoder of a spec, or that of an axis, records of the motion; `tables` are the files that it
+    reads.
     """
     return all_of([_motion(required=True), *_OPTIONS], _recording(command))
 
@@ -154,20 +157,24 @@ def encoder_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def tables_of(motion: str) -> list[Path]:
-    """Files that a motion reads."""
-    kind, _, table = motion.strip().partition(":")
-    return [Path(table)] if kind == "csv" else []
+    """Files that a motion reads, or the motions of several axes."""
+    parts = [part.strip().partition(":") for part in {motion, *motion.split(",")}]
+    return [Path(table) for kind, _, table in parts if kind == "csv"]
 
 
 def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def build(*, motion: str | None, encoder: Callable[[TachometerSpec], VirtualEncoder], **others: Any) -> Any:
-        def record(spec: TachometerSpec) -> Encoding:
+        def record(spec: TachometerSpec, axis: int | None = None) -> Encoding:
             from tachometry.sim.encoder.motion import parse_motion
 
             assert motion is not None
-            return encoder(spec).record(parse_motion(motion))
+            own = encoder(spec)
+            if axis is None:
+                return own.record(parse_motion(motion))
+            each = motion.split(",")
+            return replace(own, seed=own.seed + axis).record(parse_motion(each[min(axis, len(each) - 1)]))
 
         if motion is None:
             refuse_without("--motion", _OPTIONS)

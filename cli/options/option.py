@@ -191,7 +191,7 @@ _OUTPUT_OPTIONS = [
     output(
         "--trace",
         help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
-        "velocity in rad/s; then all other outputs that change with an update.",
+        "velocity in rad/s, or in the unit of --unit; then all other outputs that change with an update.",
     ),
     output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts), and what else ticks have."),
     output("--events", help="CSV with a row per index pulse, illegal transition and external tick that was wrong."),

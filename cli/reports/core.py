@@ -21,7 +21,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     """Rows of the table: a name and its value."""
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
-    greatest = f"{_speed(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
+    greatest = f"{speed_text(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
     latencies = manifest(spec)["latency_cycles"]
     memory = spec.memory
     return [
@@ -30,7 +30,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ("clock", f"{timing.clock_hz:,} Hz"),
         ("tick", f"{short_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
         ("maximum time", f"{short_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
-        ("unit velocity", f"{_speed(spec.unit_velocity)} (1 count per tick)"),
+        ("unit velocity", f"{speed_text(spec.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
         ("full scale", _full_scale(spec)),
         (
@@ -39,7 +39,8 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
             f"{spec.rounding_lsb} of it",
         ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.outputs if port.width > 1)),
-        *([] if memory is None else [("reciprocal", _memory(*memory))]),
+        *([] if memory is None else [("reciprocal", memory_text(*memory))]),
+        *([("reciprocal", spec.division)] if spec.division else []),
         *((name, f"{plural(n, 'clock')} ({short_time(spec.seconds(n))})") for name, n in latencies.items()),
         ("standstill", _standstill(spec)),
         *(("note", note) for note in spec.notes),
@@ -81,7 +82,8 @@ def _registers(spec: TachometerSpec, bus: str) -> tuple[str, str]:
     return "registers", f"{number} of {WORD} bits on {bus}, configuration 0x{registers.configuration:08x}"
 
 
-def _memory(kind: str, entries: int, width: int) -> str:
+def memory_text(kind: str, entries: int, width: int) -> str:
+    """A memory, and how many bits it has."""
     return f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"
 
 
@@ -91,7 +93,8 @@ def _standstill(spec: TachometerSpec) -> str:
     return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
 
 
-def _speed(rad_per_s: float) -> str:
+def speed_text(rad_per_s: float) -> str:
+    """A speed in all units."""
     return " = ".join(f"{SpeedUnit(unit).of(rad_per_s):.6g} {unit}" for unit in SPEED)
 
 

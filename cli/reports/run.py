@@ -38,7 +38,7 @@ def print_summary(
         console.print(Text(f"first mismatch in {mismatch}"))
     warnings = _warnings(spec, run, recording, truth)
     print_warnings(warnings)
-    console.print(_verdict(run, n_mismatches, warned=bool(warnings)))
+    console.print(verdict(run, n_mismatches, warned=bool(warnings)))
 
 
 def print_warnings(warnings: list[str]) -> None:
@@ -159,7 +159,8 @@ def _errors(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tupl
     ]
 
 
-def _verdict(run: Run, n_mismatches: int, warned: bool) -> Text:
+def verdict(run: Run, n_mismatches: int, warned: bool) -> Text:
+    """The last line: whether hardware and golden model agree."""
     if n_mismatches:
         return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
     only = "; neither was compared with the shaft: see the warning" if warned else ""

@@ -1,28 +1,35 @@
 """A quotient, bit by bit."""
 
-from amaranth import Cat, Const, Module, Signal, signed
+from amaranth import Array, Cat, Const, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 
 class Divider(wiring.Component):
-    """Signed serial divider, non-restoring: the quotient rounded down, ⌊2^s · dividend / divisor⌋.
+    """Signed serial divider, non-restoring: the quotient ⌊2^s · dividend / divisor⌋, or the nearest integer to it.
 
     In each step the divisor is taken from the doubled remainder, or added if that is negative; so it stays within
     −divisor … divisor − 1. The signs that it passes through, inverted but for the first, are the digits of the quotient
     in two's complement: Σ ±2^i is their weighted sum, and the last one is the correction to a remainder that is not
-    negative. A counter shows when the last digit has come. It ends from any state, unlike a marker among the digits.
+    negative. The digits follow the dividend in its register, from which a bit goes to the remainder in each step. The
+    nearest integer is ⌊(2^s · dividend + ⌊divisor/2⌋) / divisor⌋, whose dividend has the divisor's bits at its end: so
+    nothing is to be added to the quotient. A counter shows when the last digit has come. It ends from any state, unlike
+    a marker among the digits.
 
-    Latency: `done` is high as many clocks after `start` as the quotient has bits; a `start` before `done`, or together
-    with it, begins the next division.
+    Latency: `done` is high as many clocks after `start` as the quotient has bits, and one; a `start` before `done`, or
+    together with it, begins the next division.
 
     Parameters
     ----------
     divisor_width : int
     integer_bits : int
-        Of the quotient, without its sign: |dividend| < 2^integer_bits · divisor.
+        Of the quotient, without its sign: the quotient has as many, and s and the sign.
     scale_bits : int
         s.
+    nearest : bool
+        Round to the nearest integer, a tie up.
+    zeros : int
+        Bits at the end of each dividend that are 0.
 
     Members
     -------
@@ -30,63 +37,94 @@ class Divider(wiring.Component):
     dividend : In(signed(divisor_width + integer_bits + 1))
     divisor : In(divisor_width)
         Positive; both are valid with `start`.
-    busy : Out(1)
-        A division is under way or done in this clock.
+    running : Out(1)
+        A digit is found in this clock.
+    digit : Out(1)
+        The digits of the quotient in two's complement, the first ones first; the very first one is inverted.
     done : Out(1)
+        One clock: the quotient is new.
     quotient : Out(signed(integer_bits + scale_bits + 1))
-        Valid with `done`.
+        Held until the next start.
     by : Out(divisor_width)
         The divisor, held until the next start.
     """
 
-    def __init__(self, *, divisor_width: int, integer_bits: int, scale_bits: int) -> None:
-        self._integer_bits = integer_bits
+    def __init__(
+        self,
+        *,
+        divisor_width: int,
+        integer_bits: int,
+        scale_bits: int,
+        nearest: bool = False,
+        zeros: int = 0,
+    ) -> None:
         self._steps = integer_bits + scale_bits
+        self._scale_bits = scale_bits
+        self._nearest = nearest
+        self._zeros = zeros
         super().__init__(
             {
                 "start": In(1),
                 "dividend": In(signed(divisor_width + integer_bits + 1)),
                 "divisor": In(divisor_width),
-                "busy": Out(1),
+                "running": Out(1),
+                "digit": Out(1),
                 "done": Out(1),
                 "quotient": Out(signed(self._steps + 1)),
                 "by": Out(divisor_width),
             }
         )
+        # Counts down to −1.
+        self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)
+
+    def next_digit_of(self, number: int) -> Value:
+        """What `digit` would be in the clock after this one if the quotient were this number."""
+        place = self._left[: (self._steps - 1).bit_length()]
+        return Array(number >> k & 1 for k in range(1 << len(place)))[place]
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         # Only the flags of work in progress need a reset; all else is loaded before it is used.
-        running = Signal()
-        steps = Signal(signed((self._steps - 1).bit_length() + 1), reset_less=True)  # counts down to −1
+        left, running = self._left, self.running
         remainder = Signal(signed(len(self.by) + 1), reset_less=True)
-        left = Signal(self._integer_bits, reset_less=True)
-        digits = Signal(self._steps, reset_less=True)
+        digits = Signal(self._steps + 1, reset_less=True)
         by = Signal.like(self.by, reset_less=True)
         negative = remainder[-1]
         m.d.comb += [
             self.by.eq(by),
-            self.done.eq(running & steps[-1]),
-            self.busy.eq(running),
-            self.quotient.eq(Cat(~negative, digits[:-1], ~digits[-1])),
+            self.digit.eq(~negative),
+            self.quotient.eq(Cat(digits[:-1], ~digits[-1])),
         ]
         # 2·remainder ± by with one adder: −by is ~by + 1, and the 1 comes from an additional bit at the adder's end.
         term = Cat(by, Const(0)) ^ (~negative).replicate(len(by) + 1)
-        total = Cat(1, left[-1], remainder).as_signed() + Cat(~negative, term).as_signed()
+        total = Cat(1, digits[-1], remainder).as_signed() + Cat(~negative, term).as_signed()
+        m.d.sync += self.done.eq(running & left[-1] & ~self.start)
         with m.If(running):
             m.d.sync += [
                 remainder.eq(total >> 1),
-                left.eq(left << 1),
-                steps.eq(steps - 1),
-                digits.eq(Cat(~negative, digits)),
+                digits.eq(Cat(self.digit, digits)),
+                left.eq(left - 1),
             ]
-        with m.If(self.done):
+        with m.If(left[-1]):
             m.d.sync += running.eq(0)
         with m.If(self.start):
             m.d.sync += [
                 running.eq(1),
-                Cat(left, remainder).eq(self.dividend),
-                steps.eq(self._steps - 1),
+                Cat(digits[1:], remainder).eq(self._scaled),
+                left.eq(self._steps - 1),
                 by.eq(self.divisor),
             ]
         return m
+
+    @property
+    def _scaled(self) -> Value:
+        """What is divided."""
+        scale, zeros = self._scale_bits, self._zeros
+        if not self._nearest:
+            return self.dividend << scale
+        half = Cat(self.divisor[1:], Const(0, scale))
+        above = half[scale : max(scale, len(self.divisor) - 1)]
+        whole: Value = self.dividend + above
+        if len(above) <= zeros:
+            whole = Cat(above, Const(0, zeros - len(above)), self.dividend[zeros:])
+        return Cat(half[:scale], whole)

@@ -8,8 +8,8 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
-from tachometry.hdl.arithmetic.reciprocal import Reciprocal
-from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.arithmetic.reciprocal import DividedReciprocal, LookedUpReciprocal
+from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
 from tachometry.spec.formats import carried_reciprocal, reciprocal
 
@@ -33,24 +33,18 @@ class _TakesRemainder(Protocol):
     r: Signal
 
 
-def _scaler(serial: bool, carried: bool) -> Callable[..., _Scaler]:
-    if carried:
-        return SerialRemainderScaler if serial else PipelinedRemainderScaler
-    return SerialScaler if serial else PipelinedScaler
-
-
 class Quotient(wiring.Component):
     """base + N/m, and bounds of it, correctly rounded and without a divider.
 
-    1/m is looked up, carried on from m to m + 1, or constant; it is multiplied step by step or all at once. All
-    quotients share the reciprocal. A bound is the quotient of N − margin rounded down, or of N + margin rounded up.
+    1/m is looked up, divided, carried on from m to m + 1, or constant; it is multiplied step by step or all at once.
+    All quotients share the reciprocal. A bound is the quotient of N − margin rounded down, or of N + margin rounded up.
 
     Latency: that of the scaler, from `start` on.
 
     Parameters
     ----------
     shape : spec.reciprocal.Reciprocal or spec.carried_reciprocal.CarriedReciprocal
-        Widths and contents of the reciprocal.
+        Widths and contents of the reciprocal. A carried one is multiplied all at once.
     quotients : dict
         By the name of each quotient its bits, and which way it is rounded: to the nearest (0), down (−1) or up (1).
     numerator_width : int
@@ -58,7 +52,8 @@ class Quotient(wiring.Component):
     tag : data.StructLayout
         What travels along.
     serial : bool
-        Step by step: `load` may come again as soon as the result has. Otherwise it may come in every clock.
+        Step by step: `start` may come again as soon as the result has, and m, which moves then, and `tag` must stay as
+        they are until then. Otherwise it may come in every clock.
     margin : int
     constant : int or None
         m, if it is always the same.
@@ -66,13 +61,14 @@ class Quotient(wiring.Component):
     Members
     -------
     m : In(range(max_m + 1))
-        `m` and `enable` exist only if m is not constant. A carried reciprocal restricts what may follow an m.
-    enable : In(1)
-        `m` is new.
+        `m` and `moves` exist only if m is not constant. A carried reciprocal restricts what may follow an m.
+    moves : In(1)
+        This is the last clock with this m.
     load : In(1)
-        `base`, `numerator`, `m` and `tag` are valid.
+        `base` and `numerator` are valid.
     start : In(1)
-        The loaded values are to be used; only together with `load`.
+        What was loaded in the clock before is to be used; `m` and `tag` are valid. If m is looked up or divided, it
+        must have been there for as long as that takes.
     base, numerator : In(signed)
     tag : In(tag)
     results : Out(stream)
@@ -91,19 +87,23 @@ class Quotient(wiring.Component):
         constant: int | None = None,
     ) -> None:
         self._margins = {name: towards * margin for name, (_, towards) in quotients.items()}
-        self.reciprocal: Reciprocal | CarriedReciprocal | None = None
+        self.reciprocal: LookedUpReciprocal | DividedReciprocal | CarriedReciprocal | None = None
         self._constant = 0
         inputs, travels = {}, tag
         if constant is None:
-            inputs = {"m": In(range(shape.max_m + 1)), "enable": In(1)}
+            inputs = {"m": In(range(shape.max_m + 1)), "moves": In(1)}
             travels = data.StructLayout({"m": range(shape.max_m + 1), **tag.members})
         if isinstance(shape, carried_reciprocal.CarriedReciprocal):
             self.reciprocal = CarriedReciprocal(shape)
-        elif constant is None:
-            self.reciprocal = Reciprocal(shape)
-        else:
+        elif constant is not None:
             self._constant = shape.value(constant)
-        scaler = _scaler(serial, carried=isinstance(self.reciprocal, CarriedReciprocal))
+        elif isinstance(shape, reciprocal.DividedReciprocal):
+            self.reciprocal = DividedReciprocal(shape)
+        else:
+            self.reciprocal = LookedUpReciprocal(shape)
+        scaler: Callable[..., _Scaler] = SerialScaler if serial else PipelinedScaler
+        if isinstance(self.reciprocal, CarriedReciprocal):
+            scaler = RemainderScaler
         self.scalers = {
             name: scaler(
                 shape,
@@ -132,7 +132,7 @@ class Quotient(wiring.Component):
         new, q = self.results.p, self._constant
         if self.reciprocal is not None:
             m.submodules.reciprocal = self.reciprocal
-            m.d.comb += [self.reciprocal.m.eq(self.m), self.reciprocal.enable.eq(self.enable)]
+            m.d.comb += [self.reciprocal.m.eq(self.m), self.reciprocal.moves.eq(self.moves)]
             q = self.reciprocal.q
         for name, box in self.scalers.items():
             m.submodules[f"scaler_{name}"] = box

@@ -1,6 +1,6 @@
 """The reciprocal of m_s."""
 
-from amaranth import Module
+from amaranth import Cat, Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -8,10 +8,11 @@ from amaranth.lib.wiring import In, Out
 from tachometry.spec.formats import reciprocal as spec
 
 
-class Reciprocal(wiring.Component):
-    """q(m) = ⌊2^(f+g)/m⌋ from a table in block RAM.
+class LookedUpReciprocal(wiring.Component):
+    """q(m) from a table in block RAM.
 
-    Latency: q is there in the clock after `enable`, and stays until the next.
+    Latency: q is there two clocks after m. The register behind the table is what the memories of many FPGAs have
+    built in; without it, the way out of a memory and on to an adder limits the clock.
 
     Parameters
     ----------
@@ -22,18 +23,64 @@ class Reciprocal(wiring.Component):
     -------
     m : In(range(max_m + 1))
         1 … max_m.
-    enable : In(1)
+    moves : In(1)
+        Not used: see `DividedReciprocal`.
     q : Out(width)
     """
 
     def __init__(self, reciprocal: spec.Reciprocal) -> None:
         self._reciprocal = reciprocal
-        super().__init__({"m": In(range(reciprocal.max_m + 1)), "enable": In(1), "q": Out(reciprocal.width)})
+        super().__init__({"m": In(range(reciprocal.max_m + 1)), "moves": In(1), "q": Out(reciprocal.width)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         table = self._reciprocal
         m.submodules.table = memory = Memory(shape=table.width, depth=table.depth, init=table.table)
         read = memory.read_port()
-        m.d.comb += [read.addr.eq(self.m), read.en.eq(self.enable), self.q.eq(read.data)]
+        found = Signal(table.width, reset_less=True)
+        m.d.comb += [read.addr.eq(self.m), read.en.eq(1), self.q.eq(found)]
+        m.d.sync += found.eq(read.data)
+        return m
+
+
+class DividedReciprocal(wiring.Component):
+    """q(m) found by a subtraction a clock.
+
+    Latency: q is there `reciprocal.steps` and two clocks after `moves`, or after the reset, and stays until it moves.
+
+    Parameters
+    ----------
+    reciprocal : spec.reciprocal.DividedReciprocal
+
+    Members
+    -------
+    m : In(range(max_m + 1))
+        1 … max_m.
+    moves : In(1)
+        This is the last clock with this m.
+    q : Out(steps + 1)
+    """
+
+    def __init__(self, reciprocal: spec.DividedReciprocal) -> None:
+        self._reciprocal = reciprocal
+        super().__init__({"m": In(range(reciprocal.max_m + 1)), "moves": In(1), "q": Out(reciprocal.width)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        # The first digit is 1 in any case, and has gone through all others when the division is done.
+        digits = Signal(self._reciprocal.steps + 1)
+        remainder = Signal(signed(len(self.m) + 1))
+        first = Signal(init=1)
+        adds = remainder[-1]
+        multiple = Cat(self.m ^ (~adds).replicate(len(self.m)), ~adds).as_signed()
+        m.d.sync += first.eq(0)
+        with m.If(~digits[-1]):
+            m.d.sync += [
+                digits.eq(Cat(~adds, digits)),
+                # −m is ~m + 1.
+                remainder.eq((Cat(~adds, first, remainder).as_signed() + Cat(~adds, multiple).as_signed()) >> 1),
+            ]
+        with m.If(self.moves):
+            m.d.sync += [digits.eq(0), remainder.eq(0), first.eq(1)]
+        m.d.comb += self.q.eq(Cat(Const(1, 1), digits[:-1]))
         return m

@@ -1,12 +1,11 @@
 """base + N·q, rounded: the arithmetic that turns a reciprocal into a velocity.
 
-Both scalers form base·2^f + ⌊(N·q + E + 2^(k−1)) / 2^k⌋, which spec/formats/reciprocal.py shows to be correctly
-rounded, by adding q for every bit of N, the least significant first, and dropping a bit of the sum each time; the sign
-bit of N counts negative. One scaler takes a clock per bit and a single adder. The other has an adder per bit, and
-accepts any update rate. Their latencies are the same.
+Both scalers form base·2^f + ⌊(N·q + C) / 2^k⌋, which spec/formats/reciprocal.py shows to be correctly rounded. One
+takes N in digits −2 … 2 of radix 4 (Booth), the greatest first, a clock for each, with a single adder. The other has an
+adder for every bit of N, and accepts any update rate.
 """
 
-from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
+from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -18,8 +17,6 @@ from tachometry.spec.formats.reciprocal import Reciprocal
 
 class _Scaler(wiring.Component):
     """What both scalers share.
-
-    Latency: a result comes as many clocks after `start` as N has bits, and three more.
 
     Parameters
     ----------
@@ -34,12 +31,12 @@ class _Scaler(wiring.Component):
     Members
     -------
     load : In(1)
-        `base`, `numerator` and `tag` are valid.
+        `base` and `numerator` are valid.
     start : In(1)
-        The loaded values are to be used; only together with `load`.
+        What was loaded in the clock before is to be used; `q` and `tag` are valid.
     base, numerator, tag : In
     q : In(reciprocal.width)
-        Reciprocal, valid in the clock after `start`.
+        Reciprocal.
     results : Out(stream)
         `quotient` and `tag`, held until the next.
     """
@@ -53,12 +50,11 @@ class _Scaler(wiring.Component):
         tag: data.StructLayout,
         towards: int = 0,
     ) -> None:
-        self._steps = numerator_width
+        self._bits = numerator_width
+        self._digits = reciprocal.digits
         self._rounding = reciprocal.rounding(towards)
         self._frac_bits = reciprocal.frac_bits
-        # What is left to drop when all bits of N are done.
-        self._surplus = reciprocal.scale_bits - numerator_width
-        self._total_shape = signed(reciprocal.width + 1)
+        self._scale_bits = reciprocal.scale_bits
         super().__init__(
             {
                 "load": In(1),
@@ -71,86 +67,78 @@ class _Scaler(wiring.Component):
             }
         )
 
-    def _result(self, base: Signal, total: Signal) -> ValueLike:
-        """The quotient, from a total of which a bit has been dropped for every bit of N."""
-        width = len(self.results.p.quotient)
-        # Both terms may be taken modulo the width of the sum, which is known to fit.
-        return (base << self._frac_bits) + Value.cast(total >> self._surplus)[:width].as_signed()
-
 
 class SerialScaler(_Scaler):
-    """One bit of N a clock. `load` may come again as soon as the result has."""
+    """A digit of N a clock.
+
+    `q` and `tag` must stay as they are until the result. `start` may come again as soon as the result has.
+
+    Latency: a result comes as many clocks after `start` as N has digits, and one more.
+    """
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
-        # Only the flags of work in progress need a reset; all else is loaded before it is used.
-        running = Signal()
-        adding = Signal()
-        last = Signal()
-        added = Signal()
-        total = Signal(self._total_shape, reset_less=True)
-        bits = Signal(self._steps, reset_less=True)
-        step = Signal(range(self._steps + 1), reset_less=True)
-        base = Signal.like(self.base, reset_less=True)
-        tag = Signal.like(self.tag, reset_less=True)
+        n_digits = self._digits
+        run = Signal(n_digits)  # bit i: the product of digit i is added, the greatest being digit 0
+        m.d.sync += [run.eq(Cat(self.start, run)), self.results.valid.eq(run[-1])]
 
-        # What is added next: q, nothing where a bit of N is 0, −q = ~q + 1 where its sign bit is 1.
-        sign = step == self._steps - 1
-        addend = Signal.like(self.q, reset_less=True)
-        borrow = Signal(reset_less=True)
-        m.d.sync += [
-            addend.eq(self.q ^ sign.replicate(len(self.q))),
-            borrow.eq(sign & bits[0]),
-            bits.eq(bits >> 1),
-            adding.eq(running),
-            last.eq(running & sign),
-            added.eq(last),
-            self.results.valid.eq(added),
-        ]
-        with m.If(running):
-            m.d.sync += step.eq(step + 1)
-        with m.If(~bits[0]):
-            m.d.sync += addend.eq(0)
-        with m.If(sign):
-            m.d.sync += running.eq(0)
-        with m.If(adding):
-            # The carry into the adder comes from an additional bit at its end.
-            sum_ = Cat(1, total).as_signed() + Cat(borrow, addend, borrow).as_signed()
-            m.d.sync += total.eq(sum_ >> 2)
-        with m.If(added):
-            m.d.sync += [result.quotient.eq(self._result(base, total)), result.tag.eq(tag)]
+        # A digit is told by two bits of N and the one below them.
+        digits = Signal(signed(2 * n_digits), reset_less=True)
+        m.d.sync += digits.eq(digits << 2)
         with m.If(self.load):
-            m.d.sync += [
-                total.eq(self._rounding),
-                bits.eq(self.numerator),
-                step.eq(0),
-                base.eq(self.base),
-                tag.eq(self.tag),
-                running.eq(self.start),
-            ]
+            m.d.sync += digits.eq(self.numerator)
+        below, low, high = digits[-3] if n_digits > 1 else Const(0, 1), digits[-2], digits[-1]
+        twice = (high ^ low) & ~(low ^ below)
+        # Its product with q; −q is ~q + 1. The reset is the digit 0.
+        addend = Signal(signed(len(self.q) + 2), reset_less=True)
+        carry = Signal(reset_less=True)
+        product = Mux(twice, self.q << 1, self.q)
+        m.d.sync += [addend.eq(Cat(product ^ high.replicate(len(product)), high).as_signed()), carry.eq(high)]
+        with m.If((high == low) & (low == below)):
+            m.d.sync += [addend.eq(0), carry.eq(0)]
+
+        # The sum begins without the low bits of what rounds: two of them come with every digit, 0 where the carry is.
+        shifted_in = self._rounding & 2
+        begin = self._rounding >> (2 * n_digits)
+        assert self._rounding == (begin << 2 * n_digits) + shifted_in * ((1 << 2 * n_digits) - 1) // 3
+        low_bits = self._frac_bits + self._scale_bits - 2 * n_digits
+        total = Signal(signed(len(result.quotient) + self._scale_bits))
+        part = Signal(signed(len(total) - 2), reset_less=True)
+        m.d.comb += total.eq(Cat(carry, Const(shifted_in >> 1, 1), part).as_signed() + addend)
+        with m.If(run[:-1].any()):
+            m.d.sync += part.eq(total)
+        with m.If(self.load):
+            m.d.sync += part.eq(Cat(Const(begin, low_bits), self.base).as_signed())
+        with m.If(run[-1]):
+            m.d.sync += [result.quotient.eq(total >> self._scale_bits), result.tag.eq(self.tag)]
         return m
 
 
 class PipelinedScaler(_Scaler):
-    """An adder for every bit of N: `start` may be high in every clock."""
+    """An adder for every bit of N, the least significant first: `start` may be high in every clock.
+
+    Latency: a result comes as many clocks after `start` as N has bits, and one more.
+    """
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
 
-        valid, bits, base, tag = delay(m, self.start, self.numerator, self.base, self.tag)
-        valid, bits, base, tag, q = delay(m, valid, bits, base, tag, self.q)
+        bits, base = delay(m, self.numerator, self.base)
+        valid, tag, q = self.start, self.tag, self.q
         total: ValueLike = self._rounding
-        for step in range(self._steps):
-            sum_ = Signal(self._total_shape)
-            last = step == self._steps - 1
+        for step in range(self._bits):
+            sum_ = Signal(signed(len(self.q) + 1))
+            last = step == self._bits - 1
+            # A bit of the sum is dropped for every bit of N.
             m.d.sync += sum_.eq(Mux(bits[step], total - q if last else total + q, total) >> 1)
             total = sum_
             valid, bits, base, tag, q = delay(m, valid, bits, base, tag, q)
         m.d.sync += self.results.valid.eq(valid)
         with m.If(valid):
-            m.d.sync += [result.quotient.eq(self._result(base, total)), result.tag.eq(tag)]
+            left = Value.cast(total >> (self._scale_bits - self._bits))[: len(result.quotient)].as_signed()
+            m.d.sync += [result.quotient.eq((base << self._frac_bits) + left), result.tag.eq(tag)]
         return m

@@ -1,6 +1,6 @@
 """From levels to counts."""
 
-from amaranth import Cat, Module, Signal, signed
+from amaranth import Cat, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -53,18 +53,26 @@ class QuadratureDecoder(wiring.Component):
         past_a = Signal()
         past_b = Signal()
         m.d.sync += [past_a.eq(self.level_a), past_b.eq(self.level_b)]
-        change_a = self.level_a ^ past_a
-        change_b = self.level_b ^ past_b
-        counted = {
-            1: change_a & ~change_b & ~self.level_b,
-            2: change_a & ~change_b,
-            4: change_a ^ change_b,
-        }[self._decoding]
-        backward = ~(self.level_a ^ past_b)
+        counted, backward, illegal = transition(self._decoding, self.level_a, self.level_b, past_a, past_b)
         count = Signal()
         m.d.comb += [
             count.eq(self.ready & counted),
             self.step.eq(Cat(count, count & backward)),
-            self.decode_error.eq(self.ready & change_a & change_b),
+            self.decode_error.eq(self.ready & illegal),
         ]
         return m
+
+
+def transition(
+    decoding: int, level_a: Value, level_b: Value, past_a: Value, past_b: Value
+) -> tuple[Value, Value, Value]:
+    """Whether a change of levels counts, whether backward, and whether both have changed, which never counts."""
+    change_a = level_a ^ past_a
+    change_b = level_b ^ past_b
+    counted = {
+        1: change_a & ~change_b & ~level_b,
+        2: change_a & ~change_b,
+        4: change_a ^ change_b,
+    }[decoding]
+    backward = ~(level_a ^ past_b)
+    return counted, backward, change_a & change_b

@@ -4,6 +4,7 @@ from amaranth import Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.front_end.synchronizer import Synchronizer
 
 
@@ -14,13 +15,15 @@ class ExternalTick(wiring.Component):
     `max_cycles` clocks, the window ends without one, so that nothing freezes and nothing overflows. Both raise
     `tick_error`.
 
-    Latency: a rise that is sampled at clock edge c makes c + 2 the last clock of its window; `tick_error` is high two
-    clocks after its cause. For a tick that did not come it is high together with `tick`.
+    Latency: a rise that is sampled at clock edge c makes c + 2 the last clock of its window; `tick_error` is high
+    `latency` clocks after its cause. For a tick that did not come it is high together with `tick`.
 
     Parameters
     ----------
     min_cycles, max_cycles : int
         Fewest and most clocks in a window.
+    latency : int
+        That of `tick`, at least 2.
 
     Members
     -------
@@ -37,11 +40,12 @@ class ExternalTick(wiring.Component):
         If `min_cycles` is not in 2 … `max_cycles`.
     """
 
-    def __init__(self, min_cycles: int, max_cycles: int) -> None:
+    def __init__(self, min_cycles: int, max_cycles: int, latency: int = 2) -> None:
         if not 2 <= min_cycles <= max_cycles:
             raise ValueError(f"min_cycles must be from 2 to {max_cycles}, not {min_cycles}")
         self._min_cycles = min_cycles
         self._max_cycles = max_cycles
+        self._latency = latency
         super().__init__({"tick_in": In(1), "last": Out(1), "tick_error": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
@@ -64,8 +68,8 @@ class ExternalTick(wiring.Component):
         m.d.sync += [
             left.eq(left - Const(1, left.shape())),
             error.eq(rises ^ self.last),
-            self.tick_error.eq(error),
         ]
+        m.d.comb += self.tick_error.eq(*delay(m, error, clocks=self._latency - 1))
         with m.If(left == start - (self._min_cycles - 2)):
             m.d.sync += enough.eq(1)
         with m.If(self.last):

@@ -4,17 +4,21 @@ from amaranth import Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
+
 
 class IndexCapture(wiring.Component):
     """Captures the position when the index line Z rises.
 
-    Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + 2, and `index_position` is the sum of all
-    steps through clock c. `position` has this value in clock c + 2, unless the index sets it to 0.
+    Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + `latency`, and `index_position` is the
+    sum of all steps through clock c. `position` has this value in that clock, unless the index sets it to 0.
 
     Parameters
     ----------
     width : int
         Bits of the position.
+    latency : int
+        That of the position, at least 2.
 
     Members
     -------
@@ -31,7 +35,8 @@ class IndexCapture(wiring.Component):
         One clock per index.
     """
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, latency: int = 2) -> None:
+        self._latency = latency
         super().__init__(
             {
                 "level_z": In(1),
@@ -45,10 +50,11 @@ class IndexCapture(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
+        level, ready = delay(m, self.level_z, self.ready, clocks=self._latency - 2)
         past_z = Signal()
         m.d.sync += [
-            past_z.eq(self.level_z),
-            self.rises.eq(self.level_z & ~past_z & self.ready),
+            past_z.eq(level),
+            self.rises.eq(level & ~past_z & ready),
             self.index_valid.eq(self.rises),
         ]
         with m.If(self.rises):

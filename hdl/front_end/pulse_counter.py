@@ -1,17 +1,18 @@
 """m_e, the pulse number of a tick."""
 
-from amaranth import Const, Module, Mux, Signal, Value, signed
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.saturate import saturate
 
 
 class PulseCounter(wiring.Component):
     """Adds up the steps of a tick: m_e of Tsuji 2009, Sec. IV-A.
 
-    Latency: `tick` is high two clocks after the window's last clock. A step in the clock of the hand-over belongs to
-    the next window; none is lost.
+    Latency: `tick` is high two clocks after the window's last clock, or four. A step in the clock of the hand-over
+    belongs to the next window; none is lost.
 
     Parameters
     ----------
@@ -22,6 +23,9 @@ class PulseCounter(wiring.Component):
     stretched : bool
         Windows may be longer, and hold any number of steps: once their sum has left ±`max_count`, m_e is saturated,
         whatever comes after.
+    staged : bool
+        A register for the step, and one for the sum that has been held within its bound, so that `next_count` comes
+        from a register, and `tick` two clocks later.
 
     Members
     -------
@@ -36,8 +40,13 @@ class PulseCounter(wiring.Component):
         m_e, held until the next tick.
     overflow : Out(1)
         m_e was saturated; held as long as m_e.
+    coming : Out(1)
+        `tick` is high in the next clock.
+    next_count : Out(signed)
+        What `pulse_count` is then; valid with `coming`.
     open_sum : Out(signed)
-        Only if not stretched: sum of the steps after the latest `tick`'s window, up to the clock before.
+        Only if not stretched: sum of the steps after the latest `tick`'s window, up to the clock before; if staged, up
+        to two clocks before that.
 
     Raises
     ------
@@ -45,20 +54,24 @@ class PulseCounter(wiring.Component):
         If `max_count` is not in 1 … `tick_cycles`.
     """
 
-    def __init__(self, tick_cycles: int, max_count: int, *, stretched: bool = False) -> None:
+    def __init__(self, tick_cycles: int, max_count: int, *, stretched: bool = False, staged: bool = False) -> None:
         if not 1 <= max_count <= tick_cycles:
             raise ValueError(f"max_count must be from 1 to {tick_cycles}, not {max_count}")
         self._tick_cycles = tick_cycles
         self._max_count = max_count
         self._stretched = stretched
+        self._staged = staged
+        count = signed(max_count.bit_length() + 1)
         super().__init__(
             {
                 "step": In(signed(2)),
                 "last": In(1),
                 **({"beyond": In(1)} if stretched else {}),
                 "tick": Out(1),
-                "pulse_count": Out(signed(max_count.bit_length() + 1)),
+                "pulse_count": Out(count),
                 "overflow": Out(1),
+                "coming": Out(1),
+                "next_count": Out(count),
                 **({} if stretched else {"open_sum": Out(signed(tick_cycles.bit_length() + 1))}),
             }
         )
@@ -69,10 +82,9 @@ class PulseCounter(wiring.Component):
         count = Signal(signed(most.bit_length() + 1))
         step = Signal.like(count)
         complete = Signal()
-        m.d.comb += step.eq(self.step)
-        m.d.sync += [complete.eq(self.last), self.tick.eq(complete), count.eq(count + step)]
-        if not self._stretched:
-            m.d.comb += self.open_sum.eq(count)
+        new, last = delay(m, self.step, self.last, clocks=int(self._staged))
+        m.d.comb += step.eq(new)
+        m.d.sync += [complete.eq(last), self.tick.eq(self.coming), count.eq(count + step)]
         held: Value = count
         overflow: Value = Const(0)
         if self._stretched:
@@ -85,8 +97,25 @@ class PulseCounter(wiring.Component):
                 m.d.sync += count.eq(count)
             held, overflow = Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond
         elif self._max_count < self._tick_cycles:
-            held, overflow = saturate(m, count, self._max_count)
+            held, overflow = saturate(m, self._narrow(m, count), self._max_count)
         with m.If(complete):
             m.d.sync += count.eq(step)
+        coming: Value = complete
+        open_sum: Value = count
+        if self._staged:
+            coming, open_sum, held, overflow = delay(m, complete, count, held, overflow)
+        if not self._stretched:
+            m.d.comb += self.open_sum.eq(open_sum)
+        m.d.comb += [self.coming.eq(coming), self.next_count.eq(held)]
+        with m.If(coming):
             m.d.sync += [self.pulse_count.eq(held), self.overflow.eq(overflow)]
         return m
+
+    def _narrow(self, m: Module, count: Signal) -> Signal:
+        """The count in two bits more than its bound has: beyond these it is only beyond the bound, with its sign."""
+        bits = self._max_count.bit_length()
+        upper, sign = count[bits:], count[-1]
+        narrow = Signal(signed(bits + 2))
+        # The upper bits are all the sign if none of them differs from the next one.
+        m.d.comb += narrow.eq(Cat(count[:bits], sign ^ (upper[1:] ^ upper[:-1]).any(), sign))
+        return narrow

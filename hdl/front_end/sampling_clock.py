@@ -1,14 +1,23 @@
 """The sampling period."""
 
-from amaranth import Const, Module, Signal, signed
+from amaranth import Cat, Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter
+
+# Bits whose parity makes a shift register of so many bits go through all states but one (Alfke, XAPP 052).
+_TAPS = {
+    **{5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4)},
+    **{9: (9, 5), 10: (10, 7), 11: (11, 9), 12: (12, 6, 4, 1)},
+}
 
 
 class SamplingClock(wiring.Component):
     """Divides time into windows of `tick_cycles` clocks, the first of which begins with the first clock after reset.
+
+    Nothing needs the clocks of a window counted, so a shift register with feedback takes fewer cells than a counter.
+    Whatever state an upset brings, it comes to the last one of a window.
 
     Parameters
     ----------
@@ -33,14 +42,42 @@ class SamplingClock(wiring.Component):
         super().__init__({"last": Out(1)})
 
     @property
+    def states(self) -> tuple[int, ...]:
+        """States of the shift register, the last of a window at the end; empty: it is a counter."""
+        bits = self._tick_cycles.bit_length()
+        if bits not in _TAPS:
+            return ()
+        # That of ones alone does not change; of all others only the last has ones below its highest bit.
+        state = last = (1 << (bits - 1)) - 1
+        found: list[int] = []
+        while not found or state != last:
+            parity = sum(state >> (tap - 1) for tap in _TAPS[bits]) & 1
+            state = (state << 1 | parity ^ 1) & ((1 << bits) - 1)
+            found.append(state)
+        return tuple(found)
+
+    @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
         """See `IdleCounter`."""
-        return (IdleCounter("left", -1, (-1,)),) if self._tick_cycles > 1 else ()
+        if self.states:
+            return (IdleCounter("state", order=self.states),)
+        # Of two clocks none is worth skipping, and one bit goes by the name of what it is connected to.
+        return (IdleCounter("left", -1, (-1,)),) if self._tick_cycles > 2 else ()
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         if self._tick_cycles == 1:
             m.d.comb += self.last.eq(1)
+            return m
+        if states := self.states:
+            bits = states[-1].bit_length() + 1
+            first = states[-self._tick_cycles]
+            state = Signal(bits, init=first)
+            # Also of ones alone.
+            m.d.comb += self.last.eq(state[:-1].all())
+            m.d.sync += state.eq(Cat(~Cat(state[tap - 1] for tap in _TAPS[bits]).xor(), state))
+            with m.If(self.last):
+                m.d.sync += state.eq(first)
             return m
         # Counts down to −1: the sign is the flag, so nothing has to be compared.
         start = self._tick_cycles - 2

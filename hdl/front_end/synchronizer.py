@@ -14,6 +14,7 @@ class Synchronizer(FFSynchronizer):
     Parameters
     ----------
     pin : Signal, in
+        One, or several that are independent.
     level : Signal, out
     """
 
@@ -24,7 +25,7 @@ class Synchronizer(FFSynchronizer):
         if hasattr(platform, "get_ff_sync"):
             return super().elaborate(platform)
         m = Module()
-        stages = [Signal(name=f"stage{k}", reset_less=True, attrs={"ASYNC_REG": "TRUE"}) for k in range(2)]
+        stages = [Signal(len(self.i), name=f"stage{k}", reset_less=True, attrs={"ASYNC_REG": "TRUE"}) for k in range(2)]
         m.d.sync += [stages[0].eq(self.i), stages[1].eq(stages[0])]
         m.d.comb += self.o.eq(stages[1])
         return m

@@ -10,34 +10,51 @@ class AlterationDetector(wiring.Component):
 
     A tick alters when m_e(i) differs from m_e(i−1) and from b, the pulse number of the last tick that did not alter.
     So the 4 in 3 3 4 3 3 is one alteration and the return to 3 is none. Before the first tick m_e and b are 0.
-    Without latency.
+
+    Latency: `alteration` is there with `tick`, a clock after m_e.
 
     Parameters
     ----------
     count_width : int
         Bits of m_e.
+    seldom : bool
+        `tick` and `coming` are never high together.
 
     Members
     -------
+    coming : In(1)
+        `tick` follows.
     tick : In(1)
-    m_e : In(signed(count_width))
-        Valid with `tick`.
-    previous : Out(signed(count_width))
-        m_e(i−1).
+    next_count : In(signed(count_width))
+        m_e(i), valid with `coming`.
+    pulse_count : In(signed(count_width))
+        The last m_e whose `tick` has come; valid with `coming` and with `tick`.
     alteration : Out(1)
-        Valid with `tick`.
+        From `tick` on, until the next.
     """
 
-    def __init__(self, count_width: int) -> None:
+    def __init__(self, count_width: int, *, seldom: bool = False) -> None:
+        self._seldom = seldom
         shape = signed(count_width)
-        super().__init__({"tick": In(1), "m_e": In(shape), "previous": Out(shape), "alteration": Out(1)})
+        super().__init__(
+            {
+                "coming": In(1),
+                "tick": In(1),
+                "next_count": In(shape),
+                "pulse_count": In(shape),
+                "alteration": Out(1),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        offset = Signal.like(self.m_e)
-        m.d.comb += self.alteration.eq((self.m_e != self.previous) & (self.m_e != offset))
-        with m.If(self.tick):
-            m.d.sync += self.previous.eq(self.m_e)
-            with m.If(~self.alteration):
-                m.d.sync += offset.eq(self.m_e)
+        offset = Signal.like(self.pulse_count)
+        regular = self.tick & ~self.alteration  # b is the number of this tick
+        with m.If(regular):
+            m.d.sync += offset.eq(self.pulse_count)
+        differs = self.next_count != offset
+        if not self._seldom:
+            differs |= regular
+        with m.If(self.coming):
+            m.d.sync += self.alteration.eq((self.next_count != self.pulse_count) & differs)
         return m

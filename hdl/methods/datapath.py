@@ -14,8 +14,9 @@ from tachometry.spec import TachometerSpec
 class Datapath(Protocol):
     """From pulse numbers to updates.
 
-    Among its members are `updates`, and those inputs that it needs: `tick` and `pulse_count`, `step` (as late as
-    `tick`), or `step_now` (as early as the decoder has it).
+    Among its members are `updates`, and those inputs that it needs: `tick` and `pulse_count`, `coming` and `next_count`
+    (the same a clock earlier), `step` (as late as `tick`), `step_before` (a clock earlier), or `step_now` (as early as
+    the decoder has it).
     """
 
     signature: wiring.Signature

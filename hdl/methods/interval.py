@@ -1,6 +1,6 @@
 """The window of a measurement: its length and the pulse numbers at its ends."""
 
-from amaranth import Module, Mux, Signal, signed
+from amaranth import Const, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -24,20 +24,30 @@ class IntervalAccumulator(wiring.Component):
         Bits of m_e and of the numerator.
     cancel : bool
         Eq. (21) instead of eq. (17).
+    seldom : bool
+        A tick has at least three clocks, so that what the numerator has of the ticks before waits in a register.
 
     Members
     -------
-    tick, alteration : In(1)
-    m_e, previous : In(signed(count_width))
-        m_e(i) and m_e(i−1), valid with `tick`.
-    m_s : Out(range(max_ticks + 1))
-        Length of the window in ticks; as all outputs valid with `tick`.
+    tick : In(1)
+    moves : In(1)
+        m_s moves on: once for every tick, with it or as long after it as m_s is needed.
+    alteration : In(1)
+        Valid from `tick` on, until m_s moves.
+    pulse_count : In(signed(count_width))
+        m_e(i) from `tick` on, until the next.
+    next_count : In(signed(count_width))
+        m_e(i), valid in the clock before `tick`.
     numerator : Out(signed(numerator_width))
-        d0 + d1, or d1.
-    update : Out(1)
+        d0 + d1, or d1; valid in the clock before `tick`.
+    m_s : Out(range(max_ticks + 1))
+        Length of the window in ticks; as the next two valid from `tick` on, until it moves.
+    closes : Out(1)
         The window closes.
     forced : Out(1)
         The window closes without an alteration.
+    update : Out(1)
+        The window closes in this tick.
     stalled : Out(1)
         Nothing was counted in more than `max_ticks` ticks in a row; from `tick` on, until the next.
 
@@ -48,55 +58,79 @@ class IntervalAccumulator(wiring.Component):
     """
 
     def __init__(
-        self, *, max_ticks: int, kept_ticks: int, count_width: int, numerator_width: int, cancel: bool
+        self,
+        *,
+        max_ticks: int,
+        kept_ticks: int,
+        count_width: int,
+        numerator_width: int,
+        cancel: bool,
+        seldom: bool,
     ) -> None:
         if max_ticks < 2:
             raise ValueError(f"max_ticks must be at least 2, not {max_ticks}")
         self._max_ticks = max_ticks
         self._kept_ticks = kept_ticks
         self._cancel = cancel
+        self._seldom = seldom
         super().__init__(
             {
                 "tick": In(1),
+                "moves": In(1),
                 "alteration": In(1),
-                "m_e": In(signed(count_width)),
-                "previous": In(signed(count_width)),
-                "m_s": Out(range(max_ticks + 1), init=1),
+                "pulse_count": In(signed(count_width)),
+                "next_count": In(signed(count_width)),
                 "numerator": Out(signed(numerator_width)),
-                "update": Out(1),
+                "m_s": Out(range(max_ticks + 1), init=1),
+                "closes": Out(1),
                 "forced": Out(1),
+                "update": Out(1),
                 "stalled": Out(1),
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        opening = Signal.like(self.m_e)
-        silent = ~self.m_e.any()
-        rests = Signal()
-        nearly = Signal()  # the last tick ended a longest window, in which only the opening tick had a count
+        last = self.pulse_count
         longest = Signal()
         after_forced = self._kept_ticks + 1
-        d1 = self.m_e - self.previous
         m.d.comb += [
-            self.update.eq(self.tick & (self.alteration | longest)),
+            self.closes.eq(self.alteration | longest),
             self.forced.eq(longest & ~self.alteration),
-            # A longest window without an alteration goes on as it began, but for its opening tick; and a silence begins
-            # in the tick that opens a window, or in the one after it.
-            self.stalled.eq(
-                Mux(self.tick, silent & (rests | nearly | (longest & ~(opening | self.previous).any())), rests)
-            ),
-            self.numerator.eq(opening - self.previous + d1 if self._cancel else d1),
+            self.update.eq(self.tick & self.closes),
         ]
-        m.d.sync += rests.eq(self.stalled)
-        with m.If(self.tick):
-            m.d.sync += nearly.eq(self.forced & silent)
-            m.d.sync += [self.m_s.eq(self.m_s + 1), longest.eq(self.m_s == self._max_ticks - 1)]
+        # One adder for both: where m_s is the longest, this leads to what is kept.
+        back = Const((after_forced - self._max_ticks) % (1 << len(self.m_s)), len(self.m_s))
+        with m.If(self.moves):
+            m.d.sync += [
+                self.m_s.eq(self.m_s + Mux(longest, back, 1)),
+                longest.eq(self.m_s == self._max_ticks - 1),
+            ]
             with m.If(longest):
-                m.d.sync += [self.m_s.eq(after_forced), longest.eq(after_forced == self._max_ticks)]
+                m.d.sync += longest.eq(after_forced == self._max_ticks)
             with m.If(self.alteration):
                 m.d.sync += [self.m_s.eq(1), longest.eq(0)]
-            with m.If(self.update):
-                # After a forced update the kept half opens with the number that the window ends with.
-                m.d.sync += opening.eq(self.m_e)
+
+        opening = Signal.like(last)
+        opens = Signal.like(last)
+        known = Signal.like(self.numerator)
+        # After a forced update the kept half opens with the number that the window ends with.
+        m.d.comb += opens.eq(Mux(self.update, last, opening))
+        m.d.sync += opening.eq(opens)
+        domain = m.d.sync if self._seldom else m.d.comb
+        domain += known.eq((opening if self._seldom else opens) - 2 * last if self._cancel else -last)
+        m.d.comb += self.numerator.eq(known + self.next_count)
+
+        silent = ~last.any()
+        was_silent = Signal(init=1)  # m_e(i−1) is 0
+        rests = Signal()
+        nearly = Signal()  # the last tick ended a longest window, in which only the opening tick had a count
+        m.d.comb += self.stalled.eq(
+            # A longest window without an alteration goes on as it began, but for its opening tick; and a silence begins
+            # in the tick that opens a window, or in the one after it.
+            Mux(self.tick, silent & (rests | nearly | (longest & ~opening.any() & was_silent)), rests)
+        )
+        m.d.sync += [was_silent.eq(silent), rests.eq(self.stalled)]
+        with m.If(self.tick):
+            m.d.sync += nearly.eq(self.forced & silent)
         return m

@@ -163,12 +163,16 @@ class MMethod(wiring.Component):
         if self.quotient is not None:
             m.submodules.quotient = quotient = self.quotient
             # The sum takes one clock.
-            start, total, known = delay(m, self.tick, total, known)
+            load, total = delay(m, self.tick, total)
+            kept = Signal.like(known)
+            with m.If(self.tick):
+                m.d.sync += kept.eq(known)
+            start, tag = delay(m, load, kept)
             m.d.comb += [
-                quotient.load.eq(start),
+                quotient.load.eq(load),
                 quotient.start.eq(start),
                 quotient.numerator.eq(total << self._spec.error_bits),
-                quotient.tag.eq(known),
+                quotient.tag.eq(tag),
             ]
             return quotient.results.valid, quotient.results.p
         assert shift is not None

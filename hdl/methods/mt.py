@@ -2,7 +2,7 @@
 
 from amaranth import Module, Mux, Signal, Value, ValueLike
 
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
 
@@ -79,6 +79,6 @@ class MTMethod(TimedDatapath):
     def _distance(self) -> Value:
         """From the edge of the last count to that of this one; on the lattice, to the last edge of the tick."""
         if not self._spec.on_lattice:
-            return Mux(self._same, self._one, 0)
+            return self._way
         # All counts of the tick, less the one that meets the same edge again.
         return self._size + Mux(self._same, 0, Mux(self.gap_timer.negative, 1, -1))

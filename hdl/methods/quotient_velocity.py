@@ -1,12 +1,11 @@
 """Velocity as a quotient of distance and time."""
 
-from amaranth import Module, Mux, Signal, Value, signed
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.arithmetic.registers import registers
-from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.methods.datapath import stamped
 from tachometry.hdl.output.update import update_layout, update_stream
 from tachometry.spec.methods.timed import TimedTachometer
@@ -50,17 +49,21 @@ class QuotientVelocity(wiring.Component):
 
     def __init__(self, spec: TimedTachometer) -> None:
         self._spec = spec
+        f, error_bits = spec.native_frac_bits, spec.error_bits
+        # Distances are divided in half counts.
         self.divider = Divider(
             divisor_width=spec.interval_width,
-            # Distances are divided in half counts.
-            integer_bits=spec.max_quotient.bit_length() + 1,
-            scale_bits=spec.native_frac_bits,
+            integer_bits=spec.quotient_bits - (f - 1),
+            scale_bits=f - 1,
+            nearest=True,
+            # Of 1½ counts, in half counts.
+            zeros=(spec.timer_periods & -spec.timer_periods).bit_length() - 1,
         )
         self.bound_dividers = {
             name: Divider(
                 divisor_width=(spec.max_interval + 1).bit_length(),
-                integer_bits=spec.max_bound.bit_length() + spec.error_bits,
-                scale_bits=spec.native_frac_bits - spec.error_bits,
+                integer_bits=spec.quotient_bits - (f - error_bits),
+                scale_bits=f - error_bits,
             )
             for name in (BOUNDS if spec.bounds else ())
         }
@@ -85,19 +88,15 @@ class QuotientVelocity(wiring.Component):
         new = registers(self.updates.p.shape(), "new")
         m.d.comb += self.updates.p.eq(new)
         m.submodules.divider = divider = self.divider
-        measuring, rounds, compared = (Signal(name=name) for name in ("measuring", "rounds", "compared"))
-        # Where a result may be too large, a clock between the two holds it within its range.
-        holds = Signal(name="holds") if spec.saturates else rounds
+        measuring = Signal()
         # Not before the result of the last division is in `velocity`.
         decays = Signal()
         if spec.decays:
-            m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.busy & ~rounds & ~holds & ~compared)
-        backward = new.velocity[-1]
+            m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.running & ~divider.done)
         halves = self.dividend << 1
-        greatest = Mux(backward, -3 * spec.timer_periods, 3 * spec.timer_periods)
-        m.d.sync += [rounds.eq(divider.done & ~self.measure), compared.eq(holds & ~self.measure)]
+        greatest = Mux(new.velocity[-1], -3 * spec.timer_periods, 3 * spec.timer_periods)
         m.d.comb += [
-            self.free.eq(~(measuring & (divider.busy | rounds | holds))),
+            self.free.eq(~(measuring & divider.running)),
             divider.start.eq(self.measure | decays),
             divider.divisor.eq(self.divisor),
             divider.dividend.eq(Mux(self.measure, halves, greatest) if spec.decays else halves),
@@ -110,29 +109,18 @@ class QuotientVelocity(wiring.Component):
                 beyond.eq(self.beyond_in),
             ]
 
-        # The last bit of the quotient is a half: it rounds.
-        rounded = Signal(signed(len(divider.quotient)), reset_less=True)
-        with m.If(divider.done):
-            m.d.sync += rounded.eq((divider.quotient + 1) >> 1)
-        shown, saturated = rounded, Signal(name="saturated", reset_less=True)
-        if spec.saturates:
-            held, changed = saturate(m, rounded, spec.max_count << spec.native_frac_bits)
-            shown = Signal.like(held, name="shown", reset_less=True)
-            m.d.sync += [holds.eq(rounds & ~self.measure), shown.eq(held), saturated.eq(changed)]
-        change = Signal(signed(max(len(shown), spec.native_width) + 1))
-        m.d.comb += change.eq(shown - new.velocity)
-        nearer = Signal(reset_less=True)
-        m.d.sync += nearer.eq(Mux(backward, ~change[-1] & change.any(), change[-1]))
-        update = compared & (measuring | nearer) if spec.decays else compared
+        nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity)
+        update = Signal()
+        m.d.comb += update.eq(divider.done & (measuring | nearer if spec.decays else 1))
         m.d.sync += self.updates.valid.eq(update)
         with m.If(update):
             m.d.sync += [
-                new.velocity.eq(shown),
+                new.velocity.eq(velocity),
                 new.interval.eq(divider.by),
                 new.forced.eq(forced),
             ]
             if spec.flags_range:
-                m.d.sync += new.out_of_range.eq(beyond | saturated)
+                m.d.sync += new.out_of_range.eq(beyond | beyond_most)
         if spec.stamp_width:
             stamp = Signal(spec.stamp_width, reset_less=True)
             with m.If(divider.start):
@@ -142,6 +130,47 @@ class QuotientVelocity(wiring.Component):
         if spec.bounds:
             self._bounds(m, new, decays, update)
         return m
+
+    def _bounded(self, m: Module, measuring: Signal, velocity: Value) -> tuple[Value, Value, Value]:
+        """The quotient held within a bound: whether it was nearer to 0, or beyond, and what it is then.
+
+        The bound of a measurement is the greatest speed, that of a decay the velocity. The digits of highest weight
+        come first: so the first that differs from the bound's decides, and if the quotient is beyond, all that follow
+        are the bound's.
+        A copy of the velocity goes around in step with the digits of a decay, and takes up those of the result.
+        """
+        spec, divider = self._spec, self.divider
+        if not (spec.decays or spec.saturates):
+            return Const(0), Const(0), divider.quotient
+        copy = Signal(len(divider.quotient), init=1 << (len(divider.quotient) - 1))
+        nearer = Signal(reset_less=True)
+        farther = Signal(reset_less=True)
+        comes_nearer = Signal()
+        passes = Signal()
+        bound: Value = copy[-1]
+        negative: Value = velocity[-1]
+        bounded: Value = ~measuring
+        if spec.saturates:
+            negative = Signal(name="negative", reset_less=True)
+            most = Signal(reset_less=True)
+            limit = spec.max_count << spec.native_frac_bits
+            m.d.sync += most.eq(Mux(negative, divider.next_digit_of(-limit), divider.next_digit_of(limit)))
+            with m.If(divider.start):
+                m.d.sync += [negative.eq(divider.dividend[-1]), most.eq(~divider.dividend[-1])]
+            bound = Mux(measuring, most, bound) if spec.decays else most
+            bounded = Const(1)
+        m.d.comb += [
+            comes_nearer.eq(nearer | (~farther & (bound != negative) & (divider.digit == negative))),
+            passes.eq(bounded & (farther | (~nearer & (bound == negative) & (divider.digit != negative)))),
+        ]
+        with m.If(divider.running):
+            m.d.sync += [
+                Cat(nearer, farther).eq(Cat(comes_nearer, passes)),
+                copy.eq(Cat(Mux(passes, bound, divider.digit), copy)),
+            ]
+        with m.If(divider.start):
+            m.d.sync += Cat(nearer, farther).eq(0)
+        return nearer, farther if spec.saturates else Const(0), Cat(copy[:-1], ~copy[-1]).as_signed()
 
     def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
         """Two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
@@ -175,9 +204,7 @@ class QuotientVelocity(wiring.Component):
             with m.If(self.divider.start):
                 m.d.sync += none.eq(counted & end[-1] & (self.divisor == 1))
             limit = -self._spec.absent_bound
-            lower = Signal.like(box.quotient, reset_less=True)
-            with m.If(box.done):
-                m.d.sync += lower.eq(Mux(none, limit, box.quotient))
+            lower = Mux(none, limit, box.quotient)
             with m.If(update):
                 m.d.sync += new[name].eq(-lower if upper else lower)
         with m.If(update):

@@ -67,6 +67,7 @@ class RairanCounters(wiring.Component):
         self.any = Signal()
         self.c_dt = Signal(range(spec.timing.max_ticks + 1))
         self.rest = Signal()  # it has come to its end
+        self.longest = Signal()
         self.dt = DtShift(spec, len(self.n)) if spec.adaptive else None
 
     def elaborate(self, platform: object) -> Module:
@@ -136,6 +137,9 @@ class RairanCounters(wiring.Component):
     def _count(self, m: Module, pulse: Signal, opens: Signal) -> None:
         """Count Cep, which includes the count that opens a window, and Cdt since the last count."""
         c_more, c_dt, most = self.c_more, self.c_dt, self._spec.max_count
+        # Whether Cdt reaches the maximum time with this end of dt, or has reached it before.
+        full_dt = self._at_end(m, self._is(self._spec.max_dt))
+        m.d.comb += self.longest.eq(self._at_end(m, self._is(lambda k: self._spec.max_dt(k) - 1)) | full_dt)
         full: Value = Const(0)
         if most < self._spec.timing.tick_cycles:
             full = self.any & (c_more == self._of_dt(lambda k: (most << k) - 1))
@@ -147,21 +151,29 @@ class RairanCounters(wiring.Component):
                 m.d.sync += c_more.eq(c_more + self.any)
         with m.If(self.last):
             m.d.sync += [c_more.eq(0), self.any.eq(0), self.beyond.eq(0)]
-            m.d.sync += self.rest.eq(self._is_longest())
-            with m.If(~self._is(self._spec.max_dt)):
+            m.d.sync += self.rest.eq(self.longest)
+            with m.If(~full_dt):
                 m.d.sync += c_dt.eq(c_dt + 1)
         with m.If(opens):
             m.d.sync += [c_more.eq(0), self.any.eq(1), self.beyond.eq(0)]
         with m.If(pulse & ~self.last if self._spec.paper_exact else pulse):
             m.d.sync += [c_dt.eq(0), self.rest.eq(0)]
 
+    def _at_end(self, m: Module, value: Value) -> Value:
+        """What is asked at an end of dt without a count, from a register.
+
+        What it depends on has then been the same for a clock at least: another end of dt, or a count that opened a
+        window, is a dt ago; and a count that opens none finds and leaves a Cdt of 0, and makes several of one.
+        """
+        if self._spec.timing.tick_cycles == 1:
+            return value
+        held = Signal()
+        m.d.sync += held.eq(value)
+        return held
+
     def _is(self, constant: Callable[[int], int]) -> Value:
         """Cdt is a constant that depends on k of dt·2^k."""
         return self.c_dt == self._of_dt(constant)
-
-    def _is_longest(self) -> Value:
-        """Whether Cdt reaches the maximum time with this end of dt, or has reached it before."""
-        return self._is(self._spec.max_dt) | self._is(lambda k: self._spec.max_dt(k) - 1)
 
     def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal, fresh: Signal) -> None:
         """What a count or the end of dt makes of the estimate."""
@@ -178,6 +190,10 @@ class RairanCounters(wiring.Component):
             # n is that of the window before, whose k may be one more or less, until this one has measured.
             differs = (self.shift - self.dt.shift)[:2]
             n = Mux(differs[0], Mux(differs[1], n >> 1, n << 1), n)
+        # A carry tells whether `waited` is more than n.
+        bits = len(self.c_dt)
+        more = (self.c_dt + ~n[:bits] + in_step)[bits] & ~n[bits:].any()
+        falls = self._at_end(m, Mux(self.high, waited.any(), more & self.n.any()) if spec.bound_decay else Const(0))
 
         def set_(
             n: Value | int,
@@ -211,11 +227,11 @@ class RairanCounters(wiring.Component):
             set_(1, loose=~pulse)
         with m.Elif(opens & ~fresh & ((self.c_dt != 1) | ~self.high)):
             set_(self.c_dt, unsynced=~in_step)
-        with m.Elif(waits & self._is_longest()):
+        with m.Elif(waits & self.longest):
             # At rest no update would correct it after an upset.
             set_(0, update=~self.rest, forced=1, at_rest=1)
         if spec.bound_decay:
-            with m.Elif(waits & Mux(self.high, waited != 0, (waited > n) & self.n.any())):
+            with m.Elif(waits & falls):
                 set_(waited, forced=1, loose=1)
 
     def _update_to_the_letter(self, m: Module, opens: Signal) -> None:

@@ -1,8 +1,8 @@
 """The S method."""
 
-from amaranth import Module, Signal, Value
+from amaranth import Module, Signal, Value, signed
 from amaranth.lib import data, wiring
-from amaranth.lib.wiring import Out
+from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.alteration import AlterationDetector
@@ -25,7 +25,11 @@ class SMethod(wiring.Component):
     -------
     tick : In(1)
     pulse_count : In(signed)
-        m_e, valid with `tick`.
+        m_e, valid from `tick` on, until the next.
+    coming : In(1)
+        `tick` is high in the next clock.
+    next_count : In(signed)
+        What `pulse_count` is then; valid with `coming`.
     stalled : Out(1)
         Of the tick, see `IntervalAccumulator`.
     updates : Out(stream)
@@ -35,15 +39,23 @@ class SMethod(wiring.Component):
     """
 
     def __init__(self, spec: STachometer) -> None:
-        super().__init__({**datapath_members(spec), "stalled": Out(1)})
+        super().__init__(
+            {
+                **datapath_members(spec),
+                "coming": In(1),
+                "next_count": In(signed(spec.count_width)),
+                "stalled": Out(1),
+            }
+        )
         self._spec = spec
-        self.alteration = AlterationDetector(spec.count_width)
+        self.alteration = AlterationDetector(spec.count_width, seldom=spec.serial)
         self.interval_accumulator = IntervalAccumulator(
             max_ticks=spec.timing.max_ticks,
             kept_ticks=spec.kept_ticks,
             count_width=spec.count_width,
             numerator_width=spec.numerator_width,
             cancel=spec.cancel,
+            seldom=spec.serial,
         )
         self.quotient = Quotient(
             spec.reciprocal,
@@ -69,18 +81,23 @@ class SMethod(wiring.Component):
         m.submodules.interval = interval = self.interval_accumulator
         m.submodules.quotient = quotient = self.quotient
         found, new = quotient.results, self.updates.p
+        # m_s stays until the result has come, so that no register needs to keep it.
+        moves = (self.tick & ~interval.closes) | found.valid if self._spec.serial else self.tick
+        for box in (alteration, interval):
+            m.d.comb += [
+                box.tick.eq(self.tick),
+                box.pulse_count.eq(self.pulse_count),
+                box.next_count.eq(self.next_count),
+            ]
         m.d.comb += [
-            alteration.tick.eq(self.tick),
-            alteration.m_e.eq(self.pulse_count),
-            interval.tick.eq(self.tick),
-            interval.m_e.eq(self.pulse_count),
-            interval.previous.eq(alteration.previous),
+            alteration.coming.eq(self.coming),
+            interval.moves.eq(moves),
             interval.alteration.eq(alteration.alteration),
             quotient.m.eq(interval.m_s),
-            quotient.enable.eq(self.tick),
-            quotient.load.eq(self.tick),
+            quotient.moves.eq(moves),
+            quotient.load.eq(self.coming),
             quotient.start.eq(interval.update),
-            quotient.base.eq(alteration.previous),
+            quotient.base.eq(self.pulse_count),
             quotient.numerator.eq(interval.numerator << self._spec.finer),
             quotient.tag.forced.eq(interval.forced),
             self.stalled.eq(interval.stalled),
@@ -93,7 +110,7 @@ class SMethod(wiring.Component):
         if self._spec.bounds:
             # The first window has begun before there was anything to be seen.
             later = Signal()
-            with m.If(interval.update):
+            with m.If(moves & interval.closes):
                 m.d.sync += later.eq(1)
             m.d.comb += quotient.tag.bounds_valid.eq(later)
         return m

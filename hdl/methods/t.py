@@ -14,6 +14,6 @@ class TMethod(TimedDatapath):
         m.d.comb += quotient.beyond_in.eq(many)
         return (
             timer.count & (timer.opened | many) & quotient.free,
-            Mux(self._same | many, self._one, 0),
+            Mux(self._same | many, self._one, 0) if self._spec.on_lattice else self._way,
             Mux(many, 1, timer.age),
         )

@@ -1,10 +1,11 @@
 """What the datapaths of the methods have in common that measure the time between counts."""
 
-from amaranth import Module, Mux, Signal, Value, ValueLike, signed
+from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter
+from tachometry.hdl.methods.count_way import CountWay
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
@@ -25,8 +26,8 @@ class TimedDatapath(wiring.Component):
     tick : In(1)
     pulse_count : In(signed)
         m_e, valid with `tick`.
-    step : In(signed(2))
-        As late as `tick`; only if times are counted in clocks.
+    step_before : In(signed(2))
+        The step of the next clock, steps being as late as `tick`; only if times are counted in clocks.
     updates : Out(stream)
         `interval` is in timer periods. `forced`: silence alone caused the update. `out_of_range`, only if that is
         possible: the velocity was too high to be measured, and is saturated.
@@ -36,10 +37,11 @@ class TimedDatapath(wiring.Component):
         self._spec = spec
         self.gap_timer = GapTimer(spec.max_periods, on_lattice=spec.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
+        self.count_way = CountWay(reversals=not spec.paper_exact)
         super().__init__(
             {
                 **datapath_members(spec),
-                **({} if spec.on_lattice else {"step": In(signed(2))}),
+                **({} if spec.on_lattice else {"step_before": In(signed(2))}),
             }
         )
 
@@ -58,7 +60,7 @@ class TimedDatapath(wiring.Component):
     @property
     def _size(self) -> Signal:
         """What a timer period counted."""
-        size: Signal = self.pulse_count if self._spec.on_lattice else self.step
+        size: Signal = self.pulse_count if self._spec.on_lattice else self.count_way.step
         return size
 
     @property
@@ -69,9 +71,20 @@ class TimedDatapath(wiring.Component):
     @property
     def _same(self) -> Value:
         """Whether this count is from another edge than the last count."""
+        if not self._spec.on_lattice:
+            return self.count_way.moves
         if self._spec.paper_exact:
             return Value.cast(1)
         return self.gap_timer.was_negative == self.gap_timer.negative
+
+    @property
+    def _way(self) -> Value:
+        """From the edge of the last count to that of this one, times the timer periods in a tick; 0 without a count."""
+        periods = self._spec.timer_periods
+        # No bit is a gate: each is one of the registers.
+        way = self.count_way
+        bits = {(0, 0): Const(0), (1, 0): way.forward, (0, 1): way.backward, (1, 1): way.moves}
+        return Cat(bits[periods >> k & 1, -periods >> k & 1] for k in range(periods.bit_length() + 1)).as_signed()
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:
         """Whether a measurement ends with this count, its distance, and its length.
@@ -87,16 +100,20 @@ class TimedDatapath(wiring.Component):
         m.submodules.gap_timer = timer = self.gap_timer
         m.submodules.quotient_velocity = quotient = self.quotient_velocity
         size = self._size
+        if not spec.on_lattice:
+            m.submodules.count_way = way = self.count_way
+            m.d.comb += [way.step_before.eq(self.step_before), way.was_negative.eq(timer.was_negative)]
         ends, distance, time = self._window(m)
         wiring.connect(m, quotient.updates, wiring.flipped(self.updates))
         m.d.comb += [
             timer.tick.eq(self.tick),
             timer.period.eq(self.tick if spec.on_lattice else 1),
-            timer.count.eq(timer.period & size.any()),
+            # Bit 0 of a step tells that it is one.
+            timer.count.eq(self.tick & size.any() if spec.on_lattice else size[0]),
             timer.negative.eq(size[-1]),
             quotient.measure.eq(timer.overdue | ends),
             quotient.decay.eq(timer.silent),
-            quotient.dividend.eq(Mux(timer.count, distance, 0)),
+            quotient.dividend.eq(Mux(timer.overdue, 0, distance)),
             quotient.divisor.eq(time),
             quotient.forced_in.eq(~timer.count),
         ]

@@ -43,17 +43,21 @@ class Standstill(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         shown = Signal()
-        # Nominal ticks that may still be empty; the sign of what is less is the flag, so nothing has to be compared.
-        left = Signal(range(self._max_ticks + 1), init=self._max_ticks - 1)
-        less = Signal(signed(len(left) + 1))
+        # Nominal ticks that may be empty after this one; negative, if this one must not be. So a sign is the flag, and
+        # nothing has to be compared. Where the length of a tick comes with it, its own ticks are still among them.
+        differs = "shift" in self.signature.members
+        most = self._max_ticks if differs else self._max_ticks - 1
+        left = Signal(signed(most.bit_length() + 1), init=most - 1)
+        less = Signal.like(left)
         silent = ~self.m_e.any()
+        none = less[-1] if differs else left[-1]
         m.d.comb += [
-            less.eq(left - (1 << self.shift if "shift" in self.signature.members else 1)),
-            self.stalled.eq(Mux(self.tick, silent & (shown | less[-1]), shown)),
+            less.eq(left - (1 << self.shift if differs else 1)),
+            self.stalled.eq(Mux(self.tick, silent & (shown | none), shown)),
         ]
         m.d.sync += shown.eq(self.stalled)
-        with m.If(self.tick & ~less[-1]):
+        with m.If(self.tick & ~none):
             m.d.sync += left.eq(less)
         with m.If(self.tick & ~silent):
-            m.d.sync += left.eq(self._max_ticks)
+            m.d.sync += left.eq(most)
         return m

@@ -12,7 +12,7 @@ from tachometry.sim.captures.sigrok import read_sr
 from tachometry.sim.captures.text import read_csv
 from tachometry.sim.captures.vcd import read_vcd
 from tachometry.sim.signals.recording import Recording
-from tachometry.spec import TachometerSpec
+from tachometry.spec import CoreSpec
 
 
 class Reader(Protocol):
@@ -74,7 +74,7 @@ def read_capture(
     return reader(path, a, b, samplerate_hz, others)
 
 
-def with_last_tick(recording: Recording, spec: TachometerSpec) -> Recording:
+def with_last_tick(recording: Recording, spec: CoreSpec) -> Recording:
     """A list of edges with the tick of its last edge: the levels after it hold until the core has shown this tick.
 
     What ends later than with an edge ends where it says, and external ticks end with the capture.

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading, writing
-from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.signals.axes import AxesTrace, Trace
+from tachometry.sim.signals.recording import Recording
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
 # Limits of a session, which may be packed a thousand times as tightly: bytes of the list of members, of the metadata,
@@ -81,8 +82,10 @@ def read_sr(
     return Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *others))
 
 
-def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
+def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
     """Write a trace as a sigrok session of version 2, channels A, B and the others that there are, one sample a clock.
+
+    Of many axes the channels are A0, B0, then those of axis 1, and so on.
 
     Equal traces give equal files, byte for byte, with the same zlib: zlib promises what its output unpacks to, not
     which bytes it is. Read back and placed on the same clock, the file gives the same trace.
@@ -91,7 +94,7 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
     ----------
     path : path
         Takes its new content only when all is written.
-    trace : PinTrace
+    trace : PinTrace or AxesTrace
     clock_hz : int, Hz
         Clock of the trace, hence the samplerate of the session.
 
@@ -106,16 +109,19 @@ def write_sr(path: str | os.PathLike[str], trace: PinTrace, clock_hz: int, *, _c
         raise ValueError(f"clock_hz must be at least 1, not {clock_hz}")
     if trace.n_clocks < 1:
         raise ValueError(f"n_clocks must be at least 1, not {trace.n_clocks}")
-    level = trace.level
+    if isinstance(trace, AxesTrace):
+        level, channels = trace.levels, [f"{_CHANNELS[name]}{axis}" for axis, name in trace.names]
+    else:
+        level, channels = trace.level.reshape(-1, 1), [_CHANNELS[name] for name in trace.lines]
     with writing(Path(path)) as beside, zipfile.ZipFile(beside, "w") as archive:
         archive.writestr(_member("version"), "2")
-        archive.writestr(_member("metadata"), _metadata(clock_hz, [_CHANNELS[name] for name in trace.lines]))
+        archive.writestr(_member("metadata"), _metadata(clock_hz, channels))
         for number, first in enumerate(range(0, trace.n_clocks, _chunk), 1):
             end = min(first + _chunk, trace.n_clocks)
             row = int(np.searchsorted(trace.clock, first, "right")) - 1  # the row that holds at `first`
             row_end = int(np.searchsorted(trace.clock, end, "left"))
             starts = np.maximum(trace.clock[row:row_end], first)
-            samples = np.repeat(level[row:row_end], np.diff(starts, append=end))
+            samples = np.repeat(level[row:row_end], np.diff(starts, append=end), axis=0)
             archive.writestr(_member(f"logic-1-{number}"), samples.tobytes(), zipfile.ZIP_DEFLATED)
 
 
@@ -141,7 +147,7 @@ def _metadata(samplerate_hz: int, channels: list[str]) -> str:
         f"samplerate={samplerate_hz // unit} {prefix}Hz",
         "total analog=0",
         *(f"probe{number}={name}" for number, name in enumerate(channels, 1)),
-        "unitsize=1",
+        f"unitsize={-(-len(channels) // 8)}",
     ]
     return "\n".join(lines) + "\n"
 

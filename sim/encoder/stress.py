@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 
 _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
 
@@ -44,3 +45,12 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     apart[500:1000] += rng.integers(-cycles // 2, cycles, len(apart[500:1000]))
     apart[700:710] *= 4
     return trace.with_tick_in(np.cumsum(np.maximum(apart, 2)))
+
+
+def stress_of(spec: CoreSpec, seed: int, n_edges: int = 300) -> Trace:
+    """The same for many axes as well, each of which has a motion of its own."""
+    if not isinstance(spec, AxesSpec):
+        return stress(spec, seed, n_edges)
+    # Of different lengths, so that not all axes stand when one does.
+    each = [stress(spec.tachometer, seed * spec.axes + axis, n_edges + 7 * axis) for axis in range(spec.axes)]
+    return AxesTrace.of(each)

@@ -17,14 +17,15 @@ import numpy as np
 from amaranth.lib import wiring
 from numpy.typing import NDArray
 
-from tachometry.hdl import Tachometer
-from tachometry.hdl.idle import IdleCounter
+from tachometry.hdl import Tachometer, core_of
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
-from tachometry.sim.signals.recording import PinTrace, packed
+from tachometry.sim.signals.axes import Trace
+from tachometry.sim.signals.recording import packed
 from tachometry.sim.signals.run import Run, observed
-from tachometry.spec import Port, TachometerSpec
+from tachometry.spec import CoreSpec, Port
 
 DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
 
@@ -39,21 +40,42 @@ class Design:
 
     Parameters
     ----------
-    spec : TachometerSpec
+    spec : CoreSpec
     pins : list of Port
-        Inputs, in the order of the bits of a level.
+        Inputs, in the order of their levels.
     watched : Watched or None
         The core with shown signals, if there are any to be shown.
     """
 
-    spec: TachometerSpec
+    spec: CoreSpec
     pins: list[Port]
     watched: Watched | None = None
 
     @cached_property
     def component(self) -> wiring.Component:
         """The hardware, with the ports of the spec."""
-        return Tachometer(self.spec) if self.watched is None else self.watched
+        return core_of(self.spec) if self.watched is None else self.watched
+
+    @property
+    def wide(self) -> bool:
+        """Whether the level of a pin is a number, with a bit for each axis; else all levels are the bits of a byte."""
+        return any(pin.width > 1 for pin in self.pins)
+
+    def levels(self, trace: Trace) -> NDArray[Any]:
+        """Levels of all pins for each row of a trace, as `pins_text` reads them."""
+        kind = np.uint64 if self.wide else np.uint8
+        lines: list[NDArray[Any]] = [trace.lines[pin.name].astype(kind) for pin in self.pins]
+        return np.stack(lines, axis=1) if self.wide else packed(lines)
+
+    def pins_text(self, assign: Callable[[str, str], str]) -> str:
+        """Functions of the struct `Model` that set the pins; `assign` gives what sets one of them to a level in C++."""
+        level = "level[{}]" if self.wide else "level >> {} & 1"
+        text = " ".join(assign(pin.name, level.format(place)) for place, pin in enumerate(self.pins))
+        if self.wide:
+            kind, row = "const uint64_t *", f"static_cast<const uint64_t *>(levels) + row * {len(self.pins)}"
+        else:
+            kind, row = "uint8_t ", "static_cast<const uint8_t *>(levels)[row]"
+        return f"void pins({kind}level) {{ {text} }}\n  void play(const void *levels, int64_t row) {{ pins({row}); }}"
 
     @property
     def n_words(self) -> int:
@@ -88,7 +110,7 @@ class CompiledEngine(ABC):
     every_clock = False  # none is skipped
 
     def __init__(self) -> None:
-        self._libraries: dict[TachometerSpec, Path] = {}
+        self._libraries: dict[CoreSpec, Path] = {}
 
     @abstractmethod
     def library(self, design: Design) -> Path:
@@ -103,8 +125,8 @@ class CompiledEngine(ABC):
 
     def run(
         self,
-        spec: TachometerSpec,
-        trace: PinTrace,
+        spec: CoreSpec,
+        trace: Trace,
         *,
         vcd: Path | None = None,
         window: tuple[int, int] | None = None,
@@ -114,7 +136,7 @@ class CompiledEngine(ABC):
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
         design = Design(spec, pins, watched)
-        play = _Play(self._kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
+        play = Play(self._kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:
             waveform = None
@@ -132,12 +154,10 @@ class CompiledEngine(ABC):
         return run
 
 
-class _Play:
+class Play:
     """A trace that is played on a compiled design."""
 
-    def __init__(
-        self, library: Path, design: Design, trace: PinTrace, window: tuple[int, int], every_clock: bool
-    ) -> None:
+    def __init__(self, library: Path, design: Design, trace: Trace, window: tuple[int, int], every_clock: bool) -> None:
         self._library = ctypes.CDLL(str(library))
         self._library.tachometer_new.restype = ctypes.c_void_p
         self._trace = trace
@@ -150,7 +170,7 @@ class _Play:
         self._rows = np.empty((_CAPACITY, self._columns), dtype=np.int64)
         self._shown = np.empty((_CAPACITY if design.n_words else 0, 1 + design.n_words), dtype=np.int64)
         self._at = np.ascontiguousarray(trace.clock, dtype=np.int64)
-        self._level = packed([trace.lines[pin.name] for pin in design.pins])
+        self._level = design.levels(trace)
 
     def rows(self) -> NDArray[np.int64]:
         """Clock and outputs in every clock with a strobe that is done."""

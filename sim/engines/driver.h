@@ -1,5 +1,5 @@
 // The clock loop of a compiled core: plays pin changes, collects a row in every clock with a strobe. It is compiled
-// behind a `struct Model`, which the engine writes: `pins` sets the inputs, `settle` lets everything follow them,
+// behind a `struct Model`, which the engine writes: `play` sets the inputs, `settle` lets everything follow them,
 // `edge` is the rising clock edge. Between the two, values are those that a flip-flop would sample. `idle` are clocks in
 // which nothing changes but counters up to their ends, from this one on, and `move_on` does so many edges at once.
 
@@ -8,7 +8,7 @@ constexpr int64_t ROOM = 1024;  // rows
 struct Job {
   int64_t clock, end;  // clocks done, and to be done
   const int64_t *at;  // clock of each change
-  const uint8_t *level;  // a bit for each pin
+  const void *level;  // as the model plays them
   int64_t n_changes, next;
   int64_t *rows;  // clock and outputs
   int64_t n_rows, capacity;
@@ -55,7 +55,7 @@ ENTRY __attribute__((flatten)) void tachometer_run(void *home, Job *job) {
     if (N_SHOWN && job->shown_capacity - job->n_shown < room) room = job->shown_capacity - job->n_shown;
     if (room < ROOM) break;
     int64_t until = job->end - clock < room ? job->end : clock + room;
-    if (job->next < job->n_changes && job->at[job->next] == clock) model.pins(job->level[job->next++]);
+    if (job->next < job->n_changes && job->at[job->next] == clock) model.play(job->level, job->next++);
     if (job->next < job->n_changes && job->at[job->next] < until) until = job->at[job->next];
     for (; clock < until; clock++) {
       model.settle();

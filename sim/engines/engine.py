@@ -1,12 +1,12 @@
-"""Engines: what runs the hardware. All take a `PinTrace` and give a `Run`."""
+"""Engines: what runs the hardware. All take a trace of pins and give a `Run`."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.run import Run
-from tachometry.spec import Port, TachometerSpec
+from tachometry.spec import CoreSpec, Port
 
 
 class Interrupted(KeyboardInterrupt):
@@ -30,8 +30,8 @@ class Engine(Protocol):
 
     def run(
         self,
-        spec: TachometerSpec,
-        trace: PinTrace,
+        spec: CoreSpec,
+        trace: Trace,
         *,
         vcd: Path | None = None,
         window: tuple[int, int] | None = None,
@@ -41,8 +41,8 @@ class Engine(Protocol):
 
         Parameters
         ----------
-        spec : TachometerSpec
-        trace : PinTrace
+        spec : CoreSpec
+        trace : Trace
         vcd : path or None
             Where to write a waveform, and a GTKWave save file beside it with the suffix `.gtkw`.
         window : (int, int) or None
@@ -58,7 +58,7 @@ class Engine(Protocol):
         ...
 
 
-def driven_pins(spec: TachometerSpec, trace: PinTrace) -> list[Port]:
+def driven_pins(spec: CoreSpec, trace: Trace) -> list[Port]:
     """The inputs that a trace drives.
 
     Raises

@@ -6,15 +6,15 @@ from amaranth import Cat, Module, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl import Tachometer
-from tachometry.spec import TachometerSpec
+from tachometry.hdl import AnyTachometer, core_of
+from tachometry.spec import CoreSpec
 from tachometry.spec.port import INDEX, TICK, UPDATE
 
 WORD = 32  # bits
 _ORDER = {TICK: 1, UPDATE: 2, INDEX: 3}  # of strobes in the waveform; errors come first
 
 
-def shown(core: Tachometer) -> dict[str, Value]:
+def shown(core: AnyTachometer) -> dict[str, Value]:
     """Signals of the waveform, in the order in which they are shown.
 
     First the pins, then every strobe with the ports that are new with it; the inside of the datapath stands before the
@@ -36,15 +36,15 @@ class Watched(wiring.Component):
 
     Parameters
     ----------
-    spec : TachometerSpec
+    spec : CoreSpec
 
     Members
     -------
     The ports of the core, and `shown_0`, `shown_1` … of 32 bits, out: the shown signals, the first in the lowest bits.
     """
 
-    def __init__(self, spec: TachometerSpec) -> None:
-        self.core = Tachometer(spec)
+    def __init__(self, spec: CoreSpec) -> None:
+        self.core = core_of(spec)
         self.widths = {name: (len(value), value.shape().signed) for name, value in shown(self.core).items()}
         flow = {"input": In, "output": Out}
         members: dict[str, Any] = {

@@ -10,39 +10,41 @@ from amaranth import Cat, Module, Signal, Value
 from amaranth.sim import Simulator
 from numpy.typing import NDArray
 
-from tachometry.hdl import Tachometer
+from tachometry.hdl import core_of
 from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import shown
 from tachometry.sim.engines.waveform import Waveform
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.run import Run, observed
-from tachometry.spec import TachometerSpec
+from tachometry.spec import CoreSpec
 
 # The simulator counts in femtoseconds; a nanosecond per clock keeps every instant exact. Waveforms have true times.
 _PERIOD = 1e-9
 _CLOCKS_PER_CALL = 10_000
 
 
-async def drive(ctx: Any, trace: PinTrace, pins: Mapping[str, Signal], period: float) -> None:
+async def drive(ctx: Any, trace: Trace, pins: Mapping[str, Signal], period: float) -> None:
     """Let a trace play on signals, in a testbench of Amaranth's simulator that begins at time 0.
 
     Parameters
     ----------
     ctx : simulator context
-    trace : PinTrace
+    trace : Trace
     pins : mapping of str to Signal
         By the names of the lines: `a`, `b`, and `z` and `tick_in` if there are.
     period : float, seconds
         Of the simulated clock, whose edges lie in the middle of each period, as `Simulator.add_clock` has them.
     """
-    now = 0
+    now, before = 0, [-1] * len(pins)
     levels = (trace.lines[name].tolist() for name in pins)
     for clock, *row in zip(trace.clock.tolist(), *levels, strict=True):
         if clock > now:
             await ctx.delay((clock - now) * period)
             now = clock
-        for pin, level in zip(pins.values(), row, strict=True):
-            ctx.set(pin, level)
+        for pin, level, old in zip(pins.values(), row, before, strict=True):
+            if level != old:  # to set a signal takes as long as to simulate a part of a clock
+                ctx.set(pin, level)
+        before = row
 
 
 class PySim:
@@ -52,15 +54,15 @@ class PySim:
 
     def run(
         self,
-        spec: TachometerSpec,
-        trace: PinTrace,
+        spec: CoreSpec,
+        trace: Trace,
         *,
         vcd: Path | None = None,
         window: tuple[int, int] | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> Run:
         """See `Engine.run`."""
-        core = Tachometer(spec)
+        core = core_of(spec)
         top = Module()
         top.submodules.core = core
         outputs = spec.outputs

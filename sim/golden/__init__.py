@@ -4,15 +4,17 @@ from typing import Any
 
 import numpy as np
 
+from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.golden.standstill import with_stalled
+from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
-from tachometry.spec import TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 
 
 def model(spec: TachometerSpec) -> Any:
@@ -20,8 +22,12 @@ def model(spec: TachometerSpec) -> Any:
     return MODELS[spec.method](spec)
 
 
-def run(spec: TachometerSpec, trace: PinTrace) -> Run:
+def run(spec: CoreSpec, trace: Trace) -> Run:
     """What the core of `spec` must show at its ports for these pins."""
+    if isinstance(spec, AxesSpec):
+        assert isinstance(trace, AxesTrace), "many axes need the pins of each"
+        return run_axes(spec, trace, tables)
+    assert isinstance(trace, PinTrace), "a core of one axis needs the pins of one"
     return Run.of_ports(spec, trace.n_clocks, tables(spec, trace))
 
 
@@ -47,4 +53,4 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
     }
-    return {name: table.rows(table.clock < trace.n_clocks) for name, table in found.items()}
+    return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

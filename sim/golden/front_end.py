@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.ordered import places
 from tachometry.sim.signals.recording import PinTrace, merged
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 
 # Where a pair of levels stands in the forward cycle 00, 10, 11, 01 of (A, B).
-_PHASE = np.array([[0, 3], [1, 2]], dtype=np.int64)
+_PHASE = np.array([[0, 3], [1, 2]], dtype=np.uint8)
 
 
 def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -30,11 +31,12 @@ def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[N
     illegal : bool array, shape (n − 1,)
         Both lines changed.
     """
-    turn = np.diff(_PHASE[a, b]) % 4
+    turn = np.diff(_PHASE.ravel()[2 * a + b]) & 3
     step = np.array([0, 1, 0, -1], dtype=np.int64)[turn]
-    of_a = a[1:] != a[:-1]
-    counted = {4: np.ones_like(of_a), 2: of_a, 1: of_a & (b[1:] == 0)}[decoding]
-    return np.where(counted, step, 0), turn == 2
+    if decoding < 4:
+        of_a = a[1:] != a[:-1]
+        step[~(of_a if decoding == 2 else of_a & (b[1:] == 0))] = 0
+    return step, turn == 2
 
 
 def filter_line(
@@ -97,25 +99,36 @@ class Steps:
     swallowed: NDArray[np.int64]
 
 
+def together(
+    at_a: NDArray[np.int64], a: NDArray[np.uint8], at_b: NDArray[np.int64], b: NDArray[np.uint8]
+) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint8]]:
+    """Change lists of both lines as one, from the first clock on from which both are known."""
+    clock = merged(at_a, at_b)
+    clock = clock[clock >= max(at_a[0], at_b[0])]
+    return clock, a[np.searchsorted(at_a, clock, side="right") - 1], b[np.searchsorted(at_b, clock, side="right") - 1]
+
+
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     """Conditioned and decoded lines."""
-    lines, returned = {}, [np.empty(0, dtype=np.int64)]
-    for name in ("a", "b", "z") if spec.index else ("a", "b"):
+    returned = [np.empty(0, dtype=np.int64)]
+
+    def conditioned(name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         clock, level = changes(trace, name)
         if spec.filter_clocks:
             clock, level, gone = filter_line(clock, level, spec.filter_clocks)
             returned.append(gone)
-        lines[name] = clock, level
-    (at_a, a), (at_b, b) = lines["a"], lines["b"]
-    # From the first clock on from which both are known.
-    clock = merged(at_a, at_b)
-    clock = clock[clock >= max(at_a[0], at_b[0])]
-    a, b = a[np.searchsorted(at_a, clock, side="right") - 1], b[np.searchsorted(at_b, clock, side="right") - 1]
+        return clock, level
+
+    if spec.filter_clocks:
+        clock, a, b = together(*conditioned("a"), *conditioned("b"))
+    else:
+        changed = np.append(True, (trace.a[1:] != trace.a[:-1]) | (trace.b[1:] != trace.b[:-1]))
+        clock, a, b = trace.clock[changed], trace.a[changed], trace.b[changed]
     step, illegal = decode(a, b, spec.encoder.decoding)
     at = clock[1:] + spec.pin_to_count
     rises = at[:0]
     if spec.index:
-        at_z, z = lines["z"]
+        at_z, z = conditioned("z")
         rises = at_z[1:][z[1:] == 1] + spec.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
     return Steps(at, step, at[illegal], rises, np.sort(np.concatenate(returned)) + 3)
@@ -124,7 +137,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:
     """Direction in which the sum of steps first left ±`limit` in each window; 0 where it did not."""
     found = np.zeros(len(last) + 1, dtype=np.int64)
-    window = np.searchsorted(last, steps.clock, side="left")
+    window = places(last, steps.clock, "left")
     total = np.cumsum(steps.step)
     before = np.append(0, total)[np.searchsorted(steps.clock, last, side="right")]
     partial = total - np.append(0, before)[window]
@@ -151,32 +164,30 @@ def count(
         Windows that may be longer than nominal: whether the method raises `overflow`. A sum that has left
         ±max_pulse_count is saturated, whatever comes after.
     """
-    total = np.concatenate([[0], np.cumsum(steps.step)])  # total[k] = sum of the first k steps
-
-    def steps_through(clock: NDArray[np.int64]) -> NDArray[np.int64]:
-        return total[np.searchsorted(steps.clock, clock, side="right")]
-
-    reached = steps_through(last)
-    sums = np.diff(reached, prepend=0)
+    window = places(last, steps.clock, "left")
+    forward, backward = (np.bincount(window[steps.step == sign], minlength=len(last) + 1)[:-1] for sign in (1, -1))
+    sums = forward - backward
+    reached = np.cumsum(sums)
     overflow = np.abs(sums) > spec.max_pulse_count
     if beyond is not None:
         left = first_beyond(steps, last, spec.max_pulse_count)
         sums = np.where(left != 0, left * spec.max_pulse_count, sums)
         overflow = (left != 0) | beyond
     rises = steps.index
-    captured = steps_through(rises)
+    captured = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, rises, side="right")]
     # What is taken off the position: before any index, and after each.
     origin = np.append(0, captured) if spec.index_reset else np.zeros(len(rises) + 1, dtype=np.int64)
+    shown = reached - origin[np.searchsorted(rises, last, side="right")] if spec.index_reset else reached
 
     def wrapped(position: NDArray[np.int64]) -> NDArray[np.int64]:
         half = 1 << (spec.position_width - 1)
-        return (position + half) % (2 * half) - half
+        return ((position + half) & (2 * half - 1)) - half
 
     strobe = last + spec.tick_latency
-    glitches = np.searchsorted(steps.swallowed, strobe, side="right")
+    glitches = places(steps.swallowed, strobe, "right")
     columns = {
         "pulse_count": np.clip(sums, -spec.max_pulse_count, spec.max_pulse_count),
-        "position": wrapped(reached - origin[np.searchsorted(rises, last, side="right")]),
+        "position": wrapped(shown),
         "overflow": overflow,
         "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),
     }

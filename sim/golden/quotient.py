@@ -9,7 +9,8 @@ def round_quotient(
 ) -> NDArray[np.int64]:
     """2^frac_bits · numerator/denominator as an integer; the denominators are positive and below 2^61.
 
-    It is a long division, some bits at a time, so that no remainder overflows. The result must fit.
+    Where 64 bits do not hold the shifted numerators, it is a long division, some bits at a time, so that no remainder
+    overflows. The result must fit.
 
     Parameters
     ----------
@@ -18,6 +19,12 @@ def round_quotient(
     towards : int
         ⌊x + ½⌋ (0), ⌊x⌋ (−1) or ⌈x⌉ (1).
     """
+    bits = int(np.max(np.abs(numerator), initial=0)).bit_length() + frac_bits
+    if max(bits, int(np.max(denominator, initial=1)).bit_length()) < 61:
+        shifted = numerator << frac_bits
+        if towards == 0:
+            return (2 * shifted + denominator) // (2 * denominator)
+        return shifted // denominator if towards < 0 else -(-shifted // denominator)
     quotient, rest = numerator // denominator, numerator % denominator
     most = 62 - int(np.max(denominator, initial=1)).bit_length()  # bits at a time
     for bits in [most] * (frac_bits // most) + [frac_bits % most]:

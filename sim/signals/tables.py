@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.signals.axes import of_axis
 from tachometry.sim.signals.files import rows_of, write_csv
-from tachometry.sim.signals.run import Run
-from tachometry.spec import TachometerSpec
+from tachometry.sim.signals.run import Run, Table
+from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.port import TICK, UPDATE
 
 
@@ -47,9 +48,12 @@ class VelocityError:
 
 def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
     """Velocity at the end of every tick; empty if there was no update."""
-    updates = run.updates
     clock = run.ticks.clock + spec.tick_to_velocity
-    clock = clock[clock < run.n_clocks]
+    return held_from(clock[clock < run.n_clocks], run.updates, spec)
+
+
+def held_from(clock: NDArray[np.int64], updates: Table, spec: TachometerSpec) -> HeldVelocity:
+    """The velocity that is held in these clocks, from the first update on."""
     latest = np.searchsorted(updates.clock, clock, side="right") - 1
     clock, latest = clock[latest >= 0], latest[latest >= 0]
     velocity = updates.velocity[latest].astype(np.float64) * spec.rad_per_s_per_lsb
@@ -68,14 +72,26 @@ def velocity_error(
     )
 
 
-def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
+def write_trace(path: Path, spec: CoreSpec, run: Run) -> None:
     """Write a CSV with a row per update: when it came, which tick closed its window, and what all its ports say.
 
     The velocity stands there as the raw number and in the unit of the core (in rad/s, if that is counts per tick); all
-    else is raw, by the names of the ports.
+    else is raw, by the names of the ports. With many axes, the axis comes first.
     """
+    if not isinstance(spec, AxesSpec):
+        columns = _of_updates(spec, run, spec.tick_to_velocity)
+    else:
+        each = [_of_updates(spec.tachometer, of_axis(spec, run, axis), 0) for axis in range(spec.axes)]
+        axis = np.repeat(np.arange(spec.axes), [len(found["clock"]) for found in each])
+        together = {name: np.concatenate([found[name] for found in each]) for name in each[0]}
+        order = np.argsort(together["clock"], kind="stable")
+        columns = {name: column[order] for name, column in {"axis": axis, **together}.items()}
+    write_csv(path, tuple(columns), rows_of(list(columns.values())))
+
+
+def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[str, NDArray[Any]]:
     updates, unit = run.updates, spec.shown_unit
-    tick = np.searchsorted(run.ticks.clock, updates.clock - spec.tick_to_velocity, side="right") - 1
+    tick = np.searchsorted(run.ticks.clock, updates.clock - tick_to_velocity, side="right") - 1
     columns = {
         "clock": updates.clock,
         "tick": tick,
@@ -84,13 +100,21 @@ def write_trace(path: Path, spec: TachometerSpec, run: Run) -> None:
         "velocity_raw": updates.velocity,
         f"velocity_{unit.suffix}": unit.of(updates.velocity * spec.rad_per_s_per_lsb),
     }
-    columns |= {name: updates[name].astype(np.int64) for name in updates.columns if name not in (*columns, "velocity")}
-    write_csv(path, tuple(columns), rows_of(list(columns.values())))
+    return columns | {
+        name: updates[name].astype(np.int64) for name in updates.columns if name not in (*columns, "velocity")
+    }
 
 
 def write_counts(path: Path, run: Run) -> None:
-    """Write a CSV with a row per tick: its number, then what all ports say that are held by the tick."""
-    columns = {"tick": np.arange(len(run.ticks)), **run.ticks.columns}
+    """Write a CSV with a row per tick: its number, then what all ports say that are held by the tick.
+
+    With many axes, every axis has a row with the same number.
+    """
+    number = np.arange(len(run.ticks))
+    axis = run.ticks.get("axis")
+    for one in np.unique(axis):
+        number[axis == one] = np.arange(np.count_nonzero(axis == one))
+    columns = {"tick": number, **run.ticks.columns}
     write_csv(path, tuple(columns), rows_of([column.astype(np.int64) for column in columns.values()]))
 
 

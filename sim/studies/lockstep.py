@@ -6,9 +6,9 @@ from pathlib import Path
 
 from tachometry.sim import golden
 from tachometry.sim.engines.engine import Engine, Interrupted
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.run import Mismatch, Run, compare
-from tachometry.spec import TachometerSpec
+from tachometry.spec import CoreSpec
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Lockstep:
 
     Parameters
     ----------
-    trace : PinTrace
+    trace : Trace
         What was played; after Ctrl-C shorter than what was asked for.
     expected, actual : Run
         Of the golden model and of the engine.
@@ -27,7 +27,7 @@ class Lockstep:
         The first of them in each signal that differs.
     """
 
-    trace: PinTrace
+    trace: Trace
     expected: Run
     actual: Run
     n_mismatches: int
@@ -35,8 +35,8 @@ class Lockstep:
 
 
 def lockstep(
-    spec: TachometerSpec,
-    trace: PinTrace,
+    spec: CoreSpec,
+    trace: Trace,
     engine: Engine,
     *,
     expected: Run | None = None,
@@ -49,8 +49,8 @@ def lockstep(
 
     Parameters
     ----------
-    spec : TachometerSpec
-    trace : PinTrace
+    spec : CoreSpec
+    trace : Trace
     engine : Engine
     expected : Run or None
         What the golden model makes of the trace, if that is known already.

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.encoder.stress import stress
+from tachometry.sim.encoder.stress import stress_of
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.engines.pick import pick
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.run import Mismatch, Run
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.spec import TachometerSpec
+from tachometry.spec import CoreSpec
 
 _EDGES, _MOST_EDGES = 300, 50_000  # at a speed, of a motion
 # Some thousand times slower than the others, it runs a thousandth of their clocks.
@@ -29,13 +29,13 @@ class Failure:
     seed : int
     first : list of Mismatch
         In each signal that differs.
-    trace : PinTrace
+    trace : Trace
         The motion, up to what differs first.
     """
 
     seed: int
     first: list[Mismatch]
-    trace: PinTrace
+    trace: Trace
 
 
 @dataclass
@@ -59,11 +59,11 @@ class Outcome:
     failure: Failure | None = None
 
 
-def motions(spec: TachometerSpec, seed: int, n_clocks: int) -> Iterator[tuple[int, PinTrace]]:
+def motions(spec: CoreSpec, seed: int, n_clocks: int) -> Iterator[tuple[int, Trace]]:
     """Seed and motion, of `seed`, `seed` + 1 … until they have `n_clocks` clocks together; one at least."""
     done, n_edges = 0, _EDGES
     while True:
-        trace = stress(spec, seed, n_edges)
+        trace = stress_of(spec, seed, n_edges)
         yield seed, trace
         done += trace.n_clocks
         if done >= n_clocks:
@@ -72,12 +72,12 @@ def motions(spec: TachometerSpec, seed: int, n_clocks: int) -> Iterator[tuple[in
         n_edges = int(np.clip(n_edges * (n_clocks - done) // trace.n_clocks, _EDGES, _MOST_EDGES))
 
 
-def verify(spec: TachometerSpec, engines: Sequence[str], n_clocks: int, seed: int) -> dict[str, Outcome]:
+def verify(spec: CoreSpec, engines: Sequence[str], n_clocks: int, seed: int) -> dict[str, Outcome]:
     """Run motions on every engine, and compare every bit of every tick and update with the golden model.
 
     Parameters
     ----------
-    spec : TachometerSpec
+    spec : CoreSpec
     engines : sequence of str
     n_clocks : int
         Clocks that each engine is to run at least; pysim a thousandth of them, but no fewer than 10,000.
@@ -105,7 +105,7 @@ def verify(spec: TachometerSpec, engines: Sequence[str], n_clocks: int, seed: in
     return outcomes
 
 
-def _add(outcome: Outcome, spec: TachometerSpec, engine: Engine, seed: int, trace: PinTrace, expected: Run) -> None:
+def _add(outcome: Outcome, spec: CoreSpec, engine: Engine, seed: int, trace: Trace, expected: Run) -> None:
     begun = time.perf_counter()
     found = lockstep(spec, trace, engine, expected=expected)
     outcome.seconds += time.perf_counter() - begun

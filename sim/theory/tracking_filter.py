@@ -15,6 +15,8 @@ from tachometry.sim.theory.checks import Floats
 
 _PREDICT = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
 
+_SMALL = 0.01
+
 
 def gains(x: float) -> Floats:
     """What place, velocity and acceleration take of an error, shape (3,)."""
@@ -42,6 +44,8 @@ def noise_gains(x: float) -> Floats:
 
 def worst_gain(x: float) -> float:
     """The velocity that errors of at most 1 in the places of counts can cause: the sum of |impulse response|."""
+    if x < _SMALL:  # it is proportional to x, within 0.2 %
+        return worst_gain(_SMALL) * x / _SMALL
     state, step = gains(x), _step(x)
     total, n = 0.0, math.ceil(40 / x)
     for _ in range(n):

@@ -15,8 +15,9 @@ v add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at 
 most half one of the fine position. They are greatest for the least λ, and either for m = 1, for the longest silence, or
 where x = λ·m·T_s has just reached its most.
 
-The gains d and d·U/m are less than 2 and have B fraction bits. Their relative error is below 2^−B/d. It only moves the
-poles. B is such that a transient of one count per tick is off by at most an eighth of an LSB for it.
+The gain d is less than 1 and has B fraction bits. The gain d·U/m is less than 2^(1 + R) and has B − R; R is 0, except
+where ticks may be much shorter than U. Their relative error is below 2^−(B − R)/d. It only moves the poles. B − R is
+such that a transient of one count per tick is off by at most an eighth of an LSB for it.
 """
 
 import math
@@ -81,7 +82,7 @@ class Tracking:
         fitting = -ceil_log2(AGILE * self.bandwidth / self.clock_hz)
         return max(fitting, self.longest_tick.bit_length() - 1)
 
-    @property
+    @cached_property
     def unit_ticks(self) -> Fraction:
         """u: U in nominal ticks."""
         return Fraction(1 << self.unit_bits, self.tick_cycles)
@@ -122,74 +123,83 @@ class Tracking:
             finest = max(finest, *(1 + math.ceil(each) for each in bits))
         return finest
 
-    @property
+    @cached_property
     def acceleration_error(self) -> float:
         """Error of a, in its LSB."""
         u = float(self.unit_ticks)
         return max((4.5 * u / m) * 2**self.extra_bits + 1.5 / d for m, d in self._gains())
 
-    @property
+    @cached_property
+    def ratio_range(self) -> int:
+        """R, of the range of the gain d·U/m."""
+        shortest = 1 << LEAST_TICK_BITS if self.external else self.tick_cycles
+        x = min((AGILE if self.agile else 1) * self.rate(0) * shortest, self.most(0))
+        greatest = (1 - math.exp(-x)) * (1 << self.unit_bits) / shortest
+        return max(math.floor(math.log2(greatest * (1 + 2.0**-10))), 0)
+
+    @cached_property
     def gain_bits(self) -> int:
         """B: fraction bits of the multipliers."""
         d = self._gains()[0][1]
-        return max(20, self.velocity_bits + 3 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks)))))
+        least = self.velocity_bits + 3 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks))))
+        return max(20, least) + self.ratio_range
 
-    @property
+    @cached_property
     def max_velocity(self) -> int:
         """Greatest |v|, in 2^−F counts per U: `max_count` counts in a tick as long as nominal."""
         return (self.max_count << (self.frac_bits + self.unit_bits)) // self.tick_cycles
 
-    @property
+    @cached_property
     def max_acceleration(self) -> int:
         """Greatest |a|, in 2^−(F + S) counts per U²: an eighth of the greatest speed within U."""
         return (self.max_velocity << self.extra_bits) >> 3
 
-    @property
+    @cached_property
     def max_error(self) -> int:
         """|e| from which the recursion starts anew, in counts: no shaft within the greatest speed has it."""
         return 2 * self.max_count + 2
 
-    @property
+    @cached_property
     def max_gap(self) -> int:
         """Most clocks from a tick with counts to the end of the next one, and what the first count was early."""
         return (self.max_ticks + 1) * self.longest_tick
 
-    @property
+    @cached_property
     def gap_bits(self) -> int:
         """Bits of a number of clocks between counts."""
         return self.max_gap.bit_length()
 
-    @property
+    @cached_property
     def times_bits(self) -> int:
         """Bits of the sum of the times from the counts of a tick to its end, in clocks."""
         return max((self.max_count * (self.longest_tick - 1)).bit_length(), 1)
 
-    @property
+    @cached_property
     def number_bits(self) -> int:
         """Bits of the number of counts of a tick."""
         return self.max_count.bit_length()
 
-    @property
+    @cached_property
     def places_bits(self) -> int:
         """Bits of the sum of twice the places of a tick's counts, relative to its end; signed."""
         return signed_width(self.max_count * (2 * self.max_count - 1))
 
-    @property
+    @cached_property
     def _moved(self) -> float:
         """Counts that v says for a tick, at most: more than a may add to it."""
         return 2 * max(self.max_count, self.max_velocity * self.longest_tick / 2 ** (self.unit_bits + self.frac_bits))
 
-    @property
+    @cached_property
     def mean_bits(self) -> int:
         """Bits of a mean over the counts of a tick."""
         return math.ceil(math.log2(self.max_count + self._moved)) + self.frac_bits
 
-    @property
+    @cached_property
     def gap_shift(self) -> int:
         """Left shift of a gap after which it is greater than d: no tick is as short as this allows."""
         return self.gain_bits - LEAST_TICK_BITS
 
-    @property
+    @cached_property
     def least_gap(self) -> int:
         """Fewest clocks between the first two counts."""
         return max(self.tick_cycles // self.max_count, 1)
@@ -214,7 +224,8 @@ class Tracking:
             # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
             self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
             # What is multiplied: on its way to a product the adder holds nearly twice as much.
-            2 * self.max_error * of_v * 2**self.extra_bits,  # h
+            2 * self.max_error * d * 2**self.ratio_range,  # e·d
+            2 * self.max_error * of_v * 2 ** (self.extra_bits + self.ratio_range),  # h
             2 * self.max_acceleration / 2**self.frac_bits,
             2 * self.max_velocity / 2**self.frac_bits * max(1.125, 2 ** (self.times_bits - 1 - self.unit_bits)),
             4 * self.max_error,  # e less its mean
@@ -259,17 +270,17 @@ class Tracking:
         longest = (1 << (self.width - 1)) - 1 - self.max_gap
         return (*(min(span, longest) for span in spans), longest)
 
-    @property
+    @cached_property
     def late_limit(self) -> int:
         """How far p may go from the position while no count comes: ½ + 1.5·E."""
         return self.fixed(Fraction(1, 2) + Fraction(3, 2) * self.edge_error)
 
-    @property
+    @cached_property
     def mean_threshold_bits(self) -> int:
         """Fraction bits of the threshold of the mean error."""
         return THRESHOLD_BITS - math.floor(2 * math.log2(self.edge_error / 4))
 
-    @property
+    @cached_property
     def mean_threshold(self) -> int:
         """(0.25·E)²: the square of the mean error over the share of the last error in it, that is trouble."""
         return round((self.edge_error / 4) ** 2 * (1 << self.mean_threshold_bits))

@@ -290,35 +290,34 @@ class Program:
     def _gains(self) -> list[Step]:
         """d = 1 − e^−x = x/(1 + x/2 + x²/12) = 3x/((x + 3)²/4 + 3/4), and r = d·U/gap."""
         form = self.form
+        steps = form.unit_bits + form.gap_shift - form.ratio_range
         usual = self._reach("rate", "most_x") if form.growing else self._reach("rate0", "most_x0")
         reach: list[Step] = usual
         if form.agile:
             reach = [Choice(Condition.FLAG, self._reach("agile_rate", "most_x0"), usual)]
         return [
             *(*reach, Do(Op.STORE, "x"), Do(Op.ADD, "three"), Do(Op.STORE, "t"), Do(Op.TO_MQ)),
-            *(
-                Do(Op.MUL, "t", form.frac_bits + 3),
-                Do(Op.ADD, "three_quarters"),
-                Do(Op.STORE, "t"),
-                _ZERO,
-                Do(Op.TO_MQ),
-            ),
-            *(Do(Op.LOAD, "x"), *[Do(Op.ADD, "x")] * 2, Do(Op.FRACTION, "t", form.gain_bits)),
+            *(Do(Op.MUL, "t", form.frac_bits + 3), Do(Op.ADD, "three_quarters"), Do(Op.STORE, "t")),
+            *(_ZERO, Do(Op.TO_MQ), Do(Op.LOAD, "x"), *[Do(Op.ADD, "x")] * 2, Do(Op.FRACTION, "t", form.gain_bits)),
             *(Do(Op.FROM_MQ), Do(Op.STORE, "d"), _ZERO, Do(Op.TO_MQ), Do(Op.LOAD, "d")),
-            *(Do(Op.FRACTION, "gap_shifted", form.unit_bits + form.gap_shift), Do(Op.FROM_MQ), Do(Op.STORE, "r")),
+            *(Do(Op.FRACTION, "gap_shifted", steps), Do(Op.FROM_MQ), Do(Op.STORE, "r")),
         ]
 
     @property
     def _correct(self) -> list[Step]:
         """p, v and a, with the gains of the time since the counts before."""
-        b = self.form.gain_bits
+        b, more = self.form.gain_bits, self.form.ratio_range
+        # r has so many bits less than b behind the point, so what it is multiplied by is shifted by as many.
+        times_r = self._times("r", "e1", b)
+        if more:
+            times_r = [Do(Op.LOAD, "e1"), *_doubled(more), Do(Op.STORE, "t"), *self._times("r", "t", b)]
         return [
             *(*self._times("d", "e", b), Do(Op.STORE, "e1")),
             *(*self._times("d", "e1", b), Do(Op.STORE, "e2")),
             *(*self._times("d", "e2", b), *[Do(Op.ADD, "e1")] * 3, *[Do(Op.SUB, "e2")] * 3),
             *(Do(Op.ADD, "p"), Do(Op.STORE, "p")),
             # All bits of r have left mq.
-            *(*self._times("r", "e1", b), Do(Op.STORE, "h"), *_doubled(self.form.extra_bits), Do(Op.STORE, "t")),
+            *(*times_r, Do(Op.STORE, "h"), *_doubled(self.form.extra_bits + more), Do(Op.STORE, "t")),
             *(*self._times("r", "t", b), Do(Op.ADD, "a"), Do(Op.STORE, "a")),
             *(*self._times("d", "h", b), Do(Op.STORE, "t"), Do(Op.SHIFT, steps=1), Do(Op.ADD, "t"), Do(Op.STORE, "t")),
             *(Do(Op.LOAD, "v"), *[Do(Op.ADD, "h")] * 3, Do(Op.SUB, "t"), Do(Op.STORE, "v")),

@@ -65,7 +65,7 @@ class MTachometer(TachometerSpec):
     @property
     def reciprocal(self) -> Reciprocal:
         """The reciprocal 1/n, where a shift is not enough."""
-        return Reciprocal(self.average, self.max_numerator, self.native_frac_bits, self.error_bits)
+        return Reciprocal(self.average, self.max_numerator, self.native_frac_bits, self.error_bits, self.bounds)
 
     @property
     def margin(self) -> int:
@@ -93,9 +93,11 @@ class MTachometer(TachometerSpec):
 
     @property
     def serial(self) -> bool:
-        return self.shift is None and self.has_room(self.numerator_width + 3)
+        return self.shift is None and self.has_room(self.reciprocal.digits + 1)
 
     @property
     def datapath_latency(self) -> int:
-        # One clock for the sum, and those of the scaler.
-        return 1 if self.shift is not None else self.numerator_width + 4
+        if self.shift is not None:
+            return 1
+        # One clock for the sum, one to load it, one for each addition, one for the result.
+        return 3 + (self.reciprocal.digits if self.serial else self.numerator_width)

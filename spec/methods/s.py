@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
-from tachometry.spec.formats.reciprocal import Reciprocal
-from tachometry.spec.option import option
+from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
+from tachometry.spec.option import ParameterError, option
 from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.units import signed_width
+from tachometry.spec.units import plural, signed_width
 
-# Up to this many ticks 1/m_s is looked up in a table of block RAM; for longer measurements it is carried along.
+# Up to this many ticks 1/m_s can be looked up in a table of block RAM.
 MAX_TABLE = 2048
+_SOURCES = ("serial", "table")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +23,9 @@ class STachometer(TachometerSpec):
     ----------
     cancel : bool
         Cancel alternate pulse alterations: eq. (21) instead of eq. (17).
+    source : str
+        Where 1/m_s comes from if ticks leave the time: `serial`, a division, or `table`, a block RAM. Otherwise from
+        the other; and where ticks are too short for both, it is carried along.
 
     Raises
     ------
@@ -31,10 +35,23 @@ class STachometer(TachometerSpec):
 
     cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).")
 
+    source: str = option(
+        "serial",
+        "Where the reciprocal of the measurement time comes from: divided serially between two ticks, or looked up in "
+        "a table of block RAM. Where ticks are too short for the one, or windows too long, the other is taken.",
+        name="reciprocal",
+        choices=_SOURCES,
+    )
+
     method = "s"
     summary = "averages in step with the alterations of the pulse number"
     update_by = "alteration"
     pairs_all = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.source not in _SOURCES:
+            raise ParameterError("reciprocal", f"must be serial or table, not {self.source!r}")
 
     @property
     def description(self) -> str:
@@ -83,11 +100,32 @@ class STachometer(TachometerSpec):
         return int(self.uncertainty * self.numerator_per_count)
 
     @property
+    def tick_latency(self) -> int:
+        # What saturates has registers of its own: before the sum, and behind it.
+        return super().tick_latency + 2 * (self.max_count < self.longest_tick)
+
+    @property
     def reciprocal(self) -> Reciprocal | CarriedReciprocal:
-        """The reciprocal of m_s: looked up, or carried along where a table would be large."""
+        """The reciprocal of m_s: the first that there is room for, as `source` says; else carried along."""
         shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
-        carried = CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
-        return carried if self.timing.max_ticks > max(MAX_TABLE, carried.depth) else Reciprocal(*shape)
+        found = self.looked_up
+        fitting = [found] if self.timing.max_ticks <= MAX_TABLE and self.has_room(self._busy_clocks(found)) else []
+        divided = DividedReciprocal(*shape, self.bounds)
+        if self.has_room(self._busy_clocks(divided)):
+            fitting.insert(0 if self.source == "serial" else len(fitting), divided)
+        return fitting[0] if fitting else CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
+
+    @property
+    def looked_up(self) -> Reciprocal:
+        """The reciprocal of m_s as a table, whether there is room for it or not."""
+        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
+        found = Reciprocal(*shape, self.bounds)
+        return found if found.bounds or found.has_ties else NarrowReciprocal(*shape)
+
+    def _busy_clocks(self, reciprocal: Reciprocal) -> int:
+        # One clock to start over with a new m_s, then a table takes two, and a division as many as its bits.
+        found = reciprocal.steps + 1 if isinstance(reciprocal, DividedReciprocal) else 2
+        return self._serial_latency(reciprocal) + 1 + found
 
     @property
     def carried(self) -> bool:
@@ -95,9 +133,29 @@ class STachometer(TachometerSpec):
         return isinstance(self.reciprocal, CarriedReciprocal)
 
     @property
-    def memory(self) -> tuple[str, int, int]:
+    def memory(self) -> tuple[str, int, int] | None:
         """The memory of the reciprocal: its kind, entries, bits of an entry."""
+        if isinstance(self.reciprocal, DividedReciprocal):
+            return None
         return "table and carried on" if self.carried else "table", self.reciprocal.depth, self.reciprocal.width
+
+    @property
+    def division(self) -> str:
+        reciprocal = self.reciprocal
+        if isinstance(reciprocal, DividedReciprocal):
+            return f"divided in {reciprocal.steps + 1} clocks between two ticks"
+        return ""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        divided = isinstance(self.reciprocal, DividedReciprocal)
+        if divided == (self.source == "serial") and not self.carried:
+            return super().notes
+        found = "carried along" if self.carried else "divided" if divided else "from a table"
+        reason = f"a tick of {plural(self.timing.tick_cycles, 'clock')} is too short to divide between two"
+        if divided:
+            reason = f"a table has at most {MAX_TABLE} entries"
+        return (*super().notes, f"reciprocal {found}: {reason}")
 
     @property
     def numerator_width(self) -> int:
@@ -112,20 +170,22 @@ class STachometer(TachometerSpec):
     @property
     def serial(self) -> bool:
         """Whether ticks are far enough apart for one adder to form the velocity step by step."""
-        return self.has_room(self._serial_latency)
+        return not self.carried
+
+    @property
+    def busy_clocks(self) -> int:
+        reciprocal = self.reciprocal
+        assert isinstance(reciprocal, Reciprocal)
+        return self._busy_clocks(reciprocal)
 
     @property
     def datapath_latency(self) -> int:
-        return self._serial_latency if self.serial else self._pipelined_latency
-
-    @property
-    def _serial_latency(self) -> int:
-        # One clock for the table, one for its register, one for each bit of N, one to add b. A carried reciprocal takes
-        # one more for every digit of N·R/m, and one to round.
-        return 2 * self.numerator_width + 4 if self.carried else self.numerator_width + 3
-
-    @property
-    def _pipelined_latency(self) -> int:
         reciprocal = self.reciprocal
-        digits = reciprocal.digits if isinstance(reciprocal, CarriedReciprocal) else 0
-        return self.numerator_width + digits + 3
+        if isinstance(reciprocal, Reciprocal):
+            return self._serial_latency(reciprocal)
+        # One clock for the table, one for its register, one for each bit of N and each digit of N·R/m, one to add b.
+        return self.numerator_width + reciprocal.digits + 3
+
+    def _serial_latency(self, reciprocal: Reciprocal) -> int:
+        # One clock for the product of each digit, which is added in the next.
+        return reciprocal.digits + 1

@@ -147,8 +147,14 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def quotient_bits(self) -> int:
-        """Bits that the divider makes of a quotient after its sign; the last one is for rounding."""
-        return self.max_quotient.bit_length() + self.native_frac_bits + 1
+        """Bits that the divider makes of a quotient after its sign; with bounds, as many of all quotients."""
+        bits = (self.max_bound if self.bounds else self.max_quotient).bit_length() + self.native_frac_bits
+        output = self.output
+        if output is None or len(output.digits) < 3:
+            return bits
+        # Up to two more are worth it if updates are then so far apart that the unit takes one adder.
+        more = output.serial_latency - (bits + 2)
+        return bits + more if more in (1, 2) else bits
 
     @property
     def interval_width(self) -> int:
@@ -170,8 +176,8 @@ class TimedTachometer(TachometerSpec):
     @property
     def division_clocks(self) -> int:
         """Clocks from one division to the next."""
-        # A clock for each digit, its sign included, one to round, one to hold it in its range, and one to compare.
-        return self.quotient_bits + 3 + self.saturates
+        # A clock for the dividend, and one for each digit, its sign included.
+        return self.quotient_bits + 2
 
     @property
     def datapath_latency(self) -> int:

@@ -102,9 +102,9 @@ class TrackTachometer(TachometerSpec):
             raise ParameterError("bounds", f"must not be given with method {self.method}: no window encloses its speed")
         if self.form.width > MOST_WIDTH:
             raise ParameterError(
-                "bandwidth",
-                f"must be more than {float(self.bandwidth):.9g} rad/s with velocities as fine and as great: words "
-                f"would have {self.form.width} bits, and {MOST_WIDTH} are the most",
+                "method",
+                f"must not be {self.method} here: its words would have {self.form.width} bits, and {MOST_WIDTH} are "
+                "the most; a shorter max_time or tick, a lower max_speed, fewer frac_bits or another bandwidth helps",
             )
         shortest = self.min_tick_cycles
         if self.timing.tick_cycles < shortest:

@@ -21,9 +21,9 @@ def trace(monkeypatch: pytest.MonkeyPatch) -> PinTrace:
 
 def test_all_engines_and_the_bare_loop_see_the_same(trace: PinTrace) -> None:
     speed = bench.speed("m", SPEC, trace, slow=3000, fast=100_000)
-    assert min(speed.pysim, speed.verilator, speed.bare, speed.cxxrtl) > 0
+    assert min(speed.pysim, speed.verilator, speed.bare, speed.every_clock, speed.cxxrtl) > 0
     assert len(speed.cells) == len(bench.SPEED_COLUMNS)
 
 
 def test_every_step_sees_the_same(trace: PinTrace) -> None:
-    assert len(bench.steps(SPEC, trace, n_clocks=100_000)) == 6
+    assert len(bench.steps(SPEC, trace, n_clocks=100_000)) == 7

@@ -11,12 +11,15 @@ import proofs.mutation.score
 import pytest
 from proofs.mutation.cases import CASES, Case
 from proofs.mutation.equivalent import equivalent
+from proofs.mutation.inductive import Known
 from proofs.mutation.netlist import exported, mutants
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus, stimulus
+from proofs.mutation.track_lemmas import begins
 
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
+from tachometry.spec.formats.tracking_code import NOT_TAKEN, TAKEN, Condition, Instruction, Op
 
 CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=40)
 CLOCKS = 200_000
@@ -59,6 +62,7 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
 
 def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 2)
+    monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known([], ["1"]))
     played = stimulus(CASE.spec, CLOCKS)
     flat, found = mutants(exported(CASE.component), CASE.mutants, tmp_path)
     clocks, _ = run(library(CASE.pins, flat, found), len(found), len(CASE.pins.outputs), played.pins)
@@ -69,8 +73,26 @@ def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch
         assert not any(equivalent(CASE, flat, latest, played.pins, tmp_path, pool))
 
 
+def test_lemmas_must_be_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """One that holds at first only, behind one that always holds."""
+    monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known(["wire one = 1;"], ["one", "!{tick}"]))
+    flat, found = mutants(exported(CASE.component), 1, tmp_path)
+    with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match=r"lemmas: \[True, False\]"):
+        equivalent(CASE, flat, found, stimulus(CASE.spec, 100).pins, tmp_path, pool)
+
+
+def test_every_instruction_has_its_clock() -> None:
+    """A jump over one leads to the same clock as the way without it, or it is refused."""
+    wait, end = Instruction(Op.WAIT, 0, NOT_TAKEN + 1), Instruction(Op.OUT, 0, 1)
+    jump = Instruction(Op.JUMP, 2, Condition.FLAG)
+    assert begins((jump, wait, end)) == [0, NOT_TAKEN, TAKEN]
+    with pytest.raises(AssertionError):
+        begins((jump, replace(wait, steps=1), end))
+
+
 def test_golden_model_is_held_against_the_core() -> None:
     played = stimulus(CASE.spec, 1000)
-    wrong = replace(played, traces=[replace(trace, a=trace.a ^ np.uint8(1)) for trace in played.traces])
+    traces = [trace for trace in played.traces if isinstance(trace, PinTrace)]
+    wrong = replace(played, traces=[replace(trace, a=trace.a ^ np.uint8(1)) for trace in traces])
     with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match="mt, in clocks, from clock"):
         proofs.mutation.score.judge(CASE, pool, wrong)

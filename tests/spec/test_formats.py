@@ -10,7 +10,7 @@ import pytest
 from tachometry.spec import Encoder, ParameterError, STachometer, Timing
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 from tachometry.spec.formats.low_pass import LowPass
-from tachometry.spec.formats.reciprocal import Reciprocal
+from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal, _odd_neighbours
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
 
@@ -19,26 +19,100 @@ def bits_of(greatest: int) -> int:
     return next(bits for bits in count() if 2**bits > greatest)
 
 
+def wrong_quotients(form: Reciprocal, q: list[int]) -> int:
+    """How many N/(2^s·m) come out wrong, to the nearest, down or up; q(m) is that of the list."""
+    wrong = 0
+    for m, entry in enumerate(q, 1):
+        for numerator in range(-form.max_numerator, form.max_numerator + 1):
+            twice, by = numerator << (form.frac_bits + 1), m << form.halvings
+            nearest, down, up = (twice + by) // (2 * by), twice // (2 * by), -(-twice // (2 * by))
+            wanted = {0: nearest, -1: down, 1: up} if form.bounds else {0: nearest}
+            wrong += any(
+                (numerator * entry + form.rounding(towards)) >> form.scale_bits != right
+                for towards, right in wanted.items()
+            )
+    return wrong
+
+
+@pytest.mark.parametrize("kind", [Reciprocal, DividedReciprocal])
+@pytest.mark.parametrize("bounds", [False, True])
 @pytest.mark.parametrize("halvings", [0, 1, 3])
-@pytest.mark.parametrize(("max_m", "max_numerator", "frac_bits"), [(1, 1, 4), (12, 7, 4), (16, 5, 7), (17, 16, 0)])
-def test_looked_up_reciprocal(max_m: int, max_numerator: int, frac_bits: int, halvings: int) -> None:
+@pytest.mark.parametrize(
+    ("max_m", "max_numerator", "frac_bits"), [(1, 1, 4), (12, 7, 4), (16, 5, 7), (17, 16, 0), (33, 31, 4), (40, 33, 5)]
+)
+def test_reciprocals(
+    kind: type[Reciprocal], max_m: int, max_numerator: int, frac_bits: int, halvings: int, bounds: bool
+) -> None:
     """N/(2^s·m) comes out right for every m and N, ties included: to the nearest, down and up."""
-    form = Reciprocal(max_m, max_numerator, frac_bits, halvings)
+    form = kind(max_m, max_numerator, frac_bits, halvings, bounds)
     assert len(form.table) == form.depth == next(2**k for k in count() if 2**k >= max_m)
     assert form.width == bits_of(max(form.table)) == bits_of(form.value(1))
-    for m in range(1, max_m + 1):
-        entry = form.table[m % form.depth]
-        assert entry == form.value(m)
-        for numerator in range(-max_numerator, max_numerator + 1):
-            exact = Fraction(numerator << frac_bits, m << halvings)
-            for towards, wanted in ((0, math.floor(exact + Fraction(1, 2))), (-1, math.floor(exact))):
-                assert (numerator * entry + form.rounding(towards)) >> form.scale_bits == wanted
-            assert (numerator * entry + form.rounding(1)) >> form.scale_bits == math.ceil(exact)
+    q = [form.table[m % form.depth] for m in range(1, max_m + 1)]
+    assert q == [form.value(m) for m in range(1, max_m + 1)]
     assert sum(map(bool, form.table)) == max_m
     assert form.rounding() == form.rounding(0)
-    # One bit less would not satisfy 2^(g+s−max(s,1)) ≥ 2·E·max_m.
-    spare = form.scale_bits - max(halvings, 1)
-    assert 2**spare >= 2 * max_numerator * max_m > 2 ** (spare - 1)
+    assert wrong_quotients(form, q) == 0
+    # The numbers are the nearest, or the odd ones that are nearest.
+    step = 2 if kind is DividedReciprocal else 1
+    exact = [Fraction(1 << (form.frac_bits + form.guard_bits), m) for m in range(1, max_m + 1)]
+    assert all(abs(got - true) <= Fraction(step, 2) for got, true in zip(q, exact, strict=True))
+    assert kind is Reciprocal or all(got % 2 for got in q)
+    assert form.has_ties == any(
+        Fraction(2 * n << frac_bits, m << halvings) % 2 == 1 for m in range(1, max_m + 1) for n in range(1, 400)
+    )
+
+
+@pytest.mark.parametrize("kind", [Reciprocal, DividedReciprocal, NarrowReciprocal])
+def test_every_quotient_of_the_reference(kind: type[Reciprocal]) -> None:
+    """500 ticks, 7 counts: |N| ≤ 28 half counts."""
+    form = kind(500, 28, 16, 1)
+    assert {Reciprocal: (30, 14), DividedReciprocal: (30, 14), NarrowReciprocal: (25, 10)}[kind] == (
+        form.width,
+        form.scale_bits,
+    )
+    assert wrong_quotients(form, [form.value(m) for m in range(1, 501)]) == 0
+
+
+@pytest.mark.parametrize("halvings", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("max_m", "max_numerator", "frac_bits"), [(1, 1, 4), (12, 7, 7), (30, 5, 6), (17, 16, 6), (60, 28, 8), (25, 40, 7)]
+)
+def test_the_narrowest_reciprocal(max_m: int, max_numerator: int, frac_bits: int, halvings: int) -> None:
+    """Each q(m) is the least that is right; and with a bit less some m would have none."""
+    form = NarrowReciprocal(max_m, max_numerator, frac_bits, halvings)
+    assert not form.has_ties
+    q = [form.value(m) for m in range(1, max_m + 1)]
+    assert wrong_quotients(form, q) == 0
+
+    def right(m: int, entry: int, scale: int) -> bool:
+        half, by = 1 << (scale - 1), m << halvings
+        return all(
+            (n * entry + half) >> scale == ((n << (frac_bits + 1)) + by) // (2 * by)
+            for n in range(-max_numerator, max_numerator + 1)
+        )
+
+    for m, entry in enumerate(q, 1):
+        assert not right(m, entry - 1, form.scale_bits)
+    less = form.scale_bits - 1
+    nearest = [(1 << (frac_bits + less)) // (m << halvings) for m in range(1, max_m + 1)]
+    found = [any(right(m, near + off, less) for off in range(-16, 17)) for m, near in enumerate(nearest, 1)]
+    assert not all(found) or less <= 2 * form.digits
+
+
+@pytest.mark.parametrize("most", [1, 2, 3, 7, 28])
+@pytest.mark.parametrize("numerator", [5, 32, 2**16])
+def test_neighbours_with_odd_numerators(numerator: int, most: int) -> None:
+    for denominator in (1, 2, 3, 7, 27, 499):
+        exact = Fraction(numerator, denominator)
+        odd = [Fraction(2 * k + 1, n) for n in range(1, most + 1) for k in range(*_around(exact * n))]
+        if exact.denominator > most or exact.numerator % 2 == 0:
+            below, above = _odd_neighbours(numerator, denominator, most)
+            assert Fraction(*below) == max(p for p in odd if p < exact)
+            assert Fraction(*above) == min(p for p in odd if p > exact)
+
+
+def _around(value: Fraction) -> tuple[int, int]:
+    return int(value) // 2 - 2, int(value) // 2 + 3
 
 
 @pytest.mark.parametrize("halvings", [0, 1, 3])

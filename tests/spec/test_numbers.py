@@ -54,13 +54,17 @@ def test_ports_that_have_a_sign_and_those_of_16_bits() -> None:
     assert {port.name for port in spec.ports if port.is_strobe} == set(spec.strobes)
 
 
+# An update takes 8 clocks and one to start over; then the reciprocal, with 16 + 21 bits behind the point, takes 38.
+BUSY = 8 + 1 + 38
+
+
 def test_counts_per_tick() -> None:
     spec = spec_of()
     assert spec.frac_bits_range("count/tick") == (4, 24)
     assert (spec.frac_bits, spec.native_frac_bits, spec.full_scale) == (16, 16, 960 << 16)
     assert (spec.output, spec.output_latency, spec.low_pass_latency) == (None, 0, 0)
-    assert spec.tick_to_velocity == spec.datapath_latency == 13 + 3  # N of 3840 half counts has 13 bits
-    assert (spec.update_spacing, spec.min_tick_cycles, spec.longest_tick) == (960, 16, 960)
+    assert spec.tick_to_velocity == spec.datapath_latency == 7 + 1  # N of 3840 half counts has 13 bits: 7 digits
+    assert (spec.update_spacing, spec.min_tick_cycles, spec.longest_tick) == (960, BUSY, 960)
     assert (spec.shown_unit.name, spec.rounding_lsb, spec_of(unit="rpm").rounding_lsb) == ("rad/s", 0.5, 0.7)
     assert spec.greatest_speed == pytest.approx(960 * 50 * math.pi)
     assert spec.uncertainty == 1
@@ -119,11 +123,13 @@ def test_external_ticks_are_two_clocks_apart_and_leave_room_for_what_is_done_ste
     def pipelined(tick: int) -> STachometer:
         return spec_of(tick, max_tick_cycles=2 * tick)
 
-    assert fewest(960, 1920) == spec_of(960, max_tick_cycles=1920).datapath_latency == 17
+    # N of 7680 half counts has 14 bits.
+    assert spec_of(960, max_tick_cycles=1920).datapath_latency == 7 + 1
+    assert fewest(960, 1920) == BUSY + 1
     assert (fewest(2, 4), pipelined(2).serial) == (2, False)
     in_rpm = spec_of(960, max_tick_cycles=1920, unit="rad/s", frac_bits=14)
     assert in_rpm.output_serial
-    assert in_rpm.min_tick_cycles == max(17, in_rpm.output_latency) > 17
+    assert in_rpm.min_tick_cycles >= max(BUSY, in_rpm.output_latency)
     assert in_rpm.update_spacing == in_rpm.min_tick_cycles
     assert spec_of(960).update_spacing == 960
     assert [spec_of(960).has_room(clocks) for clocks in (960, 961)] == [True, False]

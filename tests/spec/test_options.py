@@ -50,7 +50,7 @@ def test_defaults_are_those_of_python(method: str) -> None:
 def test_every_option_does_what_it_says() -> None:
     texts = """ppr=24 decoding=2 clock=1MHz tick=100us max-time=5ms external-tick=yes max-tick-period=150us unit=rpm
         lsb=2^-3 velocity-width=20 max-speed=900rpm position-width=20 filter=3 index=yes index-reset=on age=1
-        bounds=true edge-error=0.25 lowpass=50rad/s cancel=no"""
+        bounds=true edge-error=0.25 lowpass=50rad/s cancel=no reciprocal=table"""
     spec = of_texts("s", dict(word.split("=") for word in texts.split()))
     assert spec == STachometer(
         encoder=Encoder(24, 2),
@@ -69,6 +69,7 @@ def test_every_option_does_what_it_says() -> None:
         edge_error=Fraction(1, 4),
         lowpass=Fraction(50),
         cancel=False,
+        source="table",
     )
     assert {about.name for about in (*common_options(), *own_options("s"))} - {"dt", "frac-bits"} == {
         word.split("=")[0] for word in texts.split()

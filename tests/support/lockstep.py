@@ -105,7 +105,9 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         filter_clocks=filter_of(method, int(rng.choice([0, 0, 0, 1, 2, 5])), tick_cycles),
         index=encoder.index,
         index_reset=encoder.index and bool(rng.random() < 0.5),
-        max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3])) if external else None,
+        max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3, 6] if method == "track" else [1, 2, 3]))
+        if external
+        else None,
         age=bool(rng.random() < 0.5),
         bounds=bool(rng.random() < 0.5) and not options.get("paper_exact") and METHODS[method].has_bounds,
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from support.compiled import build
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.spec import STachometer
+from tachometry.spec.formats.reciprocal import DividedReciprocal, Reciprocal
 
 
 class FlatQuotient(wiring.Component):
@@ -26,7 +27,7 @@ class FlatQuotient(wiring.Component):
             tag=data.StructLayout({"mark": 1}),
             serial=serial,
         )
-        self._inputs = ("m", "enable", "load", "start", "base", "numerator")
+        self._inputs = ("m", "moves", "load", "start", "base", "numerator")
         results = self.box.results.p.shape().members
         super().__init__(
             {name: In(getattr(self.box, name).shape()) for name in self._inputs}
@@ -46,6 +47,7 @@ class FlatQuotient(wiring.Component):
 
 
 # Every m with every numerator, start after start as fast as the scaler takes them; answers leave as 64-bit integers.
+# Loaded is a clock before the start.
 _MAIN = """
 #include <cstdio>
 #include <cstdint>
@@ -57,6 +59,8 @@ int main(int, char **argv) {{
   auto clock = [&] {{
     top.prev_p_clk.set<bool>(false);
     top.p_clk.set<bool>(true);
+    // GCC 12 drops inputs that are set before it (-fipa-modref) unless it cannot know who reads them.
+    asm volatile("" : : "g"(&top) : "memory");
     top.eval();
     if (top.p_done.get<bool>()) {{
       uint64_t raw = top.p_velocity.get<uint64_t>();
@@ -64,18 +68,13 @@ int main(int, char **argv) {{
     }}
     top.commit();
   }};
+  auto load = [&](int n) {{
+    top.p_base.set<uint32_t>(uint32_t(-(n >> {base_shift})) & {base_mask}u);
+    top.p_numerator.set<uint32_t>(uint32_t(n) & {mask}u);
+    top.p_load.set<bool>(true);
+  }};
   const int numerators[] = {{{numerators}}};
-  for (int m = 1; m <= {max_m}; m++) {{
-    top.p_m.set<uint32_t>(m);
-    top.p_enable.set<bool>(true);
-    for (int n : numerators) {{
-      top.p_base.set<uint32_t>(uint32_t(-(n >> {base_shift})) & {base_mask}u);
-      top.p_numerator.set<uint32_t>(uint32_t(n) & {mask}u);
-      top.p_load.set<bool>(true); top.p_start.set<bool>(true); clock();
-      top.p_enable.set<bool>(false); top.p_load.set<bool>(false); top.p_start.set<bool>(false);
-      for (int k = 1; k < {distance}; k++) clock();
-    }}
-  }}
+{loop}
   for (int k = 0; k < 100; k++) clock();
   FILE *file = fopen(argv[1], "wb");
   fwrite(answers.data(), 8, answers.size(), file);
@@ -84,24 +83,63 @@ int main(int, char **argv) {{
 """
 
 
+# The reciprocal has all the time that it takes.
+_SERIAL = """
+  for (int m = 1; m <= {max_m}; m += {every}) {{
+    if (m > 1) {{
+      top.p_moves.set<bool>(true); clock(); top.p_moves.set<bool>(false);
+    }}
+    top.p_m.set<uint32_t>(m);
+    for (int k = 0; k < {wait}; k++) clock();
+    for (int n : numerators) {{
+      load(n); clock(); top.p_load.set<bool>(false);
+      top.p_start.set<bool>(true); clock(); top.p_start.set<bool>(false);
+      for (int k = 2; k < {distance}; k++) clock();
+    }}
+  }}
+"""
+# What is started has been loaded the clock before.
+_PIPELINED = """
+  const int each = sizeof numerators / sizeof numerators[0];
+  const int64_t all = int64_t(({max_m} - 1) / {every} + 1) * each;
+  for (int64_t k = 0; k <= all; k++) {{
+    load(numerators[k % each]);
+    top.p_start.set<bool>(k > 0);
+    top.p_moves.set<bool>(k % each == 1 || each == 1);
+    top.p_m.set<uint32_t>(k > 0 ? (k - 1) / each * {every} + 1 : 0);
+    clock();
+  }}
+  top.p_start.set<bool>(false); top.p_moves.set<bool>(false);
+"""
+
+
 def every_quotient(
-    spec: STachometer, numerators: Sequence[int], distance: int, folder: Path, towards: int = 0
+    spec: STachometer,
+    numerators: Sequence[int],
+    folder: Path,
+    towards: int = 0,
+    every: int = 1,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """(base, N, m, velocity) for m = 1, 2 … max_ticks with every N each, `distance` clocks apart.
+    """(base, N, m, velocity) of each `every`-th m with every N, from start to start as fast as can be.
 
     The base is one for which the ends of the window are within the range of m_e.
     """
-    shift = 1 + spec.reciprocal.halvings
+    form = spec.reciprocal
+    serial = isinstance(form, Reciprocal)
+    max_m = spec.timing.max_ticks
+    wait = form.steps + 1 if isinstance(form, DividedReciprocal) else 2
+    distance = form.digits + 2 if serial else 1
+    shift = 1 + form.halvings
     main = _MAIN.format(
         width=spec.velocity_width,
-        max_m=spec.timing.max_ticks,
         numerators=", ".join(map(str, numerators)),
         base_shift=shift,
         base_mask=(1 << spec.count_width) - 1,
         mask=(1 << spec.numerator_width) - 1,
-        distance=distance,
+        loop=(_SERIAL if serial else _PIPELINED).format(max_m=max_m, every=every, wait=wait, distance=distance),
     )
     answers = folder / "answers"
-    subprocess.run([build(FlatQuotient(spec, serial=distance > 1, towards=towards), main, folder), answers], check=True)
-    m, n = np.meshgrid(np.arange(1, spec.timing.max_ticks + 1), np.array(numerators), indexing="ij")
+    dut = FlatQuotient(spec, serial=serial, towards=towards)
+    subprocess.run([build(dut, main, folder), answers], check=True)
+    m, n = np.meshgrid(np.arange(1, max_m + 1, every), np.array(numerators), indexing="ij")
     return -(n.ravel() >> shift), n.ravel(), m.ravel(), np.fromfile(answers, dtype=np.int64)

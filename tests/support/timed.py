@@ -35,7 +35,7 @@ def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list
         if spec.on_lattice:
             row["pulse_count"] = counts.get(clock // tick, 0) if last else row.get("pulse_count", 0)
         else:
-            row["step"] = counts.get(clock, 0)
+            row["step_before"] = counts.get(clock + 1, 0)
         rows.append(row)
     seen = clock_by_clock(DATAPATHS[spec.method](spec), rows, OUTPUTS)
     held = dict.fromkeys(OUTPUTS, 0)

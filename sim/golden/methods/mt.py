@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, chain, enclosure, updates, with_silences
+from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, enclosure, updates, with_silences
+from tachometry.sim.golden.ordered import chain, next_place, not_before
 from tachometry.sim.signals.run import Table
 from tachometry.spec import MTTachometer
 
@@ -27,14 +28,12 @@ class Model:
         n, period = len(counts.period), counts.period
         # The first count after reset or a silence only opens.
         first = (counts.gap > spec.max_periods) | (np.arange(n) == 0)
-        firsts = np.append(np.flatnonzero(first), n)
-        next_first = firsts[np.searchsorted(firsts, np.arange(n), side="right")]
-        closing = np.searchsorted(period, period + spec.min_periods, side="right")
+        closing = not_before(period, period + spec.min_periods + 1)
         if spec.whole_cycles:
             closing = self._whole(counts, closing)
         if spec.may_be_late:
             closing = np.maximum(closing, self._free(counts, first))
-        ends = np.flatnonzero(chain(np.minimum(closing, next_first)))
+        ends = np.flatnonzero(chain(np.minimum(closing, next_place(np.flatnonzero(first), n))))
         opening, ends = ends[:-1], ends[1:]
         opening, ends = opening[~first[ends]], ends[~first[ends]]
         none = np.zeros(len(ends), dtype=np.bool_)
@@ -61,8 +60,8 @@ class Model:
         opening, cycle = np.arange(n), spec.encoder.decoding
         through = later - opening  # counts, which are the distance as long as the shaft does not turn
         whole = opening + -(-through // cycle) * cycle
-        turns = np.append(np.flatnonzero(counts.size[1:] != counts.size[:-1]) + 1, n)
-        turn = np.maximum(later, turns[np.searchsorted(turns, opening, side="right")])
+        turns = np.flatnonzero(counts.size[1:] != counts.size[:-1]) + 1
+        turn = np.maximum(later, next_place(turns, n))
         latest = np.searchsorted(counts.period, counts.period + 2 * spec.min_periods, side="right")
         return np.where(through < cycle, later, np.minimum(np.minimum(whole, turn), latest))
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.methods.timed import Counts, Measurements, chain, enclosure, updates, with_silences
+from tachometry.sim.golden.methods.timed import Counts, Measurements, enclosure, updates, with_silences
+from tachometry.sim.golden.ordered import chain, next_place, not_before
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TTachometer
 
@@ -42,8 +43,7 @@ class Model:
         opened = (gap <= spec.max_periods) & (np.arange(len(gap)) > 0)
         asked = with_silences(spec, counts, found[opened | many])
         # What comes while the divider is at work is not measured; but a 0 is always forced.
-        following = np.searchsorted(asked.clock, asked.clock + spec.division_clocks)
-        zeros = np.append(np.flatnonzero(asked.forced), len(following))
-        next_zero = zeros[np.searchsorted(zeros, np.arange(len(following)), side="right")]
+        following = not_before(asked.clock, asked.clock + spec.division_clocks)
+        next_zero = next_place(np.flatnonzero(asked.forced), len(following))
         taken = asked[chain(np.minimum(following, next_zero))]
         return updates(spec, counts, taken, ticks)

@@ -7,27 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.ordered import chain, next_place, places, spans
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Table
 from tachometry.spec.methods.timed import TimedTachometer
 from tachometry.spec.tachometer import BOUNDS
 
 Ints = NDArray[np.int64]
-
-
-def chain(following: Ints) -> NDArray[np.bool_]:
-    """Which of n places are met from place 0 on; `following[k]` > k is the next after k, n for none.
-
-    All places that 2^i jumps reach are marked at once, for i = 0, 1, 2, …
-    """
-    n = len(following)
-    jump = np.append(following, n)
-    met = np.zeros(n + 1, dtype=np.bool_)
-    met[0] = True
-    while n and jump[0] < n:
-        met[jump[met]] = True
-        jump = jump[jump]
-    return met[:n]
 
 
 @dataclass(frozen=True)
@@ -71,9 +57,9 @@ class Counts:
         """Periods in which a 0 is forced."""
         begin = np.append(-1, self.period)
         end = np.append(self.period, self.n_periods)
-        times = (end - begin - 1) // max_periods
-        nth = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times) + 1
-        return np.repeat(begin, times) + nth * max_periods
+        long = np.flatnonzero(end - begin > max_periods)
+        nth, row = spans(np.ones_like(long), 1 + (end[long] - begin[long] - 1) // max_periods)
+        return begin[long[row]] + nth * max_periods
 
 
 @dataclass(frozen=True)
@@ -87,9 +73,9 @@ class Measurements:
     time : int64 array, shape (n,), timer periods
     forced, beyond : bool arrays, shape (n,)
         `beyond`: out of range before any division.
-    least, most : int64 arrays, shape (n, 2)
+    least, most : int64 arrays, shape (n, 2), or None
         Distance, in eighths of a count, and time for the least and for the greatest possible speed; time 0: that bound
-        is absent.
+        is absent. None if the core shows no bounds.
     known : bool array, shape (n,)
         Whether `least` and `most` are valid.
     """
@@ -99,18 +85,24 @@ class Measurements:
     time: Ints
     forced: NDArray[np.bool_]
     beyond: NDArray[np.bool_]
-    least: Ints
-    most: Ints
+    least: Ints | None
+    most: Ints | None
     known: NDArray[np.bool_]
 
     def __getitem__(self, rows: Any) -> "Measurements":
-        return Measurements(*(column[rows] for column in vars(self).values()))
+        columns: dict[str, Any] = {
+            name: None if column is None else column[rows] for name, column in vars(self).items()
+        }
+        return Measurements(**columns)
 
-    def merged(self, other: "Measurements") -> "Measurements":
-        """The rows of both, in order of their clocks."""
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        both = Measurements(*(np.concatenate(pair) for pair in pairs))
-        return both[np.argsort(both.clock, kind="stable")]
+    def with_more(self, more: "Measurements") -> "Measurements":
+        """The rows of both in order of their clocks; `more`, of which there are few, after those of the same clock."""
+        at = np.searchsorted(self.clock, more.clock, side="right")
+        columns: dict[str, Any] = {
+            name: None if own is None else np.insert(own, at, vars(more)[name], axis=0)
+            for name, own in vars(self).items()
+        }
+        return Measurements(**columns)
 
 
 def eighths(spec: TimedTachometer, counts: Any, side: int) -> Any:
@@ -118,8 +110,10 @@ def eighths(spec: TimedTachometer, counts: Any, side: int) -> Any:
     return 8 * counts + side * int(8 * spec.edge_error)
 
 
-def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, Ints]:
+def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, Ints] | tuple[None, None]:
     """`least` and `most` of distances between edges; each edge lies within a period before its count."""
+    if not spec.bounds:
+        return None, None
     low, high = eighths(spec, distance, -1), eighths(spec, distance, 1)
     return (
         np.stack([low, np.where(low < 0, time - 1, time + 1)], axis=1),
@@ -127,24 +121,32 @@ def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, 
     )
 
 
+def _between(spec: TimedTachometer, back: Ints, on: Ints, time: Ints) -> tuple[Ints, Ints] | tuple[None, None]:
+    """`least` and `most` of a shaft that may have gone so many counts back or on, in just this time."""
+    if not spec.bounds:
+        return None, None
+    return np.stack([eighths(spec, back, -1), time], axis=1), np.stack([eighths(spec, on, 1), time], axis=1)
+
+
 def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) -> Measurements:
     """The measurements, and a forced 0 for every silence."""
     period = counts.silences(spec.max_periods)
     none = np.zeros(len(period), dtype=np.int64)
     time = np.full(len(period), spec.max_periods)
+    # The shaft is between the same two edges at both ends.
+    least, most = _between(spec, none - 1, none + 1, time)
     silent = Measurements(
         clock=counts.clock(period),
         distance=none,
         time=time,
         forced=none == 0,
         beyond=none > 0,
-        # The shaft is between the same two edges at both ends.
-        least=np.stack([eighths(spec, none - 1, -1), time], axis=1),
-        most=np.stack([eighths(spec, none + 1, 1), time], axis=1),
+        least=least,
+        most=most,
         # The first period after reset was not seen completely.
         known=(np.arange(len(period)) > 0) | (period >= np.append(counts.period, counts.n_periods)[0]),
     )
-    return found.merged(silent)
+    return found.with_more(silent)
 
 
 def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, NDArray[np.bool_]]:
@@ -154,36 +156,52 @@ def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, ND
     return np.clip(exact, -limit, limit), np.abs(exact) > limit
 
 
-def _among(values: Ints, ordered: Ints) -> NDArray[np.bool_]:
-    """Which of the values, none negative, stand in an ordered array; `np.isin` would sort or hash it."""
-    return np.append(ordered, -1)[np.searchsorted(ordered, values)] == values
-
-
-def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> Measurements:
-    """Ticks at which the velocity decays; `held` is the velocity after each measurement.
+def _asking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> tuple[Ints, Ints]:
+    """Ticks that compare, and the measurement before each, of those measurements whose velocity may decay.
 
     A tick in whose window no count came compares, if nothing is being divided. A measurement that begins meanwhile
     takes the divider.
     """
-    through = np.searchsorted(counts.clock(counts.period), ticks.clock, side="right")
-    ask = ticks.clock[(np.diff(through, prepend=0) == 0) & ~_among(ticks.clock, taken.clock)]
-    clock = np.append(taken.clock, ask)
+    end = np.append(taken.clock, np.iinfo(np.int64).max)[1:]
+    # A velocity that is not 0 was measured at a count, so no silence is longer than the time up to the next one.
+    latest = np.minimum(end, np.append(0, ticks.clock)[-1] + 1)
+    longest = latest - taken.clock
+    if spec.on_lattice:
+        longest = places(ticks.clock, latest, "left") - places(ticks.clock, taken.clock, "left")
+    may = np.flatnonzero(np.abs(_greatest(spec, held, np.maximum(longest, 1))) < np.abs(held))
+    first = np.searchsorted(ticks.clock, taken.clock[may], side="right")
+    tick, row = spans(first, np.searchsorted(ticks.clock, end[may]))
+    counted = counts.clock(counts.period)
+    before = np.append(-1, ticks.clock)[tick]
+    empty = np.searchsorted(counted, ticks.clock[tick], side="right") == np.searchsorted(counted, before, side="right")
+    asked, row = ticks.clock[tick[empty]], row[empty]
+    # From each such measurement on, one after the other.
+    clock = np.append(taken.clock[may], asked)
     order = np.argsort(clock)
-    clock, measured = clock[order], order < len(taken.clock)
-    at, n = np.flatnonzero(measured), len(clock)
-    next_measured = np.append(at, n)[np.searchsorted(at, np.arange(n), side="right")]
-    following = np.minimum(np.searchsorted(clock, clock + spec.datapath_latency), next_measured)
-    in_time = np.append(clock, np.iinfo(np.int64).max)[next_measured] >= clock + spec.division_clocks
-    asked = np.flatnonzero(chain(following) & ~measured & in_time)
-    last = np.searchsorted(at, asked) - 1  # the measurement before
-    asked, last = asked[last >= 0], last[last >= 0]
-    velocity, clock = held[last], clock[asked]
+    clock, measured = clock[order], order < len(may)
+    following = np.minimum(
+        np.searchsorted(clock, clock + spec.datapath_latency), next_place(np.flatnonzero(measured), len(clock))
+    )
+    met = np.empty_like(measured)
+    met[order] = chain(following)
+    last = may[row]
+    compares = met[len(may) :] & (end[last] >= asked + spec.division_clocks)
+    return asked[compares], last[compares]
 
+
+def _greatest(spec: TimedTachometer, velocity: Ints, age: Ints) -> Ints:
+    """The greatest velocity of this sign after a silence; an edge may lie half a count off, so it allows 1½ counts."""
+    return rounded(spec, 3 * np.where(velocity < 0, -1, 1), age)[0]
+
+
+def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> Measurements:
+    """Ticks at which the velocity decays; `held` is the velocity after each measurement."""
+    clock, last = _asking(spec, counts, taken, held, ticks)
+    velocity = held[last]
     period = np.searchsorted(ticks.clock, clock) if spec.on_lattice else clock
     age = period - np.append(-1, counts.period)[np.searchsorted(counts.period, period)]
-    # An edge may lie half a count off: the silence allows 1½ counts.
     sign = np.where(velocity < 0, -1, 1)
-    greatest = np.abs(rounded(spec, 3 * sign, age)[0])
+    greatest = np.abs(_greatest(spec, velocity, age))
     # Least magnitude that the velocity had since the measurement, before each: of ranks, which later measurements beat.
     _, rank = np.unique(greatest, return_inverse=True)
     least = np.minimum.accumulate(rank - last * (len(rank) + 1)) + last * (len(rank) + 1)
@@ -192,33 +210,42 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     none = np.zeros(len(clock), dtype=np.bool_)
     last_size = np.append(0, counts.size)[np.searchsorted(counts.period, period)]
     # The shaft is no farther back than its last edge.
-    least = np.stack([eighths(spec, np.where((sign > 0) & (last_size > 0), 0, -1), -1), age], axis=1)
-    most = np.stack([eighths(spec, np.where((sign < 0) & (last_size < 0), 0, 1), 1), age], axis=1)
-    return Measurements(clock, 3 * sign, age, ~none, none, least, most, ~none)[nearer]
+    back = np.where((sign > 0) & (last_size > 0), 0, -1)
+    low, high = _between(spec, back, np.where((sign < 0) & (last_size < 0), 0, 1), age)
+    return Measurements(clock, 3 * sign, age, ~none, none, low, high, ~none)[nearer]
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
     """All updates with the velocity in counts per tick, as the datapath shows it."""
     # A forced 0 takes the divider, if ticks are so short that it is still at work.
     finished = np.diff(taken.clock, append=np.iinfo(np.int64).max) >= spec.division_clocks
-    shown = taken[finished]
+    held, saturated = rounded(spec, taken.distance, taken.time)
+    shown = _shown(spec, taken, held, saturated).rows(finished)
     if spec.decays:
-        held = rounded(spec, taken.distance, taken.time)[0]
-        shown = shown.merged(_decaying(spec, counts, taken, held, ticks))
-    velocity, saturated = rounded(spec, shown.distance, shown.time)
+        slower = _decaying(spec, counts, taken, held, ticks)
+        more = _shown(spec, slower, *rounded(spec, slower.distance, slower.time))
+        at = np.searchsorted(shown.clock, more.clock)
+        columns = {name: np.insert(column, at, more[name]) for name, column in shown.columns.items()}
+        shown = Table(np.insert(shown.clock, at, more.clock), columns)
+    return shown
+
+
+def _shown(spec: TimedTachometer, taken: Measurements, velocity: Ints, saturated: NDArray[np.bool_]) -> Table:
+    """Measurements as updates."""
     columns = {
         "velocity": velocity,
-        "interval": shown.time,
-        "forced": shown.forced,
-        "out_of_range": saturated | shown.beyond,
+        "interval": taken.time,
+        "forced": taken.forced,
+        "out_of_range": saturated | taken.beyond,
     }
-    return Table(shown.clock + spec.datapath_latency, columns | (_bounds(spec, shown) if spec.bounds else {}))
+    return Table(taken.clock + spec.datapath_latency, columns | (_bounds(spec, taken) if spec.bounds else {}))
 
 
 def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any]]:
     """Bounds of the velocity in counts per tick, rounded outward."""
     found: dict[str, NDArray[Any]] = {"bounds_valid": taken.known}
     for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
+        assert ends is not None
         distance, time = ends.T
         exact = round_quotient(distance * spec.timer_periods, 8 * np.maximum(time, 1), spec.native_frac_bits, towards)
         found[name] = np.where(time > 0, exact, towards * spec.absent_bound)

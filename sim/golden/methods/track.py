@@ -86,9 +86,13 @@ class Recursion:
     """
 
     def __init__(self, spec: TrackTachometer) -> None:
-        self._spec = spec
-        self._form = spec.form
+        self._form = form = spec.form
         self._constants = spec.program.constants
+        # What would be worked out for every count: fixed-point numbers of the spec's fractions.
+        self._agile = spec.agile
+        self._one, self._max_error = form.fixed(1), form.fixed(form.max_error)
+        self._error, self._twice_error = form.fixed(form.edge_error), form.fixed(2 * form.edge_error)
+        self._quarter_error = form.fixed(form.edge_error / 4)
         self._rest()
 
     def _anew(self) -> None:
@@ -160,29 +164,28 @@ class Recursion:
         form = self._form
         total = places + self._moved_by_v(times)
         e = (abs(total) // number if total >= 0 else -(abs(total) // number)) - self.p
-        if abs(e) >= form.fixed(form.max_error):
+        if abs(e) >= self._max_error:
             self._rest()
             return
         sign = 1 if e >= 0 else -1
-        error = form.fixed(form.edge_error)
-        agile = self._spec.agile and (
-            abs(e) >= form.fixed(2 * form.edge_error)
-            or (abs(e) >= error and sign * self.before >= form.fixed(form.edge_error / 4))
+        agile = self._agile and (
+            abs(e) >= self._twice_error or (abs(e) >= self._error and sign * self.before >= self._quarter_error)
         )
-        if self._spec.agile:
+        if self._agile:
             self.before = e
         if form.growing:
             self._remember(e, agile)
         x = self._reach(form.agile_rate, form.most_x[0]) if agile else self._level_reach
-        one, bits = form.fixed(1), form.gain_bits
+        one, bits = self._one, form.gain_bits
         d = (3 * x << bits) // (rounded((x + 3 * one) ** 2, form.frac_bits + 2) + (3 * one >> 2))
-        r = (d << form.unit_bits) // self.gap
+        of_r = bits - form.ratio_range
+        r = (d << form.unit_bits) // (self.gap << form.ratio_range)
         e1 = rounded(e * d, bits)
         e2 = rounded(e1 * d, bits)
         e3 = rounded(e2 * d, bits)
-        h = rounded(e1 * r, bits)
+        h = rounded(e1 * r, of_r)
         self.p += 3 * e1 - 3 * e2 + e3
-        self.a += rounded(h * r, bits - form.extra_bits)
+        self.a += rounded(h * r, of_r - form.extra_bits)
         i = rounded(h * d, bits)
         self.v += 3 * h - (i + (i >> 1))
         self.gap = 0
@@ -200,7 +203,7 @@ class Recursion:
         """The mean error, and what follows for λ."""
         form, share = self._form, self._level_reach >> 2
         self.mean += rounded((e - self.mean) * share, form.frac_bits)
-        size = min(abs(self.mean), form.fixed(1))
+        size = min(abs(self.mean), self._one)
         limit = rounded(share * form.mean_threshold, form.mean_threshold_bits)
         self.age += self.gap
         if agile:
@@ -219,7 +222,7 @@ class Recursion:
             return
         self.p = sign * form.late_limit
         if sign * self.v >= 0:
-            self.v = sign * min(abs(self.v), (form.fixed(1) << form.unit_bits) // self.gap)
+            self.v = sign * min(abs(self.v), (self._one << form.unit_bits) // self.gap)
             self.a = sign * min(sign * self.a, 0)
 
 
@@ -241,7 +244,7 @@ class Model:
         state = Recursion(spec)
         factor, shift = spec.program.acceleration_scale
         velocity_shift, fine_shift = spec.program.velocity_shift, form.frac_bits - spec.fine_bits
-        half = 1 << (spec.position_width + spec.fine_bits - 1)
+        half, lead = 1 << (spec.position_width + spec.fine_bits - 1), spec.program.lead
         rows: list[tuple[int, int, int, int]] = []
         silent = spec.timing.max_ticks  # ticks in a row before this one; the time before reset was silent
         phase = before = REST
@@ -253,7 +256,7 @@ class Model:
             state.tick(windows, i, alone, elapsed == spec.timing.max_ticks)
             before, phase = phase, state.phase
             silent = 0 if counted else elapsed
-            ahead = state.v + rounded(state.a * spec.program.lead, form.unit_bits + form.extra_bits)
+            ahead = state.v + rounded(state.a * lead, form.unit_bits + form.extra_bits)
             ahead = max(-form.max_velocity, min(ahead, form.max_velocity))
             velocity = rounded(ahead * form.tick_cycles, velocity_shift)
             acceleration = rounded(state.a * factor, shift)

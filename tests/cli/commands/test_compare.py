@@ -107,7 +107,7 @@ def test_an_external_tick_is_nominal(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_sizes(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    def measured(spec: TachometerSpec, *_: object) -> synthesis.Measurement:
+    def measured(spec: TachometerSpec, *_: object, **__: object) -> synthesis.Measurement:
         return synthesis.Measurement({"COMB": 100 + len(spec.method), "FF": 50, "Fmax": 123.4}, "")
 
     monkeypatch.setattr(synthesis, "versions", lambda: {"yosys": "0.70"})

@@ -15,6 +15,7 @@ from support.command import run
 
 from tachometry.sim.theory import tsuji
 from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.formats.reciprocal import DividedReciprocal
 from tachometry.spec.manifest import manifest
 
 OPTIONS = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400rad/s".split()
@@ -47,8 +48,9 @@ def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[st
     assert {name: int(bits) for name, bits in (pair.split() for pair in rows["widths"].split(", "))} == {
         port["name"]: port["width"] for port in described["ports"] if port["width"] > 1
     }
-    entries, width = len(spec.reciprocal.table), max(spec.reciprocal.table).bit_length()
-    assert rows["reciprocal"] == f"table: {entries} x {width} = {entries * width} bits of block RAM"
+    assert isinstance(spec.reciprocal, DividedReciprocal)
+    # All of its bits but the last, which is 1, and the first digit.
+    assert rows["reciprocal"] == f"divided in {spec.reciprocal.width} clocks between two ticks"
     for name, clocks in described["latency_cycles"].items():
         assert rows[name].startswith(f"{clocks} clocks (")
     assert rows["pin_to_count"] == "5 clocks (104.2ns)"

@@ -86,8 +86,8 @@ MUTANTS: dict[str, tuple[Any, str, str, str]] = {
     "tick lost": (PulseCounter, "self.tick.eq(complete)", "self.tick.eq(complete & ~self.step[0])", "m"),
     "glitch believed": (GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2", "s"),
     "index forgotten": (PositionCounter, "self.position.eq(0)", "self.position.eq(1)", "s"),
-    "no error": (QuadratureDecoder, "self.ready & change_a & change_b", "0", "s in rpm"),
-    "error too often": (QuadratureDecoder, "self.ready & change_a & change_b", "change_a & past_b", "s in rpm"),
+    "no error": (QuadratureDecoder, "self.ready & illegal", "0", "s in rpm"),
+    "error too often": (QuadratureDecoder, "self.ready & illegal", "counted & past_b", "s in rpm"),
     "no sign rule": (mt_method.MTMethod, "Mux(self._same, self._one, 0)", "self._one", "mt"),
 }
 

@@ -29,6 +29,7 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
         return sorted(configurations(method), key=lambda words: spec_of(words).timing.tick_cycles)[:number]
 
     monkeypatch.setattr(command, "configurations", short)
+    monkeypatch.setattr(command, "AXES", ())
     return number
 
 
@@ -134,7 +135,7 @@ def test_workers_end_with_a_command_that_is_killed() -> None:
     ("options", "message"),
     [
         (["--methods", "s,x"], "--methods must be of s, m, t, mt, rairan, track, or all, not 'x'"),
-        (["--engines", "icarus"], "--engines must be of pysim, cxxrtl, verilator, or all, not 'icarus'"),
+        (["--engines", "x"], "--engines must be of pysim, cxxrtl, verilator, cxxrtl-every-clock, or all, not 'x'"),
         (["--clocks", "-1"], "'--clocks': -1 is not in the range x>=0"),
     ],
 )

@@ -10,24 +10,41 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.arithmetic import divider
 from tachometry.hdl.arithmetic.divider import Divider
 
-OUTPUTS = ["done", "quotient", "by", "busy"]
+OUTPUTS = ["done", "quotient", "by", "running", "digit"]
 
 
-def check(integer_bits: int, scale_bits: int, divisor_width: int, cases: Sequence[tuple[int, int]]) -> None:
-    """Each case as soon as the last is done, the first of all after a start that comes to nothing."""
-    dut = divider.Divider(divisor_width=divisor_width, integer_bits=integer_bits, scale_bits=scale_bits)
-    clocks = integer_bits + scale_bits + 1
-    rows = [{"start": 1, "dividend": 0, "divisor": 1}, *[{"start": 0}] * (clocks // 2)]
+def check(
+    integer_bits: int, scale_bits: int, divisor_width: int, cases: Sequence[tuple[int, int]], zeros: int | None = None
+) -> None:
+    """Each case as soon as the last is done, the first of all with the last digit of one that comes to nothing.
+
+    `zeros`: bits at the end of each dividend that are 0, where quotients are rounded to the nearest integer.
+    """
+    dut = divider.Divider(
+        divisor_width=divisor_width,
+        integer_bits=integer_bits,
+        scale_bits=scale_bits,
+        nearest=zeros is not None,
+        zeros=zeros or 0,
+    )
+    digits = integer_bits + scale_bits + 1
+    clocks = digits + 1
+    rows = [{"start": 1, "dividend": 0, "divisor": 1}, *[{"start": 0}] * (digits - 1)]
     first = len(rows)
     for dividend, by in cases:
         rows += [{"start": 1, "dividend": dividend, "divisor": by}, *[{"start": 0}] * (clocks - 1)]
     seen = clock_by_clock(dut, [*rows, {"start": 0}, {}], OUTPUTS)
-    assert [clock for clock, row in enumerate(seen) if row["done"]] == [
-        first + (k + 1) * clocks for k in range(len(cases))
+    done = [clock for clock, row in enumerate(seen) if row["done"]]
+    assert done == [first + (k + 1) * clocks for k in range(len(cases))]
+    running = [clock for clock, row in enumerate(seen) if row["running"]]
+    assert running == [*range(1, first + 1), *(clock - digits + k for clock in done for k in range(digits))]
+    expected = [((dividend << scale_bits) + (by // 2 if zeros is not None else 0)) // by for dividend, by in cases]
+    assert [(seen[clock]["quotient"], seen[clock]["by"]) for clock in done] == [
+        (quotient, by) for quotient, (_, by) in zip(expected, cases, strict=True)
     ]
-    assert [row["busy"] for row in seen] == [0] + [1] * (len(seen) - 2) + [0]
-    got = [(row["quotient"], row["by"]) for row in seen if row["done"]]
-    assert got == [((dividend << scale_bits) // by, by) for dividend, by in cases]
+    assert seen[done[-1] + 1]["quotient"] == expected[-1]  # it is held
+    found = [sum(seen[clock - 1 - k]["digit"] << k for k in range(digits)) for clock in done]
+    assert found == [quotient + (1 << (digits - 1)) for quotient in expected]
 
 
 SMALL = [(2, 3, 3), (1, 4, 4), (3, 1, 2), (4, 2, 1)]
@@ -43,21 +60,40 @@ def test_every_quotient(integer_bits: int, scale_bits: int, divisor_width: int) 
     check(integer_bits, scale_bits, divisor_width, cases)
 
 
+@pytest.mark.parametrize("zeros", [0, 1, 2, 3])
+@pytest.mark.parametrize(("integer_bits", "scale_bits", "divisor_width"), SMALL)
+def test_nearest_integer(integer_bits: int, scale_bits: int, divisor_width: int, zeros: int) -> None:
+    cases = [
+        (dividend, by)
+        for by in range(1, 1 << divisor_width)
+        for dividend in range(1 - (by << integer_bits), by << integer_bits)
+        if dividend % (1 << zeros) == 0 and (dividend << scale_bits) + by // 2 < by << (integer_bits + scale_bits)
+    ]
+    check(integer_bits, scale_bits, divisor_width, cases, zeros)
+
+
 def test_wide_quotients() -> None:
     rng = np.random.default_rng(1)
     by = [1, (1 << 20) - 1, *rng.integers(1, 1 << 20, 60).tolist(), *rng.integers(1, 1 << 6, 60).tolist()]
     cases = [(int(rng.integers(1 - (n << 10), n << 10)), n) for n in by]
     cases += [(sign * ((n << 10) - 1), n) for n in by[:4] for sign in (1, -1)]
     check(10, 25, 20, cases)
+    check(10, 25, 20, [(4 * int(rng.integers(1 - (n << 7), n << 7)), n) for n in by], 2)
 
 
 MUTANTS = {
     "restoring nothing": ("(~negative).replicate", "Const(1).replicate"),
-    "no digit of the dividend": ("Cat(1, left[-1], remainder)", "Cat(1, 0, remainder)"),
+    "no digit of the dividend": ("Cat(1, digits[-1], remainder)", "Cat(1, 0, remainder)"),
     "first sign inverted": ("~digits[-1])", "digits[-1])"),
-    "no correction": ("Cat(~negative, digits[:-1]", "Cat(1, digits[:-1]"),
-    "a step too many": ("steps.eq(self._steps - 1)", "steps.eq(self._steps)"),
+    "digits inverted": ("self.digit.eq(~negative)", "self.digit.eq(negative)"),
+    "a step too many": ("left.eq(self._steps - 1)", "left.eq(self._steps)"),
     "not stopped": ("running.eq(0)", "running.eq(1)"),
+    "done though it starts again": (" & ~self.start)", ")"),
+}
+NEAREST_MUTANTS = {
+    "not rounded": ("half = Cat(self.divisor[1:], ", "half = Cat(Const(0, len(self.divisor) - 1), ", 0),
+    "a part of the half lost": ("whole: Value = self.dividend + above", "whole: Value = self.dividend", 0),
+    "a part of it lost in zeros": ("Cat(above, Const(0, zeros - len(above))", "Cat(Const(0, zeros)", 2),
 }
 
 
@@ -65,3 +101,10 @@ MUTANTS = {
 def test_mutants_are_caught(name: str) -> None:
     with mutant(Divider, *MUTANTS[name]), caught():
         check(2, 3, 3, [(dividend, by) for by in (1, 3, 7) for dividend in range(1 - 4 * by, 4 * by)])
+
+
+@pytest.mark.parametrize("name", NEAREST_MUTANTS)
+def test_mutants_of_rounding_are_caught(name: str) -> None:
+    *change, zeros = NEAREST_MUTANTS[name]
+    with mutant(Divider, *change), caught():
+        check(3, 1, 4, [(dividend, by) for by in (1, 7, 15) for dividend in range(-4 * by, 4 * by, 1 << zeros)], zeros)

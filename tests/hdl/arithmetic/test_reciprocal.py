@@ -1,17 +1,54 @@
+"""Reciprocals of every m, when they are due, and held."""
+
 import pytest
+from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
-from tachometry.hdl.arithmetic.reciprocal import Reciprocal
+from tachometry.hdl.arithmetic.reciprocal import DividedReciprocal, LookedUpReciprocal
 from tachometry.spec.formats import reciprocal as spec
 
 
-@pytest.mark.parametrize("max_m", [2, 3, 10, 64, 65, 500])
-def test_every_reciprocal_a_clock_after_enable_and_held(max_m: int) -> None:
+@pytest.mark.parametrize("max_m", [2, 3, 64, 65])
+def test_every_reciprocal_two_clocks_after_m(max_m: int) -> None:
     described = spec.Reciprocal(max_m, max_numerator=28, frac_bits=8, halvings=1)
-    scale = 1 << (described.frac_bits + described.guard_bits)
-    rows = []
+    rows = [{"m": m} for m in range(1, max_m + 1)] + [{}, {}]
+    seen = [row["q"] for row in clock_by_clock(LookedUpReciprocal(described), rows, ["q"])]
+    assert seen[2:] == [described.value(m) for m in range(1, max_m + 1)]
+
+
+def check_division(max_m: int) -> None:
+    """From the reset on, and then from each move on; a move in the midst of a division begins anew."""
+    described = spec.DividedReciprocal(max_m, max_numerator=7, frac_bits=4, halvings=1)
+    clocks = described.steps + 2
+    rows: list[dict[str, int]] = [{"m": 1, "moves": 0}] * (clocks - 1)
     for m in range(1, max_m + 1):
-        rows += [{"m": m, "enable": 1}, {"m": 1, "enable": 0}, {}]
-    seen = [row["q"] for row in clock_by_clock(Reciprocal(described), rows, ["q"])]
-    for m in range(1, max_m + 1):
-        assert seen[3 * m - 2] == seen[3 * m - 1] == scale // m, m
+        rows += [{"moves": 1}, *[{"m": m, "moves": 0}] * (clocks - 1)]
+        if m % 5 == 0:
+            rows += [{"moves": 1}, *[{"m": 1, "moves": 0}] * 3]
+    seen = clock_by_clock(DividedReciprocal(described), [*rows, {}, {}], ["q"])
+    moves = [0, *(clock for clock, row in enumerate(rows) if row["moves"])]
+    held = 0
+    for before, after in zip(moves, [*moves[1:], len(rows)], strict=True):
+        for clock in range(before + clocks - (before == 0), after + 1):
+            assert seen[clock]["q"] == described.value(rows[clock - 1]["m"]), clock
+            held += 1
+    assert held > max_m
+
+
+@pytest.mark.parametrize("max_m", [2, 13, 32])
+def test_every_division(max_m: int) -> None:
+    check_division(max_m)
+
+
+MUTANTS = {
+    "subtracts what it should add": ("(~adds).replicate(len(self.m))", "adds.replicate(len(self.m))"),
+    "no first digit": ("first = Signal(init=1)", "first = Signal()"),
+    "digits of the last division": ("digits.eq(0), remainder", "remainder"),
+    "remainder of the last division": ("remainder.eq(0), first", "first"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(DividedReciprocal, *MUTANTS[name]), caught():
+        check_division(13)

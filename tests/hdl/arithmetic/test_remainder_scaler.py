@@ -12,6 +12,7 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.arithmetic import carried_reciprocal, remainder_scaler
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.formats.reciprocal import DividedReciprocal
 from tachometry.spec.timing import MAX_TICKS
 
 
@@ -32,30 +33,34 @@ def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bit
     """All N that one count per tick can give, and all m_s to the longest."""
     spec = long_spec(MAX_TICKS, frac_bits, cancel=cancel)
     numerators = range(-spec.max_numerator, spec.max_numerator + 1)
-    *operands, got = every_quotient(spec, numerators, 1, tmp_path)
+    *operands, got = every_quotient(spec, numerators, tmp_path)
     assert np.array_equal(got, wanted(spec, operands))
 
 
-@pytest.mark.parametrize("tick_cycles", [2, 960])
-def test_every_interval_and_the_extreme_numerators(tmp_path: Path, tick_cycles: int) -> None:
-    """Two and 960 counts per tick: pipelined and serial."""
-    spec = long_spec(MAX_TICKS, 16, tick_cycles=tick_cycles)
+def test_every_interval_and_the_extreme_numerators_at_two_clocks_a_tick(tmp_path: Path) -> None:
+    spec = long_spec(MAX_TICKS, 16, tick_cycles=2)
     extreme = spec.max_numerator
-    distance = spec.tick_to_velocity if spec.serial else 1
-    *operands, got = every_quotient(
-        spec, [-extreme, extreme] if spec.serial else [-extreme, -1, 1, extreme], distance, tmp_path
-    )
+    *operands, got = every_quotient(spec, [-extreme, -1, 1, extreme], tmp_path)
     assert np.array_equal(got, wanted(spec, operands))
 
 
-@pytest.mark.parametrize("tick_cycles", [2, 40])
+@pytest.mark.parametrize("max_ticks", [1 << 16, MAX_TICKS])
+def test_long_measurements_that_are_divided(tmp_path: Path, max_ticks: int) -> None:
+    """Every interval up to 2^16, or every 61st up to 2^20, from 960 counts a tick and 24 fraction bits."""
+    spec = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, max_ticks), frac_bits=24)
+    assert isinstance(spec.reciprocal, DividedReciprocal)
+    every = 1 if max_ticks < MAX_TICKS else 61
+    extreme = spec.max_numerator
+    *operands, got = every_quotient(spec, [-extreme, 1, extreme], tmp_path, every=every)
+    assert np.array_equal(got, wanted(spec, operands))
+
+
+@pytest.mark.parametrize("max_ticks", [4096, 20])
 @pytest.mark.parametrize("towards", [-1, 1])
-def test_every_bound(tmp_path: Path, tick_cycles: int, towards: int) -> None:
-    """Rounded down and up, pipelined and serial; with 6 fraction bits many quotients need no rounding at all."""
-    spec = long_spec(4096, 6, tick_cycles=tick_cycles)
-    assert spec.serial == (tick_cycles == 40)
-    distance = spec.tick_to_velocity if spec.serial else 1
-    *operands, got = every_quotient(spec, range(-8, 9), distance, tmp_path, towards)
+def test_every_bound(tmp_path: Path, max_ticks: int, towards: int) -> None:
+    """Rounded down and up; with 6 fraction bits many quotients need no rounding at all. Of 20 ticks none is carried."""
+    spec = long_spec(max_ticks, 12 if max_ticks == 20 else 6, tick_cycles=2)
+    *operands, got = every_quotient(spec, range(-8, 9), tmp_path, towards)
     assert np.array_equal(got, wanted(spec, operands, towards))
 
 
@@ -63,53 +68,52 @@ def test_every_bound(tmp_path: Path, tick_cycles: int, towards: int) -> None:
 TIES, CARRIED = 6, 14
 
 
-def check_starts_over(*, serial: bool, frac_bits: int) -> None:
+def check_starts_over(*, frac_bits: int) -> None:
     """m as in the S method: up, and over again from 1 or, after the longest, from the kept half; N of all sizes."""
     spec = long_spec(2100, frac_bits, tick_cycles=2)
     rng = np.random.default_rng(1)
     m = [*range(1, 300), *range(1, 2101), *range(1051, 1200), *range(1, 20)]
     n = rng.integers(-spec.max_numerator, spec.max_numerator + 1, len(m))
     base = -(n >> 2)  # for which the ends of the window are within the range of m_e
-    off = [{"load": 0, "start": 0, "enable": 0}]
-    distance = 2 * spec.numerator_width + 4 if serial else 1
-    rows = []
-    for row in zip(m, base.tolist(), n.tolist(), strict=True):
-        rows += [{"load": 1, "start": 1, "enable": 1, **dict(zip(("m", "base", "numerator"), row, strict=True))}]
-        rows += off * (distance - 1)
-    seen = clock_by_clock(FlatQuotient(spec, serial=serial), rows + off * 40, ["done", "velocity", "m_out"])
+    # What is started has been loaded the clock before.
+    rows = [{"load": 1, "base": b, "numerator": k} for b, k in zip(base.tolist(), n.tolist(), strict=True)]
+    begun: list[dict[str, int]] = [{}, *({"start": 1, "moves": 1, "m": k} for k in m)]
+    rows = [row | start for row, start in zip([*rows, {}], begun, strict=True)]
+    off = [{"load": 0, "start": 0, "moves": 0}]
+    seen = clock_by_clock(FlatQuotient(spec, serial=False), rows + off * 40, ["done", "velocity", "m_out"])
     got = [(row["velocity"], row["m_out"]) for row in seen if row["done"]]
     assert got == list(zip(wanted(spec, [base, n, np.array(m)]).tolist(), m, strict=True))
 
 
-@pytest.mark.parametrize("serial", [True, False])
 @pytest.mark.parametrize("frac_bits", [TIES, CARRIED])
-def test_m_starts_over(frac_bits: int, serial: bool) -> None:
-    check_starts_over(serial=serial, frac_bits=frac_bits)
+def test_m_starts_over(frac_bits: int) -> None:
+    check_starts_over(frac_bits=frac_bits)
 
 
-SERIAL, PIPELINED = remainder_scaler.SerialRemainderScaler, remainder_scaler.PipelinedRemainderScaler
 MUTANTS = {
-    "quotient never corrected": (carried_reciprocal.CarriedReciprocal, "q.eq(q - less[-1])", "q.eq(q)"),
+    "quotient never corrected": (carried_reciprocal.CarriedReciprocal, "q.eq(q - borrow)", "q.eq(q)"),
     "remainder corrected by m + 1": (
         carried_reciprocal.CarriedReciprocal,
-        "less[-1], self.m, 0",
-        "less[-1], self.m + 1, 0",
+        "Mux(borrow, self.m, 0)",
+        "Mux(borrow, self.m + 1, 0)",
     ),
     "no preset at the kept half": (
         carried_reciprocal.CarriedReciprocal,
-        "sorted(spec.presets.items())",
-        "sorted(spec.presets.items())[:1]",
+        "with m.If(self.m == spec.entry):",
+        "with m.If(0):",
     ),
     "table read one m too far": (
         carried_reciprocal.CarriedReciprocal,
-        "self.m[address_bits:].any()",
-        "self.m[address_bits + 1:].any()",
+        "carried.eq(self.m[address_bits:].any())",
+        "carried.eq(self.m[address_bits + 1:].any())",
     ),
-    "serial, half down": (SERIAL, "low.as_signed(), up)", "low.as_signed(), 0)"),
-    "serial, the sign bit counts positive": (SERIAL, "borrow.eq(sign & low[0])", "borrow.eq(0)"),
-    "pipelined, the sign bit counts positive": (PIPELINED, "total - (step_q << step)", "total + (step_q << step)"),
-    "pipelined, half down": (
-        PIPELINED,
+    "the sign bit counts positive": (
+        remainder_scaler.RemainderScaler,
+        "total - (step_q << step)",
+        "total + (step_q << step)",
+    ),
+    "half down": (
+        remainder_scaler.RemainderScaler,
         "_rounded(total, quotient.as_signed(), up)",
         "_rounded(total, quotient.as_signed(), 0)",
     ),
@@ -119,4 +123,4 @@ MUTANTS = {
 @pytest.mark.parametrize("name", MUTANTS)
 def test_mutants_are_caught(name: str) -> None:
     with mutant(*MUTANTS[name]), caught():
-        check_starts_over(serial=name.startswith("serial"), frac_bits=CARRIED if "kept half" in name else TIES)
+        check_starts_over(frac_bits=CARRIED if "kept half" in name else TIES)

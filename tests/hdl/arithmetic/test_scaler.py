@@ -2,9 +2,11 @@
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from amaranth.lib import data
 from support.mutant import caught, mutant
 from support.quotient import FlatQuotient, every_quotient
 from support.sequences import rounded
@@ -12,20 +14,27 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic import scaler
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec import Encoder, MTachometer, Speed, STachometer, Timing
+from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
 
 
-def default_spec(frac_bits: int = 16, *, cancel: bool = True) -> STachometer:
+def default_spec(frac_bits: int = 16, **options: object) -> STachometer:
     timing = Timing.parse("48MHz", "20us", "10ms")
-    return STachometer(encoder=Encoder(500), timing=timing, frac_bits=frac_bits, cancel=cancel)
+    given: dict[str, object] = {"encoder": Encoder(500), "timing": timing, "frac_bits": frac_bits}
+    return STachometer(**(given | options))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("serial", [True, False])
+@pytest.mark.parametrize("source", ["serial", "table"])
 @pytest.mark.parametrize(("frac_bits", "cancel"), [(16, True), (4, True), (4, False)])
-def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bool, serial: bool) -> None:
-    spec = default_spec(frac_bits, cancel=cancel)
-    numerators = range(-spec.max_numerator, spec.max_numerator + 1)
-    base, n, m, got = every_quotient(spec, numerators, spec.tick_to_velocity if serial else 1, tmp_path)
+def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bool, source: str) -> None:
+    spec = default_spec(frac_bits, cancel=cancel, source=source)
+    assert type(spec.reciprocal) is (
+        DividedReciprocal if source == "serial" else Reciprocal if frac_bits == 4 else NarrowReciprocal
+    )
+    # Those of a sixth of the range, and the greatest.
+    few = spec.max_numerator // 6
+    numerators = [*range(-few, few + 1), -spec.max_numerator, spec.max_numerator]
+    base, n, m, got = every_quotient(spec, numerators, tmp_path)
     halvings = spec.reciprocal.halvings
     wanted = (base << frac_bits) + round_quotient(n, m << halvings, frac_bits)
     ties = (n << (frac_bits + 1)) % (m << halvings) == 0
@@ -35,53 +44,104 @@ def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bo
     assert frac_bits != 4 or np.count_nonzero(ties) > 1000
 
 
-@pytest.mark.parametrize("serial", [True, False])
-@pytest.mark.parametrize("towards", [-1, 1])
-def test_every_bound(tmp_path: Path, serial: bool, towards: int) -> None:
-    """Rounded down and up: at 4 fraction bits many quotients need no rounding at all."""
-    spec = default_spec(4)
+@pytest.mark.parametrize("source", ["serial", "table"])
+@pytest.mark.parametrize("max_speed", ["1000rad/s", "150rad/s", "2000rad/s"])
+def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source: str) -> None:
+    """All m_s and N, which have 6 bits, 3 and 7: an odd number of bits is a digit more."""
+    spec = default_spec(max_speed=Speed.parse(max_speed), source=source)
+    assert spec.numerator_width == {"1000rad/s": 6, "150rad/s": 4, "2000rad/s": 7}[max_speed]
     numerators = range(-spec.max_numerator, spec.max_numerator + 1)
-    base, n, m, got = every_quotient(spec, numerators, spec.tick_to_velocity if serial else 1, tmp_path, towards)
+    base, n, m, got = every_quotient(spec, numerators, tmp_path)
+    assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
+
+
+@pytest.mark.parametrize("source", ["serial", "table"])
+@pytest.mark.parametrize("towards", [-1, 1])
+def test_every_bound(tmp_path: Path, source: str, towards: int) -> None:
+    """Rounded down and up: at 4 fraction bits many quotients need no rounding at all."""
+    spec = default_spec(4, source=source, bounds=True, max_speed=Speed.parse("2000rad/s"))
+    numerators = range(-spec.max_numerator, spec.max_numerator + 1)
+    base, n, m, got = every_quotient(spec, numerators, tmp_path, towards)
     assert np.count_nonzero(got != (base << 4) + round_quotient(n, 2 * m, 4, towards)) == 0
     assert len(got) == len(n)
 
 
-def base(n: int) -> int:
+def base(n: Any) -> Any:
     return n % 5 - 3
 
 
-def check_ties(*, serial: bool) -> None:
+def check_ties() -> None:
     """Ties of both signs, between other values, at 4 fraction bits."""
-    spec = default_spec(4)
+    spec = default_spec(4, source="table")
     pairs = [(n, m) for m in (32, 96, 160, 480) for n in range(-18, 19)] + [(7, 3), (-7, 3), (1920, 1), (-3840, 500)]
-    pause = spec.tick_to_velocity if serial else 1
-    off = {"load": 0, "start": 0, "enable": 0}
-    rows = []
+    assert isinstance(spec.reciprocal, Reciprocal)
+    pause = spec.reciprocal.digits + 4
+    off = {"load": 0, "start": 0}
+    rows: list[dict[str, int]] = []
     for n, m in pairs:
-        rows += [{"load": 1, "start": 1, "enable": 1, "m": m, "numerator": n, "base": base(n)}] + [off] * (pause - 1)
-    seen = clock_by_clock(
-        FlatQuotient(spec, serial=serial),
-        rows + [off] * (spec.tick_to_velocity + 1),
-        ["done", "velocity", "m_out"],
-    )
-    got = [(row["velocity"], row["m_out"]) for row in seen if row["done"]]
-    assert got == [(rounded(Fraction(n, 2 * m) + base(n), 4), m) for n, m in pairs]
-    assert seen[spec.tick_to_velocity]["done"] == 1
+        rows += [{"m": m} | off] * 2 + [{"load": 1, "numerator": n, "base": base(n)}, {"load": 0, "start": 1}]
+        rows += [off] * (pause - 4)
+    seen = clock_by_clock(FlatQuotient(spec, serial=True), [*rows, {}, {}], ["done", "velocity", "m_out"])
+    found = [(clock, row["velocity"], row["m_out"]) for clock, row in enumerate(seen) if row["done"]]
+    wanted = [rounded(Fraction(n, 2 * m) + base(n), 4) for n, m in pairs]
+    assert found == [
+        (k * pause + 3 + spec.tick_to_velocity, velocity, m)
+        for k, (velocity, (_, m)) in enumerate(zip(wanted, pairs, strict=True))
+    ]
 
 
-@pytest.mark.parametrize("serial", [True, False])
-def test_ties_base_and_tag(serial: bool) -> None:
-    check_ties(serial=serial)
+def test_ties_base_and_tag() -> None:
+    check_ties()
 
 
 MUTANTS = {
-    "half-even rounding": ("(total >> self._surplus)", "((total >> self._surplus) & ~~total[: self._surplus].any())"),
-    "the sign bit counts positive": ("self.q ^ sign.replicate(len(self.q))", "self.q"),
-    "half down": ("total.eq(self._rounding)", "total.eq(1 << (self._surplus + self._steps - 1))"),
+    "half-even rounding": (
+        "(total >> self._scale_bits)",
+        "((total >> self._scale_bits) & ~~total[: self._scale_bits - 1].any())",
+    ),
+    "no negative digit": ("product ^ high.replicate(len(product))", "product"),
+    "twice is once": ("Mux(twice, self.q << 1, self.q)", "self.q"),
+    "the digit 0 is −1 after another": ("(high == low) & (low == below)", "~(high | low | below)"),
+    "half down": ("shifted_in = self._rounding & 2", "shifted_in, self._rounding = 0, self._rounding >> 13 << 13"),
 }
 
 
 @pytest.mark.parametrize("name", MUTANTS)
 def test_mutants_are_caught(name: str) -> None:
     with mutant(scaler.SerialScaler, *MUTANTS[name]), caught():
-        check_ties(serial=True)
+        check_ties()
+
+
+def check_narrow(tmp_path: Path) -> None:
+    spec = default_spec(max_speed=Speed.parse("1000rad/s"), source="table")
+    base, n, m, got = every_quotient(spec, range(-28, 29), tmp_path)
+    assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
+
+
+def test_without_slack_the_mutant_whose_negative_is_the_complement_is_caught(tmp_path: Path) -> None:
+    with mutant(scaler.SerialScaler, "carry.eq(high)", "carry.eq(0)"), caught():
+        check_narrow(tmp_path)
+
+
+@pytest.mark.parametrize("towards", [-1, 0, 1])
+@pytest.mark.parametrize("average", [3, 10])
+def test_every_sum_over_a_constant(tmp_path: Path, average: int, towards: int) -> None:
+    """The pipelined scaler, as the M method uses it where ticks are short."""
+    spec = MTachometer(encoder=Encoder(500), timing=Timing(1000, 2, 10), average=average, frac_bits=4, bounds=True)
+    assert not spec.serial
+    dut = scaler.PipelinedScaler(
+        spec.reciprocal,
+        base_width=6,
+        numerator_width=spec.numerator_width,
+        tag=data.StructLayout({"mark": 1}),
+        towards=towards,
+    )
+    rows = [
+        {"load": 1, "start": 1, "numerator": n, "base": base(n), "q": spec.reciprocal.value(average)}
+        for n in range(-spec.max_numerator, spec.max_numerator + 1)
+    ]
+    seen = clock_by_clock(dut, rows + [{}] * (spec.numerator_width + 2), ["results.p.quotient"])
+    got = [row["results.p.quotient"] for row in seen[spec.numerator_width + 2 :]]
+    n = np.arange(-spec.max_numerator, spec.max_numerator + 1)
+    wanted = (base(n) << 4) + round_quotient(n, np.full(len(n), average), 4, towards)
+    assert got == wanted.tolist()

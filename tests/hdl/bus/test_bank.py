@@ -21,9 +21,10 @@ def random_accesses(registers: RegisterMap, seed: int, n_clocks: int) -> tuple[l
     rng = np.random.default_rng(seed)
     clocks = np.flatnonzero(rng.random(n_clocks - 1) < rng.choice([0.03, 0.3, 1]))
     words = (1 << registers.address_width - 2) - 1
+    velocity = next(one.offset for one in registers.registers if one.name.startswith("VELOCITY"))  # or its low word
     accesses = []
     for clock in clocks.tolist():
-        address = int(rng.integers(words + 1)) if rng.random() < 0.7 else registers["VELOCITY"].offset // 4
+        address = int(rng.integers(words + 1)) if rng.random() < 0.7 else velocity // 4
         written = rng.random()
         if written < 0.02:
             address = registers["CONTROL"].offset // 4

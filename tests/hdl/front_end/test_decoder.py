@@ -63,7 +63,7 @@ def test_a_line_that_dithers_never_creeps(decoding: int, other: int, line: str) 
 
 
 def test_mutant_with_the_directions_exchanged_is_caught() -> None:
-    with mutant(QuadratureDecoder, "~(self.level_a ^ past_b)", "(self.level_a ^ past_b)"), caught():
+    with mutant(QuadratureDecoder, "~(level_a ^ past_b)", "(level_a ^ past_b)"), caught():
         check_all_transitions(4)
 
 

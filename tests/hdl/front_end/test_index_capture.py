@@ -66,8 +66,8 @@ def test_a_glitch_on_the_index_is_swallowed_and_counted() -> None:
 
 
 MUTANTS = {
-    "falling edge": ("self.level_z & ~past_z", "~self.level_z & past_z"),
-    "before it is real": ("& self.ready", ""),
+    "falling edge": ("level & ~past_z", "~level & past_z"),
+    "before it is real": ("& ready", ""),
     "captured a clock late": ("with m.If(self.rises)", "with m.If(self.index_valid)"),
 }
 

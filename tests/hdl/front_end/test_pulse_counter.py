@@ -2,24 +2,44 @@ import itertools
 
 import numpy as np
 import pytest
+from amaranth import Module, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
-from tachometry.spec import TachometerSpec
 
 
-def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0.5) -> None:
+class Held(wiring.Component):
+    """A number held within bounds."""
+
+    def __init__(self, width: int, limit: int) -> None:
+        self._limit = limit
+        super().__init__({"value": In(signed(width)), "held": Out(signed(limit.bit_length() + 1)), "changed": Out(1)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        held, changed = saturate(m, self.value, self._limit)
+        m.d.comb += [self.held.eq(held), self.changed.eq(changed)]
+        return m
+
+
+def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0.5, *, staged: bool = False) -> None:
     rng = np.random.default_rng(seed)
     n_ticks = 200
     steps = rng.choice([-1, 0, 1], size=(n_ticks, tick_cycles), p=[0.9 - forward, 0.1, forward])
     rows = [
         {"step": int(step), "last": int(clock == tick_cycles - 1)} for tick in steps for clock, step in enumerate(tick)
-    ] + [{"step": 0, "last": 0}] * 3
-    seen = clock_by_clock(PulseCounter(tick_cycles, max_count), rows, ["tick", "pulse_count", "overflow"])
+    ] + [{"step": 0, "last": 0}] * 5
+    dut = PulseCounter(tick_cycles, max_count, staged=staged)
+    seen = clock_by_clock(dut, rows, ["tick", "pulse_count", "overflow", "coming", "next_count"])
     strobes = [clock for clock, row in enumerate(seen) if row["tick"]]
-    assert strobes == [(k + 1) * tick_cycles - 1 + TachometerSpec.tick_latency for k in range(n_ticks)], seed
+    assert strobes == [(k + 1) * tick_cycles + 1 + 2 * staged for k in range(n_ticks)], seed
+    # What comes is known a clock before it is shown.
+    assert [clock + 1 for clock, row in enumerate(seen) if row["coming"]] == strobes, seed
+    assert all(seen[c - 1]["next_count"] == seen[c]["pulse_count"] for c in strobes), seed
     sums = steps.sum(axis=1)
     assert [seen[c]["pulse_count"] for c in strobes] == np.clip(sums, -max_count, max_count).tolist(), seed
     assert [seen[c]["overflow"] for c in strobes] == (np.abs(sums) > max_count).astype(int).tolist(), seed
@@ -31,6 +51,7 @@ def check_counts(tick_cycles: int, max_count: int, seed: int, forward: float = 0
 @pytest.mark.parametrize(("tick_cycles", "max_count"), [(1, 1), (2, 2), (3, 3), (5, 2), (16, 16), (16, 4), (16, 1)])
 def test_counts_every_step_once(tick_cycles: int, max_count: int) -> None:
     check_counts(tick_cycles, max_count, seed=tick_cycles)
+    check_counts(tick_cycles, max_count, seed=tick_cycles, staged=True)
 
 
 @pytest.mark.parametrize("forward", [0.0, 0.9])
@@ -44,9 +65,32 @@ def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
         check_counts(5, 5, seed=0)
 
 
-def test_mutant_that_saturates_one_late_is_caught() -> None:
-    with mutant(saturate, "value > Const(limit, ", "value > Const(limit + 1, "), caught():
+@pytest.mark.parametrize("right", ["value > Const(limit, ", "value < Const(-limit, "])
+def test_mutant_that_saturates_one_late_is_caught(right: str) -> None:
+    with mutant(saturate, right, right.replace("limit", "limit * 2")), caught():
         check_counts(16, 4, seed=0)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [("(high == 0) |", "~value[-1] |"), ("high.all() & low.any()", "high.all()"), ("(high.all() &", "(value[-1] &")],
+)
+def test_mutants_of_the_upper_bits_are_caught(right: str, wrong: str) -> None:
+    with mutant(saturate, right, wrong), caught():
+        check_bounds(5, 7)
+
+
+def check_bounds(width: int, limit: int) -> None:
+    values = range(-(1 << (width - 1)), 1 << (width - 1))
+    seen = clock_by_clock(Held(width, limit), [{"value": value} for value in values], ["held", "changed"])
+    for value, row in zip(values, seen, strict=True):
+        inside = max(-limit, min(limit, value))
+        assert row == {"held": inside, "changed": int(inside != value)}, value
+
+
+@pytest.mark.parametrize(("width", "limit"), [(2, 1), (2, 2), (3, 3), (5, 1), (5, 6), (5, 7), (5, 8), (5, 15), (5, 16)])
+def test_every_value_within_its_bound(width: int, limit: int) -> None:
+    check_bounds(width, limit)
 
 
 def test_bad_max_count() -> None:

@@ -22,12 +22,14 @@ def literal(m_e: list[int]) -> list[bool]:
 
 
 def detected(m_e: list[int], pause: int = 0) -> list[bool]:
-    """Inject ticks, `pause` idle clocks apart."""
-    rows = []
-    for number in m_e:
-        rows += [{"tick": 1, "m_e": number}] + [{"tick": 0, "m_e": 3}] * pause
-    seen = clock_by_clock(AlterationDetector(4), rows, ["alteration"])
-    return [bool(row["alteration"]) for row in seen[:: pause + 1]]
+    """Inject ticks, `pause` idle clocks apart; what is shown until the next."""
+    rows: list[dict[str, int]] = []
+    for number, before in zip(m_e, [0, *m_e], strict=False):
+        rows += [{"coming": 1, "next_count": number, "pulse_count": before, "tick": int(not pause and len(rows) > 0)}]
+        if pause:
+            rows += [{"coming": 0, "next_count": 3, "pulse_count": number, "tick": 1}] + [{"tick": 0}] * (pause - 1)
+    seen = clock_by_clock(AlterationDetector(4, seldom=pause > 0), [*rows, {}], ["alteration"])
+    return [bool(row["alteration"]) for row in seen[pause + 1 :: pause + 1]]
 
 
 def check_paper_sequences() -> None:
@@ -55,6 +57,14 @@ def test_golden_model_against_the_definition(seed: int) -> None:
     assert alterations(m_e).tolist() == literal(m_e.tolist()), seed
 
 
+def test_mutant_that_knows_b_too_late_is_caught() -> None:
+    """Where a tick comes in every clock, b is that of the tick before."""
+    m_e = [0, 0, 1, 1, 0, 0, 1]
+    assert detected(m_e) == literal(m_e)
+    with mutant(AlterationDetector, "differs |= regular", "differs |= 0"), caught():
+        assert detected(m_e) == literal(m_e)
+
+
 def test_mutant_with_the_literal_rule_is_caught() -> None:
-    with mutant(AlterationDetector, " & (self.m_e != offset)", ""), caught():
+    with mutant(AlterationDetector, " & differs", ""), caught():
         check_paper_sequences()

@@ -24,11 +24,12 @@ def datapath_spec(*, cancel: bool = True, serial: bool = True, frac_bits: int = 
 
 
 def run(spec: STachometer, m_e: list[int]) -> list[dict[str, int]]:
-    pause = spec.timing.tick_cycles - 1
-    rows = []
+    """What is shown from the first tick on."""
+    pause = [{"tick": 0}] * (spec.timing.tick_cycles - 2)
+    rows: list[dict[str, int]] = []
     for number in m_e:
-        rows += [{"tick": 1, "pulse_count": number}] + [{"tick": 0}] * pause
-    return clock_by_clock(SMethod(spec), rows + [{}] * spec.tick_to_velocity, OUTPUTS)
+        rows += [{"coming": 1, "next_count": number}, {"coming": 0, "tick": 1, "pulse_count": number}, *pause]
+    return clock_by_clock(SMethod(spec), rows + [{}] * spec.tick_to_velocity, OUTPUTS)[1:]
 
 
 def check_paper_sequences(*, cancel: bool = True, serial: bool = True) -> None:
@@ -72,16 +73,16 @@ def test_outputs_are_held_from_update_to_update(serial: bool) -> None:
 MUTANTS = {
     "eq. (17) for eq. (21)": (
         IntervalAccumulator,
-        "opening - self.previous + d1 if self._cancel else d1",
-        "d1 + d1",
+        "- 2 * last if self._cancel else -last",
+        "- last if self._cancel else -last",
     ),
     "m_s off by one": (IntervalAccumulator, "self.m_s.eq(1)", "self.m_s.eq(2)"),
     "window opened afresh after a forced update": (IntervalAccumulator, "self._kept_ticks + 1", "1"),
     "forced beats an alteration": (IntervalAccumulator, "longest & ~self.alteration", "longest"),
     "opening number kept over a forced update": (
         IntervalAccumulator,
-        "with m.If(self.update):",
-        "with m.If(self.alteration):",
+        "Mux(self.update, last, opening)",
+        "Mux(self.tick & self.alteration, last, opening)",
     ),
 }
 

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 from support.mutant import caught, mutant
-from support.timed import SILENCE, TICK, decay, run, silence, spec_of, speed
+from support.timed import FRAC_BITS, SILENCE, TICK, decay, run, silence, spec_of, speed
 
-from tachometry.hdl.methods import gap_timer, quotient_velocity
-from tachometry.spec import Timing
+from tachometry.hdl.methods import count_way, gap_timer, quotient_velocity
+from tachometry.spec import Speed, Timing
 from tachometry.spec.methods.timed import TimedTachometer
 
 METHODS = ["t", "mt"]
@@ -60,6 +60,23 @@ def test_standstill(method: str, sign: int) -> None:
     check_standstill(method, sign)
 
 
+def check_greatest_speed(method: str, sign: int = 1) -> None:
+    """What is too fast is held there, whichever way; what is slower is not."""
+    spec = timed(method, bound_decay=False, max_speed=Speed.parse("2rev/s"))
+    assert spec.saturates
+    fast = {5, 9} if method == "t" else range(5, 21)  # two counts; a tick full of them
+    got = run(spec, dict.fromkeys([*fast, 139], sign), 180)
+    last, first = max(fast), min(fast)
+    velocities = [(last, 2 << FRAC_BITS, last - first), (139, speed(1, 139 - last), 139 - last)]
+    assert [row[:3] for row in got] == [(clock, sign * velocity, time) for clock, velocity, time in velocities]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_greatest_speed(method: str, sign: int) -> None:
+    check_greatest_speed(method, sign)
+
+
 def check_one_count(method: str) -> None:
     """One count is no speed."""
     n = 100 + 3 * SILENCE
@@ -72,6 +89,18 @@ def check_one_count(method: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_one_count_then_silence(method: str) -> None:
     check_one_count(method)
+
+
+def check_counts_in_a_row(method: str) -> None:
+    """The sign of the first counts for the second, which comes in the next clock."""
+    got = run(timed(method, bound_decay=False), {5: -1, 6: -1, 60: -1}, 61)
+    expected = [(6, speed(-1, 1), 1), (60, speed(-1, 54), 54)] if method == "t" else [(60, speed(-2, 55), 55)]
+    assert [row[:3] for row in got] == expected
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_counts_in_a_row(method: str) -> None:
+    check_counts_in_a_row(method)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -168,17 +197,25 @@ MUTANTS = {
         check_count_at_the_maximum_time,
     ),
     "no sign kept": (gap_timer.GapTimer, "was_negative.eq(self.negative)", "was_negative.eq(0)", check_reversal),
-    "never nearer": (quotient_velocity.QuotientVelocity, "change[-1])", "0)", check_standstill),
-    "always nearer": (
+    "no sign rule": (count_way.CountWay, "negative == last if self._reversals else 1", "1", check_reversal),
+    "not the sign of the count just before": (
+        count_way.CountWay,
+        "Mux(self.step[0], self.step[1], self.was_negative)",
+        "self.was_negative",
+        check_counts_in_a_row,
+    ),
+    "never nearer": (quotient_velocity.QuotientVelocity, "measuring | nearer", "measuring", check_standstill),
+    "always nearer": (quotient_velocity.QuotientVelocity, "measuring | nearer", "1", check_standstill),
+    "compared with what was shown before": (
         quotient_velocity.QuotientVelocity,
-        "~change[-1] & change.any(), change[-1]",
-        "1, 1",
+        "Cat(Mux(passes, bound, divider.digit), copy)",
+        "Cat(copy[-1], copy)",
         check_standstill,
     ),
     "down and not to the nearest": (
         quotient_velocity.QuotientVelocity,
-        "(divider.quotient + 1) >> 1",
-        "divider.quotient >> 1",
+        "nearest=True",
+        "nearest=False",
         check_standstill,
     ),
     "forced as it was before": (
@@ -187,10 +224,16 @@ MUTANTS = {
         "forced.eq(forced)",
         check_standstill,
     ),
+    "beyond the greatest speed": (
+        quotient_velocity.QuotientVelocity,
+        "bounded & (farther",
+        "~measuring & (farther",
+        check_greatest_speed,
+    ),
     "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
     "decaying too early": (
         quotient_velocity.QuotientVelocity,
-        " & ~rounds & ~holds & ~compared",
+        " & ~divider.done",
         "",
         check_turning_tail,
     ),

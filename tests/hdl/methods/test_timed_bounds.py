@@ -54,7 +54,7 @@ def check(method: str, timer: str, seed: int = 1) -> None:
         if spec.on_lattice:
             row["pulse_count"] = int(m_e[min(clock, CLOCKS - 1) // TICK])
         else:
-            row["step"] = int(step[clock]) if clock < CLOCKS else 0
+            row["step_before"] = int(step[clock + 1]) if clock + 1 < CLOCKS else 0
         rows.append(row)
     datapath = DATAPATHS[spec.method](spec)
     seen = clock_by_clock(datapath, rows, ["velocity_valid", *NAMES])

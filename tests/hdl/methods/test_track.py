@@ -14,6 +14,7 @@ from support.simulate import clock_by_clock
 from support.tracking import hostile
 
 from tachometry.hdl.methods import track
+from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.track import Model
 from tachometry.sim.signals.run import Table
@@ -159,6 +160,27 @@ def check_reset(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_reset(seed: int) -> None:
     check_reset(seed)
+
+
+def check_reset_about_update() -> None:
+    """A reset in each of the last clocks before an update: it does not come."""
+    nothing = {"step": 0, "tick": 0, "rst": 0}
+    rows: list[dict[str, int]] = []
+    for before in range(8):
+        rows += [nothing | {"tick": 1}, *[nothing] * (SPEC.datapath_latency - before - 1), nothing | {"rst": 1}]
+        rows += [nothing] * 6
+    # The first one is shown in the clock of the reset.
+    assert [clock for clock, *_ in updates_of(SPEC, rows)] == [SPEC.datapath_latency]
+
+
+def test_reset_about_update() -> None:
+    check_reset_about_update()
+
+
+@pytest.mark.parametrize("stage", ["held", "active"])
+def test_stages_without_reset_are_caught(stage: str) -> None:
+    with mutant(TrackMachine, f"        {stage} = Signal()", f"        {stage} = Signal(reset_less=True)"), caught():
+        check_reset_about_update()
 
 
 def test_stamp() -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
+from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
 from proofs.formal.buses import ON_BUSES
 from proofs.formal.prove import Proof
 from proofs.formal.tracking import COUNTS_OF_A_TICK
@@ -53,19 +54,18 @@ _METHOD_PROBES = {
     "core_longest": "datapath.interval.longest",
     "core_opening": "datapath.interval.opening",
     "core_numerator": "datapath.interval.numerator",
-    "core_previous": "datapath.alteration.previous",
+    "core_alteration": "datapath.alteration.alteration",
     "core_offset": "datapath.alteration.offset",
     "core_rests": "datapath.interval.rests",
     "core_nearly": "datapath.interval.nearly",
 }
-_SERIAL_PROBES = {
-    "core_running": "datapath.quotient.scaler_velocity.running",
-    "core_step": "datapath.quotient.scaler_velocity.step",
-}
+_SERIAL_PROBES = {"core_known": "datapath.interval.known"}
 _CARRIED_PROBES = {
     "core_carried": "datapath.quotient.reciprocal.carried",
     "core_q": "datapath.quotient.scaler_velocity.q",
     "core_r": "datapath.quotient.scaler_velocity.r",
+    "core_less": "datapath.quotient.reciprocal.less",
+    "core_carried_q": "datapath.quotient.reciprocal.carried_q",
 }
 _STANDSTILL_PROBES = {"core_rests": "standstill.shown", "core_empty": "standstill.left"}
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
@@ -89,7 +89,7 @@ def front(name: str, spec: STachometer) -> Proof:
     }
     probes = _FRONT_PROBES | within("glitch", _FILTER_PROBES, spec.filter_clocks > 0)
     probes |= within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
-    return Proof(name, spec, "front", parameters, probes, depth=5)
+    return Proof(name, spec, "front", parameters, probes, depth=3 + spec.tick_latency)
 
 
 def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_table: int | None = None) -> Proof:
@@ -98,7 +98,7 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         latency, serial, used = spec.tick_to_velocity, spec.serial, spec.reciprocal
     carried = {}
     if isinstance(used, CarriedSpec):
-        carried = {"CARRIED": used.depth, "C": used.scale, "SERIAL": int(serial)}
+        carried = {"CARRIED": used.depth, "C": used.scale}
     parameters = {
         "T": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
@@ -108,13 +108,15 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         "NUMERATOR_WIDTH": spec.numerator_width,
         "FRAC_BITS": spec.frac_bits,
         "CANCEL": int(spec.cancel),
+        "SERIAL": int(serial),
+        "TICK_LATENCY": spec.tick_latency,
         "TICK_TO_VELOCITY": latency,
         "AGE": int(spec.age),
     }
     probes = _METHOD_PROBES | within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
     probes |= within("aged", {"core_age": "age"}, spec.age)
     probes |= within("carried", _CARRIED_PROBES, bool(carried))
-    probes |= within("serial", _SERIAL_PROBES, bool(carried) and serial)
+    probes |= within("serial", _SERIAL_PROBES, serial)
     return Proof(
         name, spec, "method", parameters | carried, probes, depth or latency + 2, without=without, max_table=max_table
     )
@@ -221,15 +223,15 @@ _TIMED_PROBES = {
     "core_opened": "datapath.gap_timer.opened",
     "core_negative": "datapath.gap_timer.was_negative",
     "core_measuring": "datapath.quotient_velocity.measuring",
-    "core_rounds": "datapath.quotient_velocity.rounds",
-    "core_compared": "datapath.quotient_velocity.compared",
+    "core_done": "datapath.quotient_velocity.divider.done",
     "core_forced": "datapath.quotient_velocity.forced",
-    "core_rounded": "datapath.quotient_velocity.rounded",
+    "core_copy": "datapath.quotient_velocity.copy",
+    "core_nearer": "datapath.quotient_velocity.nearer",
+    "core_passes": "datapath.quotient_velocity.farther",
     "core_running": "datapath.quotient_velocity.divider.running",
     "core_remainder": "datapath.quotient_velocity.divider.remainder",
-    "core_left": "datapath.quotient_velocity.divider.left",
     "core_digits": "datapath.quotient_velocity.divider.digits",
-    "core_steps": "datapath.quotient_velocity.divider.steps",
+    "core_steps": "datapath.quotient_velocity.divider.left",
     "core_by": "datapath.quotient_velocity.divider.by",
 }
 _WINDOW_OF_MT_PROBES = {
@@ -288,7 +290,7 @@ def timed(
     probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
-    held = {"core_holds": "holds", "core_shown": "shown", "core_saturated": "saturated"}
+    held = {"core_back": "negative", "core_most": "most"}
     probes |= within("holds", {name: f"datapath.quotient_velocity.{at}" for name, at in held.items()}, spec.saturates)
     probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
     return Proof(name, spec, "timed", parameters, probes, depth=4)
@@ -311,7 +313,7 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
 # What can be said of M/T without what is divided; "travelled" takes as long as all the others.
 _MT_GIVEN = {
     "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
-    "lemma_left lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
+    "lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
     "lemma_window_free pt_update pt_held pt_spacing pt_rest",
     "travelled": "lemma_travelled",
 }
@@ -342,8 +344,8 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
 
 
 PROOFS = [
-    front("x4, 960 clocks", core(960, max_count=20)),
-    front("x4, filter 3", core(960, max_count=20, filter_clocks=3)),
+    front("x4, 15 clocks", core(15, max_count=7)),
+    front("x4, filter 3", core(15, max_count=6, filter_clocks=3)),
     front("x4, 2 clocks", core(2)),
     front("x4, 1 clock", core(1)),
     front("x2, 7 clocks", core(7, max_count=2, decoding=2)),
@@ -357,16 +359,15 @@ PROOFS = [
     m_method("M", small_m(1)),
     m_method("M of 4", small_m(4)),
     m_method("M of 3", small_m(3)),
-    method("serial", small(tick_cycles=7, max_ticks=16), depth=14),
-    method("sums", core(40, 8, max_count=7), depth=2, without="p4_* p5_velocity p7_* lemma_since"),
+    method("table", small(tick_cycles=7), depth=14),
+    method("sums", core(12, 8, max_count=7), depth=10, without="p4_* p5_velocity p7_* lemma_since"),
     method(
         "sums of eq. (17)",
-        core(40, 8, max_count=7, cancel=False),
-        depth=2,
+        core(12, 8, max_count=7, cancel=False),
+        depth=10,
         without="p4_* p5_velocity p7_* lemma_since",
     ),
-    method("carried", small(max_ticks=16), max_table=4),
-    method("serial, carried", small(tick_cycles=12, max_ticks=6), max_table=4),
+    method("carried", small(max_ticks=16)),
     reciprocal("2049 ticks", core(5, 2049, max_count=1)),
     reciprocal("6 ticks", small(max_ticks=6), max_table=4),
     rairan("Rairán", 3, 4, 2),
@@ -385,5 +386,7 @@ PROOFS = [
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
     *COUNTS_OF_A_TICK,
+    *COUNTS_OF_AXES,
+    *POSITIONS_OF_AXES,
     *ON_BUSES,
 ]

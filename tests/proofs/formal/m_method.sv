@@ -50,7 +50,7 @@ module m_method #(
 
   wire rests, rested;
   wire [31:0] quiet;
-  wire [$clog2(MAX_TICKS+1)-1:0] core_empty;
+  wire signed [$clog2(MAX_TICKS):0] core_empty;
   wire core_rests;
   standstill #(MAX_TICKS, COUNT_WIDTH) still (clk, rst, tick, pulse_count, rests, rested, quiet);
 
@@ -66,7 +66,7 @@ module m_method #(
   always @* begin
     lemma_bounded: assert (bounded && ticks <= N);
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && core_empty == (rested ? 0 : MAX_TICKS - quiet));
+        && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     pm_update: assert (velocity_valid == tick_ && interval == N && !forced);
     pm_velocity: assert (!velocity_valid || (2 * shown <= 2 * scaled + N && 2 * scaled + N < 2 * shown + 2 * N));
     pm_stalled: assert (stalled == rests);

@@ -10,10 +10,11 @@ module method #(
     parameter NUMERATOR_WIDTH = 6,
     parameter FRAC_BITS = 4,
     parameter CANCEL = 1,
+    parameter TICK_LATENCY = 2,
     parameter TICK_TO_VELOCITY = 9,
-    parameter CARRIED = 0,        // the table of the carried reciprocal has that many entries; 0: all looked up
+    parameter CARRIED = 0,        // the table of the carried reciprocal has that many entries; 0: none is carried
     parameter C = 8,              // what it divides
-    parameter SERIAL = 0,         // carried, and its scaler does a step a clock
+    parameter SERIAL = 0,         // m_s stays until the update is shown
     parameter AGE = 0,            // there is an age
     parameter UPSET = 0           // whether an update is due and what b is are taken from the core, which may have any state
 ) (
@@ -29,8 +30,8 @@ module method #(
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
   wire [I-1:0] core_m_s;
-  wire core_longest, core_rests, core_nearly;
-  wire signed [COUNT_WIDTH-1:0] core_opening, core_previous, core_offset;
+  wire core_longest, core_rests, core_nearly, core_alteration;
+  wire signed [COUNT_WIDTH-1:0] core_opening, core_offset;
   wire signed [NUMERATOR_WIDTH-1:0] core_numerator;
   wire signed [$clog2(T + 1):0] core_count;
 
@@ -76,8 +77,19 @@ module method #(
       if (m_e_j > MAX_COUNT || m_e_j < -MAX_COUNT) bounded = 0;
     end
   end
-  wire signed [S-1:0] reduced = 2 * $signed({1'b0, core_m_s}) * core_previous
-      + (CANCEL ? core_numerator : 2 * core_numerator);
+  // What enters the scaler is there a clock before the tick.
+  reg signed [NUMERATOR_WIDTH-1:0] numerator = 0;
+  always @(posedge clk) numerator <= rst ? 0 : core_numerator;
+  wire signed [S-1:0] reduced = 2 * $signed({1'b0, core_m_s}) * previous + (CANCEL ? numerator : 2 * numerator);
+
+  // The window that closed, while the core still works on it.
+  reg [TICK_TO_VELOCITY-1:0] closed = 0;  // in which of the clocks before
+  reg [I-1:0] pending_m_s = 1;
+  wire pending = SERIAL && closed != 0;
+  always @(posedge clk) begin
+    closed <= rst ? 0 : {closed, update};
+    if (update) pending_m_s <= m_s;
+  end
 
   // Ticks since the last update, and what that was: once here, and once from the ports.
   reg [I-1:0] since = 0, since_update = 0;
@@ -130,6 +142,9 @@ module method #(
   reg [$clog2(T):0] clock = 0;
   always @(posedge clk) clock <= rst || clock == T - 1 ? 0 : clock + 1;
   wire signed [$clog2(T)+1:0] elapsed = $signed({1'b0, clock}), most = clock == 0 ? T : elapsed;
+  reg signed [$clog2(T)+1:0] most_before = 0;
+  always @(posedge clk) most_before <= rst ? 0 : most;
+  wire signed [$clog2(T)+1:0] bound = TICK_LATENCY > 2 ? most_before : most;  // the step may come a clock later
   generate
     if (T > 1) begin : window
       wire signed [$clog2(T - 1):0] core_left;
@@ -138,9 +153,12 @@ module method #(
   endgenerate
   always @* begin
     lemma_clock: assert (clock < T);
-    lemma_count: assert (core_count <= most && -core_count <= most);
+    lemma_count: assert (core_count <= bound && -core_count <= bound);
     lemma_bounded: assert (bounded && (UPSET || (offset <= MAX_COUNT && -offset <= MAX_COUNT)));
-    lemma_core: assert (core_m_s == m_s && core_longest == full && core_previous == previous && core_offset == offset);
+    lemma_core: assert (core_m_s == (pending ? pending_m_s : m_s) && core_longest == (pending ? pending_m_s == MAX_TICKS : full)
+        && core_offset == offset);
+    lemma_last: assert (tick || pulse_count == previous);
+    lemma_alteration: assert (!tick || core_alteration == alteration);
     lemma_opening: assert (core_opening == opening);
     lemma_m_s: assert (m_s >= 1 && m_s <= MAX_TICKS && m_s == since + 1 + (after_forced ? KEPT : 0));
     lemma_alike: assert (alike);
@@ -155,10 +173,10 @@ module method #(
   end
   generate
     if (SERIAL) begin : serial
-      localparam LAST = 2 * NUMERATOR_WIDTH + 2;
-      wire core_running;
-      wire [$clog2(LAST + 2)-1:0] core_step;
-      always @* lemma_running: assert (!core_running || core_step <= LAST);
+      wire signed [NUMERATOR_WIDTH-1:0] core_known;
+      reg before = 0;
+      always @(posedge clk) before <= !rst && tick;
+      always @* lemma_known: assert (tick || before || core_known == (CANCEL ? opening - 2 * pulse_count : -pulse_count));
     end
     if (AGE) begin : aged
       wire [I-1:0] core_age;
@@ -175,14 +193,20 @@ module method #(
       always @* p8_age: assert (core_age == (all < MAX_TICKS ? all : MAX_TICKS));
     end
     if (CARRIED) begin : carried
+      localparam Q = $clog2(C / CARRIED + 1);
       wire core_carried;
       wire [$clog2(C):0] core_q;
       wire [I-1:0] core_r;
+      wire signed [(I > Q ? I : Q):0] core_less;
+      wire [Q-1:0] core_carried_q;
       reg [I-1:0] m = 0;  // at the last tick
       wire [I+$clog2(C):0] product = core_q * m;
       always @(posedge clk) m <= rst ? 0 : tick ? m_s : m;
       always @* begin
         lemma_next: assert (m_s == 1 || (m != 0 && m_s == (m == MAX_TICKS ? KEPT : m) + 1));
+        lemma_less: assert (!core_carried || core_less == $signed({1'b0, core_r}) - $signed({1'b0, core_q}));
+        // What the last of the table leaves there.
+        lemma_ready: assert (m == 0 || m >= CARRIED || (core_less == C % CARRIED && core_carried_q == C / CARRIED));
         lemma_carried: assert (core_carried == (m >= CARRIED));
         lemma_reciprocal: assert (m == 0 || (core_r < m && product + core_r == C));
       end
@@ -194,7 +218,7 @@ module method #(
     p4_range: assert (!velocity_valid || (interval >= 1 && interval <= MAX_TICKS));
     p4_latest: assert (since_update < MAX_TICKS - (was_forced ? KEPT : 0));
     p4_held: assert (velocity_valid || outputs == held);
-    p5_numerator: assert (sum == reduced);
+    p5_numerator: assert (!tick || sum == reduced);
     p5_velocity: assert ((have <= wanted && wanted < have + divisor) || (shown_m_s == 0 && velocity == 0));
     p7_stalled: assert (stalled == rests);
     p7_falls: assert (!(tick && pulse_count != 0) || !stalled);

@@ -5,9 +5,13 @@ from typing import Any
 
 from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.arithmetic.divider import Divider
-from tachometry.hdl.arithmetic.remainder_scaler import PipelinedRemainderScaler, SerialRemainderScaler
+from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.axes.axes_datapath import AxesDatapath
+from tachometry.hdl.axes.axis_counters import AxisCounters
+from tachometry.hdl.axes.rounds import Rounds
+from tachometry.hdl.axes.turns import Turns
 from tachometry.hdl.bus.axi_lite import AxiLiteBridge
 from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.bus.tick_position import TickPosition
@@ -56,17 +60,23 @@ RECURSIVE_SUM = (
 )
 
 MUTANTS = [
-    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(self.level_a ^ past_b)", "~(self.level_b ^ past_a)"),
+    Mutant("x4, 2 clocks", "p1_phase", QuadratureDecoder, "~(level_a ^ past_b)", "~(level_b ^ past_a)"),
     Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
-    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~self.level_b", "~change_b & self.level_b"),
+    Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~level_b", "~change_b & level_b"),
     Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
     Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
     Mutant("x2, 7 clocks", "p3_overflow", saturate, "above.eq(value > ", "above.eq(value >= "),
-    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & (self.m_e != offset)", ""),
-    Mutant("eq. (21), 1 clock", "p4_interval", IntervalAccumulator, "m_s.eq(after_forced)", "m_s.eq(after_forced - 1)"),
+    Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & differs", ""),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p4_interval",
+        IntervalAccumulator,
+        "(after_forced - self._max_ticks)",
+        "(after_forced - 1 - self._max_ticks)",
+    ),
     Mutant(
         "eq. (21), 1 clock",
         "p4_range",
@@ -74,46 +84,45 @@ MUTANTS = [
         "self.m_s == self._max_ticks - 1",
         "self.m_s == self._max_ticks",
     ),
-    Mutant("eq. (21), 1 clock", "p4_latest", IntervalAccumulator, "(self.alteration | longest)", "self.alteration"),
-    Mutant("eq. (21), 1 clock", "p4_held", PipelinedScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
+    Mutant(
+        "eq. (21), 1 clock",
+        "p4_latest",
+        IntervalAccumulator,
+        "closes.eq(self.alteration | longest)",
+        "closes.eq(self.alteration)",
+    ),
+    Mutant("eq. (21), 1 clock", "p4_held", RemainderScaler, "with m.If(valid):", "with m.If(valid | self.load):"),
     Mutant(
         "eq. (21), 1 clock",
         "p5_numerator",
         IntervalAccumulator,
-        "opening - self.previous + d1",
-        "opening - self.previous",
+        "- 2 * last if",
+        "- last if",
     ),
-    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else d1", "else d1 + d1"),
-    Mutant("eq. (21), 1 clock", "p5_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
+    Mutant("eq. (17)", "p5_numerator", IntervalAccumulator, "else -last", "else -2 * last"),
+    Mutant("eq. (21), 1 clock", "p5_velocity", RemainderScaler, "total - (step_q << step)", "total + (step_q << step)"),
+    Mutant("carried", "p5_velocity", RemainderScaler, "nearest = ~doubled", "nearest = doubled"),
+    Mutant("table", "p5_velocity", SerialScaler, "(high ^ low) & ~(low ^ below)", "(high ^ low) & ~below", 32),
+    Mutant("M of 3", "pm_velocity", PipelinedScaler, "total - q if last", "total + q if last"),
+    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "r.eq(less + corrected)", "r.eq(less)"),
     Mutant(
-        "eq. (17)",
-        "p5_velocity",
-        PipelinedScaler,
-        "= reciprocal.rounding(towards)",
-        "= reciprocal.rounding(towards) >> 1",
+        "x4, 2 clocks", "p6_error", QuadratureDecoder, "backward, change_a & change_b", "backward, change_a | change_b"
     ),
-    Mutant(
-        "serial", "p5_velocity", SerialScaler, "sign = step == self._steps - 1", "sign = step == self._steps - 2", 32
-    ),
-    Mutant("carried", "p5_velocity", PipelinedRemainderScaler, "nearest = ~doubled", "nearest = doubled"),
-    Mutant("serial, carried", "p5_velocity", SerialRemainderScaler, "nearest = ~doubled", "nearest = doubled", 32),
-    Mutant("6 ticks", "p5_reciprocal", CarriedReciprocal, "less + Mux(less[-1], self.m, 0)", "less"),
-    Mutant("x4, 2 clocks", "p6_error", QuadratureDecoder, "change_a & change_b)", "(change_a | change_b))"),
     Mutant("x4, 2 clocks", "p6_uncounted", QuadratureDecoder, "change_a ^ change_b,", "change_a | change_b,"),
     Mutant("x4, 2 clocks", "p6_quiet", InputConditioner, "(clocks_since_reset[-1])", "(clocks_since_reset[-2])"),
     Mutant(
         "eq. (21), 1 clock",
         "p7_stalled",
         IntervalAccumulator,
-        "~(opening | self.previous).any()",
-        "~self.previous.any()",
+        "~opening.any() & was_silent",
+        "was_silent",
     ),
     Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
     Mutant("age", "p8_age", UpdateAge, "Mux(self.update, fresh, self.before)", "Mux(self.update, 0, self.before)"),
     Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & total.any())"),
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
-    Mutant("M of 4", "pm_stalled", Standstill, "init=self._max_ticks - 1", "init=self._max_ticks - 2"),
+    Mutant("M of 4", "pm_stalled", Standstill, "init=most - 1", "init=most - 2"),
     Mutant("M of 3", "pm_bounds", MMethod, "margin=spec.margin", "margin=0"),
     Mutant(
         "M of 4", "pm_known", MMethod, "known.bounds_valid.eq(seen >= spec.average)", "known.bounds_valid.eq(seen != 0)"
@@ -125,16 +134,16 @@ MUTANTS = [
     Mutant("Rairán", "pr_update", RairanCounters, "(~moved | self.rest)", "~moved", 32),
     Mutant("Rairán", "pr_velocity", RairanMethod, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
     Mutant("Rairán", "pr_rest", RairanCounters, "set_(0, update=~self.rest", "set_(1, update=~self.rest", 32),
-    Mutant("Rairán", "pr_stalled", Standstill, "left.eq(self._max_ticks)", "left.eq(self._max_ticks - 1)", 32),
+    Mutant("Rairán", "pr_stalled", Standstill, "left.eq(most)", "left.eq(most - 1)", 32),
     Mutant("Rairán", "pr_range", RairanCounters, "with m.If(full):", "with m.If(0):"),
     Mutant("Rairán", "pr_flag", RairanCounters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
-    Mutant("T", "pt_update", QuotientVelocity, "compared & (measuring | nearer)", "compared & nearer"),
+    Mutant("T", "pt_update", QuotientVelocity, "measuring | nearer", "nearer"),
     Mutant("M/T in ticks", "pt_update", MTMethod, "length == self._min_periods", "length == self._min_periods - 1", 32),
     Mutant("M/T of whole cycles", "pt_update", MTMethod, "cycled.eq(0), waived.eq(0)", "cycled.eq(0)", 48),
-    Mutant("T in ticks", "pt_spacing", Divider, "steps.eq(self._steps - 1)", "steps.eq(self._steps - 2)", 32),
+    Mutant("T in ticks", "pt_spacing", Divider, "left.eq(self._steps - 1)", "left.eq(self._steps - 2)", 32),
     Mutant("T", "pt_interval", GapTimer, "self.age.eq(1)", "self.age.eq(2)"),
     Mutant("T", "pt_range", GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods", 32),
-    Mutant("T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant("T", "pt_velocity", QuotientVelocity, "nearest=True", "nearest=False"),
     Mutant(
         "M/T in ticks",
         "pt_velocity",
@@ -143,11 +152,11 @@ MUTANTS = [
         "travelled.eq(Mux(ends, 0, total))",
         32,
     ),
-    Mutant("T", "pt_flag", QuotientVelocity, "beyond | saturated", "beyond"),
-    Mutant("T in ticks", "pt_flag", QuotientVelocity, "beyond | saturated", "saturated"),
-    Mutant("T", "pt_saturated", QuotientVelocity, "new.velocity.eq(shown)", "new.velocity.eq(rounded)"),
-    Mutant("T in ticks", "pt_decays", QuotientVelocity, "change.any(), change[-1])", "change.any(), 1)"),
-    Mutant("T in ticks", "pt_bound", QuotientVelocity, "compared & (measuring | nearer)", "compared & measuring", 32),
+    Mutant("T", "pt_flag", QuotientVelocity, "beyond | beyond_most", "beyond"),
+    Mutant("T in ticks", "pt_flag", QuotientVelocity, "beyond | beyond_most", "beyond_most"),
+    Mutant("T", "pt_saturated", QuotientVelocity, "Mux(passes, bound, divider.digit)", "divider.digit"),
+    Mutant("T in ticks", "pt_decays", QuotientVelocity, "measuring | nearer", "1"),
+    Mutant("T in ticks", "pt_bound", QuotientVelocity, "measuring | nearer", "measuring", 32),
     Mutant(
         "T",
         "pt_rest",
@@ -170,13 +179,15 @@ MUTANTS = [
         "upset, eq. (21)",
         "p4_latest",
         IntervalAccumulator,
-        "self.m_s.eq(self.m_s + 1)",
-        "self.m_s.eq(self.m_s + (self.m_s <= self._max_ticks))",
+        "self.m_s + Mux(longest, back, 1)",
+        "self.m_s + Mux(longest, back, self.m_s <= self._max_ticks)",
     ),
-    Mutant("upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(self.m == preset):", "with m.If(0):"),
+    Mutant(
+        "upset, carried", "p5_velocity", CarriedReciprocal, "with m.If(~self.m[address_bits:].any()):", "with m.If(0):"
+    ),
     Mutant("upset, M of 4", "pm_velocity", MovingSum, *RECURSIVE_SUM),
     Mutant("upset, Rairán", "pr_estimate", RairanMethod, "shown = update | at_rest", "shown = update"),
-    Mutant("upset, T", "pt_interval", Divider, "steps.eq(steps - 1)", "steps.eq(steps - (steps < self._steps))"),
+    Mutant("upset, T", "pt_interval", Divider, "left.eq(left - 1)", "left.eq(left - (left < self._steps))"),
     Mutant("upset, M/T: given", "pt_update", MTMethod, "length.eq(length + 1)", "length.eq(length + ~length.all())"),
     Mutant(
         "upset, M/T: travelled",
@@ -189,10 +200,10 @@ MUTANTS = [
         "upset, M/T: since",
         "lemma_fresh",
         QuotientVelocity,
-        "compared & (measuring | nearer)",
-        "compared & nearer",
+        "measuring | nearer",
+        "nearer",
     ),
-    Mutant("upset, M/T", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant("upset, M/T", "pt_velocity", Divider, "Cat(1, digits[-1], remainder)", "Cat(1, 0, remainder)"),
     Mutant(
         "upset, M/T of whole cycles: given",
         "lemma_length",
@@ -211,10 +222,12 @@ MUTANTS = [
         "upset, M/T of whole cycles: since",
         "lemma_fresh",
         QuotientVelocity,
-        "compared & (measuring | nearer)",
-        "compared & nearer",
+        "measuring | nearer",
+        "nearer",
     ),
-    Mutant("upset, M/T of whole cycles", "pt_velocity", Divider, "Cat(~negative, digits[", "Cat(negative, digits["),
+    Mutant(
+        "upset, M/T of whole cycles", "pt_velocity", Divider, "Cat(1, digits[-1], remainder)", "Cat(1, 0, remainder)"
+    ),
     Mutant(
         "upset, M/T of whole cycles: cycles", "lemma_waived", MTMethod, "cycled.eq(0), waived.eq(0)", "cycled.eq(0)"
     ),
@@ -251,4 +264,12 @@ MUTANTS = [
     Mutant("axi-lite", "pa_stable", AxiLiteBridge, "self.s_axi_rvalid & self.s_axi_rready", "self.s_axi_rvalid"),
     Mutant("axi-lite", "pa_written", AxiLiteBridge, "bresp.eq(slave_error)", "bresp.eq(0)"),
     Mutant("axi-lite", "pa_data", AxiLiteBridge, "rdata.eq(native.read_data)", "rdata.eq(native.read_data >> 1)"),
+    Mutant("positions of two axes", "px_position", AxesDatapath, "before.position + count", "before.position", 60),
+    Mutant("positions of two axes", "px_once", Turns, "ends & ~final", "ends & final", 40),
+    Mutant("two axes of four slots", "px_axis", AxisCounters, "self.axis.eq(slot)", "self.axis.eq(self.slot)"),
+    Mutant("two axes of four slots", "px_step", AxisCounters, "write.data.b.eq(new_b)", "write.data.b.eq(b)"),
+    Mutant("two axes of four slots", "px_count", AxisCounters, "write.addr.eq(self.axis)", "write.addr.eq(slot)"),
+    Mutant("two axes of four slots", "px_count", AxisCounters, "Mux(first, 0, before.count)", "before.count", 32),
+    Mutant("three axes of five slots", "px_error", AxisCounters, "ready & illegal", "illegal"),
+    Mutant("three axes of five slots", "px_complete", Rounds, "self.last.eq(clock.last)", "self.last.eq(self.first)"),
 ]

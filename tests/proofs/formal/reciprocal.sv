@@ -13,6 +13,9 @@ module reciprocal #(
   tachometer core (.clk(clk), .rst(rst), .a(a), .b(b), .tick(tick));
   wire [I-1:0] core_m_s, core_r;
   wire [$clog2(C):0] core_q;
+  localparam Q = $clog2(C / CARRIED + 1);
+  wire signed [(I > Q ? I : Q):0] core_less;
+  wire [Q-1:0] core_carried_q;
   wire core_longest, core_carried;
 
   reg [I-1:0] m = 0;  // 0 before the first tick
@@ -23,6 +26,9 @@ module reciprocal #(
     lemma_longest: assert (core_longest == (core_m_s == MAX_TICKS));
     lemma_m_s: assert (core_m_s >= 1 && core_m_s <= MAX_TICKS);
     lemma_next: assert (core_m_s == 1 || (m != 0 && core_m_s == (m == MAX_TICKS ? KEPT : m) + 1));
+    lemma_less: assert (!core_carried || core_less == $signed({1'b0, core_r}) - $signed({1'b0, core_q}));
+    // What the last of the table leaves there.
+    lemma_ready: assert (m == 0 || m >= CARRIED || (core_less == C % CARRIED && core_carried_q == C / CARRIED));
     lemma_carried: assert (core_carried == (m >= CARRIED));
     p5_reciprocal: assert (m == 0 || (core_r < m && product + core_r == C));
   end

@@ -26,7 +26,7 @@ module timed #(
 ) (
     input clk, input rst, input a, input b
 );
-  localparam V = VELOCITY_WIDTH, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS, W = 8;
+  localparam V = VELOCITY_WIDTH, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS - 1, W = 8;
   localparam P = LATTICE ? 1 : T, B = DIVISION_CLOCKS, LONG = MAX_PERIODS * (LATTICE ? T : 1), PHASES = LATTICE ? T : 1;
   localparam PATIENCE = MIN_PERIODS * (CYCLE > 1 ? 2 : 1);  // timer periods after which any count closes a window
   wire tick, velocity_valid, forced, stalled;
@@ -37,18 +37,16 @@ module timed #(
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
-  wire core_running, core_rounds, core_holding, core_compared, core_measuring, core_forced, core_opened;
-  wire [$clog2(MAX_TICKS+1)-1:0] core_empty;
+  wire core_running, core_done, core_measuring, core_forced, core_opened, core_nearer;
+  wire signed [$clog2(MAX_TICKS):0] core_empty;
   wire core_rests;
   wire core_negative, core_longest;
   wire signed [1:0] core_step;
   wire [$clog2(MAX_PERIODS+1)-1:0] core_age;
   wire signed [I:0] core_remainder;
-  wire [Q-1:0] core_left;
-  wire [N-1:0] core_digits;
+  wire [N:0] core_digits, core_copy;
   wire signed [$clog2(N):0] core_steps;
   wire [I-1:0] core_by;
-  wire signed [N:0] core_rounded;
 
   // The port that is not always there.
   wire beyond;
@@ -122,8 +120,8 @@ module timed #(
   reg measuring = 0, silent = 0, many_now = 0;
   reg signed [I+Q:0] distance = 0;
   reg [I-1:0] times = 1;
-  wire free = UPSET ? !core_measuring || !(core_running || core_rounds || core_holding) : since == 0 || since == B || !measuring;
-  wire idles = UPSET ? !(core_running || core_rounds || core_holding || core_compared) : since == 0;
+  wire free = UPSET ? !core_measuring || !core_running : since == 0 || since == B || !measuring;
+  wire idles = UPSET ? !(core_running || core_done) : since == 0;
   wire measured = MT ? closes : count && free && (opened || many);
   wire decays = tick && !count && !seen && !overdue && idles;
   wire signed [W-1:0] pairs = MT ? travelled + pair : many ? (negative ? -1 : 1) : pair;
@@ -177,13 +175,14 @@ module timed #(
       {was_distance, was_times} <= {shown_distance, shown_times};
     end
 
-  // Which of them began, after an upset, when what is given held; after a reset those too that there are not.
+  // Which of them began, after an upset, when what is given held; after a reset those too that there are not. A decay is
+  // of use only if what it is compared with is.
   reg [7:0] fresh_clocks = 0;
   reg fresh_division = SETTLED < 0, fresh_due = SETTLED < 0, fresh_before = SETTLED < 0, fresh_past = SETTLED < 0;
   wire fresh_now = fresh_clocks == SETTLED, fresh = due ? fresh_due : fresh_before;
   always @(posedge clk) begin
     if (!fresh_now) fresh_clocks <= fresh_clocks + 1;
-    if (fresh_now && (rst || overdue || measured || decays)) fresh_division <= 1;
+    if (fresh_now && (rst || overdue || measured || (decays && fresh))) fresh_division <= 1;
     fresh_due <= fresh_division;
     if (fresh_now && rst) {fresh_before, fresh_past} <= 2'b11;
     else begin
@@ -197,19 +196,26 @@ module timed #(
   wire signed [N+I+2:0] divisor = $signed({1'b0, shown_times, 1'b0}), have = divisor * velocity;
   localparam signed [V-1:0] LIMIT = MAX_VELOCITY << FRAC_BITS;
   wire fits = !SATURATES || (wanted < divisor * (LIMIT + 1) && wanted >= -divisor * LIMIT);
-  wire signed [N+1:0] shown = !SATURATES ? core_rounded : core_rounded > LIMIT ? LIMIT
-      : core_rounded < -LIMIT ? -LIMIT : core_rounded;
 
-  // Lemmas: what the induction needs to know of the state. Of a division: its distance, shifted, is the remainder and
-  // the divisor times the digits so far, 1 or -1 each.
+  // Lemmas: what the induction needs to know of the state. Of a division: what is divided, shifted, is the remainder and
+  // the divisor times the digits so far, 1 or -1 each; behind the digits is what is left of it.
   wire [4:0] j = since - 1;
-  wire signed [N+I+1:0] all = distance <<< FRAC_BITS;
+  wire signed [N+I+1:0] all = (distance <<< FRAC_BITS - 1) + $signed({1'b0, times[I-1:1]});
   wire signed [N+I+1:0] taken = all >>> (N - j);
-  wire [N-1:0] found_digits = core_digits & ((1 << j) - 1);
+  wire [N:0] found_digits = core_digits & ((1 << j) - 1);
   wire signed [N+1:0] digits = $signed({1'b0, found_digits, 1'b0}) - (1 <<< j) + 1;
   wire signed [N+I+1:0] passed = $signed({1'b0, times}) * digits;
-  wire signed [N+I+2:0] asked = all + $signed({1'b0, times}), twice = $signed({1'b0, times, 1'b0});
-  wire signed [N+I+2:0] found = twice * core_rounded;
+  wire signed [N+I+2:0] asked = (distance <<< FRAC_BITS) + $signed({1'b0, times}), twice = $signed({1'b0, times, 1'b0});
+  wire signed [N:0] quotient = $signed({!core_digits[N], core_digits[N-1:0]});
+  wire signed [N+I+2:0] found = twice * quotient;
+  // The bound, its first digits, and the velocity, signs inverted.
+  wire minus = distance < 0;
+  wire signed [N:0] bound = !measuring ? velocity : minus ? -LIMIT : LIMIT;
+  wire [N:0] bound_digits = {!bound[N], bound[N-1:0]} >> (N + 1 - j), more_digits = core_digits >> (j + 1);
+  wire signed [N:0] long_velocity = velocity;
+  wire [N:0] velocity_digits = {!long_velocity[N], long_velocity[N-1:0]};
+  wire core_passes;
+  wire [N:0] taken_digits = core_copy & ((1 << j) - 1);
   wire signed [W+3:0] most = measuring ? 2 * MAX_QUOTIENT * times : (times << Q) - 1, farthest = (LATTICE ? MAX_COUNT : 1) * (length - 1);
   reg [$clog2(T):0] phase = PHASES;  // of the timer period, 1 to PHASES; waits for the first tick
   always @(posedge clk) phase <= rst ? PHASES : period ? 1 : phase < PHASES ? phase + 1 : PHASES;
@@ -220,20 +226,25 @@ module timed #(
         && core_negative == was_negative);
     lemma_since: assert (since <= B && since <= spacing + !velocity_valid && spacing <= B);
     lemma_free: assert (since == 0 || !measuring || since >= (age - 1) * PHASES + phase);
-    lemma_running: assert (core_running == (since >= 1 && since <= N + 1) && core_rounds == (since == N + 2)
-        && core_compared == (since == B));
+    lemma_running: assert (core_running == (since >= 1 && since <= N + 1) && core_done == (since == B));
     lemma_kept: assert (!fresh_division || since == 0 || (core_measuring == measuring && core_forced == silent
         && core_by == times));
     lemma_asked: assert (!fresh_division || since == 0 || (times >= 1 && distance <= most && -distance <= most));
     lemma_times: assert (!fresh_division || since == 0 || times <= MAX_PERIODS + (MT ? PATIENCE : 0));
     lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
     lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
-    lemma_left: assert (!core_running || core_left == ((distance << j) & ((1 << Q) - 1)));
+    lemma_left: assert (!fresh_division || !core_running || more_digits == (all & ((1 << (N - j)) - 1)));
     lemma_steps: assert (!core_running || core_steps == N - 1 - $signed({1'b0, j}));
     lemma_remainder: assert (!fresh_division || !core_running || (core_remainder < $signed({1'b0, times})
         && core_remainder >= -$signed({1'b0, times})));
     lemma_quotient: assert (!fresh_division || !core_running || taken == core_remainder + passed);
-    lemma_rounded: assert (!fresh_division || since < N + 2 || (found <= asked && asked < found + twice));
+    lemma_found: assert (!fresh_division || since < B || (found <= asked && asked < found + twice));
+    lemma_compared: assert (!fresh_division || since == 0 || !(measuring ? SATURATES : fresh)
+        || (core_nearer == (minus ? found_digits > bound_digits : found_digits < bound_digits)
+            && core_passes == (minus ? found_digits < bound_digits : found_digits > bound_digits)));
+    lemma_taken: assert (!fresh_division || since == 0 || taken_digits == (core_passes ? bound_digits : found_digits) || (!fresh && !measuring && core_passes));
+    lemma_copy: assert (!fresh || (since != 0 && measuring)
+        || core_copy >> (since == 0 ? 0 : j) == (velocity_digits & ((1 << (since == 0 ? N + 1 : N + 1 - j)) - 1)));
     lemma_decays: assert (!fresh_division || since == 0 || measuring
         || (distance == (velocity < 0 ? -3 * P : 3 * P) && silent));
     lemma_decayed: assert (!fresh_due || !due || due_measuring
@@ -241,20 +252,18 @@ module timed #(
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && core_empty == (rested ? 0 : MAX_TICKS - quiet));
+        && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     lemma_fresh: assert (fresh && fresh_past);
     lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+1-:V]));
   end
   generate
     if (SATURATES) begin : holds
-      wire core_holds, core_saturated;
-      wire signed [V-1:0] core_shown;
-      assign core_holding = core_holds;
+      wire core_back, core_most;
       always @* begin
-        lemma_holds: assert (core_holds == (since == N + 3));
-        lemma_held: assert (since < N + 3 || (core_shown == shown && core_saturated == (shown != core_rounded)));
+        lemma_back: assert (!fresh_division || since == 0 || core_back == minus);
+        lemma_most: assert (!fresh_division || !core_running || !measuring || core_most == (j == 0 ? !minus : bound[N - j]));
       end
-    end else assign core_holding = 0;
+    end
     if (FLAGS) begin : flag
       wire core_beyond;
       always @* lemma_beyond: assert (since == 0 || core_beyond == many_now);
@@ -319,7 +328,7 @@ module timed #(
     pt_saturated: assert (!fresh || fits || kept || shown_times == 0 || velocity == (shown_distance < 0 ? -LIMIT : LIMIT));
     pt_decays: assert (!fresh_past || !fresh_due || !velocity_valid || due_measuring || (forced
         && (past < 0 ? velocity <= 0 && velocity > past : velocity >= 0 && velocity < past)));
-    pt_bound: assert (!fresh_due || !due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
+    pt_bound: assert (!fresh_past || !fresh_due || !due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
     pt_rest: assert (idle < LONG + B || velocity == 0);
     pt_stalled: assert (stalled == rests);
     pt_held: assert (velocity_valid || outputs == held);

@@ -1,6 +1,6 @@
 """How many wrong cores the tests' motions tell from the right one: `make mutate`.
 
-Names of methods as arguments choose those, and `registers` what is around a core.
+Names of methods as arguments choose those, `registers` what is around a core, and `axes` cores of many.
 """
 
 import os
@@ -15,7 +15,7 @@ from support.report import chosen, row
 
 from tachometry.spec import METHODS
 
-GROUPS = (*METHODS, "registers")
+GROUPS = (*METHODS, "registers", "axes")
 LEAST = 0.99  # of the mutants that are not equivalent
 
 

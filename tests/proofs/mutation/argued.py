@@ -1,7 +1,7 @@
 """Survivors that are equivalent to the core by an argument made by hand, where the proof does not reach.
 
-The keys are the core, the line of the HDL, and what the mutant changes in the cell that Yosys made of that line. B is
-the value that a reset gives, and S is whether there is a reset.
+The keys are the core, the line of the HDL, and what the mutant changes in the cell that Yosys made of that line, with
+the cell where the line has several of a kind. B is the value that a reset gives, and S is whether there is a reset.
 """
 
 from pathlib import Path
@@ -20,29 +20,67 @@ _EVEN = (
     "the tick, but where it asks for more than one, and then 2 and 3 are exchanged, and 0 and 1"
 )
 _EACH_TICK = "every tick has an update, so the age is at most 1"
+_OPEN_PLACES = "the first count after a reset is alone in its tick and replaces it, and without one it is not read"
+_SIGN = (
+    "an instruction behind a jump keeps a sign that is not its own, which no way that the jump leads to reads before "
+    "it has kept another one"
+)
+_POSITIVE = (
+    "the time between the first two counts is not held at `least_gap` any more, and only there is `POSITIVE` used: a "
+    "count in less time is faster than the greatest speed, at which it is held, and the quotient fits the word"
+)
+_MET = "return Cat(met[item] for item in Condition).bit_select(condition, 1)"
+_AT_REST = "with m.If(stop | (~fetched & ~self.begin)):  # at rest it is at the first instruction"
+_READS = "read.en.eq(done & ~write.en),  # the program never reads while it writes"
+_CLEAR = "(done & following.clear & ~taken) | (work & now.positive & negative) | (work & now.negative & ~negative)"
 
 ARGUED = {
     ("track, age", '"number": Out(form.number_bits),', "S[0] const0"): _OUTPUT_OF_COUNTS,
     ("track, age", '"places": Out(signed(form.places_bits)),', "B[3] const1"): _OUTPUT_OF_COUNTS,
     ("track, age", '"number": Out(form.number_bits),', "number[0] inv"): _EVEN,
     ("track, external tick", '"places": Out(signed(form.places_bits)),', "B[2] const1"): _OUTPUT_OF_COUNTS,
-    ("track, external tick", '"number": Out(form.number_bits),', "A[0] inv"): _EVEN,
-    ("track, external tick", '"number": Out(form.number_bits),', "number[0] cnot1"): _EVEN,
-    ("track, external tick", 'places = Signal.like(self.places, name="open_places")', "B[4] const1"): (
-        "the first count after a reset is alone in its tick and replaces it, and without one it is not read"
+    ("track, age", '"number": Out(form.number_bits),', "D[0] inv"): _EVEN,
+    ("track, age", '"places": Out(signed(form.places_bits)),', "places[1] cnot0"): (
+        "it is inverted like that if the number of counts is even, and the program reads the places of two counts an "
+        "even number of clocks after the tick"
     ),
+    ("track, external tick", '"number": Out(form.number_bits),', "A[0] inv"): _EVEN,
+    ("track, external tick", '"number": Out(form.number_bits),', "Y[0] cnot0"): _EVEN,
+    ("track, external tick", '"number": Out(form.number_bits),', "number[0] cnot1"): _EVEN,
+    ("track, external tick", 'places = Signal.like(self.places, name="open_places")', "B[4] const1"): _OPEN_PLACES,
+    ("track, external tick", 'places = Signal.like(self.places, name="open_places")', "B[2] const1"): _OPEN_PLACES,
+    ("track, age", "pc = Signal(address_width)", "B[2] inv"): (
+        "a clock after a reset it is 0, as always at rest, and no tick comes as early"
+    ),
+    ("track, age", _AT_REST, "$247.A[0] const0"): (
+        "it is 0 a clock later, as always at rest, and no tick comes as early"
+    ),
+    ("track, age", "following = Signal(layout, reset_less=True)", "following[23] cnot1"): (
+        "that is the address of a `TO_MQ`, which has none"
+    ),
+    ("track, external tick", "following = Signal(layout, reset_less=True)", "following[26] cnot1"): (
+        "that is the address of a `MUL`, and its word has been read before"
+    ),
+    ("track, external tick", "special = Mux(work, now.special, Special.NONE)", "$350.S[0] const1"): (
+        "that is for `TEST_OR`, which is never behind a jump; and after a reset nothing reads the flag before a `TEST`"
+    ),
+    ("track, index", _READS, "$185.Y[0] const1"): (
+        "what is read then is not used: no operation that is executed reads two behind one that writes"
+    ),
+    ("track, index", "with m.If(self.tick & ~less[-1]):", "$20.B[0] const1"): (
+        "if `less` is below 0 the standstill is shown, whatever is left, until a tick with counts sets that anew"
+    ),
+    ("track, age", _CLEAR, "$209.A[0] inv"): _POSITIVE,
+    ("track, external tick", _CLEAR, "$218.A[0] inv"): _POSITIVE,
+    ("track, index", _MET, "A[2] cnot1"): "the flag is asked for only behind an error, when the phase is not one count",
+    ("track, external tick", "with m.If(work & now.keep):", "A[0] const1"): _SIGN,
     ("track, external tick", "*(fetch.addr.eq(place), fetch.en.eq(done | self.begin)),", "B[0] const0"): (
         "the program has ended when it begins, and then no instruction takes longer"
     ),
-    (
-        "track, external tick",
-        "return Cat(met[item] for item in Condition).bit_select(condition, 1)",
-        "A[5] cnot1",
-    ): "whether the phase is rest is asked only of ticks that are not beyond the greatest speed",
-    ("track, age", "with m.If(work & now.keep):", "A[0] const1"): (
-        "an instruction behind a jump keeps a sign that is not its own, which no way that the jump leads to reads "
-        "before it has kept another one"
+    ("track, external tick", _MET, "A[5] cnot1"): (
+        "whether the phase is rest is asked only of ticks that are not beyond the greatest speed"
     ),
+    ("track, age", "with m.If(work & now.keep):", "A[0] const1"): _SIGN,
     ("track, age", '"after": Out(range(max_age + 1)),', "after[1] const0"): _EACH_TICK,
     ("track, age", '"age": Out(range(max_age + 1)),', "age$49[1] cnot1"): _EACH_TICK,
     ("t, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
@@ -70,11 +108,11 @@ ARGUED = {
 
 def argued(core: str, mutant: Mutant) -> bool:
     """Whether an argument covers a mutant of a core."""
-    change = mutant.place.rpartition(".")[2]
-    for place in mutant.lines:
-        file, _, number = place.partition(":")
+    place = f".{mutant.place}"
+    for source in mutant.lines:
+        file, _, number = source.partition(":")
         if file.startswith("hdl/"):
             line = (ROOT / file).read_text(encoding="utf-8").splitlines()[int(number.split(".")[0]) - 1]
-            if (core, line.strip(), change) in ARGUED:
+            if any((core, line.strip()) == key[:2] and place.endswith(f".{key[2]}") for key in ARGUED):
                 return True
     return False

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from amaranth.lib import wiring
 from numpy.typing import NDArray
+from proofs.mutation.axes import AXES
 from proofs.mutation.cases import Case, Pins
 from proofs.mutation.stimulus import Stimulus, noise_lines, stimulus
 from support.serial import SpiHost, UartHost
@@ -267,7 +268,7 @@ def _settings(rng: np.random.Generator, registers: RegisterMap, n_clocks: int) -
     return {"uart_rx": line}
 
 
-BOXES = [
+BOXES: list[Case] = [
     Box("registers, native", replace(_SPEC, filter_clocks=0), 120, bus="native", lines=_native),
     Box("wishbone", _SPEC, 40, bus="wishbone", lines=_wishbone, sources="hdl/bus/wishbone.py*"),
     Box("apb", _SPEC, 40, bus="apb", lines=_apb, sources="hdl/bus/apb.py*"),
@@ -276,4 +277,5 @@ BOXES = [
     Box("uart", _SPEC, 80, bus="uart", lines=_uart, sources="hdl/bus/uart.py*"),
     Box("emulator", _SPEC, 100, bus="uart", demo=True, lines=_settings, sources="hdl/demo/*"),
     Box("telemetry", _SPEC, 60, bus="uart", demo=True, lines=_settings, sources="hdl/bus/telemetry.py*"),
+    *AXES,
 ]

@@ -121,8 +121,8 @@ _FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_reset": True
 # Ticks of an odd number of clocks: inverters in a loop would cancel over an even one. With `track` the latency is even,
 # for the same reason.
 CASES = [
-    _case("s", "table", 3, 6, 1, 340, age=True),
-    _case("s", "carried, serial", 15, 16, 2, 340, max_table=8, frac_bits=6, **_FRONT),
+    _case("s", "carried", 3, 6, 1, 340, age=True),
+    _case("s", "table", 15, 16, 2, 340, frac_bits=6, source="table", **_FRONT),
     _case("s", "carried, bounds", 3, 9, 1, 340, max_table=4, bounds=True, cancel=False),
     _case("m", "of 3", 3, 2, 2, average=3, bounds=True, age=True),
     _case(

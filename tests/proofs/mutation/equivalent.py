@@ -2,44 +2,39 @@
 
 The netlist is cut at its flip-flops. Core and mutant run side by side from their initial values, whatever the pins and
 `rst` do, and ABC (`dprove`: correspondence of signals, then property directed reachability) proves that all outputs are
-equal in every clock. At first a mutant has the core's flip-flops, but for those that it was seen to set differently: of
-these it has its own. Proven with the outputs is then that what goes into the shared ones is equal, wherefore they may
-be shared, and the lemmas of the case, which are about the core's registers. What is left is tried once more with
-nothing shared, and without lemmas.
+equal in every clock. A large memory that is written is cut out as well: core and mutant must write the same to it,
+and what either reads is any word, but the same one if the addresses are the same.
+
+First `proofs.mutation.inductive` is asked, where it knows enough of the core. In what ABC is asked, a mutant has the
+core's flip-flops, but for those that it was seen to set differently: of these it has its own. Proven with the outputs
+is then that what goes into the shared ones is equal, wherefore they may be shared, and the lemmas of the case, which
+are about the core's registers. What is left is tried once more with nothing shared, and without lemmas, if the core is
+small.
 """
 
 import ctypes
-import json
 import re
 import shutil
 import tempfile
-from collections import defaultdict
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from proofs.mutation.cases import Case, Pins
-from proofs.mutation.lemmas import lemmas
-from proofs.mutation.netlist import SELECTOR, Mutant, selected, yosys
+from proofs.mutation.inductive import Known, proven
+from proofs.mutation.lemmas import known, lemmas
+from proofs.mutation.netlist import SELECTOR, Mutant, yosys
+from proofs.mutation.opened import Opened, Register, opened, written
 from proofs.mutation.simulate import compiled, key
 
 from tachometry.sim.engines import build
 
-_MAP = """\
-read_rtlil flat.il
-{mutants}
-memory -nomap
-memory_map
-dffunmap
-opt_clean
-write_rtlil mapped.il
-write_json mapped.json
-"""
 _WATCH = """
 struct State {{ {registers} }};
+template <size_t N> static inline value<N> merged(const value<N> &old, const value<N> &mask, const value<N> &word) {{
+  return old.bit_and(mask.bit_not()).bit_or(word.bit_and(mask));
+}}
 template <size_t N> static inline void note(const value<N> &one, const value<N> &other, uint8_t *row) {{
   for (size_t k = 0; k < N; k++) row[k] |= (one.data[k / 32] ^ other.data[k / 32]) >> (k % 32) & 1;
 }}
@@ -56,6 +51,7 @@ ENTRY void mutation_watch(
       select(top, k);
       {set}
       settle(top);
+      {read}
       {get}
       uint8_t *row = differ + (k - 1) * {width};
       if (k) {{ {compare} }}
@@ -87,87 +83,46 @@ _SHARED = 1000  # bits of registers above which nothing is proven unless they ar
 _TOGETHER = 8  # mutants for one run of Yosys
 
 
-def _found(pattern: str, text: str) -> str:
-    match = re.search(pattern, text)
-    assert match is not None
-    return match[1]
-
-
-@dataclass(frozen=True)
-class Register:
-    """A flip-flop; `init` has a character for each bit, the highest first, x where it is not known."""
-
-    width: int
-    init: str
-    names: frozenset[str]
-
-
-@dataclass(frozen=True)
-class Opened:
-    """A netlist in RTLIL, cut at its flip-flops: register k comes in as `q_k` and goes out as `d_k`."""
-
-    text: str
-    registers: list[Register]
-
-
-def _known(mapped: dict[str, Any]) -> dict[str, tuple[str, frozenset[str]]]:
-    """Initial value and names of each register, by its cell."""
-    (module,) = mapped["modules"].values()
-    bits: dict[Any, str] = {}
-    names: dict[tuple[Any, ...], set[str]] = defaultdict(set)
-    for name, net in module["netnames"].items():
-        names[tuple(net["bits"])].add(re.sub(r"\$\d+", "", name))
-        if "init" in net["attributes"]:
-            bits.update(zip(net["bits"], reversed(net["attributes"]["init"]), strict=True))
-    known = {}
-    for name, cell in module["cells"].items():
-        if cell["type"] == "$dff":
-            q = cell["connections"]["Q"]
-            known[name] = "".join(bits.get(bit, "x") for bit in reversed(q)), frozenset(names[tuple(q)])
-    return known
-
-
-def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
-    """The netlist of a group of mutants without its flip-flops, memories taken apart."""
-    (folder / "flat.il").write_text(flat)
-    # What drives a register's net instead of it has lost the initial value.
-    yosys(_MAP.format(mutants=""), folder)
-    known = _known(json.loads((folder / "mapped.json").read_text()))
-    yosys(_MAP.format(mutants="\n".join([*selected(group), "setattr -unset init w:*"])), folder)
-    text = (folder / "mapped.il").read_text()
-    registers: list[Register] = []
-    wires: list[str] = []
-    connections: list[str] = []
-
-    def cut(cell: re.Match[str]) -> str:
-        d, q, width = (_found(pattern, cell[2]) for pattern in (r"\\D (.*)", r"\\Q (.*)", r"\\WIDTH (\d+)"))
-        k = len(registers)
-        registers.append(Register(int(width), *known.get(cell[1].removeprefix("\\"), ("x" * int(width), frozenset()))))
-        wires.append(
-            f"  wire width {width} input {1000 + 2 * k} \\q_{k}\n  wire width {width} output {1001 + 2 * k} \\d_{k}\n"
-        )
-        connections.append(f"  connect {q} \\q_{k}\n  connect \\d_{k} {d}\n")
-        return ""
-
-    text = re.sub(r"^  cell \$dff (\S+)\n(.*?)^  end\n", cut, text, flags=re.DOTALL | re.MULTILINE)
-    head, body = re.split(r"(?<=^module \\top\n)", text, maxsplit=1, flags=re.MULTILINE)
-    body, tail = body.rsplit("end\n", 1)
-    return Opened(head + "".join(wires) + body + "".join(connections) + "end\n" + tail, registers)
+def _chunks(word: int, width: int) -> str:
+    """A number as CXXRTL has it."""
+    return f"value<{width}>{{{', '.join(f'{word >> low & 0xFFFFFFFF:#x}u' for low in range(0, width, 32))}}}"
 
 
 def watched(ports: Pins, cut: Opened, n_mutants: int, pins: NDArray[np.uint64]) -> NDArray[np.bool_]:
     """Which bits of the registers each mutant was seen to set differently, shape (n_mutants, bits)."""
-    registers = list(enumerate(cut.registers))
+    registers, memories = list(enumerate(cut.registers)), list(enumerate(cut.memories))
     place = np.cumsum([0, *(register.width for _, register in registers)])
     more = _WATCH.format(
-        registers=" ".join(f"value<{register.width}> r_{k};" for k, register in registers),
+        registers=" ".join(
+            [
+                *(f"value<{register.width}> r_{k};" for k, register in registers),
+                *(f"std::vector<value<{memory.width}>> m_{k};" for k, memory in memories),
+            ]
+        ),
         init=" ".join(
             f"state.r_{k}.data[{chunk // 32}] = {int(register.init.replace('x', '0'), 2) >> chunk & 0xFFFFFFFF}u;"
             for k, register in registers
             for chunk in range(0, register.width, 32)
+        )
+        + "".join(
+            f"state.m_{k} = {{{', '.join(_chunks(word, memory.width) for word in memory.words)}}};"
+            for k, memory in memories
         ),
         set=" ".join(f"top.p_q__{k} = state.r_{k};" for k, _ in registers),
-        get=" ".join(f"state.r_{k} = now(top.p_d__{k});" for k, _ in registers),
+        read=" ".join(
+            f"top.p_word__{k} = state.m_{k}[now(top.p_address__{k}).template get<size_t>()]; settle(top);"
+            for k, _ in memories
+        ),
+        get=" ".join(
+            [
+                *(f"state.r_{k} = now(top.p_d__{k});" for k, _ in registers),
+                *(
+                    f"{{ auto &word = state.m_{k}[now(top.p_place__{k}).template get<size_t>()];"
+                    f" word = merged(word, now(top.p_mask__{k}), now(top.p_data__{k})); }}"
+                    for k, _ in memories
+                ),
+            ]
+        ),
         compare=" ".join(f"note(core.r_{k}, state.r_{k}, row + {place[k]});" for k, _ in registers),
         width=place[-1],
     )
@@ -185,16 +140,16 @@ def watched(ports: Pins, cut: Opened, n_mutants: int, pins: NDArray[np.uint64]) 
     return differ.astype(bool)
 
 
-def _lemmas(case: Case, cut: Opened) -> list[str]:
-    """The lemmas of the case with the registers that they name, less those of a register that is not there."""
+def _named(texts: list[str], cut: Opened) -> list[str]:
+    """Lines of Verilog with the registers that they name, less those that name one which is not there."""
 
     def register(found: re.Match[str]) -> str:
         name = f".{found[2]}"
         numbers = [k for k, one in enumerate(cut.registers) if any(f".{own}".endswith(name) for own in one.names)]
         return f"{'core' if found[1] == '{' else 'mutant'}_q_{numbers[0] if len(numbers) == 1 else '?'}"
 
-    named = [re.sub(r"([{\[])([a-z][\w.]*)[}\]]", register, lemma) for lemma in lemmas(case.spec)]
-    return [lemma for lemma in named if "_q_?" not in lemma]
+    named = [re.sub(r"([{\[])([a-z][\w.]*)[}\]]", register, text) for text in texts]
+    return [text for text in named if "_q_?" not in text]
 
 
 def _miter(ports: Pins, cut: Opened, number: int, differ: NDArray[np.bool_], more: list[str]) -> str:
@@ -238,6 +193,9 @@ def _miter(ports: Pins, cut: Opened, number: int, differ: NDArray[np.bool_], mor
     for port in ports.outputs:
         lines += [f"wire [{port.width - 1}:0] core_{port.name}, mutant_{port.name};"]
         equal.append(f"core_{port.name} == mutant_{port.name}")
+    for k, memory in enumerate(cut.memories):
+        inputs.append(f"input [{memory.width - 1}:0] any_{k}, other_{k}")
+        lines += written(k, memory, links, equal)
     for (side, link), selector in zip(links.items(), (0, number), strict=True):
         link += [f".{name}({name})" for name in pins] + [f".{SELECTOR}({selector})"]
         link += [f".{port.name}({side}_{port.name})" for port in ports.outputs]
@@ -259,14 +217,14 @@ def equivalent(
 ) -> list[bool]:
     """Whether each mutant is proven to show at every output in every clock what the core shows, whatever the inputs."""
     cut = opened(flat, group, folder)
-    many = sum(register.width for register in cut.registers) > _SHARED
+    many = bool(cut.memories) or sum(register.width for register in cut.registers) > _SHARED
     differ = watched(case.pins, cut, len(group), pins[: 10 * _WATCHED if many else _WATCHED])
     text = folder / "cut.il"
     text.write_text(cut.text)
 
-    more = _lemmas(case, cut)
+    more = _named(lemmas(case.spec), cut)
 
-    def proven(numbers: list[int]) -> set[int]:
+    def solved(numbers: list[int]) -> set[int]:
         own = Path(tempfile.mkdtemp(dir=folder))
         shutil.copy(text, own)
         script = ["read_rtlil cut.il", "design -save all"]
@@ -277,10 +235,14 @@ def equivalent(
         return {number for number in numbers if _holds(own / f"verdict_{number}", own / f"left_{number}.il")}
 
     alike: set[int] = set()
+    found = known(case.spec)
+    if found:
+        named = Known(_named(found.definitions, cut), _named(found.lemmas, cut))
+        alike.update(np.flatnonzero(proven(case.pins, cut, differ, named, folder, pool)) + 1)
     for together in (_TOGETHER,) if many else (_TOGETHER, 1):
         left = [number for number in range(1, len(group) + 1) if number not in alike]
         parts = [left[first : first + together] for first in range(0, len(left), together)]
-        alike = alike.union(*pool.map(proven, parts))
+        alike = alike.union(*pool.map(solved, parts))
         # Some set a register that they share only later.
         differ[:] = True
         more.clear()

@@ -1,5 +1,6 @@
 """What is played on the mutants: many short motions with a reset before each, in the middle of the one before."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
 from tachometry.spec import TachometerSpec
 
@@ -24,14 +26,14 @@ class Stimulus:
     ----------
     pins : uint64 array, shape (clocks, words)
         Bit 0 is `rst`, above it the other inputs in the order of the ports.
-    traces : list of PinTrace
+    traces : sequence of PinTrace or AxesTrace
         One after each reset.
     starts : list of int
         Clock in which each of them begins, the first one after a reset.
     """
 
     pins: NDArray[np.uint64]
-    traces: list[PinTrace]
+    traces: Sequence[Trace]
     starts: list[int]
 
 
@@ -100,6 +102,18 @@ def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     return _trace(spec, (np.cumsum(changes, axis=1) % 2).astype(np.uint8))
 
 
+def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
+    """Motions that end in each of the clocks about the end of a tick, and about an update, and a whole one."""
+    found = []
+    for before in range(-3, 10):
+        for of_tick in (True, False):
+            trace = noise(spec, rng, 4 * spec.longest_tick, 2)
+            run = golden.run(spec, trace)
+            clocks = run.ticks.clock - spec.tick_latency if of_tick else run.updates.clock
+            found.append(trace.until(int(rng.choice(clocks[:2])) - before))
+    return [*found, noise(spec, rng, 4 * spec.longest_tick, 2)]
+
+
 def _trace(spec: TachometerSpec, level: NDArray[np.uint8]) -> PinTrace:
     """The trace with these levels of A, B, Z and the tick, as far as they are there."""
     names = _lines(spec)
@@ -126,6 +140,20 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
     period = 64 if long else 8  # with more resets between
     longest = spec.longest_tick * spec.timing.max_ticks
     n_silences = 10 if long else 40
+
+    def add(trace: PinTrace, resets: int) -> None:
+        """A motion, and clocks of reset before it."""
+        nonlocal done
+        level = np.zeros(trace.n_clocks, dtype=np.uint8)
+        level[trace.clock] = 1
+        row = np.cumsum(level) - 1
+        played = packed([trace.lines[name] for name in _lines(spec)])[row] << np.uint8(1)
+        reset = rng.integers(0, 256, resets).astype(np.uint8) | np.uint8(1)
+        starts.append(done + resets)
+        pins.extend([reset, played])
+        traces.append(trace)
+        done += resets + trace.n_clocks
+
     while done < n_clocks:
         if done > n_clocks // 4 and not shaken:
             trace, shaken = rattle(spec, rng), True
@@ -149,14 +177,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         # Some end early: the next reset comes in the middle.
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
-        resets = int(rng.choice([1, 1, 2, 5]))
-        level = np.zeros(trace.n_clocks, dtype=np.uint8)
-        level[trace.clock] = 1
-        row = np.cumsum(level) - 1
-        played = packed([trace.lines[name] for name in _lines(spec)])[row] << np.uint8(1)
-        reset = rng.integers(0, 256, resets).astype(np.uint8) | np.uint8(1)
-        starts.append(done + resets)
-        pins += [reset, played]
-        traces.append(trace)
-        done += resets + trace.n_clocks
+        add(trace, int(rng.choice([1, 1, 2, 5])))
+    for trace in ending(spec, rng) if long else ():
+        add(trace, 1)
     return Stimulus(np.concatenate(pins).astype(np.uint64)[:, np.newaxis], traces, starts)

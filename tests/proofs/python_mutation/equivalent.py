@@ -29,7 +29,23 @@ _argue(
 _argue(
     "sim/golden/quotient.py: round_quotient",
     "Denominators are at least 1. Fewer bits at a time give the same quotient; without denominators there is none.",
-    *("1 → 0", "1 → 2"),
+    *("1 → 0", "1 → 2", "1 → 0 #2", "1 → 2 #2"),
+)
+_argue(
+    "sim/golden/quotient.py: round_quotient",
+    "In long division the quotient is the same, and twice a number of 61 bits and another of 61 bits fit 63 bits.",
+    *("0 → 1 #2", "0 → -1 #2", "61 → 62", "61 → 60"),
+)
+_argue(
+    "sim/golden/quotient.py: round_quotient",
+    "To the nearest was answered before.",
+    *("towards < 0 → towards <= 0", "0 → 1 #4"),
+)
+_argue(
+    "sim/golden/ordered.py: places",
+    "It is a search where it need not be one, or a division by the distance 1 for one number.",
+    *("1 → 2", "ordered[1] - ordered[0] → ordered[1] + ordered[0]", "1 → 0 #2", "0 → 1", "0 → -1", "0 → 1 #2"),
+    *("0 → -1 #2", "step < 1 → step <= 1", "1 → 2 #3", "np.diff(ordered) != step → np.diff(ordered) == step"),
 )
 _argue(
     "sim/golden/methods/s.py: Model.updates",
@@ -128,30 +144,52 @@ _argue(
     f"{_TIMED}: _decaying",
     "A velocity of 0 does not decay, whatever its sign is taken for.",
     "velocity < 0 → velocity <= 0",
-    "0 → 1 #5",
+    "0 → 1",
+)
+_argue(
+    f"{_TIMED}: _greatest",
+    "A velocity of 0 does not decay, whatever its sign; the sign is 1 or −1, and 3 // 1 = 3, 3 // −1 = −3.",
+    "3 * np.where(velocity < 0, -1, 1) → 3 // np.where(velocity < 0, -1, 1)",
+    "velocity < 0 → velocity <= 0",
+    "0 → 1",
 )
 _argue(
     f"{_TIMED}: _decaying",
     "The sign is 1 or −1, and 3 // 1 = 3, 3 // −1 = −3.",
     "3 * sign → 3 // sign",
-    "3 * sign → 3 // sign #2",
 )
 _argue(
     f"{_TIMED}: _decaying",
-    "Before the first count the velocity is 0 and does not decay, so neither the age nor the last count matters.",
-    *("-1 → 1", "1 → 2 #2", "1 → 0 #2", "0 → 1 #7", "0 → -1 #7"),
+    "A tick that asks comes after a measurement, so there is a count before it.",
+    *("-1 → 1", "1 → 2", "1 → 0", "0 → 1 #2", "0 → -1 #2"),
 )
 _argue(
     f"{_TIMED}: _decaying",
     "The sign of a velocity that decays, and the size of a count, are never 0.",
-    *("sign > 0 → sign >= 0", "0 → -1 #8", "last_size > 0 → last_size >= 0", "0 → -1 #9"),
-    *("sign < 0 → sign <= 0", "0 → 1 #11", "last_size < 0 → last_size <= 0", "0 → 1 #12"),
+    *("sign > 0 → sign >= 0", "0 → -1 #3", "last_size > 0 → last_size >= 0", "0 → -1 #4"),
+    *("sign < 0 → sign <= 0", "0 → 1 #6", "last_size < 0 → last_size <= 0", "0 → 1 #7"),
 )
 _argue(
-    f"{_TIMED}: _decaying",
-    "With one count before the first tick nothing has been measured, so the velocity is 0 and does not decay. If ticks "
-    "are counted and the first is of many, it is itself a measurement, and does not compare.",
+    f"{_TIMED}: _asking",
+    "More measurements are looked at, or none fewer whose velocity decays: each tick is held against it later.",
+    *("1 → 2 #3", "1 → 0 #3", "'left' → 'right'", "'left' → 'right' #2", "1 → 2 #4"),
+    "np.abs(_greatest(spec, held, np.maximum(longest, 1))) < np.abs(held) → "
+    "np.abs(_greatest(spec, held, np.maximum(longest, 1))) <= np.abs(held)",
+)
+_argue(
+    f"{_TIMED}: _asking",
+    "Without ticks none asks.",
     *("0 → 1", "0 → -1"),
+)
+_argue(
+    f"{_TIMED}: _asking",
+    "No count is seen before clock 2, and the tick in whose clock something is measured is not empty.",
+    *("-1 → 1 #2", "1 → 2 #5", "1 → 0 #5", "'right' → 'left'"),
+)
+_argue(
+    f"{_TIMED}: Counts.silences",
+    "Of just the longest time there is no silence either way.",
+    "end - begin > max_periods → end - begin >= max_periods",
 )
 _argue(
     f"{_TIMED}: updates",
@@ -169,11 +207,10 @@ _argue(
     "0 → 1 #2",
 )
 _argue(
-    f"{_TIMED}: _among",
-    "What is looked up are clocks of ticks, and no tick is before clock 2.",
-    *("-1 → 1", "1 → 2", "1 → 0"),
+    f"{_TIMED}: Measurements.with_more",
+    "No silence ends in the period of a count.",
+    "'right' → 'left'",
 )
-_argue(f"{_TIMED}: Measurements.merged", "Both are of one class, with as many columns.", "True → False")
 _argue(f"{_TIMED}: _bounds", "There are two bounds, and two ends of the enclosure.", "True → False")
 
 _argue(

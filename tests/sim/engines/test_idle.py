@@ -1,5 +1,6 @@
 """Clocks that CXXRTL skips: every row is that of a simulation which skips none."""
 
+from collections import defaultdict
 from dataclasses import replace
 from typing import Any
 
@@ -7,8 +8,8 @@ import numpy as np
 import pytest
 from support.mutant import caught, mutant
 
+from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.idle import IdleCounter
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.rairan import RairanMethod
@@ -20,7 +21,6 @@ from tachometry.sim.signals.run import compare
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS, TachometerSpec, of_texts
 
-CORES = [words for method in METHODS for words in configurations(method)]
 SKIPPING, EVERY_CLOCK = Cxxrtl(), Cxxrtl(every_clock=True)
 
 
@@ -37,18 +37,43 @@ def check(spec: TachometerSpec, trace: PinTrace) -> None:
     assert number == 0, first
 
 
-@pytest.mark.parametrize("words", CORES, ids=" ".join)
-def test_rows_are_those_of_every_clock(words: tuple[str, ...]) -> None:
-    """On every configuration of the matrix; and with edges far apart, so that whole ticks are skipped."""
-    spec = spec_of(words)
+def cores_with_counters(method: str) -> list[TachometerSpec]:
+    """Of the matrix, those with the shortest and the longest ticks of each set of idle counters.
+
+    Without such counters nothing is skipped.
+    """
+    found = defaultdict(list)
+    for spec in map(spec_of, configurations(method)):
+        if counters := Tachometer(spec).idle_counters:
+            found[tuple(counter.path for counter in counters)].append(spec)
+    ordered = [sorted(alike, key=lambda spec: spec.timing.tick_cycles) for alike in found.values()]
+    return [spec for alike in ordered for spec in ([alike[0], alike[-1]] if len(alike) > 1 else alike)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rows_are_those_of_every_clock(method: str) -> None:
+    """On random motions; and with edges far apart, so that whole ticks are skipped."""
+    specs = cores_with_counters(method)
+    assert len(specs) > 1
+    for spec in specs:
+        check_core(spec)
+
+
+def check_core(spec: TachometerSpec) -> None:
     trace = stress(spec, 3, 50)
     if trace.n_clocks > 2e7:
         trace = trace.until(20_000_000)
     check(spec, trace)
     cycles = spec.longest_tick
-    slow = turning([3 * cycles + 1, 5, cycles - 1], 12, 5 * cycles)
-    others = {pin.name: np.zeros(12, dtype=np.uint8) for pin in spec.pins if pin.name not in slow.lines}
+    slow = turning([3 * cycles + 1, 5, max(cycles - 1, 1)], 12, 5 * cycles)
+    low = np.zeros(12, dtype=np.uint8)
+    others: dict[str, Any] = {pin.name: low for pin in spec.pins if pin.name not in slow.lines}
     check(spec, replace(slow, **others))
+
+
+def test_ticks_of_two_clocks_have_nothing_to_skip() -> None:
+    """Their counter is one bit, which has no name of its own."""
+    check_core(of_texts("s", {"ppr": "8", "tick": "2", "max-time": "6"}))
 
 
 def slow_shaft(method: str, **texts: str) -> tuple[TachometerSpec, PinTrace]:
@@ -57,11 +82,16 @@ def slow_shaft(method: str, **texts: str) -> tuple[TachometerSpec, PinTrace]:
     return spec, turning([1500, 40_000, 150, 2_500_000, 990], 40, 3_000_000)
 
 
+def slow(method: str) -> tuple[TachometerSpec, PinTrace]:
+    """Of the method, or of one with ticks so long that they are counted."""
+    return slow_shaft("s", tick="5ms", **{"max-time": "50ms"}) if method == "long" else slow_shaft(method)
+
+
 def check_slow(method: str) -> None:
-    check(*slow_shaft(method))
+    check(*slow(method))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, "long"])
 def test_slow_shafts(method: str) -> None:
     check_slow(method)
 
@@ -69,8 +99,9 @@ def test_slow_shafts(method: str) -> None:
 @pytest.mark.parametrize(
     ("box", "right", "wrong", "method"),
     [
-        (SamplingClock, '("left", -1, (-1,))', '("left", -1, (-2,))', "s"),
-        (SamplingClock, '("left", -1, (-1,))', '("left", -1, (-2,))', "m"),
+        (SamplingClock, "order=self.states", "order=self.states[1:] + self.states[:1]", "s"),
+        (SamplingClock, "order=self.states", "order=self.states[1:] + self.states[:1]", "m"),
+        (SamplingClock, '("left", -1, (-1,))', '("left", -1, (-2,))', "long"),
         (RairanMethod, '"counters.left", -1, (-1,)', '"counters.left", -1, (-2,)', "rairan"),
         (GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods - 2", "t"),
         (MTMethod, "(self._min_periods, self._patient_periods)", "(self._min_periods + 3,)", "mt"),
@@ -79,7 +110,7 @@ def test_slow_shafts(method: str) -> None:
 def test_mutants_are_caught(box: Any, right: str, wrong: str, method: str) -> None:
     """So clocks are skipped, by each counter."""
     with mutant(box, right, wrong), caught():
-        number, first = compare(Cxxrtl(every_clock=True).run(*slow_shaft(method)), Cxxrtl().run(*slow_shaft(method)))
+        number, first = compare(Cxxrtl(every_clock=True).run(*slow(method)), Cxxrtl().run(*slow(method)))
         assert number == 0, first
 
 

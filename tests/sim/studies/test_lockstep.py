@@ -7,10 +7,11 @@ import pytest
 
 from tachometry.sim import golden
 from tachometry.sim.engines.engine import Interrupted
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec import CoreSpec, of_texts
 
 SPEC = of_texts("m", {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"})
 LEVEL = quadrature(np.arange(100))
@@ -25,7 +26,7 @@ class Stops:
     def __init__(self, after: int | None = None) -> None:
         self.after, self.given = after, dict[str, Any]()
 
-    def run(self, spec: TachometerSpec, trace: PinTrace, **given: Any) -> Run:
+    def run(self, spec: CoreSpec, trace: Trace, **given: Any) -> Run:
         self.given = given
         if self.after is None:
             return golden.run(spec, trace)

@@ -80,14 +80,23 @@ def test_bandwidth(x: float) -> None:
     assert velocity.std() * math.sqrt(2) == pytest.approx(w * math.sqrt(0.5), rel=0.01)
 
 
-@pytest.mark.parametrize("x", REACHES)
-def test_the_worst_noise_is_no_larger_than_said_and_is_reached(x: float) -> None:
-    n = 2000
+def worst_velocity(x: float, n: int) -> float:
+    """What n errors of 1 or −1 cause if each has the worse sign."""
     impulse = np.zeros(n)
     impulse[0] = 1
     answer = states(x, impulse)[:, 1]
-    worst = np.sign(answer[::-1])
-    assert states(x, worst)[-1, 1] == pytest.approx(tracking_filter.worst_gain(x), rel=1e-4)
+    return float(states(x, np.sign(answer[::-1]))[-1, 1])
+
+
+@pytest.mark.parametrize("x", REACHES)
+def test_the_worst_noise_is_no_larger_than_said_and_is_reached(x: float) -> None:
+    assert worst_velocity(x, 2000) == pytest.approx(tracking_filter.worst_gain(x), rel=1e-4)
+
+
+def test_the_worst_noise_of_a_long_memory() -> None:
+    """It is proportional to x there, so that a low bandwidth takes no longer to plan."""
+    assert worst_velocity(0.002, 20_000) == pytest.approx(tracking_filter.worst_gain(0.002), rel=2e-3)
+    assert 1e6 * tracking_filter.worst_gain(1e-9) == pytest.approx(tracking_filter.worst_gain(1e-3))
 
 
 @pytest.mark.parametrize("growing", [True, False])

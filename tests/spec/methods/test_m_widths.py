@@ -19,7 +19,7 @@ def test_a_mean_is_a_shift_where_it_is_a_number_of_the_format(average: int, frac
     exact = 2**frac_bits % average == 0
     spec = make_spec(average, frac_bits)
     assert spec.shift == (frac_bits - average.bit_length() + 1 if exact else None)
-    assert spec.datapath_latency == (1 if exact else spec.numerator_width + 4)
+    assert spec.datapath_latency == (1 if exact else (spec.numerator_width + 1) // 2 + 3)
 
 
 @pytest.mark.parametrize(("eighths", "parts"), [(0, 1), (8, 1), (4, 2), (2, 4), (6, 4), (1, 8), (3, 8)])
@@ -34,10 +34,10 @@ def test_bounds_take_parts_of_a_count(average: int, eighths: int, parts: int) ->
     assert spec.max_numerator == 20 * average * parts + margin
     shifts = average != 3 and 2**5 % (average * parts) == 0
     assert (spec.shift is not None) == shifts
-    # One clock for the sum, one for each bit, three more for the scaler.
+    # One clock for the sum, one for each two bits, two more for the scaler.
     bits = (20 * average * parts + int(margin)).bit_length() + 1
     assert spec.numerator_width == bits
-    assert spec.datapath_latency == (1 if shifts else bits + 4)
+    assert spec.datapath_latency == (1 if shifts else (bits + 1) // 2 + 3)
 
 
 def test_without_bounds_there_is_no_margin() -> None:
@@ -47,9 +47,10 @@ def test_without_bounds_there_is_no_margin() -> None:
 
 
 def test_one_adder_is_enough_if_a_tick_is_long() -> None:
-    """The numerator of 3 ticks of 9 clocks has 6 bits, and an adder three clocks more to do."""
-    assert [make_spec(3, tick=tick).serial for tick in (8, 9, 10)] == [False, True, True]
+    """The numerator of 3 ticks of 4 clocks has 5 bits, and an adder a clock more to do than it has digits."""
+    assert [make_spec(3, tick=tick).serial for tick in (3, 4, 5)] == [False, True, True]
+    assert [make_spec(3, tick=tick).datapath_latency for tick in (3, 4)] == [5 + 3, 3 + 3]
     assert not make_spec(4).serial
-    # Ticks from outside may come in half the time; of 20 clocks the numerator has 7 bits, of 22 it has 8.
-    external = [make_spec(3, tick=tick, max_tick_cycles=tick).serial for tick in (9, 18, 19, 20, 22)]
-    assert external == [False, False, False, True, True]
+    # Ticks from outside may come in half the time; of 10 clocks the numerator has 6 bits.
+    external = [make_spec(3, tick=tick, max_tick_cycles=tick).serial for tick in (4, 7, 8, 10)]
+    assert external == [False, False, True, True]

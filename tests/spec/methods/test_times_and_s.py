@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 
 from tachometry.spec import Encoder, MTTachometer, Speed, STachometer, Timing, TTachometer
+from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
+from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
 
 
 def timing(tick: int, max_ticks: int) -> Timing:
@@ -24,43 +26,46 @@ def s(tick: int = 20, max_ticks: int = 10, **options: Any) -> STachometer:
     return STachometer(encoder=Encoder(8), timing=timing(tick, max_ticks), **({"frac_bits": 4} | options))
 
 
-def test_a_division_takes_a_clock_a_digit_its_sign_included_one_to_round_and_one_to_compare() -> None:
-    """By default 30 clocks, as docs/timed.md says: 960 counts a tick are 10 bits, 16 follow, and one to round with."""
-    assert [one(encoder=Encoder(500)).division_clocks for one in (TTachometer, MTTachometer)] == [30, 30]
+def test_a_division_takes_a_clock_a_digit_its_sign_included_and_one_for_the_dividend() -> None:
+    """By default 28 clocks, as docs/timed.md says: 960 counts a tick are 10 bits, and 16 follow."""
+    assert [one(encoder=Encoder(500)).division_clocks for one in (TTachometer, MTTachometer)] == [28, 28]
     # Twenty counts have 5 bits; on the lattice T has one count a tick, and M/T twenty.
-    assert [t().division_clocks, mt().division_clocks] == [5 + 4 + 1 + 3] * 2
-    assert [t(timer="tick").division_clocks, mt(timer="tick").division_clocks] == [1 + 4 + 1 + 3, 5 + 4 + 1 + 3]
-    assert t().datapath_latency == 13 + 1
+    assert [t().division_clocks, mt().division_clocks] == [5 + 4 + 2] * 2
+    assert [t(timer="tick").division_clocks, mt(timer="tick").division_clocks] == [1 + 4 + 2, 5 + 4 + 2]
+    assert t().datapath_latency == 11 + 1
+    # A bound may be 41 counts. A greatest speed changes nothing.
+    assert t(bounds=True).division_clocks == 6 + 4 + 2
+    assert t(max_speed=Speed(Fraction(1000), "rev/s")).division_clocks == 11
 
 
 def test_updates_are_a_division_apart() -> None:
-    """On the lattice they come with ticks: a division of 13 clocks takes three ticks of 6, two of 12, one of 13."""
-    assert [t().update_spacing, mt().update_spacing] == [13, 13]
-    assert [mt(tick, timer="tick").update_spacing for tick in (16, 13, 12, 6)] == [16, 13, 12, 12]
-    assert [mt(tick, timer="tick").division_clocks for tick in (16, 13, 12, 6)] == [13, 12, 12, 11]
-    assert t(timer="tick", max_tick_cycles=40).update_spacing == 9
+    """On the lattice they come with ticks: a division of 11 clocks takes two ticks of 10, one of 11."""
+    assert [t().update_spacing, mt().update_spacing] == [11, 11]
+    assert [mt(tick, timer="tick").update_spacing for tick in (16, 11, 9, 6)] == [16, 11, 18, 12]
+    assert [mt(tick, timer="tick").division_clocks for tick in (16, 11, 9, 6)] == [11, 10, 10, 9]
+    assert t(timer="tick", max_tick_cycles=40).update_spacing == 7
 
 
 def test_the_maximum_time_is_a_division_at_least() -> None:
-    assert [t(20, 10).max_periods, t(2, 2, frac_bits=4).max_periods] == [200, 2 + 4 + 1 + 3]
-    assert [mt(20, 10, timer="tick").max_periods, mt(5, 2, timer="tick").max_periods] == [10, 3]
-    assert [mt(5, 2, timer="tick").division_clocks, mt(5, 2, timer="tick").division_periods] == [11, 3]
+    assert [t(20, 10).max_periods, t(2, 2, frac_bits=4).max_periods] == [200, 2 + 4 + 2]
+    assert [mt(20, 10, timer="tick").max_periods, mt(4, 2, timer="tick").max_periods] == [10, 3]
+    assert [mt(4, 2, timer="tick").division_clocks, mt(4, 2, timer="tick").division_periods] == [9, 3]
     short = t(3, 2)
-    assert (short.division_clocks, short.max_time_cycles, short.standstill_ticks) == (10, 10, 4)
-    assert (mt(5, 2, timer="tick").max_time_cycles, mt(5, 2, timer="tick").standstill_ticks) == (15, 3)
+    assert (short.division_clocks, short.max_time_cycles, short.standstill_ticks) == (8, 8, 3)
+    assert (mt(4, 2, timer="tick").max_time_cycles, mt(4, 2, timer="tick").standstill_ticks) == (12, 3)
     assert t(20, 10).notes == ()
-    assert short.notes == ("maximum time raised from 6 clocks to 10: a division takes 10",)
+    assert short.notes == ("maximum time raised from 6 clocks to 8: a division takes 8",)
 
 
 def test_the_minimum_time() -> None:
     """A tick by default; a measurement that is longer than B − 1 finds the divider free."""
-    assert [mt().min_periods, mt(min_time=77).min_periods, mt(min_time=3).min_periods] == [20, 77, 12]
+    assert [mt().min_periods, mt(min_time=77).min_periods, mt(min_time=3).min_periods] == [20, 77, 10]
     assert [mt(timer="tick").min_periods, mt(timer="tick", min_time=60).min_periods] == [1, 3]
-    assert mt(3, 9, timer="tick").min_periods == 3  # ten clocks are four ticks
+    assert mt(3, 9, timer="tick").min_periods == 2  # eight clocks are three ticks
     assert [mt(min_time=77).min_time_cycles, mt(timer="tick", min_time=60).min_time_cycles] == [77, 60]
     assert mt(min_time=77).parameters["min_time"] == 77
     assert mt().parameters["min_time"] == 20
-    assert mt(min_time=3).notes == ("minimum time raised from 3 clocks to 12: a division takes 13",)
+    assert mt(min_time=3).notes == ("minimum time raised from 3 clocks to 10: a division takes 11",)
     for wrong, message in ((0, "from 1 to 200 clocks"), (201, "from 1 to 200 clocks")):
         with pytest.raises(ValueError, match=f"^min_time must be {message}, the maximum time, not {wrong}$"):
             mt(min_time=wrong)
@@ -73,7 +78,7 @@ def test_the_longest_measurement() -> None:
     """T: a maximum time. M/T: the count that closes comes a maximum time after T_c at most; or a late division."""
     assert [t().max_interval, t().interval_width] == [200, 8]
     assert [mt().max_interval, mt(min_time=77).max_interval] == [220, 277]
-    assert [mt(timer="tick").max_interval, mt(timer="tick", max_tick_cycles=20).max_interval] == [1 + 10, 7 + 10]
+    assert [mt(timer="tick").max_interval, mt(timer="tick", max_tick_cycles=20).max_interval] == [1 + 10, 6 + 10]
     # With whole cycles it comes after twice T_c; at x1 each count is one.
     assert mt(whole_cycles=True, min_time=77).max_interval == 2 * 77 + 200
     assert [(one.cycle_counts, one.patient_periods) for one in (mt(), mt(whole_cycles=True))] == [(1, 20), (4, 40)]
@@ -86,10 +91,10 @@ def test_the_longest_measurement() -> None:
 
 def test_what_is_remembered() -> None:
     """T: the time since the last count, which may wrap, and that to the next; then a division."""
-    assert t().remembered_clocks == (256 + 200 + 1) + 13
-    assert t(timer="tick").remembered_clocks == (16 + 10 + 1) * 20 + 9
-    assert t(timer="tick", max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30 + 9
-    assert mt().remembered_clocks == (256 + 200 + 220 + 2) + 13
+    assert t().remembered_clocks == (256 + 200 + 1) + 11
+    assert t(timer="tick").remembered_clocks == (16 + 10 + 1) * 20 + 7
+    assert t(timer="tick", max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30 + 7
+    assert mt().remembered_clocks == (256 + 200 + 220 + 2) + 11
 
 
 def test_speeds_beyond_the_range() -> None:
@@ -145,26 +150,62 @@ def test_the_numerator_of_s() -> None:
     assert (s(bounds=True, cancel=False).numerator_per_count, s(bounds=True, cancel=False).max_numerator) == (1, 41)
 
 
+def kind(spec: STachometer) -> type:
+    return type(spec.reciprocal)
+
+
 def test_the_reciprocal_of_s() -> None:
-    """Up to 2048 ticks it is looked up; beyond, it is carried, if the table that this needs is not longer."""
-    assert [s(1, ticks).carried for ticks in (500, 2048, 2049, 5000)] == [False, False, True, True]
-    assert [s(1, 5000, frac_bits=24).carried, s(1, 4096, frac_bits=24).carried] == [True, False]
+    """Divided where a tick leaves the time, or from a table of up to 2048 ticks; otherwise it is carried along."""
+    assert [kind(s(tick)) for tick in (960, 19, 18, 7, 6, 1)] == [
+        *(
+            DividedReciprocal,
+            DividedReciprocal,
+            NarrowReciprocal,
+            NarrowReciprocal,
+            CarriedReciprocal,
+            CarriedReciprocal,
+        )
+    ]
+    assert [kind(s(tick, source="table")) for tick in (960, 7, 6)] == [
+        NarrowReciprocal,
+        NarrowReciprocal,
+        CarriedReciprocal,
+    ]
+    # Ties and bounds take a general one.
+    assert [kind(s(18, ticks)) for ticks in (15, 16)] == [NarrowReciprocal, Reciprocal]
+    assert kind(s(18, bounds=True)) is Reciprocal
+    assert [kind(s(960, ticks, source="table")) for ticks in (2048, 2049)] == [Reciprocal, DividedReciprocal]
+    assert kind(s(18, 2049)) is CarriedReciprocal
     assert s(1, 5001).reciprocal.entry == 2501  # type: ignore[union-attr]
-    assert [s().memory[0], s(1, 5000).memory[0]] == ["table", "table and carried on"]
-    assert [s().memory[1], s(1, 5000).memory[1]] == [16, 4]
+    assert [one.memory and one.memory[:2] for one in (s(960), s(18), s(1, 5000))] == [
+        *(None, ("table", 16), ("table and carried on", 4))
+    ]
+
+
+def test_what_is_told_of_the_reciprocal() -> None:
+    assert [one.division for one in (s(18), s(19))] == ["", "divided in 13 clocks between two ticks"]
+    assert [one.notes for one in (s(19), s(18, source="table"), s(960, 2048, source="table"))] == [()] * 3
+    short = "a tick of {} is too short to divide between two"
+    assert s(18).notes == (f"reciprocal from a table: {short.format('18 clocks')}",)
+    assert s(1, source="table").notes == (f"reciprocal carried along: {short.format('1 clock')}",)
+    assert s(960, 2049, source="table").notes == ("reciprocal divided: a table has at most 2048 entries",)
+    with pytest.raises(ValueError, match=r"^reciprocal must be serial or table, not 'none'$"):
+        s(source="none")
 
 
 def test_latencies_of_s() -> None:
-    """80 has 7 bits, so N has 8: one clock each, one for the table, one for its register, one to add b."""
-    assert [s(tick).serial for tick in (11, 20)] == [True, True]
-    assert [s(10).serial, s(9).serial] == [True, False]
-    assert [s(20).datapath_latency, s(1).datapath_latency, s(9).datapath_latency] == [8 + 3, 4 + 3, 7 + 3]
-    # One more for every digit of N·R/m, and one to round.
-    slow = s(40, 5000, max_speed=Speed(Fraction(1000), "rev/s"))
-    assert (slow.carried, slow.max_numerator, slow.serial) == (True, 8, True)
-    assert slow.datapath_latency == 2 * 5 + 4
+    """80 has 7 bits, so N has 8: four digits, one clock each, and one to start."""
+    assert [s(tick).serial for tick in (7, 18)] == [True, True]
+    assert [s(6).serial, s(18, 2049).serial] == [False, False]
+    assert [s(18).datapath_latency, s(7).datapath_latency, s(19).datapath_latency] == [4 + 1, 3 + 1, 4 + 1]
+    # A table takes three clocks more: m_s, the table, its register. A division one more for every bit.
+    assert [s(18).busy_clocks, s(19).busy_clocks] == [5 + 3, 5 + 1 + 13]
+    # One for each bit of N and each digit of N·R/m, and one each for the table, its register, and to round.
     fast = s(1, 5000)
     assert (fast.max_numerator, fast.datapath_latency) == (4, 4 + 2 + 3)
+    # What saturates has two registers of its own.
+    slow: dict[str, Any] = {"max_speed": Speed(Fraction(1000), "rev/s")}
+    assert [one.tick_latency for one in (s(), s(**slow), s(1, **slow), t(), t(**slow))] == [2, 4, 2, 2, 2]
 
 
 def test_windows_of_s() -> None:

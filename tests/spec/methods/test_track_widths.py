@@ -7,7 +7,7 @@ from support.tracking import Interpreter, hostile, ticks_of
 
 from tachometry.sim.golden.methods.track import Model, Windows, rounded
 from tachometry.sim.signals.run import Table
-from tachometry.spec import TrackTachometer
+from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import LEVELS
 from tachometry.spec.formats.tracking_code import Phase
 
@@ -41,6 +41,24 @@ def test_hostile_counts(seed: int) -> None:
     spec, *_ = random_case(seed, "track")
     assert isinstance(spec, TrackTachometer)
     assert check(spec, seed) >= spec.form.width - 6
+
+
+@pytest.mark.parametrize(
+    ("longest", "options"),
+    [
+        ("683us", {}),  # U is more than half of 1/λ_0 from here on
+        ("5ms", {"agile": "no"}),
+        ("11ms", {"bandwidth": "200rad/s", "frac-bits": "8"}),
+        ("200us", {"bandwidth": "20kHz"}),
+    ],
+)
+def test_ticks_that_may_be_much_shorter_than_the_longest(longest: str, options: dict[str, str]) -> None:
+    """The unit of time follows the longest tick, so gains are greater than elsewhere."""
+    core = {"ppr": "500", "clock": "48MHz", "max-speed": "1000rad/s", "external-tick": "yes"}
+    spec = of_texts("track", core | {"max-tick-period": longest} | options)
+    assert isinstance(spec, TrackTachometer)
+    assert spec.form.ratio_range > 0
+    check(spec, 1)
 
 
 @pytest.mark.parametrize("seed", range(CASES, CASES + 20))

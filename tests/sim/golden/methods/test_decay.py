@@ -11,7 +11,8 @@ import pytest
 
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps, count
-from tachometry.sim.golden.methods.timed import Counts, chain
+from tachometry.sim.golden.methods.timed import Counts
+from tachometry.sim.golden.ordered import chain
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTTachometer, Speed, TachometerSpec, Timing, TTachometer
 

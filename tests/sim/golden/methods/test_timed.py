@@ -95,8 +95,7 @@ def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
     ("method", "box", "right", "wrong"),
     [
         ("mt", MTMethod, "self.quotient_velocity.free if spec.may_be_late else 1", "1"),
-        ("t", QuotientVelocity, "divider.done & ~self.measure", "divider.done"),
-        ("t", QuotientVelocity, "compared.eq(holds & ~self.measure)", "compared.eq(holds)"),
+        ("t", QuotientVelocity, "divider.start.eq(self.measure |", "divider.start.eq(self.measure & self.free |"),
     ],
 )
 def test_mutants_are_caught(method: str, box: type, right: str, wrong: str) -> None:

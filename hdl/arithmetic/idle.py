@@ -18,11 +18,14 @@ class IdleCounter:
         What it counts by, −1 or 1.
     stops : tuple of int
         Values at which something else may follow from it.
+    order : tuple of int
+        Instead of these two: its values, each after the one before, if it does not count. The last is the stop.
     """
 
     path: str
-    step: int
-    stops: tuple[int, ...]
+    step: int = 0
+    stops: tuple[int, ...] = ()
+    order: tuple[int, ...] = ()
 
     def within(self, box: str) -> "IdleCounter":
         """The same from outside of a box."""

@@ -1,0 +1,1 @@
+"""Many axes through one datapath."""

@@ -1,0 +1,158 @@
+"""The S method for many axes."""
+
+from amaranth import Module, Signal, Value, signed
+from amaranth.lib import data, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.arithmetic.quotient import Quotient
+from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.axes.axis_window import AxisWindow
+from tachometry.hdl.axes.turns import Turns
+from tachometry.spec.axes import DECIDE, READ, AxesSpec
+
+
+class AxesDatapath(wiring.Component):
+    """S-method datapath that the axes have in turn: from the counts of a tick to position and velocity.
+
+    The counts of all axes are handed over in one round; then each axis has its turn. In a turn the state of the axis is
+    read, m_e and position are made, the window is followed, and the velocity is computed, as `SMethod` does it.
+
+    Latency: the outputs of an axis are new `spec.turn_cycles` and `READ` clocks after its turn has begun, in the turn
+    of the next.
+
+    Parameters
+    ----------
+    spec : AxesSpec
+
+    Members
+    -------
+    complete : In(1)
+        `count` is handed over. The turns begin with the clock after that of axis 0.
+    slot : In(range(slots))
+        Whose count it is.
+    count : In(signed)
+    tick : Out(1)
+        One clock for every axis in every tick.
+    axis : Out(range(axes))
+        Valid with `tick`; as are `pulse_count`, `position`, `overflow` and `stalled`.
+    velocity_valid : Out(1)
+        Only together with `tick`: `velocity`, `interval` and `forced` are new.
+    """
+
+    def __init__(self, spec: AxesSpec) -> None:
+        self._spec = spec
+        axis = spec.axis
+        self.turns = Turns(spec.axes, spec.turn_cycles)
+        self.window = AxisWindow(
+            max_ticks=axis.timing.max_ticks,
+            kept_ticks=axis.kept_ticks,
+            count_width=axis.count_width,
+            numerator_width=axis.numerator_width,
+            cancel=axis.cancel,
+        )
+        self.quotient = Quotient(
+            spec.reciprocal,
+            quotients={"velocity": (axis.native_width, 0)},
+            numerator_width=axis.numerator_width,
+            tag=data.StructLayout({"forced": 1}),
+            serial=True,
+        )
+        super().__init__(
+            {
+                "complete": In(1),
+                "slot": In(range(spec.slots)),
+                "count": In(signed(spec.rounds.bit_length() + 1)),
+                "tick": Out(1),
+                "axis": Out(len(self.turns.axis)),
+                "pulse_count": Out(signed(axis.count_width)),
+                "position": Out(signed(axis.position_width)),
+                "overflow": Out(1),
+                "stalled": Out(1),
+                "velocity_valid": Out(1),
+                "velocity": Out(signed(axis.native_width)),
+                "interval": Out(axis.interval_width),
+                "forced": Out(1),
+            }
+        )
+
+    @property
+    def probes(self) -> dict[str, Value]:
+        """What a waveform should show of the inside."""
+        return {"turn": self.turns.axis, "m_s": self.window.state.m_s, "numerator": self.window.numerator}
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec = self._spec
+        m.submodules.turns = turns = self.turns
+        m.submodules.window = window = self.window
+        m.submodules.quotient = quotient = self.quotient
+        m.submodules.handed_over = handed = Memory(shape=self.count.shape(), depth=spec.slots, init=[])
+        kept = data.StructLayout({"position": self.position.shape(), "window": window.state.shape()})
+        m.submodules.state = state = Memory(shape=kept, depth=spec.axes, init=[])
+        read_count = handed.read_port()
+        write_count = handed.write_port()
+        read = state.read_port()
+        write = state.write_port()
+        m.d.comb += [
+            turns.begin.eq(self.complete & (self.slot == 0)),
+            write_count.addr.eq(self.slot),
+            write_count.data.eq(self.count),
+            write_count.en.eq(self.complete),
+            read_count.addr.eq(turns.axis),
+            read.addr.eq(turns.axis),
+        ]
+        # Block RAM is slow.
+        count = Signal.like(self.count)
+        before = Signal(kept)
+        with m.If(turns.step[READ - 1]):
+            m.d.sync += [count.eq(read_count.data), before.eq(read.data)]
+
+        overflow = Signal()
+        m_e = count
+        if spec.axis.max_count < spec.rounds:
+            m_e, overflow = saturate(m, count, spec.axis.max_count)
+        with m.If(turns.step[READ]):
+            m.d.sync += [
+                self.axis.eq(turns.axis),
+                self.pulse_count.eq(m_e),
+                self.overflow.eq(overflow),
+                self.position.eq(before.position + count),
+            ]
+            with m.If(turns.clears):
+                m.d.sync += [self.pulse_count.eq(0), self.overflow.eq(0), self.position.eq(0)]
+
+        decides = turns.step[DECIDE]
+        updates = Signal()
+        forced = Signal()
+        m.d.sync += updates.eq(decides & window.update)
+        with m.If(decides):
+            m.d.sync += [self.stalled.eq(window.next.rests), forced.eq(window.forced)]
+        m.d.comb += [
+            window.clears.eq(turns.clears),
+            window.state.eq(before.window),
+            window.m_e.eq(self.pulse_count),
+            write.addr.eq(turns.axis),
+            write.data.position.eq(self.position),
+            write.data.window.eq(window.next),
+            write.en.eq(decides),
+            quotient.m.eq(window.state.m_s),
+            quotient.load.eq(decides),
+            quotient.start.eq(updates),
+            quotient.base.eq(window.state.previous),
+            quotient.numerator.eq(window.numerator),
+            quotient.tag.forced.eq(forced),
+        ]
+        found = quotient.results
+        # As late as the velocity: what the next turn has by then does not show yet.
+        ended = turns.step[-1] & ~turns.clears
+        (tick,) = delay(m, ended, clocks=READ + 1)
+        m.d.comb += [
+            self.tick.eq(tick),
+            self.velocity_valid.eq(found.valid),
+            self.velocity.eq(found.p.velocity),
+            self.interval.eq(found.p.m),
+            self.forced.eq(found.p.forced),
+        ]
+        return m

@@ -1,0 +1,104 @@
+"""m_e of every axis."""
+
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth.lib import data, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.front_end.decoder import transition
+
+
+class AxisCounters(wiring.Component):
+    """Decodes the lines of an axis in its slot, and adds up the steps of its tick; levels and sums are in a memory.
+
+    Latency: what is seen in a slot is at the outputs three clocks later. It is back in the memory a clock after that,
+    when the axis has its next slot at the earliest: a round has four at least.
+
+    Parameters
+    ----------
+    axes, slots : int
+    rounds : int
+        Rounds of a tick: most steps of an axis in it.
+    decoding : int
+        Counts per period: 1, 2 or 4.
+
+    Members
+    -------
+    slot : In(range(slots))
+    first, last, ready : In(1)
+        Of this round, see `Rounds`.
+    level_a, level_b : In(axes)
+        Levels in this clock, bit k of axis k.
+    axis : Out(range(slots))
+        Of the other outputs.
+    step : Out(signed(2))
+        −1, 0 or +1.
+    decode_error : Out(1)
+        Both lines changed.
+    complete : Out(1)
+        The tick of this axis is over.
+    count : Out(signed)
+        Sum of its steps in this tick.
+    """
+
+    def __init__(self, *, axes: int, slots: int, rounds: int, decoding: int) -> None:
+        self._slots = slots
+        self._decoding = decoding
+        super().__init__(
+            {
+                "slot": In(range(slots)),
+                "first": In(1),
+                "last": In(1),
+                "ready": In(1),
+                "level_a": In(axes),
+                "level_b": In(axes),
+                "axis": Out(range(slots)),
+                "step": Out(signed(2)),
+                "decode_error": Out(1),
+                "complete": Out(1),
+                "count": Out(signed(rounds.bit_length() + 1)),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        kept = data.StructLayout({"a": 1, "b": 1, "count": self.count.shape()})
+        m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
+        read = memory.read_port()
+        write = memory.write_port()
+        level_a, level_b = (of_slot(line, self.slot) for line in (self.level_a, self.level_b))
+        seen = level_a, level_b, self.slot, self.first, self.last, self.ready
+        a, b, slot, first, last, ready = delay(m, *seen, clocks=2)
+        # Block RAM is slow.
+        before = Signal(kept)
+        m.d.sync += before.eq(read.data)
+        counted, backward, illegal = transition(self._decoding, a, b, before.a, before.b)
+        count = Signal()
+        step = Signal.like(self.step)
+        m.d.comb += [
+            read.addr.eq(self.slot),
+            count.eq(ready & counted),
+            step.eq(Cat(count, count & backward)),
+        ]
+        new_a, new_b = delay(m, a, b)
+        m.d.sync += [
+            self.axis.eq(slot),
+            self.step.eq(step),
+            self.decode_error.eq(ready & illegal),
+            self.complete.eq(last),
+            self.count.eq(Mux(first, 0, before.count) + step),
+        ]
+        m.d.comb += [
+            write.addr.eq(self.axis),
+            write.data.a.eq(new_a),
+            write.data.b.eq(new_b),
+            write.data.count.eq(self.count),
+            write.en.eq(1),
+        ]
+        return m
+
+
+def of_slot(lines: Signal, slot: Signal) -> Value:
+    """The line of the axis whose slot it is; those of nobody stay low."""
+    return Cat(lines, Const(0, 1 << len(slot))).bit_select(slot, 1)

@@ -1,0 +1,91 @@
+"""The window of a measurement, for an axis whose state is in a memory."""
+
+from amaranth import Module, Mux, signed
+from amaranth.lib import data, wiring
+from amaranth.lib.wiring import In, Out
+
+
+class AxisWindow(wiring.Component):
+    """What `AlterationDetector` and `IntervalAccumulator` do together; their registers come in and go out. No latency.
+
+    Parameters
+    ----------
+    max_ticks, kept_ticks : int
+        Longest window, and what a forced update leaves of it.
+    count_width, numerator_width : int
+        Bits of m_e and of the numerator.
+    cancel : bool
+        Eq. (21) of Tsuji 2009 instead of eq. (17).
+
+    Members
+    -------
+    clears : In(1)
+        The next state is that of a reset.
+    state : In
+        `previous` is m_e(i−1), `offset` the pulse number of the last tick that did not alter, `opening` that of the
+        tick that opened the window, `m_s` the length of the window; `rests` and `nearly` say what has been silent.
+    m_e : In(signed(count_width))
+        Pulse number of this tick; with `clears` it is 0.
+    next : Out
+        State of the next tick.
+    numerator : Out(signed(numerator_width))
+    update : Out(1)
+        The window closes.
+    forced : Out(1)
+        The window closes without an alteration.
+    """
+
+    def __init__(
+        self, *, max_ticks: int, kept_ticks: int, count_width: int, numerator_width: int, cancel: bool
+    ) -> None:
+        self._max_ticks = max_ticks
+        self._kept_ticks = kept_ticks
+        self._cancel = cancel
+        count = signed(count_width)
+        state = data.StructLayout(
+            {
+                "previous": count,
+                "offset": count,
+                "opening": count,
+                "m_s": range(max_ticks + 1),
+                "rests": 1,
+                "nearly": 1,
+            }
+        )
+        super().__init__(
+            {
+                "clears": In(1),
+                "state": In(state),
+                "m_e": In(count),
+                "next": Out(state),
+                "numerator": Out(signed(numerator_width)),
+                "update": Out(1),
+                "forced": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        state, after, m_e = self.state, self.next, self.m_e
+        alteration = (m_e != state.previous) & (m_e != state.offset) & ~self.clears
+        longest = state.m_s == self._max_ticks
+        silent = ~m_e.any()
+        d1 = m_e - state.previous
+        restarts = alteration | self.clears
+        goes_on = Mux(longest, self._kept_ticks + 1, state.m_s + 1)
+        m.d.comb += [
+            self.update.eq((alteration | longest) & ~self.clears),
+            self.forced.eq(longest & ~restarts),
+            self.numerator.eq(state.opening - state.previous + d1 if self._cancel else d1),
+            after.previous.eq(m_e),
+            after.offset.eq(Mux(alteration, state.offset, m_e)),
+            after.opening.eq(Mux(alteration | longest | self.clears, m_e, state.opening)),
+            after.m_s.eq(Mux(restarts, 1, goes_on)),
+            after.nearly.eq(self.forced & silent),
+            after.rests.eq(
+                silent
+                & ~self.clears
+                & (state.rests | state.nearly | (longest & ~(state.opening | state.previous).any()))
+            ),
+        ]
+        return m

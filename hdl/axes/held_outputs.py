@@ -1,0 +1,51 @@
+"""What was last shown of every axis."""
+
+from collections.abc import Mapping, Sequence
+
+from amaranth import Module, Shape, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class HeldOutputs(wiring.Component):
+    """A register for every value of every axis.
+
+    Latency: a value is in its register in the clock after its strobe.
+
+    Parameters
+    ----------
+    axes : int
+    values : mapping of str to Shape
+        What comes with the strobe.
+
+    Members
+    -------
+    strobe : In(1)
+    axis : In(range(axes))
+        Whose values they are.
+    NAME : In
+        One for each value, by its name.
+    NAME_0, NAME_1 … : Out
+        Of each axis the latest value, at first 0.
+    """
+
+    def __init__(self, axes: int, axis_width: int, values: Mapping[str, Shape]) -> None:
+        self._axes = axes
+        self._names: Sequence[str] = tuple(values)
+        super().__init__(
+            {
+                "strobe": In(1),
+                "axis": In(axis_width),
+                **{name: In(shape) for name, shape in values.items()},
+                **{f"{name}_{axis}": Out(shape) for axis in range(axes) for name, shape in values.items()},
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        for axis in range(self._axes):
+            mine = Signal(name=f"of_{axis}")
+            m.d.comb += mine.eq(self.strobe & (self.axis == axis))
+            with m.If(mine):
+                m.d.sync += [getattr(self, f"{name}_{axis}").eq(getattr(self, name)) for name in self._names]
+        return m

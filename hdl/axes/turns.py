@@ -1,0 +1,55 @@
+"""Which axis has the datapath."""
+
+from amaranth import Cat, Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+
+class Turns(wiring.Component):
+    """Gives the datapath to one axis after the other, for some clocks each.
+
+    After reset each has a turn before any tick: the datapath has nothing else to do, and clears its memory.
+
+    Parameters
+    ----------
+    axes : int
+    cycles : int
+        Clocks of a turn.
+
+    Members
+    -------
+    begin : In(1)
+        The first turn begins in the next clock; not before the last one has ended.
+    axis : Out(range(axes))
+        Whose turn it is.
+    clears : Out(1)
+        It is a turn after reset.
+    step : Out(cycles)
+        Bit n in the n-th clock of a turn.
+    """
+
+    def __init__(self, axes: int, cycles: int) -> None:
+        self._axes = axes
+        super().__init__(
+            {
+                "begin": In(1),
+                "axis": Out(range(max(axes, 2))),
+                "clears": Out(1, init=1),
+                "step": Out(cycles, init=1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        final = Signal()
+        ends = self.step[-1]
+        m.d.comb += final.eq(self.axis == self._axes - 1)
+        m.d.sync += self.step.eq(Cat(ends & ~final, self.step))
+        with m.If(ends):
+            m.d.sync += self.axis.eq(self.axis + 1)
+            with m.If(final):
+                m.d.sync += [self.axis.eq(0), self.clears.eq(0)]
+        # Whatever an upset has left ends here.
+        with m.If(self.begin):
+            m.d.sync += [self.step.eq(1), self.axis.eq(0)]
+        return m

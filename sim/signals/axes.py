@@ -1,0 +1,98 @@
+"""Pins of many encoders, and the tables of one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.signals.arrays import Ints
+from tachometry.sim.signals.recording import PinTrace, merged
+from tachometry.sim.signals.run import Run
+from tachometry.spec.axes import AxesSpec
+from tachometry.spec.port import TICK, UPDATE
+
+
+@dataclass(frozen=True)
+class AxesTrace:
+    """Levels that the first synchroniser flip-flops of many axes sample, on the core's clock.
+
+    Parameters
+    ----------
+    each : tuple of PinTrace
+        Of axis 0, of axis 1 …, with the same lines and as long as each other.
+    """
+
+    each: tuple[PinTrace, ...]
+
+    def __post_init__(self) -> None:
+        if len({(trace.n_clocks, *trace.lines) for trace in self.each}) != 1:
+            raise ValueError("traces of axes must have the same lines, and as many clocks as each other")
+
+    @classmethod
+    def of(cls, each: Sequence[PinTrace]) -> AxesTrace:
+        """Traces up to where the last of them ends: where another ends earlier, its levels stay."""
+        n_clocks = max(trace.n_clocks for trace in each)
+        return cls(tuple(replace(trace, n_clocks=n_clocks) for trace in each))
+
+    @property
+    def n_clocks(self) -> int:
+        """Number of clocks to run."""
+        return self.each[0].n_clocks
+
+    @cached_property
+    def clock(self) -> Ints:
+        """Clock edges from which the levels of the same row are sampled."""
+        return merged(*(trace.clock for trace in self.each))
+
+    @cached_property
+    def lines(self) -> dict[str, NDArray[np.uint64]]:
+        """The lines by name, each as a number with a bit for every axis."""
+        found = {name: np.zeros(len(self.clock), dtype=np.uint64) for name in self.each[0].lines}
+        for axis, trace in enumerate(self.each):
+            held = np.searchsorted(trace.clock, self.clock, side="right") - 1
+            for name, line in trace.lines.items():
+                found[name] |= line[held].astype(np.uint64) << np.uint64(axis)
+        return found
+
+    @property
+    def names(self) -> list[tuple[int, str]]:
+        """Every line by its axis and its name: those of axis 0, of axis 1 …."""
+        return [(axis, name) for axis, trace in enumerate(self.each) for name in trace.lines]
+
+    @property
+    def levels(self) -> NDArray[np.uint8]:
+        """A row of bytes for each clock of `clock`, with a bit for each of `names`, the first lowest."""
+        bits = [self.lines[name] >> np.uint64(axis) & np.uint64(1) for axis, name in self.names]
+        return np.packbits(np.stack(bits, axis=1).astype(np.uint8), axis=1, bitorder="little")
+
+    def until(self, n_clocks: int) -> AxesTrace:
+        """The first clocks of the trace."""
+        return AxesTrace(tuple(trace.until(n_clocks) for trace in self.each))
+
+
+Trace = PinTrace | AxesTrace
+
+
+def of_axis(spec: AxesSpec, run: Run, axis: int) -> Run:
+    """The rows of one axis, with the ports of a core of its own.
+
+    The rows of the strobe of updates are those among the ticks of this axis.
+    """
+    found = {}
+    ticks = run.tables[TICK]
+    own = ticks.clock[ticks["axis"] == axis]
+    for strobe, names in spec.axis.strobes.items():
+        table = run.tables[strobe]
+        if strobe == UPDATE:
+            chosen = np.isin(table.clock, own)
+        else:
+            chosen = table["axis" if strobe == TICK else f"{strobe.removesuffix('_valid')}_axis"] == axis
+        rows = table.rows(chosen)
+        found[strobe] = rows
+        if spec.parallel:
+            found[strobe] = rows.having(**{name: rows[f"{name}_{axis}"] for name in names})
+    return Run.of_ports(spec.axis, run.n_clocks, found)

@@ -1,0 +1,88 @@
+"""Registers behind block RAMs, in netlists as Yosys writes them."""
+
+from copy import deepcopy
+from typing import Any
+
+import pytest
+
+from tachometry.boards.fpga.boards import BOARDS
+from tachometry.boards.fpga.ecp5_memory import use_output_registers
+
+PLAIN = {"CEMUX": "1 ", "CLKMUX": "CLK", "GSR": "DISABLED", "LSRMUX": "LSR", "REGSET": "RESET"}
+
+
+def cell(kind: str, ways: dict[str, str], inputs: dict[str, Any], outputs: dict[str, Any]) -> dict[str, Any]:
+    directions = dict.fromkeys(inputs, "input") | dict.fromkeys(outputs, "output")
+    wires = {name: [bit] for name, bit in (inputs | outputs).items()}
+    return {"type": kind, "parameters": ways, "port_directions": directions, "connections": wires}
+
+
+def register(data: int, out: int, **other: str) -> dict[str, Any]:
+    return cell("TRELLIS_FF", dict(PLAIN), {"CLK": 2, "DI": data, "LSR": "0"} | other, {"Q": out})
+
+
+def netlist() -> dict[str, Any]:
+    """A block RAM of which three bits are read, their registers, and a gate behind these."""
+    ways = {"REGMODE_A": "NOREG", "REGMODE_B": "NOREG"}
+    memory = cell(
+        "DP16KD",
+        ways,
+        {"CLKA": "0", "CLKB": 2, "OCEA": "0", "OCEB": "1", "ADB0": 3},
+        {"DOA0": 10, "DOA1": 11, "DOB0": 12, "DOB1": 13},
+    )
+    cells = {"memory": memory} | {f"register{k}": register(10 + k, 20 + k) for k in range(3)}
+    cells["gate"] = cell("LUT4", {}, {"A": 20, "B": 21, "C": 22}, {"Z": 30})
+    ports = {"clk": {"direction": "input", "bits": [2]}, "out": {"direction": "output", "bits": [30]}}
+    return {"modules": {"top": {"ports": ports, "cells": cells}}}
+
+
+def test_registers_move_into_the_block_ram() -> None:
+    found = netlist()
+    assert use_output_registers(found) == 3
+    cells = found["modules"]["top"]["cells"]
+    assert [*cells] == ["memory", "gate"]
+    memory = cells["memory"]
+    assert memory["parameters"] == {"REGMODE_A": "OUTREG", "REGMODE_B": "OUTREG"}
+    assert {name: memory["connections"][name] for name in ("DOA0", "DOA1", "DOB0", "DOB1", "OCEA", "OCEB")} == {
+        **{"DOA0": [20], "DOA1": [21], "DOB0": [22], "DOB1": [13], "OCEA": ["1"], "OCEB": ["1"]}
+    }
+    assert cells["gate"] == netlist()["modules"]["top"]["cells"]["gate"]
+    # It has them now.
+    assert use_output_registers(found) == 0
+
+
+OTHERS = {
+    "enabled": lambda cells, ports: cells["register1"]["parameters"].update(CEMUX="CE"),
+    "reset": lambda cells, ports: cells["register1"]["connections"].update(LSR=[5]),
+    "set at first": lambda cells, ports: cells["register1"]["parameters"].update(REGSET="SET"),
+    "another clock": lambda cells, ports: cells["register1"]["connections"].update(CLK=[6]),
+    "the other edge": lambda cells, ports: cells["register1"]["parameters"].update(CLKMUX="INV"),
+    "read elsewhere": lambda cells, ports: cells["gate"]["connections"].update(D=[11]),
+    "a port": lambda cells, ports: ports["out"]["bits"].append(11),
+    "no register": lambda cells, ports: cells["register1"].update(type="LUT4"),
+    "an enable": lambda cells, ports: cells["register1"].update(
+        cell("TRELLIS_FF", dict(PLAIN), {"CLK": 2, "DI": 7, "CE": 11}, {"Q": 21})
+    ),
+    "it has registers": lambda cells, ports: cells["memory"]["parameters"].update(REGMODE_B="OUTREG"),
+    "two clocks": lambda cells, ports: cells["memory"]["connections"].update(CLKA=[6]),
+}
+
+
+def check_stays(name: str) -> None:
+    found = netlist()
+    top = found["modules"]["top"]
+    top["cells"]["gate"]["port_directions"]["D"] = "input"
+    OTHERS[name](top["cells"], top["ports"])
+    before = deepcopy(found)
+    assert use_output_registers(found) == 0
+    assert found == before
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_is_no_output_register_stays(name: str) -> None:
+    check_stays(name)
+
+
+def test_boards_of_ecp5_use_it() -> None:
+    using = {name for name, board in BOARDS.items() if board.flow and board.flow.netlist is use_output_registers}
+    assert using == {name for name in BOARDS if name.startswith("ulx3s")}

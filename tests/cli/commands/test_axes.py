@@ -1,0 +1,105 @@
+"""Cores of many axes on the command line."""
+
+import csv
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from support.command import run
+
+from tachometry.cli.commands import verify as command
+from tachometry.sim.studies.axes import AXES
+
+CORE = "--ppr 25 --clock 20kHz --tick 2ms --max-time 8ms --max-speed 100rad/s --engine pysim".split()
+MOTIONS = "ramp:0:60:100ms,constant:-40:100ms"
+
+
+def rows(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    return [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_simulate_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each axis has its own motion; a saved capture has the channels of all of them."""
+    files = {"--trace": "t.csv", "--counts": "c.csv", "--events": "e.csv", "--save-capture": "s.sr", "--vcd": "v.vcd"}
+    outputs = [word for option, name in files.items() for word in (option, tmp_path / name)]
+    axes = ["--axes", "3", "--index"]
+    assert run("simulate", *CORE, *axes, "--motion", MOTIONS, "--jitter", "0.1", *outputs) == 0
+    told = rows(capsys)
+    assert "axis 0 " in told[3]
+    found = [re.match(r"axis (\d) .*counts in (-?\d+), counts out (-?\d+), 0 errors flagged", line) for line in told]
+    counts = {match[1]: (match[2], match[3]) for match in found if match}
+    assert {axis: out for axis, (_, out) in counts.items()}.keys() == {"0", "1", "2"}
+    assert all(abs(int(wanted) - int(out)) <= 1 for wanted, out in counts.values())
+    assert int(counts["0"][1]) > 10 > -10 > int(counts["1"][1])
+    assert told[-1].startswith("PASS: hardware and golden model agree in every bit of ")
+    with (tmp_path / "t.csv").open() as file:
+        updates = list(csv.DictReader(file))
+    assert {row["axis"] for row in updates} == {"0", "1", "2"}
+    assert "turn" in (tmp_path / "v.vcd").read_text()
+    # Another order of the axes, other ports.
+    assert run("replay", tmp_path / "s.sr", *CORE, *axes, "--parallel") == 0
+    again = {line.split()[1]: line for line in rows(capsys) if line.startswith("axis")}
+    assert all(f"counts out {counts[axis][1]}," in again[axis] for axis in counts)
+    assert run("replay", tmp_path / "s.sr", *CORE, *axes, "--a", "A1,A0") == 2
+    assert "--a must be 3 channels with commas between, one for each axis, not 'A1,A0'" in capsys.readouterr().err
+    two = ["--axes", "2", "--a", "A1,A0", "--b", "B1,B0"]
+    assert run("replay", tmp_path / "s.sr", *CORE, *two) == 0
+    other = {line.split()[1]: line for line in rows(capsys) if line.startswith("axis")}
+    assert f"counts out {counts['1'][1]}," in other["0"]
+
+
+def test_edges_that_are_too_close_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    core = "--ppr 25 --clock 2kHz --tick 20ms --max-time 80ms --engine pysim --axes 3".split()
+    assert run("simulate", *core, "--motion", "constant:60:100ms,stop:100ms") == 0
+    assert "WARNING: axis 0: " in (told := capsys.readouterr().out)
+    assert "came within 4 clocks of another, in which an axis is looked at once" in told.replace("\n", " ")
+    assert "WARNING: axis 1" not in told
+
+
+@pytest.mark.parametrize("parallel", [[], ["--parallel"]])
+def test_generate(parallel: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The smoke test beside the Verilog finds each axis where it turned to."""
+    core = "--ppr 25 --clock 1MHz --tick 100us --max-time 400us --index".split()
+    assert run("generate", *core, "--axes", "3", *parallel, "--name", "axes", "-o", tmp_path) == 0
+    told = rows(capsys)
+    assert any(line.startswith("axes 3, each looked at every 4 clocks and computed in ") for line in told)
+    assert json.loads((tmp_path / "axes.json").read_text())["parameters"]["axes"] == 3
+    assert "*sync_z/stage0_reg*/D" in (tmp_path / "axes.xdc").read_text()
+    subprocess.run(["iverilog", "-g2012", "-Wall", "-o", "bench", "axes.v", "axes_tb.sv"], cwd=tmp_path, check=True)
+    done = subprocess.run(["./bench"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("PASS: position 24 of axis 0")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("--parallel", "--parallel must be given together with --axes"),
+        ("--axes 65", "--axes must be from 1 to 64, not 65"),
+        ("--axes 4 --method m", "--method must be s together with --axes, not m"),
+        ("--axes 4 --filter 3", "--filter must not be given together with axes: "),
+        ("--axes 4 --unit rpm", "--unit must not be given together with axes: "),
+        ("--axes 8 --tick 1us --max-time 1ms", "--tick, in clocks, must be at least "),
+        ("--axes 4 --bus spi", "--bus must not be given together with axes: "),
+        ("--axes 4 --for rio", "--for must not be given together with axes: "),
+        ("--axes 4 --testbench cocotb", "--testbench must not be given together with --axes: "),
+    ],
+)
+def test_what_is_refused(words: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("generate", "--ppr", "500", "-o", tmp_path / "out", *words.split()) == 2
+    assert capsys.readouterr().err.startswith(f"tachometry: error: {told}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_figure_of_many(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--axes", "2", "--motion", "stop:10ms", "--plot", tmp_path / "p.png"]
+    assert run("simulate", *CORE, *words) == 2
+    assert "--plot must not be given together with --axes" in capsys.readouterr().err
+
+
+def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command, "configurations", lambda method: [])
+    monkeypatch.setattr(command, "AXES", AXES[2:3])
+    assert run("verify", "--methods", "s", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out") == 0
+    assert rows(capsys)[1].split()[:3] == ["s", "pysim", "1"]

@@ -1,0 +1,36 @@
+"""Small cores of many axes, with motions that are short enough for Amaranth's simulator."""
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.axes import AxesTrace
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import AxesSpec, Encoder, Speed, STachometer, Timing
+
+CLOCK_HZ = 1_000_000
+TICK_CYCLES = 40
+MAX_TICKS = 4
+
+
+def small(axes: int = 3, *, parallel: bool = False, most: int | None = 2, **options: Any) -> AxesSpec:
+    """A tick of 40 clocks, in which `most` counts are the most that are measured."""
+    timing = Timing(CLOCK_HZ, TICK_CYCLES, MAX_TICKS)
+    speed = None if most is None else Speed(Fraction(most * CLOCK_HZ, 100 * TICK_CYCLES), "rev/s")
+    alone = STachometer(encoder=Encoder(25), timing=timing, frac_bits=8, max_speed=speed, **options)
+    return AxesSpec(tachometer=alone, axes=axes, parallel=parallel)
+
+
+def motions(spec: AxesSpec, n_clocks: int = 2000) -> AxesTrace:
+    """Of each axis another one: counts, reversals, both lines at once, standstill; index lines are high at first."""
+    each = [stress(spec.tachometer, seed=7 + axis, n_edges=5 + 3 * axis) for axis in range(spec.axes)]
+    high = [replace(trace, z=None if trace.z is None else 1 - trace.z) for trace in each]
+    return AxesTrace.of(high).until(n_clocks)
+
+
+def check(spec: AxesSpec, trace: AxesTrace | None = None) -> None:
+    """Hold the core against its golden model."""
+    found = lockstep(spec, motions(spec) if trace is None else trace, PySim())
+    assert found.n_mismatches == 0, found.first
