@@ -1,18 +1,26 @@
 """A velocity loop about a core: what Tsuji 2009, Sec. VII, does with a motor, and what is measured of it."""
 
+import functools
 import math
-from dataclasses import dataclass, replace
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.engines.loop import Course, Edges, Gains, LoopSimulation, Motor
+from tachometry.sim.engines.loop import Course, Edges, Gains, Log, LoopSimulation, Motor
+from tachometry.spec import TachometerSpec
+from tachometry.spec.option import ParameterError
 
+LOG_SECONDS = 1e-4
 _PERIOD = 1e-3  # s, of the tables of a course
 _PASSAGES = 1 << 16
 _SOUND_HZ = 50.0
+_AT_LIMIT = 0.999
 
 
 class Command(Protocol):
@@ -24,6 +32,26 @@ class Command(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Load:
+    """A torque for some time.
+
+    Parameters
+    ----------
+    torque : float, Nm
+        Against the shaft.
+    begin, seconds : float, s
+    """
+
+    torque: float
+    begin: float
+    seconds: float
+
+    def __post_init__(self) -> None:
+        if not (self.begin >= 0 and self.seconds > 0 and math.isfinite(self.torque)):
+            raise ParameterError("load", "must begin at 0 s or later and last longer than 0 s")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Task:
     """What the shaft is to do, and what disturbs it.
 
@@ -31,40 +59,45 @@ class Task:
     ----------
     motion : Command
         The commanded speed, and by its integral the commanded angle.
-    load : float, Nm
-        Against the motion, for `load_seconds` from `load_from` on.
-    load_from, load_seconds : float, s
+    load : Load or None
+    virtual : bool
+        The load is a current that is added behind the controller, as in the paper's experiment, and no torque.
     noise : float, Nm rms
         Of the torque: Gaussian, a new value every millisecond.
     """
 
     motion: Command
-    load: float = 0.0
-    load_from: float = 0.0
-    load_seconds: float = 0.0
+    load: Load | None = None
+    virtual: bool = False
     noise: float = 0.0
 
-    def course(self, seed: int) -> Course:
+    def course(self, motor: Motor, seed: int) -> Course:
         """The tables of a run."""
-        time = np.arange(math.ceil(self.motion.duration / _PERIOD - 1e-9) + 1) * _PERIOD
+        time = np.arange(max(math.ceil(self.motion.duration / _PERIOD - 1e-9), 1) + 1) * _PERIOD
         time = np.minimum(time, self.motion.duration)
         load = self.noise * np.random.default_rng([seed, 1]).standard_normal(len(time))
-        load += self.load * ((time >= self.load_from) & (time < self.load_from + self.load_seconds))
+        current = np.zeros(len(time))
+        if self.load is not None:
+            torque = self.load.torque * ((time >= self.load.begin) & (time < self.load.begin + self.load.seconds))
+            if self.virtual:
+                current -= torque / motor.torque_constant
+            else:
+                load += torque
         speed = self.motion.speed(time)
         # The integral of what is drawn between two values, so that speed and angle agree.
         angle = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * _PERIOD))
-        return Course(seconds=_PERIOD, speed=speed, angle=angle, load=load)
+        return Course(seconds=_PERIOD, speed=speed, angle=angle, load=load, current=current)
 
 
 def edges_of(encoder: VirtualEncoder) -> Edges:
     """The disc of a virtual encoder, and its jitter as a displacement of each passage."""
     jitter = encoder.jitter * np.random.default_rng([encoder.seed, 2]).standard_normal(_PASSAGES)
-    return Edges(np.asarray(encoder.disc.offset), np.clip(jitter, -0.4, 0.4))
+    return Edges(np.asarray(encoder.disc.offset), jitter)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Figures of a run, from a time on.
+    """Figures of a run: all but the dip from a time on until a load comes.
 
     Parameters
     ----------
@@ -72,17 +105,77 @@ class Outcome:
         Of the shaft's true speed less the commanded one.
     sound : float, A rms
         Of the commanded current, above 50 Hz: what is heard.
-    shown : float, rad/s
-        Largest deviation of the speed as the paper shows it, see `as_shown`.
+    limited : float
+        Share of the time in which the commanded current is at its limit.
+    dip : float or None, rad/s
+        The largest deviation of the true speed while a load is there and for as long behind it, less the mean for as
+        long before it; None without a load.
     """
 
     rms: float
     largest: float
     sound: float
-    shown: float
+    limited: float
+    dip: float | None
 
 
-def as_shown(log: dict[str, FloatArray], rad_per_count: float, rate: float = 30.0, period: float = 1e-3) -> FloatArray:
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """A loop: a core, what is about it, and what it is to do.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    gains : Gains
+    task : Task
+    motor : Motor
+    encoder : VirtualEncoder
+    begin : float, s
+        From when on it is judged.
+    """
+
+    spec: TachometerSpec
+    gains: Gains
+    task: Task
+    motor: Motor = field(default_factory=Motor)
+    encoder: VirtualEncoder
+    begin: float = 0.0
+
+    def run(self, simulation: LoopSimulation, seed: int, log: float = LOG_SECONDS) -> Log:
+        """The log of a run with a seed, which every random number depends on."""
+        edges = edges_of(replace(self.encoder, seed=seed))
+        return simulation.run(self.motor, edges, self.gains, self.task.course(self.motor, seed), log=log)
+
+    def outcome(self, log: Log) -> Outcome:
+        """What came of a run."""
+        until = self.task.motion.duration if self.task.load is None else self.task.load.begin
+        late = (log["time"] >= self.begin) & (log["time"] < until)
+        error = (log["speed"] - log["command"])[late]
+        current = log["current"][late]
+        return Outcome(
+            rms=float(np.sqrt(np.mean(error**2))),
+            largest=float(np.abs(error).max()),
+            sound=sound(current, float(log["time"][1] - log["time"][0])),
+            limited=float(np.mean(np.abs(current) >= _AT_LIMIT * self.gains.current_limit)),
+            dip=None if self.task.load is None else _dip(log, self.task.load),
+        )
+
+
+def sound(current: FloatArray, seconds: float) -> float:
+    """The RMS of a current, sampled every so many seconds, above 50 Hz."""
+    spectrum = np.abs(np.fft.rfft(current - current.mean()))
+    loud = np.fft.rfftfreq(len(current), seconds) > _SOUND_HZ
+    return float(np.sqrt(2 * np.sum(spectrum[loud] ** 2)) / len(current))
+
+
+def _dip(log: Log, load: Load) -> float:
+    time, error = log["time"], log["speed"] - log["command"]
+    before = error[(time >= load.begin - load.seconds) & (time < load.begin)]
+    during = error[(time >= load.begin) & (time < load.begin + 2 * load.seconds)]
+    return float(np.abs(during - (before.mean() if len(before) else 0.0)).max())
+
+
+def as_shown(log: Log, rad_per_count: float, rate: float = 30.0, period: float = 1e-3) -> FloatArray:
     """The speed by the M method every `period` through a low-pass filter of `rate` rad/s, as in Figs. 13 and 14."""
     every = round(period / (log["time"][1] - log["time"][0]))
     measured = np.diff(log["position"][::every], prepend=0.0) * rad_per_count / period
@@ -93,39 +186,37 @@ def as_shown(log: dict[str, FloatArray], rad_per_count: float, rate: float = 30.
     return np.array(found)
 
 
-def outcome(log: dict[str, FloatArray], rad_per_count: float, begin: float = 0.0) -> Outcome:
-    """What came of a run, from `begin` (s) on."""
-    late = log["time"] >= begin
-    error = (log["speed"] - log["command"])[late]
-    current, spacing = log["current"][late], float(log["time"][1] - log["time"][0])
-    spectrum = np.abs(np.fft.rfft(current - current.mean()))
-    loud = np.fft.rfftfreq(len(current), spacing) > _SOUND_HZ
-    shown = as_shown(log, rad_per_count)
-    every = len(log["time"]) / len(shown)
-    wanted = log["command"][np.minimum((np.arange(len(shown)) * every).astype(int), len(log["command"]) - 1)]
-    seen = np.arange(len(shown)) * every * spacing >= begin
+def mean(outcomes: Sequence[Outcome]) -> Outcome:
+    """The mean of outcomes, but the largest deviation of all."""
+    dips = [one.dip for one in outcomes if one.dip is not None]
     return Outcome(
-        rms=float(np.sqrt(np.mean(error**2))),
-        largest=float(np.abs(error).max()),
-        sound=float(np.sqrt(2 * np.sum(spectrum[loud] ** 2)) / len(current)),
-        shown=float(np.abs(shown - wanted)[seen].max()),
+        rms=float(np.mean([one.rms for one in outcomes])),
+        largest=max(one.largest for one in outcomes),
+        sound=float(np.mean([one.sound for one in outcomes])),
+        limited=float(np.mean([one.limited for one in outcomes])),
+        dip=float(np.mean(dips)) if dips else None,
     )
 
 
-def dip(log: dict[str, FloatArray], begin: float, seconds: float) -> float:
-    """The largest deviation of the true speed within a time after a load has come, less the mean before it: rad/s."""
-    time, error = log["time"], log["speed"] - log["command"]
-    before = error[(time >= begin - seconds) & (time < begin)].mean()
-    return float(np.abs(error[(time >= begin) & (time < begin + seconds)] - before).max())
+@functools.lru_cache(maxsize=32)
+def simulation_of(spec: TachometerSpec) -> LoopSimulation:
+    """The compiled simulation of a core."""
+    return LoopSimulation(spec)
 
 
-def seeded(encoder: VirtualEncoder, seed: int) -> VirtualEncoder:
-    """The same encoder with other random numbers."""
-    return replace(encoder, seed=seed)
+def each_seed(setting: Setting, seeds: Sequence[int], jobs: int | None = None) -> Iterator[Log]:
+    """Logs of a setting in the order of the seeds, run in so many threads, by default one for each core."""
+    simulation = simulation_of(setting.spec)
+    with ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
+        try:
+            yield from pool.map(lambda seed: setting.run(simulation, seed), seeds)
+        except BaseException:
+            simulation.stop()  # the runs in all threads, for which this one then waits
+            pool.shutdown(cancel_futures=True)
+            simulation.stop(False)
+            raise
 
 
-def run(
-    simulation: LoopSimulation, motor: Motor, encoder: VirtualEncoder, gains: Gains, task: Task, log: float, seed: int
-) -> dict[str, FloatArray]:
-    """A run with a seed."""
-    return simulation.run(motor, edges_of(seeded(encoder, seed)), gains, task.course(seed), log=log)
+def outcome_of(setting: Setting, seeds: Sequence[int], jobs: int | None = None) -> Outcome:
+    """The mean outcome of a setting."""
+    return mean([setting.outcome(log) for log in each_seed(setting, seeds, jobs)])

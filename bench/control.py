@@ -1,0 +1,91 @@
+"""The tables and the figure of docs/control.md: what a velocity loop about a core can do, mean of seeds."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from pages import markdown
+
+from tachometry.sim.engines.loop import Observer
+from tachometry.sim.plots.usable_gain import Found, save_usable_gains
+from tachometry.sim.studies.control import Outcome, outcome_of
+from tachometry.sim.studies.usable_gain import IDEAL, KINDS, REAL, TICKS, setting, usable, variants
+
+DISCS = {"ideal disc": IDEAL, "real disc": REAL}
+SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}
+
+
+def cells(outcome: Outcome) -> tuple[str, ...]:
+    """What tables say of an outcome."""
+    assert outcome.dip is not None
+    return tuple(f"{value:.3g}" for value in (outcome.rms, outcome.largest, outcome.dip, outcome.sound))
+
+
+HEADS = ("RMS error", "greatest", "dip", "current above 50 Hz")
+
+
+def usable_gains(seeds: Sequence[int], jobs: int) -> tuple[str, list[Found]]:
+    """A row per disc, method and tick: the usable gain, and what comes of it; and the same for the figure."""
+    rows, found = [], []
+    for disc, encoder in DISCS.items():
+        for kind in KINDS:
+            for seconds in TICKS:
+                if kind.method == "track" and seconds < kind.shortest:
+                    continue  # the core has a new velocity every 20 µs
+                best = usable(lambda kv: setting(kind, kv, seconds, encoder), seeds, jobs)  # noqa: B023
+                print(disc, kind.name, seconds, best, file=sys.stderr, flush=True)
+                name = (disc, kind.name, SHOWN_TICKS[seconds])
+                rows.append((*name, f"{best[0]:g}", *cells(best[1])) if best else (*name, *"-----"))
+                if best is not None:
+                    found.append(Found(disc, kind.name, seconds, *best))
+    return markdown(("disc", "method", "T_s", "usable k_v", *HEADS), rows, left=(0, 1, 2)), found
+
+
+def weights(seeds: Sequence[int], jobs: int) -> str:
+    """Ticks of 20 µs: the observer with every tick, and with every update, for S and M/T."""
+    rows = []
+    for disc, encoder in DISCS.items():
+        for kv in (40.0, 80.0, 160.0):
+            for kind in KINDS:
+                found = outcome_of(setting(kind, kv, 20e-6, encoder), seeds, jobs)
+                rows.append((disc, f"{kv:g}", kind.name, *cells(found)))
+    return markdown(("disc", "k_v", "method", *HEADS), rows, left=(0, 2))
+
+
+def assumptions(seeds: Sequence[int], jobs: int) -> str:
+    """What is changed against the real disc, ticks of 20 µs and 1 ms, k_v = 80 and 40."""
+    rows = []
+    for kv, seconds in ((40.0, 1e-3), (80.0, 20e-6)):
+        base = setting(KINDS[0], kv, seconds, REAL)
+        for name, varied in variants(base):
+            rows.append((SHOWN_TICKS[seconds], f"{kv:g}", name, *cells(outcome_of(varied, seeds, jobs))))
+        conventional = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
+        found = outcome_of(conventional, seeds, jobs)
+        rows.append((SHOWN_TICKS[seconds], f"{kv:g}", "the conventional observer", *cells(found)))
+    return markdown(("T_s", "k_v", "what is changed", *HEADS), rows, left=(0, 2))
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=6, metavar="N", help="seeds of what is random (%(default)s)")
+    parser.add_argument("--jobs", type=int, metavar="N", help="threads (one for each core)")
+    parser.add_argument("--only", choices=("gains", "weights", "assumptions"), help="one of the tables")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="figure of the usable gains")
+    given = parser.parse_args()
+    seeds = range(given.seeds)
+    if given.only in (None, "weights"):
+        sys.stdout.write(f"{weights(seeds, given.jobs)}\n")
+    if given.only in (None, "assumptions"):
+        sys.stdout.write(f"{assumptions(seeds, given.jobs)}\n")
+    if given.only in (None, "gains"):
+        table, found = usable_gains(seeds, given.jobs)
+        sys.stdout.write(f"{table}\n")
+        if given.plot is not None:
+            save_usable_gains(given.plot, found)
+
+
+if __name__ == "__main__":
+    main()
