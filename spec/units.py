@@ -60,6 +60,7 @@ ANGLE = {**_decimal(rad=0, mrad=-3), "deg": Unit(pi=Fraction(1, 180))}
 DEGREES = {"deg": Unit()}
 BANDWIDTH = {"rad/s": Unit(), **{name: Unit(unit.size, Fraction(2)) for name, unit in FREQUENCY.items()}}
 FRACTION = {"": Unit(), "%": Unit(Fraction(1, 100))}
+TORQUE = _decimal(Nm=0, mNm=-3)
 
 
 def read_quantity(what: str, text: str, units: Units, default: str = "") -> tuple[Fraction, str]:

@@ -103,22 +103,34 @@ class Gains:
     current_limit: float = 8.0
 
     def __post_init__(self) -> None:
-        _more_than_0(self, "observer", "filter", "seconds", "inertia", "torque_constant", "current_limit")
+        _more_than_0(self, "observer", "seconds", "inertia", "torque_constant", "current_limit")
+        if not self.filter > 0:
+            raise ParameterError("filter_rate", f"must be more than 0, not {self.filter:g}")
         _at_least_0(self, "position", "velocity", "delay")
         if self.delay > self.seconds:
             raise ParameterError("delay", f"must be at most a control tick, {self.seconds:g} s, not {self.delay:g}")
 
 
+# What the parameters are called where they are given.
+_CALLED = {
+    "position": "kp",
+    "velocity": "kv",
+    "observer": "observer_rate",
+    "coulomb": "friction",
+    "driver_seconds": "driver_time",
+}
+
+
 def _more_than_0(what: object, *names: str) -> None:
     for name in names:
-        if not getattr(what, name) > 0:
-            raise ParameterError(name, f"must be more than 0, not {getattr(what, name):g}")
+        if not 0 < getattr(what, name) < math.inf:
+            raise ParameterError(_CALLED.get(name, name), f"must be more than 0, not {getattr(what, name):g}")
 
 
 def _at_least_0(what: object, *names: str) -> None:
     for name in names:
         if not 0 <= getattr(what, name) < math.inf:
-            raise ParameterError(name, f"must be at least 0, not {getattr(what, name):g}")
+            raise ParameterError(_CALLED.get(name, name), f"must be at least 0, not {getattr(what, name):g}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,79 +1,78 @@
 """Figs. 13, 14 and 15 of Tsuji 2009: velocity loops with a disturbance observer about the core."""
 
 import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tachometry.sim.encoder.motion import FloatArray, cos2pi, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.engines.loop import Gains, LoopSimulation, Motor
+from tachometry.sim.engines.loop import Gains, Log, Motor, Observer
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
-from tachometry.sim.studies.control import Task, as_shown, dip, outcome, run
+from tachometry.sim.studies.control import Load, Setting, Task, as_shown, each_seed, mean
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing
 
 _LINES = 500
-_LIMIT = 8.0  # A
-_MOTOR = Motor(coulomb=0.005, current_limit=_LIMIT)
+_MOTOR = Motor(coulomb=0.005)
 _ENCODER = VirtualEncoder(_LINES, jitter=0.1, nonuniformity=0.2, phase_error_deg=20)
 _NOISE = 0.005  # Nm
 _ASSUMED = (
     "500 PPR with 20 °e phase error, disc errors of 0.2 and jitter of 0.1 quarter periods; J = 0.003 kg m², "
     "60.3 mNm/A, 0.1 ms, at most 8 A, friction 5 mNm, torque noise 5 mNm"
 )
-_SEEDS = range(6)
-_TIME, _SPEED, _CURRENT = "time (s)", "velocity (rad/s)", "current (A)"
-_LOG = 1e-4  # s
+_TIME, _SPEED = "time (s)", "velocity (rad/s)"
+_COUNT = 2 * math.pi / _LINES  # rad, of the figures with single decoding
+_KVS = (10.0, 25.0, 50.0, 75.0, 100.0, 150.0)  # 1/s
+_FEW_KVS = (10.0, 25.0, 50.0)
 
 
-def _core(method: type[TachometerSpec], *, decoding: int, tick: str, **options: object) -> TachometerSpec:
+def _core(method: type[TachometerSpec], *, decoding: int, tick: str, **options: Any) -> TachometerSpec:
     timing = Timing.parse("48MHz", tick, "10ms")
-    return method(encoder=Encoder(_LINES, decoding), timing=timing, **options)  # type: ignore[arg-type]
+    return method(encoder=Encoder(_LINES, decoding), timing=timing, **options)
 
 
-def _gains(kp: float, kv: float, rate: float, seconds: float, synchronised: bool) -> Gains:
-    return Gains(
+def _setting(
+    spec: TachometerSpec, task: Task, begin: float, *, kp: float, kv: float, rate: float, synchronised: bool
+) -> Setting:
+    gains = Gains(
         position=kp,
         velocity=kv,
         observer=rate,
         filter=rate,
-        seconds=seconds,
-        synchronised=synchronised,
-        current_limit=_LIMIT,
+        seconds=float(spec.timing.tick_seconds),
+        way=Observer.SYNCHRONISED if synchronised else Observer.CONVENTIONAL,
     )
+    return Setting(spec=spec, gains=gains, task=task, motor=_MOTOR, encoder=_ENCODER, begin=begin)
 
 
-def _shown(label: str, log: dict[str, FloatArray], rad_per_count: float, rate: float) -> Curve:
-    shown = as_shown(log, rad_per_count, rate)
-    return Curve(label, np.arange(len(shown)) * 1e-3, shown)
+def _shown(log: Log) -> Curve:
+    shown = as_shown(log, _COUNT)
+    return Curve("speed by M, 30 rad/s", np.arange(len(shown)) * 1e-3, shown)
 
 
 def fig13(lab: Lab) -> Result:
     """Fig. 13: PD control with a disturbance observer, by the M method and by the S method."""
-    task = Task(
-        motion=parse_motion("ramp:0:40rad/s:5s+constant:40rad/s:5s"),
-        load=0.2,
-        load_from=7.0,
-        load_seconds=0.5,
-        noise=_NOISE,
-    )
+    load = Load(torque=0.2, begin=7.0, seconds=0.5)
+    motion = parse_motion("ramp:0:40rad/s:5s+constant:40rad/s:5s")
+    task = Task(motion=motion, load=load, virtual=True, noise=_NOISE)
     cases: list[tuple[str, type[TachometerSpec], float, float]] = [
-        ("M, G = 20 rad/s, k_v = 20", MTachometer, 20.0, 20.0),
-        ("M, G = 50 rad/s, k_v = 20", MTachometer, 50.0, 20.0),
-        ("S, G = 50 rad/s, k_v = 20", STachometer, 50.0, 20.0),
-        ("S, G = 50 rad/s, k_v = 30", STachometer, 50.0, 30.0),
+        ("M, G = 20 rad/s, $k_v$ = 20", MTachometer, 20.0, 20.0),
+        ("M, G = 50 rad/s, $k_v$ = 20", MTachometer, 50.0, 20.0),
+        ("S, G = 50 rad/s, $k_v$ = 20", STachometer, 50.0, 20.0),
+        ("S, G = 50 rad/s, $k_v$ = 30", STachometer, 50.0, 30.0),
     ]
-    methods: tuple[type[TachometerSpec], ...] = (MTachometer, STachometer)
-    simulations = {method: LoopSimulation(_core(method, decoding=1, tick="1ms")) for method in methods}
     panels, sounds, dips = [], [], []
     for title, method, rate, kv in cases:
-        gains = _gains(20.0, kv, rate, 1e-3, method is STachometer)
-        logs = [run(simulations[method], _MOTOR, _ENCODER, gains, task, _LOG, seed) for seed in _SEEDS]
-        sounds.append(float(np.mean([outcome(log, 1.0, 5.5).sound for log in logs])))
-        dips.append(float(np.mean([dip(log, 7.0, 0.5) for log in logs])))
-        curve = _shown("speed by M, 30 rad/s", logs[0], 2 * math.pi / _LINES, 30.0)
+        spec, synchronised = _core(method, decoding=1, tick="1ms"), method is STachometer
+        setting = _setting(spec, task, 5.5, kp=20.0, kv=kv, rate=rate, synchronised=synchronised)
+        logs = list(each_seed(setting, lab.seeds))
+        found = mean([setting.outcome(log) for log in logs])
+        sounds.append(found.sound)
+        dips.append(found.dip or 0.0)
         wanted = Curve("command", logs[0]["time"], logs[0]["command"], "reference")
-        panels.append(Panel(title, _TIME, _SPEED, (curve, wanted), y_limits=(0.0, 45.0)))
+        panels.append(Panel(title, _TIME, _SPEED, (_shown(logs[0]), wanted), y_limits=(0.0, 45.0)))
     return Result(
         "Tsuji 2009, Fig. 13",
         "PD control with disturbance observer",
@@ -109,25 +108,15 @@ def fig14(lab: Lab) -> Result:
         ("(c) and synchronising the disturbance observer", True, True),
     ]
     panels, means = [], []
-    held: tuple[FloatArray, FloatArray] = (np.empty(0), np.empty(0))
+    limits: dict[str, Any] = {"levels": tuple(_COUNT / 1e-3 * k for k in range(1, 4)), "y_limits": (0.0, 48.0)}
     for title, cancel, synchronised in cases:
-        simulation = LoopSimulation(_core(STachometer, decoding=1, tick="1ms", cancel=cancel))
-        gains = _gains(100.0, 30.0, 40.0, 1e-3, synchronised)
-        logs = [run(simulation, _MOTOR, _ENCODER, gains, task, _LOG, seed) for seed in _SEEDS]
-        means.append(float(np.mean([outcome(log, 2 * math.pi / _LINES, 8.0).shown for log in logs])))
-        curve = _shown("speed by M, 30 rad/s", logs[0], 2 * math.pi / _LINES, 30.0)
-        panels.append(Panel(title, _TIME, _SPEED, (curve,), levels=_levels(), y_limits=(0.0, 48.0)))
-        held = logs[0]["time"], logs[0]["held"]
-    panels.append(
-        Panel(
-            "(d) as (c), without a filter",
-            _TIME,
-            _SPEED,
-            (Curve("velocity of the core", *held, "held"),),
-            levels=_levels(),
-            y_limits=(0.0, 48.0),
-        )
-    )
+        spec = _core(STachometer, decoding=1, tick="1ms", cancel=cancel)
+        setting = _setting(spec, task, 8.0, kp=100.0, kv=30.0, rate=40.0, synchronised=synchronised)
+        logs = list(each_seed(setting, lab.seeds))
+        means.append(float(np.mean([_deviation(log, 8.0) for log in logs])))
+        panels.append(Panel(title, _TIME, _SPEED, (_shown(logs[0]),), **limits))
+        held = Curve("velocity of the core", logs[0]["time"], logs[0]["held"], "held")
+    panels.append(Panel("(d) as (c), without a filter", _TIME, _SPEED, (held,), **limits))
     return Result(
         "Tsuji 2009, Fig. 14",
         "validity of technical solutions",
@@ -137,7 +126,7 @@ def fig14(lab: Lab) -> Result:
             Claim(
                 "the velocity deviates most without any technical solution, less with alternate alterations "
                 "cancelled, and least with the observer synchronised: 4.82, 2.36 and 0.52 rad/s",
-                f"largest deviations from 8 s on, mean of {len(_SEEDS)} discs: "
+                f"largest deviations from 8 s on, mean of {len(lab.seeds)} discs: "
                 f"{means[0]:.2f}, {means[1]:.2f} and {means[2]:.2f} rad/s",
                 means[0] > means[1] > means[2],
             ),
@@ -145,15 +134,18 @@ def fig14(lab: Lab) -> Result:
     )
 
 
-def _levels() -> tuple[float, ...]:
-    unit = 2 * math.pi / _LINES / 1e-3
-    return tuple(unit * k for k in range(1, 4))
+def _deviation(log: Log, begin: float) -> float:
+    """The largest deviation of the speed as it is shown from the command, from a time on."""
+    shown = _shown(log)
+    wanted = np.interp(shown.x, log["time"], log["command"])
+    return float(np.abs(shown.y - wanted)[shown.x >= begin].max())
 
 
+@dataclass(frozen=True)
 class _Cosine:
-    """ω = 200/π·(1 − cos(πt/10)) for ten seconds."""
+    """ω = 200/π·(1 − cos(πt/10)), for ten seconds in the paper."""
 
-    duration = 10.0
+    duration: float
 
     def speed(self, t: FloatArray) -> FloatArray:
         """In rad/s."""
@@ -162,29 +154,25 @@ class _Cosine:
 
 def fig15(lab: Lab) -> Result:
     """Fig. 15: the RMS of the tracking error over the gain."""
-    task = Task(motion=_Cosine(), noise=_NOISE)
-    kvs = np.array([25.0, 50.0, 100.0, 150.0, 200.0, 300.0])
-    kinds = [
-        ("M/T, timer of $T_s$", _core(MTTachometer, decoding=4, tick="20us", timer="tick"), False),
-        ("M/T, timer of a clock", _core(MTTachometer, decoding=4, tick="20us"), False),
-        ("S", _core(STachometer, decoding=4, tick="20us"), False),
-        ("M/T, timer of $T_s$, synchronised", _core(MTTachometer, decoding=4, tick="20us", timer="tick"), True),
-        ("S, synchronised", _core(STachometer, decoding=4, tick="20us"), True),
-    ]
+    task = Task(motion=_Cosine(10.0 if lab.whole else 4.0), noise=_NOISE)
+    kvs = np.array(_KVS if lab.whole else _FEW_KVS)
+    mt = _core(MTTachometer, decoding=4, tick="20us", timer="tick", paper_exact=True, min_time=48_000)
+    s = _core(STachometer, decoding=4, tick="20us")
+    kinds = {"M/T": (mt, False), "S": (s, False), "M/T, synchronised": (mt, True), "S, synchronised": (s, True)}
     found: dict[str, FloatArray] = {}
-    for label, spec, synchronised in kinds:
-        simulation = LoopSimulation(spec)
+    for label, (spec, synchronised) in kinds.items():
         rms = []
         for kv in kvs.tolist():
-            gains = _gains((kv / 2) ** 2, kv, 2 * kv, 20e-6, synchronised)
-            logs = (run(simulation, _MOTOR, _ENCODER, gains, task, 20e-6, seed) for seed in _SEEDS)
-            rms.append(float(np.mean([outcome(log, 1.0).rms for log in logs])))
+            setting = _setting(spec, task, 0.0, kp=(kv / 2) ** 2, kv=kv, rate=2 * kv, synchronised=synchronised)
+            rms.append(mean([setting.outcome(log) for log in each_seed(setting, lab.seeds)]).rms)
         found[label] = np.array(rms)
-    mt, s, both = found["M/T, timer of $T_s$"], found["S"], found["S, synchronised"]
+    mt_rms, s_rms = found["M/T"], found["S, synchronised"]
+    low, high = 0, int(np.argmin(np.abs(kvs - 50)))
     return Result(
         "Tsuji 2009, Fig. 15",
-        "RMS of the velocity tracking error",
-        f"$T_s$ = 20 µs, x4, $k_p$ = ($k_v$/2)², G = 2$k_v$, 200/π·(1 − cos(πt/10)) rad/s for 10 s; {_ASSUMED}",
+        "comparison of RMS of velocity tracking error",
+        f"$T_s$ = 20 µs, x4, M/T with $T_c$ = 1 ms, $k_p$ = ($k_v$/2)², G = 2$k_v$, 200/π·(1 − cos(πt/10)) rad/s for "
+        f"10 s; {_ASSUMED}",
         (
             Panel(
                 "",
@@ -196,16 +184,20 @@ def fig15(lab: Lab) -> Result:
         ),
         (
             Claim(
-                "S and M/T have almost the same performance with a low gain",
-                f"at k_v = {kvs[0]:g}: {mt[0]:.3f} rad/s with M/T, {s[0]:.3f} with S, {both[0]:.3f} with S "
-                "synchronised",
-                bool(max(mt[0], s[0], both[0]) < 1.5 * min(mt[0], s[0], both[0])),
+                "S and M/T have almost the same control performance with a low feedback gain",
+                f"with k_v = {kvs[low]:g}: {s_rms[low]:.3f} rad/s with S, {mt_rms[low]:.3f} with M/T",
+                bool(max(s_rms[low], mt_rms[low]) < 1.2 * min(s_rms[low], mt_rms[low])),
             ),
             Claim(
-                "the minimum RMS of S is smaller than that of M/T",
-                f"{both.min():.3f} rad/s with S synchronised, {s.min():.3f} with S and an observer at every tick, "
-                f"{mt.min():.3f} with M/T",
-                bool(both.min() < mt.min()),
+                "the performance of M/T degrades with a higher feedback gain",
+                f"with k_v = {kvs[high]:g}: {s_rms[high]:.3f} rad/s with S, {mt_rms[high]:.3f} with M/T",
+                bool(mt_rms[high] > 2 * s_rms[high] and mt_rms[high] > mt_rms[low]),
+            ),
+            Claim(
+                "the minimum RMS of S is smaller",
+                f"{s_rms.min():.3f} rad/s with S, {mt_rms.min():.3f} with M/T; {found['M/T, synchronised'].min():.3f} "
+                f"with M/T and an observer that is synchronised, {found['S'].min():.3f} with S and one that is not",
+                bool(s_rms.min() < mt_rms.min()),
             ),
         ),
     )

@@ -61,7 +61,9 @@ def _draw(found: Sequence[Found]) -> Figure:
             axes = figure.add_axes(place, sharey=first)
             first = first or axes
             for number, name in enumerate(names):
-                shown = sorted((one.seconds, _values(one)[row]) for one in found if (one.disc, one.name) == (disc, name))
+                shown = sorted(
+                    (one.seconds, _values(one)[row]) for one in found if (one.disc, one.name) == (disc, name)
+                )
                 x, y = [one[0] for one in shown], [one[1] for one in shown]
                 axes.plot(x, y, color=COLOURS[number], marker=_MARKS[number], markersize=4, linewidth=1, label=name)
             axes.set_xscale("log")
