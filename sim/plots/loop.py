@@ -7,11 +7,21 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tachometry.sim.engines.loop import Log
-from tachometry.sim.plots.style import COLOURS, ERROR, ESTIMATE, columns, in_words, place_panels, save_figure
+from tachometry.sim.plots.style import (
+    COLOURS,
+    ERROR,
+    ESTIMATE,
+    FloatArray,
+    columns,
+    in_words,
+    place_panels,
+    save_figure,
+)
 from tachometry.sim.studies.control import Setting
 from tachometry.sim.studies.loops import FIGURES
 from tachometry.spec.units import FREQUENCY, SPEED, TIME, read_nearest
+
+Log = Mapping[str, FloatArray]
 
 _HEIGHTS = {"speed": 3.0, "error": 1.7, "current": 1.7}
 _MARKS = "os^Dv<>pPX"
