@@ -14,7 +14,7 @@ CORE = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms".split()
 SHORT = [*CORE, "--motion", "ramp:0:4:30ms+constant:4:50ms", "--from", "40ms"]
 
 
-def run(*args: str | Path) -> int:
+def run(*args: object) -> int:
     return command.run("loop", *args)
 
 
