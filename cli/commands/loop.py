@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.loop import loop_options
+from tachometry.cli.options.closed_loop import loop_options
 from tachometry.cli.options.motion import FORMS, tables_of
 from tachometry.cli.options.option import option, output
 from tachometry.cli.reports.streams import INTERRUPTED
@@ -107,7 +107,7 @@ def loop(
     Several methods, or axes with --vary, are run on all cores, which needs the extra `sweep`. Equal options give equal
     files. It needs a C++ compiler.
     """
-    from tachometry.cli.reports.loop import print_loop, print_loops, write_log, write_loops
+    from tachometry.cli.reports.closed_loop import print_loop, print_loops, write_log, write_loops
     from tachometry.cli.sweeping.loops import loops_of
     from tachometry.sim.engines import build
 
