@@ -60,6 +60,9 @@ ANGLE = {**_decimal(rad=0, mrad=-3), "deg": Unit(pi=Fraction(1, 180))}
 DEGREES = {"deg": Unit()}
 BANDWIDTH = {"rad/s": Unit(), **{name: Unit(unit.size, Fraction(2)) for name, unit in FREQUENCY.items()}}
 FRACTION = {"": Unit(), "%": Unit(Fraction(1, 100))}
+PLAIN = {"": Unit()}
+CURRENT = _decimal(A=0, mA=-3)
+TORQUE_CONSTANT = {"Nm/A": Unit(), "mNm/A": Unit(Fraction(1, 1000))}
 
 
 def read_quantity(what: str, text: str, units: Units, default: str = "") -> tuple[Fraction, str]:
