@@ -14,10 +14,10 @@ from tachometry.spec.units import signed_width
 class Controller(wiring.Component):
     """Forms the products of `ControlForm` one by one at each control tick, and the current from them.
 
-    All inputs but `n` and `total` are taken with `tick`; these hold until `clear` or `add`. Every run takes the same
-    time, whether there has been an update or not.
+    All inputs but `n` and `total` are taken with `tick`; these hold until `clear`. Every run takes the same time,
+    whether there has been an update or not.
 
-    Latency: `valid` is high `LoopSpec.latency` clocks after `tick`. The next `tick` may come in that clock.
+    Latency: `valid` is high `LoopSpec.latency` clocks after `tick`. The next `tick` may come a clock later.
 
     Parameters
     ----------
@@ -38,10 +38,8 @@ class Controller(wiring.Component):
         ΣI.
     clear : Out(1)
         One clock: the update has been used.
-    add : Out(1)
-        One clock: `next_current` is that of this control tick.
-    next_current : Out(signed)
     valid : Out(1)
+        One clock: `current` is that of this control tick.
     current : Out(signed)
     saturated : Out(1)
     y, w : Out(signed)
@@ -65,8 +63,6 @@ class Controller(wiring.Component):
                 "n": In(range(form.longest + 1)),
                 "total": In(signed(signed_width(form.most_sum))),
                 "clear": Out(1),
-                "add": Out(1),
-                "next_current": Out(current),
                 "valid": Out(1),
                 "current": Out(current),
                 "saturated": Out(1),
@@ -130,17 +126,15 @@ class Controller(wiring.Component):
         with m.If(finish):
             m.d.sync += term.eq(0)
 
-        rounded = Signal(signed(form.total_width - GUARD_BITS + 1))
-        m.d.comb += rounded.eq((total + (1 << (GUARD_BITS - 1))) >> GUARD_BITS)
-        held, saturated = saturate(m, rounded, form.current_limit)
-        m.d.comb += [
-            self.clear.eq(stored & (term == Term.CURRENT) & due),
-            self.add.eq(finish),
-            self.next_current.eq(Mux(enabled, held, 0)),
-        ]
+        wanted = Signal(signed(form.total_width - GUARD_BITS))
+        m.d.comb += wanted.eq(total >> GUARD_BITS)
+        # First within as many bits as the limit has, without a carry; then there are only these to be compared.
+        short, beyond = saturate(m, wanted, (1 << form.current_limit.bit_length()) - 1)
+        held, changed = saturate(m, short, form.current_limit)
+        m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)
         m.d.sync += self.valid.eq(finish)
         with m.If(finish):
-            m.d.sync += [self.current.eq(self.next_current), self.saturated.eq(saturated & enabled)]
+            m.d.sync += [self.current.eq(Mux(enabled, held, 0)), self.saturated.eq((beyond | changed) & enabled)]
         return m
 
     def _factor(self, m: Module, term: Signal, load: Value) -> Value:
@@ -203,14 +197,14 @@ class Controller(wiring.Component):
 
     def _store(self, m: Module, term: Signal, step: Value, due: Signal, total: Signal) -> None:
         """Add a product to what it belongs to."""
+        # With one adder: w − step is w + ~step + 1, and the 1 comes from an additional bit at its end.
+        less = term != Term.CURRENT
+        w = (Cat(1, self.w).as_signed() + Cat(less, step ^ less.replicate(len(step))).as_signed()) >> 1
         with m.Switch(term):
             with m.Case(Term.FILTER), m.If(due):
-                m.d.sync += [self.y.eq(self.y + step), self.w.eq(self.w - step)]
-            with m.Case(Term.OBSERVER), m.If(due):
-                m.d.sync += self.w.eq(self.w - step)
-            with m.Case(Term.CURRENT), m.If(due):
-                m.d.sync += self.w.eq(self.w + step)
-            with m.Case(Term.POSITION):
-                m.d.sync += total.eq(step)
+                m.d.sync += [self.y.eq(self.y + step), self.w.eq(w)]
+            with m.Case(Term.OBSERVER, Term.CURRENT), m.If(due):
+                m.d.sync += self.w.eq(w)
             with m.Default():
-                m.d.sync += total.eq(total + step)
+                # The first one rounds the sum.
+                m.d.sync += total.eq(Mux(term == Term.POSITION, 1 << (GUARD_BITS - 1), total) + step)

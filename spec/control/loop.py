@@ -177,10 +177,10 @@ class LoopSpec:
         if not 1 <= self.period <= MAX_PERIOD:
             raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
         self._check_formats()
-        if self.period < self.latency:
+        if self.period < self.least_period:
             raise ParameterError(
                 "control_period",
-                f"must be at least {plural(self.latency, 'clock')}, as long as the controller computes with a "
+                f"must be at least {plural(self.least_period, 'clock')}, as long as the controller computes with a "
                 f"{self.multiplier} multiplier, not {self.period}",
             )
 
@@ -323,6 +323,11 @@ class LoopSpec:
         one to hold the current."""
         unfiltered = 2 if self.filter is None else 0
         return (len(Term) - (self.filter is None)) * self.product_clocks + unfiltered + 1
+
+    @property
+    def least_period(self) -> int:
+        """Fewest clocks between two control ticks: the current is added to those before it."""
+        return self.latency + 1
 
     @property
     def ports(self) -> tuple[Port, ...]:

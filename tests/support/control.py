@@ -62,8 +62,8 @@ class Beside(wiring.Component):
         m.submodules.controller = controller = self.controller
         m.d.comb += [
             *(window.tick.eq(self.tick), window.update.eq(self.update), window.velocity.eq(self.velocity)),
-            *(window.clear.eq(controller.clear), window.add.eq(controller.add)),
-            *(window.current.eq(controller.next_current), controller.tick.eq(self.tick)),
+            *(window.clear.eq(controller.clear), window.add.eq(controller.valid)),
+            *(window.current.eq(controller.current), controller.tick.eq(self.tick)),
             *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "total")),
             *(getattr(controller, name).eq(getattr(self, name)) for name in self.inputs),
             *(getattr(self, name).eq(getattr(controller, name)) for name in ("valid", *COLUMNS)),
@@ -78,7 +78,7 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
     """
     rng = np.random.default_rng(seed)
     form, period = spec.form, spec.period
-    spacing = np.where(rng.random(n_ticks) < 0.7, spec.latency, period)
+    spacing = np.where(rng.random(n_ticks) < 0.7, spec.least_period, period)
     clock = 5 + np.cumsum(spacing)
     n_clocks = int(clock[-1]) + spec.latency + 2
     # Often none for longer than the longest measurement, often many between two control ticks.
@@ -151,7 +151,7 @@ def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> tuple[PinTrace, l
     at = np.unique(np.concatenate([trace.clock, clock, clock + 1]))
     at = at[at < trace.n_clocks]
     held = np.searchsorted(trace.clock, at, side="right") - 1
-    columns = {name: line[held] for name, line in trace.lines.items()}
+    columns: dict[str, Any] = {name: line[held] for name, line in trace.lines.items()}
     tick = np.searchsorted(clock, at, side="right") - 1
     for name, values in commands.items():
         there = np.isin(at, clock)
