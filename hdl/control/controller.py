@@ -83,11 +83,15 @@ class Controller(wiring.Component):
         total = Signal(signed(form.total_width), reset_less=True)
 
         term = Signal(Term)
-        load = Signal()
+        # In this order: a word is loaded, what is to be taken from it is, the product begins, and its result is stored.
         again = Signal()
+        load = Signal()
+        subtract = Signal()
         start = Signal()
         stored = Signal()
+        # Then the sum is held within few bits, and within the limit.
         finish = Signal()
+        limit = Signal()
         word = Signal(signed(form.word_width), reset_less=True)
         box = SerialProduct if self._multiplier == "serial" else ParallelProduct
         m.submodules.product = product = box(form.word_width, form.factor_bits)
@@ -100,17 +104,32 @@ class Controller(wiring.Component):
             stored.eq(product.done),
         ]
         step: Value = product.product
+        m.d.sync += start.eq(subtract)
         if unfiltered:
             skipped = Signal()
-            m.d.sync += skipped.eq(self.tick)
+            m.d.sync += [skipped.eq(subtract & (term == Term.FILTER)), start.eq(subtract & (term != Term.FILTER))]
             m.d.comb += stored.eq(product.done | skipped)
             step = Mux(skipped, word, product.product)
-            m.d.sync += start.eq(again)
-        else:
-            m.d.sync += start.eq(load)
-        m.d.sync += [again.eq(stored & (term != Term.DISTURBANCE)), finish.eq(stored & (term == Term.DISTURBANCE))]
+        m.d.sync += [
+            subtract.eq(load),
+            again.eq(stored & (term != Term.DISTURBANCE)),
+            finish.eq(stored & (term == Term.DISTURBANCE)),
+            limit.eq(finish),
+            self.valid.eq(limit),
+        ]
+        # A clock later, what is to be taken from it.
+        less_filter = Signal()
+        less_velocity = Signal()
+        less = Mux(less_filter, self.y << self._shift(Term.FILTER), 0)
+        less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)
+        m.d.sync += [
+            less_filter.eq(term == Term.FILTER),
+            less_velocity.eq(term == Term.VELOCITY),
+        ]
         with m.If(load):
             m.d.sync += word.eq(self._word(m, term, total, velocity, acceleration))
+        with m.Elif(subtract):
+            m.d.sync += word.eq(word - less)
         with m.If(self.tick):
             difference = self.command_position - (self.position << POSITION_FRAC_BITS)
             m.d.sync += [
@@ -122,19 +141,21 @@ class Controller(wiring.Component):
             ]
         with m.If(stored):
             m.d.sync += term.eq(term + 1)
-            self._store(m, term, step, due, total)
+        self._store(m, term, stored, step, due, total)
         with m.If(finish):
             m.d.sync += term.eq(0)
 
         wanted = Signal(signed(form.total_width - GUARD_BITS))
         m.d.comb += wanted.eq(total >> GUARD_BITS)
         # First within as many bits as the limit has, without a carry; then there are only these to be compared.
-        short, beyond = saturate(m, wanted, (1 << form.current_limit.bit_length()) - 1)
-        held, changed = saturate(m, short, form.current_limit)
+        held, outside = saturate(m, wanted, (1 << form.current_limit.bit_length()) - 1)
+        short = Signal.like(held, reset_less=True)
+        beyond = Signal(reset_less=True)
+        m.d.sync += [short.eq(held), beyond.eq(outside)]
+        limited, changed = saturate(m, short, form.current_limit)
         m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)
-        m.d.sync += self.valid.eq(finish)
-        with m.If(finish):
-            m.d.sync += [self.current.eq(Mux(enabled, held, 0)), self.saturated.eq((beyond | changed) & enabled)]
+        with m.If(limit):
+            m.d.sync += [self.current.eq(Mux(enabled, limited, 0)), self.saturated.eq((beyond | changed) & enabled)]
         return m
 
     def _factor(self, m: Module, term: Signal, load: Value) -> Value:
@@ -171,40 +192,51 @@ class Controller(wiring.Component):
         return read.data
 
     def _word(self, m: Module, term: Signal, total: Signal, velocity: Signal, acceleration: Signal) -> Value:
-        """What a term multiplies: a difference."""
+        """What a term multiplies, or what y is still to be taken from."""
         form = self._form
-        error, _ = saturate(m, total, form.most_error)
-        y, fine = self.y, form.extra_bits
-        words: dict[Term, tuple[Value, Value | None]] = {
-            Term.FILTER: (self.held << fine, y),
-            Term.OBSERVER: (self.w, None),
-            Term.CURRENT: (self.total, None),
-            Term.POSITION: (error, None),
-            Term.VELOCITY: (velocity << (fine - form.command_bits), y),
-            Term.ACCELERATION: (acceleration, None),
-            Term.DISTURBANCE: (self.w, None),
+        held, _ = saturate(m, total, form.most_error)
+        error = Signal.like(held, reset_less=True)
+        m.d.sync += error.eq(held)
+        fine = form.extra_bits
+        words: dict[Term, Value] = {
+            Term.FILTER: self.held << fine,
+            Term.OBSERVER: self.w,
+            Term.CURRENT: self.total,
+            Term.POSITION: error,
+            Term.VELOCITY: velocity << (fine - form.command_bits),
+            Term.ACCELERATION: acceleration,
+            Term.DISTURBANCE: self.w,
         }
-        more = Signal(signed(form.word_width))
-        less = Signal(signed(form.word_width))
+        word = Signal(signed(form.word_width), name="loaded")
         with m.Switch(term):
-            for one, (first, second) in words.items():
-                shift = form.terms[one].shift if one in form.terms else 0
+            for one, value in words.items():
                 with m.Case(one):
-                    m.d.comb += more.eq(first << shift)
-                    if second is not None:
-                        m.d.comb += less.eq(second << shift)
-        return more - less
+                    m.d.comb += word.eq(value << self._shift(one))
+        return word
 
-    def _store(self, m: Module, term: Signal, step: Value, due: Signal, total: Signal) -> None:
+    def _shift(self, term: Term) -> int:
+        found = self._form.terms.get(term)
+        return 0 if found is None else found.shift
+
+    def _store(self, m: Module, term: Signal, stored: Value, step: Value, due: Signal, total: Signal) -> None:
         """Add a product to what it belongs to."""
-        # With one adder: w − step is w + ~step + 1, and the 1 comes from an additional bit at its end.
-        less = term != Term.CURRENT
-        w = (Cat(1, self.w).as_signed() + Cat(less, step ^ less.replicate(len(step))).as_signed()) >> 1
-        with m.Switch(term):
-            with m.Case(Term.FILTER), m.If(due):
-                m.d.sync += [self.y.eq(self.y + step), self.w.eq(w)]
-            with m.Case(Term.OBSERVER, Term.CURRENT), m.If(due):
-                m.d.sync += self.w.eq(w)
-            with m.Default():
-                # The first one rounds the sum.
-                m.d.sync += total.eq(Mux(term == Term.POSITION, 1 << (GUARD_BITS - 1), total) + step)
+        # Where it goes is in registers: the term has been the same for some clocks.
+        to_y = Signal()
+        to_w = Signal()
+        minus = Signal()
+        first = Signal()
+        m.d.sync += [
+            to_y.eq(term == Term.FILTER),
+            to_w.eq(term <= Term.CURRENT),
+            minus.eq(term != Term.CURRENT),
+            first.eq(term == Term.POSITION),
+        ]
+        with m.If(stored & due & to_y):
+            m.d.sync += self.y.eq(self.y + step)
+        with m.If(stored & due & to_w):
+            # With one adder: w − step is w + ~step + 1, and the 1 comes from an additional bit at its end.
+            term_of_w = Cat(minus, step ^ minus.replicate(len(step))).as_signed()
+            m.d.sync += self.w.eq((Cat(1, self.w).as_signed() + term_of_w) >> 1)
+        with m.If(stored & ~to_w):
+            # The first one rounds the sum.
+            m.d.sync += total.eq(Mux(first, 1 << (GUARD_BITS - 1), total) + step)

@@ -49,10 +49,10 @@ class SerialProduct(_Product):
         left = Signal(range(bits), reset_less=True)
         running = Signal()
         last = Signal()
-        m.d.comb += [last.eq(running & (left == 0)), self.product.eq(total)]
+        m.d.comb += self.product.eq(total)
         # What is left of the point rounds: one more in the last addition, from an additional bit at the adder's end.
         addend = Cat(last, Mux(factor[0], self.word, 0)).as_signed()
-        m.d.sync += self.done.eq(last)
+        m.d.sync += [last.eq(running & (left == 1)), self.done.eq(last)]
         with m.If(running):
             m.d.sync += [
                 total.eq((Cat(1, total).as_signed() + addend) >> 2),

@@ -26,9 +26,12 @@ MAX_WORD_WIDTH = 80
 ACCELERATION_WIDTH = 20
 MULTIPLIERS = ("serial", "parallel")
 _GROUP = "Loop"
-# Clocks of a product beside one for each bit of the coefficient: to load the word, to begin, to store the result.
-_SERIAL_MORE = 3
-_PARALLEL = 5  # the coefficient, the product and its rounding have a register each
+# Clocks of a product: to load the word, to subtract from it, to begin, to store the result; and between them one for
+# each bit of the coefficient, or one for the product and one to round it.
+_STEPS = 4
+_PARALLEL = 2
+_UNFILTERED = 3  # to load the velocity, to subtract, to store
+_LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 
 def _clocks(what: str, text: str) -> Derived:
@@ -315,14 +318,13 @@ class LoopSpec:
     @property
     def product_clocks(self) -> int:
         """Clocks from one product to the next."""
-        return self.form.factor_bits + _SERIAL_MORE if self.multiplier == "serial" else _PARALLEL
+        return _STEPS + (self.form.factor_bits if self.multiplier == "serial" else _PARALLEL)
 
     @property
     def latency(self) -> int:
-        """Clocks from `control_tick` to `current_valid`: the products, or one clock for the filter that is none, and
-        one to hold the current."""
-        unfiltered = 2 if self.filter is None else 0
-        return (len(Term) - (self.filter is None)) * self.product_clocks + unfiltered + 1
+        """Clocks from `control_tick` to `current_valid`."""
+        unfiltered = _UNFILTERED if self.filter is None else 0
+        return (len(Term) - (self.filter is None)) * self.product_clocks + unfiltered + _LIMIT
 
     @property
     def least_period(self) -> int:

@@ -27,12 +27,12 @@ SMALL = LoopSpec(
     velocity_gain=Fraction(200),
     observer=Fraction(2000),
     filter=Fraction(1000),
-    period=40,
+    period=50,
     multiplier="parallel",
 )
 CONVENTIONAL = replace(SMALL, synchronised=False, filter=Fraction(3000))
 UNFILTERED = replace(SMALL, filter=None)
-SERIAL = replace(SMALL, multiplier="serial", period=300)
+SERIAL = replace(SMALL, multiplier="serial", period=320)
 COLUMNS = ("current", "saturated", "y", "w")
 
 
