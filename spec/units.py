@@ -89,8 +89,9 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
     if match is None or unit not in units:
         names = ", ".join(filter(None, units))
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
-        allowed = f"or one in {names}" if "" in units else allowed
-        raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
+        if "" in units:
+            allowed = names and f"or one in {names}"
+        raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed)))}, not {text!r}")
     value = Fraction(match[1])
     if value and not _LEAST <= abs(value) <= _GREATEST:
         raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")

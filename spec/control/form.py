@@ -27,6 +27,7 @@ every n. So |w| ≤ 2V + M. The position error is held within a limit at which i
 together and the limit of the current: holding it changes no current.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
@@ -216,16 +217,13 @@ def extra_bits(*least: Fraction) -> int:
 
 def factor_bits(found: Sequence[Sequence[Fraction]]) -> int:
     """p: so many that the least coefficient that is not 0 has its bits."""
-    least = min(min(one / _one(each) for one in each) for each in found if each[0])
+    least = min(min(each) / _one(each) for each in found if each[0])
     return LEAST_COEFFICIENT + max(1, ceil_log2(1 / least))
 
 
 def _one(found: Sequence[Fraction]) -> int:
     """The power of two, at least 1, that is greater than all of them."""
-    one = 1
-    while max(found) >= one:
-        one *= 2
-    return one
+    return 1 << math.floor(max(found)).bit_length()
 
 
 def coefficients(found: Sequence[Fraction], bits: int) -> Coefficients:

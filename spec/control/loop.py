@@ -354,7 +354,7 @@ class LoopSpec:
     @property
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults included."""
-        own = {about.field: about.canonical(getattr(self, about.field)) for about in options_of(LoopSpec)}
+        own = {about.parameter: about.canonical(getattr(self, about.field)) for about in options_of(LoopSpec)}
         return {**self.tachometer.parameters, "loop": own}
 
 

@@ -161,9 +161,9 @@ def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> tuple[PinTrace, l
     return trace, of_tick, np.stack([at, *(columns[name].astype(np.int64) for name in names)], axis=1)
 
 
-def check_core(spec: LoopSpec, seed: int = 1) -> Run:
+def check_core(spec: LoopSpec, seed: int = 1, n_edges: int = 3) -> Run:
     """Hold a whole core against the golden model: what it must show."""
-    trace, commands, changes = core_case(spec, seed)
+    trace, commands, changes = core_case(spec, seed, n_edges)
     wanted = run_loop(spec, trace, commands, golden.tables)
     names = [port.name for port in spec.pins]
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
