@@ -1,6 +1,8 @@
 """Disturbance observer and controller: one multiplier, and a product after the other."""
 
-from amaranth import Cat, Module, Mux, Signal, Value, signed
+from collections.abc import Mapping
+
+from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -9,6 +11,17 @@ from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
 from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, TABLED, ControlForm, Term
 from tachometry.spec.units import signed_width
+
+
+def _choose(m: Module, term: Signal, values: Mapping[Term, ValueLike], found: Signal) -> None:
+    """`found` is the value of a term; that of the last one stands for all others, which have none."""
+    *others, last = values
+    with m.Switch(term):
+        for one in others:
+            with m.Case(one):
+                m.d.comb += found.eq(values[one])
+        with m.Default():
+            m.d.comb += found.eq(values[last])
 
 
 class Controller(wiring.Component):
@@ -161,15 +174,12 @@ class Controller(wiring.Component):
     def _factor(self, m: Module, term: Signal, load: Value) -> Value:
         """The coefficient of a term, valid in the clock after `load`."""
         form = self._form
+        values: dict[Term, ValueLike] = {one: each.values[0] for one, each in form.terms.items()}
+        if form.longest > 1:
+            tabled = self._tabled(m, term, load)
+            values |= dict.fromkeys(set(TABLED) & values.keys(), tabled)
         factor = Signal(form.factor_bits)
-        fixed = {one: found.values for one, found in form.terms.items() if len(found.values) == 1}
-        with m.Switch(term):
-            for one, (value,) in fixed.items():
-                with m.Case(one):
-                    m.d.comb += factor.eq(value)
-            if form.longest > 1:
-                with m.Default():
-                    m.d.comb += factor.eq(self._tabled(m, term, load))
+        _choose(m, term, values, factor)
         return factor
 
     def _tabled(self, m: Module, term: Signal, load: Value) -> Value:
@@ -184,10 +194,7 @@ class Controller(wiring.Component):
         m.submodules.table = table = Memory(shape=form.factor_bits, depth=len(init), init=init)
         read = table.read_port()
         which = Signal(range(len(places)))
-        with m.Switch(term):
-            for one, values in of_term.items():
-                with m.Case(one):
-                    m.d.comb += which.eq(places[values])
+        _choose(m, term, {one: places[values] for one, values in of_term.items()}, which)
         m.d.comb += [read.addr.eq(Cat(self.n, which)), read.en.eq(load)]
         return read.data
 
@@ -208,10 +215,7 @@ class Controller(wiring.Component):
             Term.DISTURBANCE: self.w,
         }
         word = Signal(signed(form.word_width), name="loaded")
-        with m.Switch(term):
-            for one, value in words.items():
-                with m.Case(one):
-                    m.d.comb += word.eq(value << self._shift(one))
+        _choose(m, term, {one: value << self._shift(one) for one, value in words.items()}, word)
         return word
 
     def _shift(self, term: Term) -> int:

@@ -84,7 +84,7 @@ MUTANTS: dict[str, tuple[Any, str, str, LoopSpec, int]] = {
         8,
     ),
     "no step without a filter": (Controller, "Mux(skipped, word, product.product)", "product.product", UNFILTERED, 8),
-    "the table of another term": (Controller, "which.eq(places[values])", "which.eq(0)", SMALL, 8),
+    "the table of another term": (Controller, "{one: places[values] for one", "{one: 0 for one", SMALL, 8),
     "a product is not rounded": (ParallelProduct, "whole + (1 << (bits - 1))", "whole", SMALL, 8),
     "a serial product is not rounded": (SerialProduct, "Cat(last, Mux", "Cat(0, Mux", SERIAL, 8),
     "a bit is left out": (SerialProduct, "left.eq(bits - 1)", "left.eq(bits - 2)", SERIAL, 8),
