@@ -139,7 +139,7 @@ class LoopSpec:
         parse=_positive(CURRENT),
     )
     period: int = option(
-        Derived(lambda spec: spec.timing.tick_cycles),
+        Derived(lambda spec: int(spec.timing.tick_cycles)),
         "Time between two control ticks, a whole number of clocks; a plain number is clocks.",
         shown="one tick",
         name="control-period",
