@@ -16,7 +16,16 @@ from tachometry.cli.options.sweep import by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.option import ParameterError
 from tachometry.spec.timing import whole_clocks
-from tachometry.spec.units import BANDWIDTH, TIME, TORQUE, format_time, parse_time, read_nearest
+from tachometry.spec.units import (
+    BANDWIDTH,
+    CURRENT,
+    TIME,
+    TORQUE,
+    TORQUE_CONSTANT,
+    format_time,
+    parse_time,
+    read_nearest,
+)
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.studies.control import Load, Setting
@@ -31,33 +40,37 @@ _OPTIONS = [
     option(_LOOP, "--kv", type=float, default=30.0, metavar="K_V", help="Gain of the velocity, in 1/s."),
     option(
         _LOOP,
-        "--observer-rate",
+        "--observer",
         type=_RATE,
         default="40rad/s",
-        metavar="G_DIS",
-        help="Cut-off frequency of the disturbance observer, in rad/s, Hz or kHz.",
+        metavar="BANDWIDTH",
+        help="Bandwidth G_dis of the disturbance observer, in rad/s, Hz or kHz.",
     ),
     option(
         _LOOP,
-        "--filter-rate",
-        metavar="G_V",
-        help="Cut-off frequency of the low-pass filter of the velocity, or none for no filter. [default: that of the "
-        "observer]",
+        "--velocity-filter",
+        metavar="[BANDWIDTH|none]",
+        help="Bandwidth G_v of the low-pass filter of the velocity, or none. [default: that of --observer; none with "
+        "method track]",
     ),
     option(
         _LOOP,
-        "--observer",
-        type=click.Choice(["synchronised", "conventional", "acceleration"]),
-        default="synchronised",
-        help="Filter and observer go on with each update of the velocity, by eq. (22) (Tsuji 2009, Fig. 11); or at "
-        "each control tick with the velocity that is held (Fig. 2); or so, but from the acceleration that method track "
-        "measures.",
+        "--synchronised/--no-synchronised",
+        default=True,
+        help="Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
+        "with the velocity that is held (Fig. 2).",
     ),
     option(
         _LOOP,
-        "--control-tick",
+        "--measured-acceleration",
+        is_flag=True,
+        help="The observer works at every control tick, with the acceleration that method track measures.",
+    ),
+    option(
+        _LOOP,
+        "--control-period",
         metavar="TIME",
-        help="Time between two commands of a current, in s, ms, us or ns, or clocks. [default: a tick of the core]",
+        help="Time between two control ticks, a whole number of clocks; a plain number is clocks. [default: one tick]",
     ),
     option(
         _LOOP,
@@ -67,9 +80,23 @@ _OPTIONS = [
     ),
     option(_LOOP, "--unfiltered", is_flag=True, help="K_V acts on the velocity before the low-pass filter."),
     option(_LOOP, "--feed-forward", is_flag=True, help="Add the acceleration of the command."),
-    option(_LOOP, "--current-limit", type=float, default=8.0, metavar="A", help="Greatest current that is commanded."),
+    option(
+        _LOOP,
+        "--current-limit",
+        type=Quantity(CURRENT, "A"),
+        default="20A",
+        metavar="CURRENT",
+        help="Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
+    ),
     option(_MOTOR, "--inertia", type=float, default=0.003, metavar="J", help="Of shaft and load, in kg m²."),
-    option(_MOTOR, "--torque-constant", type=float, default=0.0603, metavar="K_T", help="In Nm/A."),
+    option(
+        _MOTOR,
+        "--torque-constant",
+        type=Quantity(TORQUE_CONSTANT, "Nm/A"),
+        default="60.3mNm/A",
+        metavar="KT",
+        help="Torque constant K_t of the motor, in Nm/A or mNm/A.",
+    ),
     option(_MOTOR, "--driver-time", type=_TIME, default="100us", metavar="TIME", help="Time constant of the current."),
     option(_MOTOR, "--friction", type=_TORQUE, default="5mNm", metavar="TORQUE", help="Coulomb friction, Nm or mNm."),
     option(_MOTOR, "--viscous", type=float, default=0.0, metavar="B", help="Viscous friction in Nm/(rad/s)."),
@@ -114,10 +141,10 @@ def _load(text: str | None) -> Load | None:
     return Load(torque=torque, begin=begin, seconds=seconds)
 
 
-def _filter_rate(text: str | None, observer: float) -> float:
+def _filter(spec: TachometerSpec, text: str | None, observer: float) -> float:
     if text is None:
-        return observer
-    return math.inf if text.strip() == "none" else read_nearest("filter-rate", text, BANDWIDTH, "rad/s")
+        return math.inf if spec.method == "track" else observer
+    return math.inf if text.strip() == "none" else read_nearest("velocity_filter", text, BANDWIDTH, "rad/s")
 
 
 def _setting_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -175,10 +202,11 @@ def _motor_and_gains(
     *,
     kp: float,
     kv: float,
-    observer_rate: float,
-    filter_rate: str | None,
-    observer: str,
-    control_tick: str | None,
+    observer: float,
+    velocity_filter: str | None,
+    synchronised: bool,
+    measured_acceleration: bool,
+    control_period: str | None,
     delay: str | None,
     unfiltered: bool,
     feed_forward: bool,
@@ -191,8 +219,8 @@ def _motor_and_gains(
 ) -> tuple[Any, Any]:
     from tachometry.sim.engines.loop import Gains, Motor, Observer
 
-    if observer == "acceleration" and not hasattr(spec, "acceleration_per_lsb"):
-        raise ParameterError("observer", f"must not be acceleration with method {spec.method}, which measures none")
+    if measured_acceleration and not hasattr(spec, "acceleration_per_lsb"):
+        raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
     motor = Motor(
         inertia=inertia,
         torque_constant=torque_constant,
@@ -201,21 +229,24 @@ def _motor_and_gains(
         coulomb=friction,
     )
     hz = spec.timing.clock_hz
-    clocks = spec.timing.tick_cycles if control_tick is None else whole_clocks("control_tick", control_tick, hz)
+    clocks = spec.timing.tick_cycles if control_period is None else whole_clocks("control_period", control_period, hz)
     late = 0 if delay is None else whole_clocks("delay", delay, hz)
     if not 1 <= clocks <= hz:
-        raise ParameterError("control_tick", f"must be from a clock to 1s, not {control_tick or clocks}")
+        raise ParameterError("control_period", f"must be from a clock to 1s, not {control_period or clocks}")
     if not 0 <= late <= clocks:
         raise ParameterError(
             "delay", f"must be at most a control tick, {format_time(spec.seconds(clocks))}, not {delay}"
         )
+    way = Observer.SYNCHRONISED if synchronised else Observer.CONVENTIONAL
+    if measured_acceleration:
+        way = Observer.ACCELERATION
     gains = Gains(
         position=kp,
         velocity=kv,
-        observer=observer_rate,
-        filter=_filter_rate(filter_rate, observer_rate),
+        observer=observer,
+        filter=_filter(spec, velocity_filter, observer),
         seconds=float(spec.seconds(clocks)),
-        way=Observer[observer.upper()],
+        way=way,
         delay=float(spec.seconds(late)),
         on_filtered=not unfiltered,
         feed_forward=feed_forward,

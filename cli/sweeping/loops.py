@@ -7,8 +7,8 @@ from itertools import product
 
 import click
 
-from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.closed_loop import LOOP, loop_click_options, loop_options
+from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.methods import listed_methods
 from tachometry.cli.options.option import told
 from tachometry.cli.sweeping.points import has_option

@@ -105,7 +105,7 @@ class Gains:
     def __post_init__(self) -> None:
         _more_than_0(self, "observer", "seconds", "inertia", "torque_constant", "current_limit")
         if not self.filter > 0:
-            raise ParameterError("filter_rate", f"must be more than 0, not {self.filter:g}")
+            raise ParameterError("velocity_filter", f"must be more than 0, not {self.filter:g}")
         _at_least_0(self, "position", "velocity", "delay")
         if self.delay > self.seconds:
             raise ParameterError("delay", f"must be at most a control tick, {self.seconds:g} s, not {self.delay:g}")
@@ -115,7 +115,6 @@ class Gains:
 _CALLED = {
     "position": "kp",
     "velocity": "kv",
-    "observer": "observer_rate",
     "coulomb": "friction",
     "driver_seconds": "driver_time",
 }

@@ -72,8 +72,8 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
         (
             "loop",
             [
-                *"--kp --kv --observer-rate --filter-rate --observer --control-tick --delay --current-limit".split(),
-                *"--inertia --friction --load --vary --methods --seeds --log --csv --seed".split(),
+                *"--kp --kv --observer --velocity-filter --synchronised --control-period --delay".split(),
+                *"--current-limit --inertia --friction --load --vary --methods --seeds --log --csv --seed".split(),
                 *FAULTS[:4],
             ],
             ["Controller", "Motor and load", "Sweep", "Motion", "Encoder faults", "Outputs"],

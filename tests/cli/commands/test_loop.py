@@ -22,7 +22,7 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     for folder in ("one", "two"):
         files = ["--log", tmp_path / folder / "log.csv", "--csv", tmp_path / folder / "all.csv"]
         files += ["--plot", tmp_path / folder / "loop.png"]
-        assert run(*SHORT, "--load", "20mNm:60ms:10ms", "--kv", "80", "--seeds", "2", "--seed", "7", *files) == 0
+        assert run(*SHORT, "--load", "20mNm:60ms:10ms", "--kv", "20", "--seeds", "2", "--seed", "7", *files) == 0
     table = capsys.readouterr().out.splitlines()
     assert table[0].split()[:4] == ["seed", "RMS", "error", "(rad/s)"]
     assert [line.split()[0] for line in table[1:4]] == ["7", "8", "mean"]
@@ -42,12 +42,12 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = ["--csv", tmp_path / "all.csv", "--plot", tmp_path / "loops.pdf"]
-    options = ["--methods", "s", "--vary", "kv=20,80", "--vary", "observer=synchronised,conventional"]
+    options = ["--methods", "s", "--vary", "kv=20,80", "--vary", "synchronised=yes,no"]
     assert run(*SHORT, *options, "--seeds", "1", "--jobs", "1", *files) == 0
     table = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert table[0][:3] == ["method", "kv", "observer"]
+    assert table[0][:3] == ["method", "kv", "synchronised"]
     assert [row[1:3] for row in table[1:5]] == [
-        [kv, o] for kv in ("20", "80") for o in ("synchronised", "conventional")
+        [kv, o] for kv in ("20", "80") for o in ("yes", "no")
     ]
     assert " ".join(table[6]).startswith("4 loops with 1 seed each, run in ")
     with (tmp_path / "all.csv").open() as file:
@@ -55,7 +55,7 @@ def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureF
     assert [row["kv"] for row in rows] == ["20", "20", "80", "80"]
     assert (tmp_path / "loops.pdf").read_bytes().startswith(b"%PDF")
     # One of them alone, in this process, is the same.
-    assert run(*SHORT, "--kv", "80", "--observer", "conventional", "--seeds", "1", "--csv", tmp_path / "one.csv") == 0
+    assert run(*SHORT, "--kv", "80", "--no-synchronised", "--seeds", "1", "--csv", tmp_path / "one.csv") == 0
     with (tmp_path / "one.csv").open() as file:
         (alone,) = csv.DictReader(file)
     assert {name: rows[3][name] for name in alone} == alone
@@ -65,13 +65,13 @@ def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureF
     ("options", "message"),
     [
         ("--kv -1", "--kv must be at least 0, not -1"),
-        ("--observer-rate 0", "--observer-rate must be more than 0, not 0"),
-        ("--filter-rate 0", "--filter-rate must be more than 0, not 0"),
-        ("--filter-rate some", "--filter-rate must be a number in rad/s"),
+        ("--observer 0", "--observer must be more than 0, not 0"),
+        ("--velocity-filter 0", "--velocity-filter must be more than 0, not 0"),
+        ("--velocity-filter some", "--velocity-filter must be a number in rad/s"),
         ("--delay 30us", "--delay must be at most a control tick, 20us, not 30us"),
-        ("--control-tick 1ns", "--control-tick must be a whole number of clocks"),
-        ("--control-tick 2s", "--control-tick must be from a clock to 1s, not 2s"),
-        ("--observer acceleration", "--observer must not be acceleration with method s"),
+        ("--control-period 1ns", "--control-period must be a whole number of clocks"),
+        ("--control-period 2s", "--control-period must be from a clock to 1s, not 2s"),
+        ("--measured-acceleration", "--measured-acceleration must not be given with method s"),
         ("--load 1Nm:2s", "--load must be TORQUE:FROM:TIME, such as 0.2Nm:7s:500ms, not '1Nm:2s'"),
         ("--load 1Nm:41ms:1s", "--load must begin 2ms or more after --from, and within --motion"),
         ("--from 79ms", "--from must be from 0 to 2ms before the end of --motion, not 79ms"),

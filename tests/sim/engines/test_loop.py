@@ -220,8 +220,8 @@ def test_a_run_can_be_stopped() -> None:
     ("wrong", "message"),
     [
         ({"velocity": -1.0}, "kv must be at least 0, not -1"),
-        ({"observer": math.inf}, "observer_rate must be more than 0, not inf"),
-        ({"filter": 0.0}, "filter_rate must be more than 0, not 0"),
+        ({"observer": math.inf}, "observer must be more than 0, not inf"),
+        ({"filter": 0.0}, "velocity_filter must be more than 0, not 0"),
         ({"delay": 1.0}, "delay must be at most a control tick, 2e-05 s, not 1"),
         ({"current_limit": math.nan}, "current_limit must be more than 0, not nan"),
     ],
