@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -13,7 +14,8 @@ from tachometry.spec.units import format_time
 
 _MARKS = "os^DvP"
 # Inches.
-_WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM, _ACROSS, _DOWN, _PANEL = 9.0, 7.0, 0.75, 0.75, 0.5, 0.35, 0.25, 3.9
+_WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM, _ACROSS, _DOWN, _PANEL = 9.0, 6.5, 0.75, 0.7, 0.65, 0.25, 0.25, 3.9
+_TICKS = ((50, 100, 200, 400), (0.1, 0.2, 0.4, 0.8), (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
 _ROWS = ("usable $k_v$ (1/s)", "dip under 0.2 Nm (rad/s)", "current above 50 Hz (A rms)")
 
 
@@ -68,9 +70,10 @@ def _draw(found: Sequence[Found]) -> Figure:
                 axes.plot(x, y, color=COLOURS[number], marker=_MARKS[number], markersize=4, linewidth=1, label=name)
             axes.set_xscale("log")
             axes.set_yscale("linear" if row == len(_ROWS) - 1 else "log")
-            axes.set_xticks(ticks, [format_time_of(tick) for tick in ticks], minor=False)
+            axes.set_xticks(ticks, [format_time(Fraction(f"{tick:.6g}")) for tick in ticks])
+            axes.set_yticks(_TICKS[row], [f"{tick:g}" for tick in _TICKS[row]])
+            axes.minorticks_off()
             axes.tick_params(labelbottom=row == len(_ROWS) - 1, labelleft=column == 0)
-            axes.grid(visible=True, which="both", color="0.92", linewidth=0.6)
             if row == 0:
                 axes.set_title(disc, loc="left", fontsize=9)
             if column == 0:
@@ -81,9 +84,3 @@ def _draw(found: Sequence[Found]) -> Figure:
     figure.text(0.5, 0.02, "control tick", ha="center", fontsize=9)
     return figure
 
-
-def format_time_of(seconds: float) -> str:
-    """A time in the words of the project, from a float."""
-    from fractions import Fraction
-
-    return format_time(Fraction(f"{seconds:.6g}"))
