@@ -27,7 +27,7 @@ def _choose(m: Module, term: Signal, values: Mapping[Term, ValueLike], found: Si
 class Controller(wiring.Component):
     """Forms the products of `ControlForm` one by one at each control tick, and the current from them.
 
-    All inputs but `n` and `total` are taken with `tick`; these hold until `clear`. Every run takes the same time,
+    All inputs but `n` and `current_sum` are taken with `tick`; these hold until `clear`. Every run takes the same time,
     whether there has been an update or not.
 
     Latency: `valid` is high `LoopSpec.latency` clocks after `tick`. The next `tick` may come a clock later.
@@ -47,7 +47,7 @@ class Controller(wiring.Component):
     enable : In(1)
     command_position, command_velocity, command_acceleration : In(signed)
     n : In(range(longest + 1))
-    total : In(signed)
+    current_sum : In(signed)
         ΣI.
     clear : Out(1)
         One clock: the update has been used.
@@ -74,7 +74,7 @@ class Controller(wiring.Component):
                 "command_velocity": In(signed(form.command_width)),
                 "command_acceleration": In(signed(form.acceleration_width)),
                 "n": In(range(form.longest + 1)),
-                "total": In(signed(signed_width(form.most_sum))),
+                "current_sum": In(signed(signed_width(form.most_sum))),
                 "clear": Out(1),
                 "valid": Out(1),
                 "current": Out(current),
@@ -208,7 +208,7 @@ class Controller(wiring.Component):
         words: dict[Term, Value] = {
             Term.FILTER: self.held << fine,
             Term.OBSERVER: self.w,
-            Term.CURRENT: self.total,
+            Term.CURRENT: self.current_sum,
             Term.POSITION: error,
             Term.VELOCITY: velocity << (fine - form.command_bits),
             Term.ACCELERATION: acceleration,

@@ -60,7 +60,7 @@ class LoopCore(wiring.Component):
             window.current.eq(controller.current),
             controller.tick.eq(clock.tick),
             controller.position.eq(tachometer.position),
-            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "total")),
+            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
             *(getattr(controller, name).eq(getattr(self, name)) for name in _COMMANDS),
             self.control_tick.eq(clock.tick),
             self.current_valid.eq(controller.valid),

@@ -35,7 +35,7 @@ class UpdateWindow(wiring.Component):
     due : Out(1)
         Valid with `tick`: the window is to be used.
     n : Out(range(longest + 1))
-    total : Out(signed)
+    current_sum : Out(signed)
         ΣI.
     """
 
@@ -51,7 +51,7 @@ class UpdateWindow(wiring.Component):
                 "held": Out(signed(form.velocity_width)),
                 "due": Out(1),
                 "n": Out(range(form.longest + 1)),
-                "total": Out(signed(form.most_sum.bit_length() + 1)),
+                "current_sum": Out(signed(form.most_sum.bit_length() + 1)),
             }
         )
 
@@ -72,7 +72,7 @@ class UpdateWindow(wiring.Component):
             with m.If(self.update):
                 m.d.sync += self.held.eq(self.velocity)
         with m.If(self.add):
-            m.d.sync += [self.n.eq(self.n + 1), self.total.eq(self.total + self.current)]
+            m.d.sync += [self.n.eq(self.n + 1), self.current_sum.eq(self.current_sum + self.current)]
         with m.If(self.clear):
-            m.d.sync += [self.n.eq(0), self.total.eq(0)]
+            m.d.sync += [self.n.eq(0), self.current_sum.eq(0)]
         return m

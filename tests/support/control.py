@@ -18,6 +18,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table, compare, observed
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
+from tachometry.spec.control.form import ControlForm
 
 SMALL = LoopSpec(
     tachometer=STachometer(
@@ -39,10 +40,10 @@ COLUMNS = ("current", "saturated", "y", "w")
 class Beside(wiring.Component):
     """Window and controller, joined as in the core."""
 
-    def __init__(self, spec: LoopSpec) -> None:
+    def __init__(self, form: ControlForm, multiplier: str) -> None:
         # By the names in their modules, where a mutant takes their place.
-        self.window = update_window.UpdateWindow(spec.form)
-        self.controller = controller.Controller(spec.form, spec.multiplier)
+        self.window = update_window.UpdateWindow(form)
+        self.controller = controller.Controller(form, multiplier)
         commands = ("enable", "position", "command_position", "command_velocity", "command_acceleration")
         self.inputs = {name: getattr(self.controller, name).shape() for name in commands}
         super().__init__(
@@ -64,7 +65,7 @@ class Beside(wiring.Component):
             *(window.tick.eq(self.tick), window.update.eq(self.update), window.velocity.eq(self.velocity)),
             *(window.clear.eq(controller.clear), window.add.eq(controller.valid)),
             *(window.current.eq(controller.current), controller.tick.eq(self.tick)),
-            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "total")),
+            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
             *(getattr(controller, name).eq(getattr(self, name)) for name in self.inputs),
             *(getattr(self, name).eq(getattr(controller, name)) for name in ("valid", *COLUMNS)),
         ]
@@ -120,7 +121,7 @@ def check(spec: LoopSpec, n_ticks: int = 300, seed: int = 1, less: int = 0) -> T
     names = ("command_position", "command_velocity", "command_acceleration", "enable")
     commands = [Command(*values) for values in zip(*(ticks[name].tolist() for name in names), strict=True)]
     wanted = control(spec, ticks.clock, ticks.position, updates, commands)
-    seen = clock_by_clock(Beside(spec), rows, ["valid", *COLUMNS])
+    seen = clock_by_clock(Beside(spec.form, spec.multiplier), rows, ["valid", *COLUMNS])
     got = [(clock, *(row[name] for name in COLUMNS)) for clock, row in enumerate(seen) if row["valid"]]
     columns = (wanted.clock, *wanted.columns.values())
     assert got == list(zip(*(column.tolist() for column in columns), strict=True))

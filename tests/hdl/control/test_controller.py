@@ -53,9 +53,9 @@ MUTANTS: dict[str, tuple[Any, str, str, LoopSpec, int]] = {
         CONVENTIONAL,
         8,
     ),
-    "the latest current alone": (UpdateWindow, "self.total + self.current", "self.current", SMALL, 8),
+    "the latest current alone": (UpdateWindow, "self.current_sum + self.current", "self.current", SMALL, 8),
     "ticks are not counted": (UpdateWindow, "self.n + 1", "1", SMALL, 8),
-    "the window is not cleared": (UpdateWindow, "[self.n.eq(0), self.total.eq(0)]", "[self.n.eq(0)]", SMALL, 8),
+    "the window is not cleared": (UpdateWindow, "[self.n.eq(0), self.current_sum.eq(0)]", "[self.n.eq(0)]", SMALL, 8),
     "the current is not rounded": (Controller, "1 << (GUARD_BITS - 1), total)", "0, total)", SMALL, 8),
     "the sum begins with the one before": (
         Controller,
