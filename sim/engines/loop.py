@@ -170,39 +170,43 @@ class Edges:
     jitter: FloatArray
 
 
-class _LoopDesign(Design):
+class LoopDesign(Design):
+    """A core to be compiled with plant and controller."""
+
     def source(self, model: str) -> str:
-        head = f"#define N_COLUMNS {len(self.outputs)}\n#include <cstdint>\n"
+        """See `Design.source`."""
+        head = f"#define N_COLUMNS {len(self.outputs)}\n#define GATES 0\n#include <cstdint>\n"
         parts = [Path(__file__).with_name(part).read_text(encoding="utf-8") for part in PARTS]
         return "\n".join([head, model, *parts])
 
 
-def _struct(name: str, **members: Any) -> type[ctypes.Structure]:
+def struct(name: str, **members: Any) -> type[ctypes.Structure]:
     return type(name, (ctypes.Structure,), {"_fields_": list(members.items())})
 
 
 _D, _I, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
-_MOTOR = _struct("Motor", **{field.name: _D for field in fields(Motor)})
-_ENCODER = _struct("Encoder", pitch=_D, offset=_P, n_edges=_I, jitter=_P, n_jitter=_I)
-_CONTROLLER = _struct(
+_MOTOR = struct("Motor", **{field.name: _D for field in fields(Motor)})
+_ENCODER = struct("Encoder", pitch=_D, offset=_P, n_edges=_I, jitter=_P, n_jitter=_I)
+CONTROLLER = struct(
     "Controller",
     **dict.fromkeys(("position", "velocity", "observer", "filter", "inertia", "torque_constant", "current_limit"), _D),
     **dict.fromkeys(("way", "on_filtered", "feed_forward", "clocks", "first", "delay"), _I),
 )
-_CORE = _struct(
+_CORE = struct(
     "Core",
     **dict.fromkeys(("rad_per_s", "rad_per_s2", "rad_per_count"), _D),
     **dict.fromkeys(("velocity", "valid", "position", "acceleration"), _I),
     clock_seconds=_D,
 )
-_COURSE = _struct("Course", speed=_P, angle=_P, load=_P, current=_P, n=_I, clocks=_I)
-_LOOP = _struct(
+_COURSE = struct("Course", speed=_P, angle=_P, load=_P, current=_P, n=_I, clocks=_I)
+_LOOP = struct(
     "Loop",
-    **{"motor": _MOTOR, "encoder": _ENCODER, "controller": _CONTROLLER, "core": _CORE, "course": _COURSE},
+    **{"motor": _MOTOR, "encoder": _ENCODER, "controller": CONTROLLER, "core": _CORE, "course": _COURSE},
     **dict.fromkeys(("step", "end", "log"), _I),
     rows=_P,
     n_rows=_I,
     stop=_P,
+    gates=_P,
 )
 
 
@@ -212,6 +216,8 @@ class LoopSimulation:
     Parameters
     ----------
     spec : TachometerSpec
+    design : LoopDesign or None
+        What is compiled; None: the core of the spec alone.
 
     Raises
     ------
@@ -219,9 +225,9 @@ class LoopSimulation:
         If there is no C++ compiler.
     """
 
-    def __init__(self, spec: TachometerSpec) -> None:
+    def __init__(self, spec: TachometerSpec, design: LoopDesign | None = None) -> None:
         self._spec = spec
-        self._design = _LoopDesign(spec, list(spec.pins))
+        self._design = design or LoopDesign(spec, list(spec.pins))
         self._library = ctypes.CDLL(str(Cxxrtl().library(self._design)))
         self._stop = _I(0)
 
@@ -236,10 +242,16 @@ class LoopSimulation:
 
         The motor goes on in steps of `step` seconds, or from event to event.
         """
+        return self.call(motor, edges, self._controller(gains), course, log, step, None)
+
+    def call(
+        self, motor: Motor, edges: Edges, controller: Any, course: Course, log: float, step: float, gates: int | None
+    ) -> Log:
+        """See `run`; `gates` is where a controller in gates is described, in place of one in double precision."""
         spec = self._spec
         arrays = (edges.offset, edges.jitter, course.speed, course.angle, course.load, course.current)
         offset, jitter, *tables = (np.ascontiguousarray(one, dtype=np.float64) for one in arrays)
-        end, apart = self._clocks(course.seconds) * (len(course.speed) - 1), self._clocks(log)
+        end, apart = self.clocks(course.seconds) * (len(course.speed) - 1), self.clocks(log)
         rows = np.zeros((end // apart + 1, len(COLUMNS)))
         loop = _LOOP(
             motor=_MOTOR(**{field.name: getattr(motor, field.name) for field in fields(Motor)}),
@@ -247,24 +259,26 @@ class LoopSimulation:
                 2 * np.pi / (4 * spec.encoder.pulses_per_rev),
                 *(offset.ctypes.data, len(offset), jitter.ctypes.data, len(jitter)),
             ),
-            controller=self._controller(gains),
+            controller=controller,
             core=self._core(),
-            course=_COURSE(*(one.ctypes.data for one in tables), len(course.speed), self._clocks(course.seconds)),
-            **{"step": self._clocks(step), "end": end, "log": apart, "rows": rows.ctypes.data},
+            course=_COURSE(*(one.ctypes.data for one in tables), len(course.speed), self.clocks(course.seconds)),
+            **{"step": self.clocks(step), "end": end, "log": apart, "rows": rows.ctypes.data},
             stop=ctypes.addressof(self._stop),
+            gates=gates,
         )
         self._library.loop_run(ctypes.byref(loop))
         return dict(zip(COLUMNS, rows[: loop.n_rows].T, strict=True))
 
-    def _clocks(self, seconds: float) -> int:
+    def clocks(self, seconds: float) -> int:
+        """A time in whole clocks, at least one."""
         return max(round(seconds * self._spec.timing.clock_hz), 1)
 
     def _controller(self, gains: Gains) -> Any:
-        clocks, spec = self._clocks(gains.seconds), self._spec
+        clocks, spec = self.clocks(gains.seconds), self._spec
         # It comes when the velocity of a tick is there.
         first = (spec.pin_to_count + spec.tick_latency + spec.tick_to_velocity + 1) % clocks
         delay = min(round(gains.delay * spec.timing.clock_hz), clocks)
-        return _CONTROLLER(
+        return CONTROLLER(
             *(gains.position, gains.velocity, gains.observer, gains.filter),
             *(gains.inertia, gains.torque_constant, gains.current_limit),
             *(gains.way, gains.on_filtered, gains.feed_forward, clocks, first, delay),

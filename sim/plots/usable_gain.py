@@ -83,4 +83,3 @@ def _draw(found: Sequence[Found]) -> Figure:
     figure.legend(handles, labels, loc="upper center", ncols=len(names), fontsize=8)
     figure.text(0.5, 0.02, "control tick", ha="center", fontsize=9)
     return figure
-

@@ -46,9 +46,7 @@ def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureF
     assert run(*SHORT, *options, "--seeds", "1", "--jobs", "1", *files) == 0
     table = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert table[0][:3] == ["method", "kv", "synchronised"]
-    assert [row[1:3] for row in table[1:5]] == [
-        [kv, o] for kv in ("20", "80") for o in ("yes", "no")
-    ]
+    assert [row[1:3] for row in table[1:5]] == [[kv, o] for kv in ("20", "80") for o in ("yes", "no")]
     assert " ".join(table[6]).startswith("4 loops with 1 seed each, run in ")
     with (tmp_path / "all.csv").open() as file:
         rows = list(csv.DictReader(file))

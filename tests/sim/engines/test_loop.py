@@ -84,14 +84,14 @@ def test_friction_holds_a_shaft_that_rests() -> None:
 
 def mutated(monkeypatch: pytest.MonkeyPatch, right: str, wrong: str) -> LoopSimulation:
     """The same loop from a source in which one thing is wrong."""
-    source: Callable[..., str] = loop._LoopDesign.source
+    source: Callable[..., str] = loop.LoopDesign.source
 
-    def changed(design: loop._LoopDesign, model: str) -> str:
+    def changed(design: loop.LoopDesign, model: str) -> str:
         text = source(design, model)
         assert text.count(right) == 1
         return text.replace(right, wrong)
 
-    monkeypatch.setattr(loop._LoopDesign, "source", changed)
+    monkeypatch.setattr(loop.LoopDesign, "source", changed)
     return LoopSimulation(S_CORE)
 
 
