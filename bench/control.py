@@ -1,16 +1,20 @@
 """The tables and the figure of docs/control.md: what a velocity loop about a core can do, mean of seeds."""
 
 import argparse
+import functools
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 from pages import markdown
 
 from tachometry.sim.engines.loop import Observer
+from tachometry.sim.figures.tsuji_loops import Cosine
 from tachometry.sim.plots.usable_gain import Found, save_usable_gains
-from tachometry.sim.studies.control import Outcome, outcome_of
+from tachometry.sim.studies.control import Outcome, Task, mean, outcome_of
+from tachometry.sim.studies.gate_check import check
 from tachometry.sim.studies.usable_gain import IDEAL, KINDS, REAL, TICKS, setting, usable, variants
 
 DISCS = {"ideal disc": IDEAL, "real disc": REAL}
@@ -67,12 +71,30 @@ def assumptions(seeds: Sequence[int], jobs: int) -> str:
     return markdown(("T_s", "k_v", "what is changed", *HEADS), rows, left=(0, 2))
 
 
+def in_gates(seeds: Sequence[int], jobs: int) -> str:
+    """The controller in gates against its golden model, and against double precision."""
+    held = setting(KINDS[0], 80.0, 20e-6, REAL)
+    cosine = replace(
+        setting(KINDS[0], 50.0, 20e-6, REAL), task=Task(motion=Cosine(10.0), noise=held.task.noise), begin=1.0
+    )
+    rows = []
+    for name, one in (("as in Fig. 15, k_v = 50, 10 s each", cosine), ("39 rad/s, k_v = 80, 1.2 s each", held)):
+        with ThreadPoolExecutor(jobs) as pool:
+            found = list(pool.map(functools.partial(check, one), seeds))
+        gates, double = mean([one.gates for one in found]), mean([one.double for one in found])
+        ticks, wrong = sum(one.ticks for one in found), sum(one.mismatches for one in found)
+        errors = (f"{gates.rms:.4g}", f"{double.rms:.4g}", f"{gates.sound:.4g}", f"{double.sound:.4g}")
+        rows.append((name, f"{ticks}", f"{wrong}", *errors))
+    heads = ("loop", "control ticks", "mismatches", "RMS error", "in double", "current above 50 Hz", "in double")
+    return markdown(heads, rows)
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=6, metavar="N", help="seeds of what is random (%(default)s)")
     parser.add_argument("--jobs", type=int, metavar="N", help="threads (one for each core)")
-    parser.add_argument("--only", choices=("gains", "weights", "assumptions"), help="one of the tables")
+    parser.add_argument("--only", choices=("gains", "weights", "assumptions", "gates"), help="one of the tables")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="figure of the usable gains")
     given = parser.parse_args()
     seeds = range(given.seeds)
@@ -80,6 +102,8 @@ def main() -> None:
         sys.stdout.write(f"{weights(seeds, given.jobs)}\n")
     if given.only in (None, "assumptions"):
         sys.stdout.write(f"{assumptions(seeds, given.jobs)}\n")
+    if given.only in (None, "gates"):
+        sys.stdout.write(f"{in_gates(seeds, given.jobs)}\n")
     if given.only in (None, "gains"):
         table, found = usable_gains(seeds, given.jobs)
         sys.stdout.write(f"{table}\n")

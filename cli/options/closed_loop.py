@@ -78,6 +78,12 @@ _OPTIONS = [
         metavar="TIME",
         help="From a control tick until its current is commanded, at most a control tick. [default: none]",
     ),
+    option(
+        _LOOP,
+        "--gates",
+        is_flag=True,
+        help="Run the controller in gates, too: the core that generate --loop makes with these options.",
+    ),
     option(_LOOP, "--unfiltered", is_flag=True, help="K_V acts on the velocity before the low-pass filter."),
     option(_LOOP, "--feed-forward", is_flag=True, help="Add the acceleration of the command."),
     option(
@@ -169,11 +175,12 @@ def _setting(
     start: str,
     load: str | None,
     torque_noise: float,
+    gates: bool,
     **given: Any,
 ) -> Setting:
     from tachometry.sim.encoder.motion import parse_motion
     from tachometry.sim.encoder.virtual import VirtualEncoder
-    from tachometry.sim.studies.control import Setting, Task
+    from tachometry.sim.studies.control import Setting, Task, in_gates
 
     if not (torque_noise >= 0 and math.isfinite(torque_noise)):
         raise ParameterError("torque_noise", f"must be at least 0 Nm, not {torque_noise:g}")
@@ -194,7 +201,8 @@ def _setting(
         seed=seed,
     )
     motor, gains = _motor_and_gains(spec, **given)
-    return Setting(spec=spec, gains=gains, task=task, motor=motor, encoder=encoder, begin=begin)
+    setting = Setting(spec=spec, gains=gains, task=task, motor=motor, encoder=encoder, begin=begin)
+    return in_gates(setting) if gates else setting
 
 
 def _motor_and_gains(

@@ -73,6 +73,10 @@ class GateLoop:
         self._design = _GateDesign(spec, list(spec.pins))
         self._simulation = LoopSimulation(spec.tachometer, self._design)
 
+    def stop(self, ending: bool = True) -> None:
+        """See `LoopSimulation.stop`."""
+        self._simulation.stop(ending)
+
     def run(
         self, motor: Motor, edges: Edges, course: Course, *, feed_forward: bool = False, log: float = 1e-4
     ) -> tuple[Log, Through]:

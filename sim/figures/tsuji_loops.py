@@ -142,7 +142,7 @@ def _deviation(log: Log, begin: float) -> float:
 
 
 @dataclass(frozen=True)
-class _Cosine:
+class Cosine:
     """ω = 200/π·(1 − cos(πt/10)), for ten seconds in the paper."""
 
     duration: float
@@ -154,7 +154,7 @@ class _Cosine:
 
 def fig15(lab: Lab) -> Result:
     """Fig. 15: the RMS of the tracking error over the gain."""
-    task = Task(motion=_Cosine(10.0 if lab.whole else 4.0), noise=_NOISE)
+    task = Task(motion=Cosine(10.0 if lab.whole else 4.0), noise=_NOISE)
     kvs = np.array(_KVS if lab.whole else _FEW_KVS)
     mt = _core(MTTachometer, decoding=4, tick="20us", timer="tick", paper_exact=True, min_time=48_000)
     s = _core(STachometer, decoding=4, tick="20us")

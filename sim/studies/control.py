@@ -6,15 +6,20 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from fractions import Fraction
+from typing import Any, Protocol
 
 import numpy as np
 
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.engines.loop import Course, Edges, Gains, Log, LoopSimulation, Motor
+from tachometry.sim.engines.gate_loop import GateLoop, Through
+from tachometry.sim.engines.loop import Course, Edges, Gains, Log, LoopSimulation, Motor, Observer
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.option import ParameterError
+
+Simulation = LoopSimulation | GateLoop
 
 LOG_SECONDS = 1e-4
 _PERIOD = 1e-3  # s, of the tables of a course
@@ -132,6 +137,8 @@ class Setting:
     encoder : VirtualEncoder
     begin : float, s
         From when on it is judged.
+    gates : LoopSpec or None
+        The core whose controller runs in place of one in double precision, see `in_gates`.
     """
 
     spec: TachometerSpec
@@ -140,11 +147,24 @@ class Setting:
     motor: Motor = field(default_factory=Motor)
     encoder: VirtualEncoder
     begin: float = 0.0
+    gates: LoopSpec | None = None
 
-    def run(self, simulation: LoopSimulation, seed: int, log: float = LOG_SECONDS) -> Log:
+    @property
+    def simulation(self) -> Simulation:
+        """The compiled simulation of its core."""
+        return simulation_of(self.gates or self.spec)
+
+    def run(self, simulation: Simulation, seed: int, log: float = LOG_SECONDS) -> Log:
         """The log of a run with a seed, which every random number depends on."""
+        if isinstance(simulation, GateLoop):
+            return self.through(simulation, seed, log)[0]
         edges = edges_of(replace(self.encoder, seed=seed))
         return simulation.run(self.motor, edges, self.gains, self.task.course(self.motor, seed), log=log)
+
+    def through(self, simulation: GateLoop, seed: int, log: float = LOG_SECONDS) -> tuple[Log, Through]:
+        """The same of a controller in gates, and what went through it."""
+        edges, course = edges_of(replace(self.encoder, seed=seed)), self.task.course(self.motor, seed)
+        return simulation.run(self.motor, edges, course, feed_forward=self.gains.feed_forward, log=log)
 
     def outcome(self, log: Log) -> Outcome:
         """What came of a run."""
@@ -199,14 +219,55 @@ def mean(outcomes: Sequence[Outcome]) -> Outcome:
 
 
 @functools.lru_cache(maxsize=32)
-def simulation_of(spec: TachometerSpec) -> LoopSimulation:
-    """The compiled simulation of a core."""
-    return LoopSimulation(spec)
+def simulation_of(spec: TachometerSpec | LoopSpec) -> Any:
+    """The compiled simulation of a core: a `GateLoop` if it has its loop in gates, else a `LoopSimulation`."""
+    return GateLoop(spec) if isinstance(spec, LoopSpec) else LoopSimulation(spec)
+
+
+def in_gates(setting: Setting) -> Setting:
+    """The same loop with its controller in gates; products are formed bit by bit where that is fast enough.
+
+    Raises
+    ------
+    ParameterError
+        If it is none that there is in gates.
+    """
+    gains = setting.gains
+    for name, wrong in (
+        ("delay", gains.delay > 0),
+        ("unfiltered", not gains.on_filtered),
+        ("measured_acceleration", gains.way is Observer.ACCELERATION),
+    ):
+        if wrong:
+            raise ParameterError(name, "must not be given together with --gates")
+
+    def exact(value: float) -> Fraction:
+        return Fraction(f"{value:.12g}")
+
+    given: dict[str, Any] = {
+        "tachometer": setting.spec,
+        "inertia": exact(gains.inertia),
+        "torque_constant": exact(gains.torque_constant),
+        "position_gain": exact(gains.position),
+        "velocity_gain": exact(gains.velocity),
+        "observer": exact(gains.observer),
+        "filter": None if math.isinf(gains.filter) else exact(gains.filter),
+        "current_limit": exact(gains.current_limit),
+        "period": round(gains.seconds * setting.spec.timing.clock_hz),
+        "synchronised": gains.way is Observer.SYNCHRONISED,
+    }
+    try:
+        gates = LoopSpec(**given)
+    except ParameterError as error:
+        if error.parameter != "control_period":
+            raise
+        gates = LoopSpec(**given, multiplier="parallel")
+    return replace(setting, gates=gates)
 
 
 def each_seed(setting: Setting, seeds: Sequence[int], jobs: int | None = None) -> Iterator[Log]:
     """Logs of a setting in the order of the seeds, run in so many threads, by default one for each core."""
-    simulation = simulation_of(setting.spec)
+    simulation = setting.simulation
     with ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
         try:
             yield from pool.map(lambda seed: setting.run(simulation, seed), seeds)

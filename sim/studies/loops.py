@@ -48,7 +48,17 @@ class LoopPoint:
         """Digest of all that decides the row."""
         motion = [array.tobytes() for array in vars(self.setting.task.motion).values()]
         one = self.setting
-        rest = (one.spec, one.gains, one.task.load, one.task.virtual, one.task.noise, one.motor, one.encoder, one.begin)
+        rest = (
+            one.spec,
+            one.gains,
+            one.task.load,
+            one.task.virtual,
+            one.task.noise,
+            one.motor,
+            one.encoder,
+            one.begin,
+            one.gates,
+        )
         return digest(self.code, self.method, motion, *rest, self.seeds)
 
     @property

@@ -140,7 +140,7 @@ def variants(base: Setting) -> Iterator[tuple[str, Setting]]:
     yield "a delay of a tick", replace(base, gains=replace(gains, delay=gains.seconds))
     yield "driver of 1 ms", replace(base, motor=replace(motor, driver_seconds=1e-3))
     yield "inertia 20 % above the controller's", replace(base, motor=replace(motor, inertia=1.2 * motor.inertia))
-    yield "current limit of 4 A", replace(base, gains=replace(gains, current_limit=4.0))
+    yield "current limit of 20 A", replace(base, gains=replace(gains, current_limit=20.0))
     yield "acceleration of the command fed forward", replace(base, gains=replace(gains, feed_forward=True))
 
 

@@ -59,6 +59,19 @@ def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureF
     assert {name: rows[3][name] for name in alone} == alone
 
 
+def test_a_controller_in_gates(tmp_path: Path) -> None:
+    gains = "--kp 1600 --kv 80 --observer 160 --current-limit 8A --seeds 1".split()
+    for name, more in (("gates", ["--gates"]), ("double", [])):
+        assert run(*SHORT, *gains, *more, "--log", tmp_path / f"{name}.csv") == 0
+    current = {}
+    for name in ("gates", "double"):
+        with (tmp_path / f"{name}.csv").open() as file:
+            current[name] = [float(row["current (A)"]) for row in csv.DictReader(file)]
+    away = {name: max(abs(2048 * value - round(2048 * value)) for value in each) for name, each in current.items()}
+    assert away["gates"] < 1e-4  # whole LSB, but for what the file rounds
+    assert away["double"] > 0.1
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -77,6 +90,8 @@ def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureF
         ("--torque-noise -1Nm", "--torque-noise must be at least 0 Nm, not -1"),
         ("--inertia 0", "--inertia must be more than 0, not 0"),
         ("--friction -1Nm", "--friction must be at least 0, not -1"),
+        ("--gates --delay 1us", "--delay must not be given together with --gates"),
+        ("--gates --kv 0", "--kv must be greater than 0, not 0"),
         ("--seeds 0", "--seeds must be from 1 to 1000, not 0"),
         ("--jobs 0", "--jobs must be at least 1, not 0"),
         ("--jobs 1 --scheduler tcp://nobody:1", "--jobs must not be given together with --scheduler"),

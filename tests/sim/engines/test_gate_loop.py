@@ -11,11 +11,13 @@ from support.mutant import caught
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.gate_loop import GateLoop, Through
-from tachometry.sim.engines.loop import Log
-from tachometry.sim.golden.control import Command, run_loop
-from tachometry.sim.studies.control import Load, Outcome, Task, edges_of, simulation_of
+from tachometry.sim.engines.loop import Log, Observer
+from tachometry.sim.golden.control import Command, Control, run_loop
+from tachometry.sim.studies.control import Load, Outcome, Task, edges_of, in_gates, simulation_of
+from tachometry.sim.studies.gate_check import check
 from tachometry.sim.studies.usable_gain import KINDS, MOTOR, REAL, setting
 from tachometry.spec.control import LoopSpec
+from tachometry.spec.option import ParameterError
 
 DOUBLE = replace(
     setting(KINDS[0], 80.0, 20e-6, REAL),
@@ -84,3 +86,23 @@ def test_the_loop_does_what_one_in_double_precision_does() -> None:
     assert found[0].rms == pytest.approx(found[1].rms, rel=0.05)
     assert found[0].sound == pytest.approx(found[1].sound, rel=0.05)
     assert found[0].dip == pytest.approx(found[1].dip, rel=0.05)
+
+
+def test_the_core_of_a_setting_has_its_gains() -> None:
+    assert in_gates(DOUBLE).gates == SPEC
+    fast = in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, seconds=2e-6, way=Observer.CONVENTIONAL))).gates
+    assert fast is not None
+    assert (fast.period, fast.multiplier, fast.synchronised) == (96, "parallel", False)
+    for name, wrong in (("delay", {"delay": 1e-6}), ("unfiltered", {"on_filtered": False})):
+        with pytest.raises(ParameterError, match=f"{name} must not be given together with --gates"):
+            in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, **wrong)))
+    with pytest.raises(ParameterError, match="observer must be from"):
+        in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, observer=1e-9)))
+
+
+def test_a_check_counts_what_differs(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = check(DOUBLE, 1)
+    assert (found.ticks, found.mismatches) == (19_999, 0)
+    assert found.gates.rms == pytest.approx(found.double.rms, rel=0.05)
+    monkeypatch.setattr(Control, "update", lambda self, velocity: None)  # no velocity at all
+    assert check(DOUBLE, 1).mismatches > 19_999
