@@ -82,23 +82,27 @@ def test_friction_holds_a_shaft_that_rests() -> None:
     holds_a_shaft_that_rests()
 
 
-def mutated(monkeypatch: pytest.MonkeyPatch, right: str, wrong: str) -> LoopSimulation:
-    """The same loop from a source in which one thing is wrong."""
+@pytest.fixture(scope="module")
+def wrong() -> LoopSimulation:
+    """The same loop from a source in which two things are wrong that have nothing to do with each other."""
     source: Callable[..., str] = loop.LoopDesign.source
+    mutants = {"else torque = 0;": "else torque *= 0.01;", "observe(seconds, n ?": "observe(2e-5, n ?"}
 
     def changed(design: loop.LoopDesign, model: str) -> str:
         text = source(design, model)
-        assert text.count(right) == 1
-        return text.replace(right, wrong)
+        for right, other in mutants.items():
+            assert text.count(right) == 1
+            text = text.replace(right, other)
+        return text
 
-    monkeypatch.setattr(loop.LoopDesign, "source", changed)
-    return LoopSimulation(S_CORE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop.LoopDesign, "source", changed)
+        return LoopSimulation(S_CORE)
 
 
-def test_a_shaft_that_creeps_at_rest_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    creeping = mutated(monkeypatch, "else torque = 0;", "else torque *= 0.01;")
+def test_a_shaft_that_creeps_at_rest_is_caught(wrong: LoopSimulation) -> None:
     with caught():
-        holds_a_shaft_that_rests(creeping)
+        holds_a_shaft_that_rests(wrong)
 
 
 @pytest.mark.parametrize("encoder", [IDEAL, replace(REAL, jitter=0, duty_error_deg=15), replace(REAL, jitter=0)])
@@ -177,8 +181,7 @@ def test_weights_of_eq_22(way: Observer) -> None:
     weights_of_eq_22(way)
 
 
-def test_a_weight_that_forgets_the_measurement_time_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = mutated(monkeypatch, "observe(seconds, n ?", "observe(2e-5, n ?")
+def test_a_weight_that_forgets_the_measurement_time_is_caught(wrong: LoopSimulation) -> None:
     with caught():
         weights_of_eq_22(Observer.SYNCHRONISED, wrong)
 
