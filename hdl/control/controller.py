@@ -139,8 +139,9 @@ class Controller(wiring.Component):
             less_filter.eq(term == Term.FILTER),
             less_velocity.eq(term == Term.VELOCITY),
         ]
+        loaded = self._word(m, term, total, velocity, acceleration)
         with m.If(load):
-            m.d.sync += word.eq(self._word(m, term, total, velocity, acceleration))
+            m.d.sync += word.eq(loaded)
         with m.Elif(subtract):
             m.d.sync += word.eq(word - less)
         with m.If(self.tick):
