@@ -6,30 +6,31 @@ from proofs.formal.prove import Proof
 from support.control import Beside
 
 from tachometry.spec import Encoder, STachometer
-from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, Coefficients, ControlForm, Term
+from tachometry.spec.control.form import GUARD_BITS, Coefficients, ControlForm, Term
 from tachometry.spec.units import signed_width
 
 _SPEC = STachometer(encoder=Encoder(1))
 # Numbers as small as a solver can look at; the coefficients are of no real motor.
 _FORM = ControlForm(
-    velocity_width=3,
-    velocity_limit=3,
+    velocity_width=2,
+    velocity_limit=1,
     extra_bits=1,
-    factor_bits=3,
+    factor_bits=2,
     terms={
-        Term.FILTER: Coefficients((2, 4, 5)),
-        Term.OBSERVER: Coefficients((3, 5, 6)),
-        Term.CURRENT: Coefficients((4, 3, 2)),
-        Term.POSITION: Coefficients((3,)),
-        Term.VELOCITY: Coefficients((5,), 3),
-        Term.ACCELERATION: Coefficients((4,), 2),
-        Term.DISTURBANCE: Coefficients((6,), 2),
+        Term.FILTER: Coefficients((1, 2, 3)),
+        Term.OBSERVER: Coefficients((1, 2, 3)),
+        Term.CURRENT: Coefficients((2, 1, 1)),
+        Term.POSITION: Coefficients((3,), 4),
+        Term.VELOCITY: Coefficients((3,), 2),
+        Term.ACCELERATION: Coefficients((2,), 3),
+        Term.DISTURBANCE: Coefficients((3,), 1),
     },
-    current_limit=5,
+    current_limit=2,
     position_width=2,
     command_bits=1,
-    acceleration_width=3,
+    acceleration_width=2,
     synchronised=True,
+    position_bits=1,
 )
 _PROBES = {
     "core_due": "window.due",
@@ -63,7 +64,7 @@ def _control(name: str) -> Proof:
         "LIMIT": form.current_limit,
         "GUARD": GUARD_BITS,
         "POSITION_WIDTH": form.position_width,
-        "FRACTION": POSITION_FRAC_BITS,
+        "FRACTION": form.position_bits,
         "COMMAND_WIDTH": form.command_width,
         "COMMAND_BITS": form.command_bits,
         "ACCELERATION_WIDTH": form.acceleration_width,

@@ -1,7 +1,7 @@
 // Properties of the control loop, alone: any inputs, control ticks at any time after the one before is done. The reference
 // is computed from what is there at a control tick, in W bits: that the core is equal to it shows that nothing wraps.
 module control #(
-    parameter W = 16,
+    parameter W = 10,
     parameter VELOCITY_WIDTH = 3, V = 3, EXTRA = 1, P = 3, LONGEST = 3, N_WIDTH = 2, LIMIT = 5, GUARD = 4,
     parameter POSITION_WIDTH = 2, FRACTION = 8, COMMAND_WIDTH = 4, COMMAND_BITS = 1, ACCELERATION_WIDTH = 3,
     parameter Y_WIDTH = 4, W_WIDTH = 6, CURRENT_WIDTH = 4, SUM_WIDTH = 5, WORD_WIDTH = 12, TOTAL_WIDTH = 14,
@@ -129,7 +129,6 @@ module control #(
     lemma_limit: assert (core_limit == (since == FINISH + 1));
     lemma_term: assert (core_term == (since <= FINISH ? term : 0));
     lemma_since: assert (since <= DONE);
-    pc_valid: assert (valid == (since == DONE));
     // What is taken at a control tick.
     lemma_taken: assert (since == 0 || (t_held <= most_v && t_held >= -most_v && t_y <= most_y && t_y >= -most_y));
     lemma_z: assert (since == 0 || (t_z <= most_z && t_z >= -most_z));
@@ -140,16 +139,21 @@ module control #(
     lemma_held: assert (core_held <= most_v && core_held >= -most_v);
     // The words, and what becomes of them.
     pc_word: assert (!runs || step < 2 || core_word == word);
-    pc_y: assert (since == 0 || y == (since < EACH ? t_y : y1));
-    pc_w: assert (since == 0 || w == (since < EACH ? t_w : since < EACH * 2 ? w1 : since < EACH * 3 ? w2 : w3));
-    pc_total: assert (since == 0 || core_total == (since < EACH * 4 ? t_error : since < EACH * 5 ? sum3 : since < EACH * 6 ? sum4 : since < FINISH ? sum5 : sum6));
-    pc_current: assert (since != DONE || current == next_current);
-    pc_saturated: assert (since != DONE || saturated == (t_enable && wanted != limited));
-    pc_limit: assert (current <= limit && current >= -limit);
-    // What is at rest.
-    pc_bounds: assert (since != 0 || (y <= most_y && y >= -most_y && z <= most_z && z >= -most_z));
+    pc_state: assert (
+        y <= most_y && y >= -most_y && z <= most_z && z >= -most_z &&
+        (since == 0 ||
+            (y == (since < EACH ? t_y : y1) &&
+             w == (since < EACH ? t_w : since < EACH * 2 ? w1 : since < EACH * 3 ? w2 : w3))));
+    pc_total: assert (
+        since == 0 || core_total == (
+            since < EACH * 4 ? t_error : since < EACH * 5 ? sum3 : since < EACH * 6 ? sum4 : since < FINISH ? sum5 : sum6));
+    // Within its limit at all times, and at the end what the equations say.
+    pc_current: assert (
+        valid == (since == DONE) && current <= limit && current >= -limit &&
+        (since != DONE || (current == next_current && saturated == (t_enable && wanted != limited))));
+    // Whatever has come.
     pc_n: assert (core_n == n && n <= LONGEST);
-    pc_sum: assert (core_sum == sum && sum <= $signed({1'b0, n}) * limit && sum >= -$signed({1'b0, n}) * limit);
+    lemma_total: assert (core_sum == sum && sum <= $signed({1'b0, n}) * limit && sum >= -$signed({1'b0, n}) * limit);
     lemma_window: assert (since == 0 || (since < EACH * 3 ? n == t_n && sum == t_sum : t_due ? n == 0 && sum == 0 : n == t_n && sum == t_sum));
   end
 endmodule

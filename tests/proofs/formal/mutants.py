@@ -274,17 +274,9 @@ MUTANTS = [
     Mutant("two axes of four slots", "px_count", AxisCounters, "Mux(first, 0, before.count)", "before.count", 32),
     Mutant("three axes of five slots", "px_error", AxisCounters, "ready & illegal", "illegal"),
     Mutant("three axes of five slots", "px_complete", Rounds, "self.last.eq(clock.last)", "self.last.eq(self.first)"),
-    Mutant("control loop", "pc_total", Controller, "self.position << POSITION_FRAC_BITS", "0"),
+    Mutant("control loop", "pc_total", Controller, "self.position << form.position_bits", "0"),
     Mutant("control loop", "pc_word", Controller, "self.held << fine", "self.held"),
-    Mutant("control loop", "pc_y", Controller, "stored & due & to_y", "stored", 32),
-    Mutant("control loop", "pc_w", Controller, "stored & due & to_w", "stored", 32),
-    Mutant("control loop", "pc_bounds", Controller, "stored & due & to_w", "stored", 52),
-    Mutant("control loop", "pc_valid", Controller, "self.valid.eq(limit)", "self.valid.eq(finish)", 52),
-    Mutant("control loop", "pc_current", Controller, "Mux(enabled, limited, 0)", "limited", 52),
-    Mutant("control loop", "pc_saturated", Controller, "(beyond | changed) & enabled", "changed & enabled", 52),
-    Mutant("control loop", "pc_limit", Controller, "Mux(enabled, limited, 0)", "short", 52),
+    Mutant("control loop", "pc_state", Controller, "stored & due & to_y", "stored", 32),
+    Mutant("control loop", "pc_current", Controller, "Mux(enabled, limited, 0)", "Mux(enabled, short, 0)", 52),
     Mutant("control loop", "pc_n", UpdateWindow, "self.n + 1", "self.n + 2", 52),
-    Mutant(
-        "control loop", "pc_sum", UpdateWindow, "self.current_sum + self.current", "self.current_sum - self.current", 52
-    ),
 ]
