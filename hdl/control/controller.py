@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
-from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, TABLED, ControlForm, Term
+from tachometry.spec.control.form import GUARD_BITS, TABLED, ControlForm, Term
 from tachometry.spec.units import signed_width
 
 
@@ -70,7 +70,7 @@ class Controller(wiring.Component):
                 "held": In(signed(form.velocity_width)),
                 "position": In(signed(form.position_width)),
                 "enable": In(1),
-                "command_position": In(signed(form.position_width + POSITION_FRAC_BITS)),
+                "command_position": In(signed(form.position_width + form.position_bits)),
                 "command_velocity": In(signed(form.command_width)),
                 "command_acceleration": In(signed(form.acceleration_width)),
                 "n": In(range(form.longest + 1)),
@@ -139,12 +139,13 @@ class Controller(wiring.Component):
             less_filter.eq(term == Term.FILTER),
             less_velocity.eq(term == Term.VELOCITY),
         ]
+        loaded = self._word(m, term, total, velocity, acceleration)
         with m.If(load):
-            m.d.sync += word.eq(self._word(m, term, total, velocity, acceleration))
+            m.d.sync += word.eq(loaded)
         with m.Elif(subtract):
             m.d.sync += word.eq(word - less)
         with m.If(self.tick):
-            difference = self.command_position - (self.position << POSITION_FRAC_BITS)
+            difference = self.command_position - (self.position << form.position_bits)
             m.d.sync += [
                 due.eq(self.due),
                 enabled.eq(self.enable),

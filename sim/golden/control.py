@@ -10,7 +10,7 @@ from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+from tachometry.spec.control.form import GUARD_BITS, ControlForm, Term
 from tachometry.spec.control.loop import LoopSpec
 from tachometry.spec.control.ports import CONTROL, CURRENT
 from tachometry.spec.port import UPDATE
@@ -60,7 +60,7 @@ class Control:
         # For each term the shift and the coefficients, as reading them takes most of the time.
         self._terms = {term: (one.shift, one.values) for term, one in form.terms.items()}
         self._half = 1 << (form.factor_bits - 1)
-        wraps = form.position_width + POSITION_FRAC_BITS
+        wraps = form.position_width + form.position_bits
         self._turn, self._half_turn, self._most_error = 1 << wraps, 1 << (wraps - 1), form.most_error
 
     @property
@@ -83,7 +83,7 @@ class Control:
         elif self._waits or self._n == form.longest:
             self._observe(self._n)
         self._waits, self._ticked = False, True
-        error = (command.position - (position << POSITION_FRAC_BITS) + self._half_turn) % self._turn - self._half_turn
+        error = (command.position - (position << form.position_bits) + self._half_turn) % self._turn - self._half_turn
         error = max(-self._most_error, min(error, self._most_error))
         speed = (command.velocity << (form.extra_bits - form.command_bits)) - self.y
         total = (

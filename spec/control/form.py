@@ -100,6 +100,8 @@ class ControlForm:
         Bits of the position, fraction bits of the commanded velocity, bits of the commanded acceleration.
     synchronised : bool
         Whether filter and observer work at updates of the velocity, not at control ticks.
+    position_bits : int
+        Fraction bits of the commanded position.
     """
 
     velocity_width: int
@@ -112,6 +114,7 @@ class ControlForm:
     command_bits: int
     acceleration_width: int
     synchronised: bool
+    position_bits: int = POSITION_FRAC_BITS
 
     @property
     def longest(self) -> int:
@@ -161,7 +164,7 @@ class ControlForm:
     @cached_property
     def most_error(self) -> int:
         """The position error is held within ±this, in units of the commanded position: all bits are 1."""
-        half = (1 << (self.position_width + POSITION_FRAC_BITS - 1)) - 1
+        half = (1 << (self.position_width + self.position_bits - 1)) - 1
         if not self.terms[Term.POSITION].values[0]:
             return 1
         enough = self._most_others + (self.current_limit << GUARD_BITS) + 1
@@ -202,7 +205,7 @@ class ControlForm:
     @property
     def total_width(self) -> int:
         """Bits of the sum that becomes the current, and of the position error before it is held."""
-        return max(signed_width(self.most_total), self.position_width + POSITION_FRAC_BITS)
+        return max(signed_width(self.most_total), self.position_width + self.position_bits)
 
 
 def ratios(rate: Fraction, seconds: Fraction, longest: int) -> list[Fraction]:

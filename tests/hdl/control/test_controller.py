@@ -74,7 +74,7 @@ MUTANTS: dict[str, tuple[Any, str, str, LoopSpec, int]] = {
         SMALL,
         0,
     ),
-    "position error without the position": (Controller, "self.position << POSITION_FRAC_BITS", "0", SMALL, 8),
+    "position error without the position": (Controller, "self.position << form.position_bits", "0", SMALL, 8),
     "an update every time": (Controller, "due.eq(self.due)", "due.eq(1)", SMALL, 8),
     "w without the change of y": (
         Controller,
