@@ -1,7 +1,5 @@
 """What the datapaths of the methods have in common that measure the time between counts."""
 
-from functools import cached_property
-
 from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
@@ -39,6 +37,8 @@ class TimedDatapath(wiring.Component):
         self._spec = spec
         self.gap_timer = GapTimer(spec.max_periods, on_lattice=spec.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
+        if not spec.on_lattice:
+            self.count_way = CountWay(reversals=not spec.paper_exact)
         super().__init__(
             {
                 **datapath_members(spec),
@@ -57,11 +57,6 @@ class TimedDatapath(wiring.Component):
         if self._spec.on_lattice:  # which counts with the tick
             return ()
         return (IdleCounter("gap_timer.age", 1, (self._spec.max_periods - 1,)),)
-
-    @cached_property
-    def count_way(self) -> CountWay:
-        """The way of each count; there is none where times are counted in ticks."""
-        return CountWay(reversals=not self._spec.paper_exact)
 
     @property
     def _size(self) -> Signal:
