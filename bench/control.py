@@ -77,8 +77,13 @@ def in_gates(seeds: Sequence[int], jobs: int) -> str:
     cosine = replace(
         setting(KINDS[0], 50.0, 20e-6, REAL), task=Task(motion=Cosine(10.0), noise=held.task.noise), begin=1.0
     )
+    loops = {
+        "S, as in Fig. 15, k_v = 50, 10 s each": cosine,
+        "S, 39 rad/s, k_v = 80, 1.2 s each": held,
+        "M/T, 39 rad/s, k_v = 80, 1.2 s each": setting(KINDS[2], 80.0, 20e-6, REAL),
+    }
     rows = []
-    for name, one in (("as in Fig. 15, k_v = 50, 10 s each", cosine), ("39 rad/s, k_v = 80, 1.2 s each", held)):
+    for name, one in loops.items():
         with ThreadPoolExecutor(jobs) as pool:
             found = list(pool.map(functools.partial(check, one), seeds))
         gates, double = mean([one.gates for one in found]), mean([one.double for one in found])

@@ -37,6 +37,6 @@ def test_a_row_and_a_mark_for_every_gain_that_is_usable(tmp_path: Path, monkeypa
 def test_mismatches_of_all_seeds_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "check", lambda one, seed: Checked(1000, seed, FINE, FINE))
     rows = bench.in_gates(range(6), 1).splitlines()[2:]
-    assert len(rows) == 2
+    assert len(rows) == 3
     for line in rows:
         assert line.split(" | ")[1:] == ["6000", "15", "0.1234", "0.1234", "0.3", "0.3 |"]
