@@ -10,10 +10,11 @@ from pathlib import Path
 
 from pages import markdown
 
+from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
-from tachometry.sim.figures.tsuji_loops import Cosine
+from tachometry.sim.figures.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
 from tachometry.sim.plots.usable_gain import Found, save_usable_gains
-from tachometry.sim.studies.control import Outcome, Task, mean, outcome_of
+from tachometry.sim.studies.control import Outcome, Task, each_seed, mean, outcome_of
 from tachometry.sim.studies.gate_check import check
 from tachometry.sim.studies.usable_gain import IDEAL, KINDS, REAL, TICKS, setting, usable, variants
 
@@ -94,12 +95,27 @@ def in_gates(seeds: Sequence[int], jobs: int) -> str:
     return markdown(heads, rows)
 
 
+def solutions(seeds: Sequence[int], jobs: int) -> str:
+    """The largest deviations of Fig. 14 with shorter ticks, mean of seeds: 1 s to 39 rad/s, from 2 s to 4 s."""
+    motion, rows = parse_motion("ramp:0:39rad/s:1s+constant:39rad/s:3s"), []
+    for seconds in (1e-3, 1e-4, 20e-6, 1e-6):
+        _, tick = TICKS[seconds]
+        found = []
+        for _, cancel, synchronised in SOLUTIONS:
+            logs = each_seed(solution(tick, motion, cancel, synchronised), seeds, jobs)
+            found.append(sum(deviation(log, 2.0) for log in logs) / len(seeds))
+        rows.append((SHOWN_TICKS[seconds], *(f"{value:.2f}" for value in found)))
+    return markdown(("T_s", "(a)", "(b)", "(c)"), rows)
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=6, metavar="N", help="seeds of what is random (%(default)s)")
     parser.add_argument("--jobs", type=int, metavar="N", help="threads (one for each core)")
-    parser.add_argument("--only", choices=("gains", "weights", "assumptions", "gates"), help="one of the tables")
+    parser.add_argument(
+        "--only", choices=("gains", "weights", "assumptions", "gates", "solutions"), help="one of the tables"
+    )
     parser.add_argument("--plot", type=Path, metavar="FILE", help="figure of the usable gains")
     given = parser.parse_args()
     seeds = range(given.seeds)
@@ -107,6 +123,8 @@ def main() -> None:
         sys.stdout.write(f"{weights(seeds, given.jobs)}\n")
     if given.only in (None, "assumptions"):
         sys.stdout.write(f"{assumptions(seeds, given.jobs)}\n")
+    if given.only in (None, "solutions"):
+        sys.stdout.write(f"{solutions(seeds, given.jobs)}\n")
     if given.only in (None, "gates"):
         sys.stdout.write(f"{in_gates(seeds, given.jobs)}\n")
     if given.only in (None, "gains"):

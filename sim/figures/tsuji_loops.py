@@ -11,7 +11,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Gains, Log, Motor, Observer
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
-from tachometry.sim.studies.control import Load, Setting, Task, as_shown, each_seed, mean
+from tachometry.sim.studies.control import Command, Load, Setting, Task, as_shown, each_seed, mean
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing
 
 _LINES = 500
@@ -99,21 +99,22 @@ def fig13(lab: Lab) -> Result:
     )
 
 
+# Of Fig. 14: whether alternate alterations are cancelled, and whether the observer is synchronised.
+SOLUTIONS = (
+    ("(a) without any technical solutions", False, False),
+    ("(b) cancelling out alternate pulse alteration", True, False),
+    ("(c) and synchronising the disturbance observer", True, True),
+)
+
+
 def fig14(lab: Lab) -> Result:
     """Fig. 14: S without the technical solutions, with alternate alterations cancelled, and synchronised too."""
-    task = Task(motion=parse_motion("ramp:0:39rad/s:5s+constant:39rad/s:10s"), noise=_NOISE)
-    cases = [
-        ("(a) without any technical solutions", False, False),
-        ("(b) cancelling out alternate pulse alteration", True, False),
-        ("(c) and synchronising the disturbance observer", True, True),
-    ]
+    motion = parse_motion("ramp:0:39rad/s:5s+constant:39rad/s:10s")
     panels, means = [], []
     limits: dict[str, Any] = {"levels": tuple(_COUNT / 1e-3 * k for k in range(1, 4)), "y_limits": (0.0, 48.0)}
-    for title, cancel, synchronised in cases:
-        spec = _core(STachometer, decoding=1, tick="1ms", cancel=cancel)
-        setting = _setting(spec, task, 8.0, kp=100.0, kv=30.0, rate=40.0, synchronised=synchronised)
-        logs = list(each_seed(setting, lab.seeds))
-        means.append(float(np.mean([_deviation(log, 8.0) for log in logs])))
+    for title, cancel, synchronised in SOLUTIONS:
+        logs = list(each_seed(solution("1ms", motion, cancel, synchronised), lab.seeds))
+        means.append(float(np.mean([deviation(log, 8.0) for log in logs])))
         panels.append(Panel(title, _TIME, _SPEED, (_shown(logs[0]),), **limits))
         held = Curve("velocity of the core", logs[0]["time"], logs[0]["held"], "held")
     panels.append(Panel("(d) as (c), without a filter", _TIME, _SPEED, (held,), **limits))
@@ -134,7 +135,13 @@ def fig14(lab: Lab) -> Result:
     )
 
 
-def _deviation(log: Log, begin: float) -> float:
+def solution(tick: str, motion: Command, cancel: bool, synchronised: bool) -> Setting:
+    """The loop of Fig. 14 with some of the technical solutions."""
+    spec, task = _core(STachometer, decoding=1, tick=tick, cancel=cancel), Task(motion=motion, noise=_NOISE)
+    return _setting(spec, task, 0.0, kp=100.0, kv=30.0, rate=40.0, synchronised=synchronised)
+
+
+def deviation(log: Log, begin: float) -> float:
     """The largest deviation of the speed as it is shown from the command, from a time on."""
     shown = _shown(log)
     wanted = np.interp(shown.x, log["time"], log["command"])
