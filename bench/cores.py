@@ -11,7 +11,6 @@ from tachometry.hdl.export import verilog_of
 from tachometry.sim.studies.size import CORE, TARGETS
 from tachometry.spec import (
     AxesSpec,
-    CoreSpec,
     Encoder,
     MTachometer,
     MTTachometer,
@@ -24,6 +23,7 @@ from tachometry.spec import (
     TrackTachometer,
     TTachometer,
 )
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
@@ -36,7 +36,7 @@ class Configuration:
     ----------
     name, what : str
         Its name, and what distinguishes it, for the tables.
-    spec : TachometerSpec or AxesSpec
+    spec : TachometerSpec, AxesSpec or LoopSpec
     bars : dict
         Limits by target and figure: Fmax must reach its bar, everything else must not exceed it.
     is_option : bool
@@ -52,7 +52,7 @@ class Configuration:
 
     name: str
     what: str
-    spec: CoreSpec
+    spec: AnySpec
     bars: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_option: bool = True
     targets: tuple[str, ...] = tuple(TARGETS)
@@ -64,7 +64,7 @@ class Configuration:
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
         """Verilog and ports."""
         bus = bus_of(self.bus)
-        if isinstance(self.spec, AxesSpec):
+        if isinstance(self.spec, AxesSpec | LoopSpec):
             return export(self.spec, CORE)[f"{CORE}.v"], self.spec.ports
         if self.demo and bus is not None:
             registers = DemoMap(self.spec)
@@ -111,6 +111,11 @@ AXES_BARS: dict[int, Mapping[str, Mapping[str, float]]] = {
     8: {"ECP5": {"COMB": 8 * 60, "FF": 8 * 65, "MULT": 0, "Fmax": 140}},
     32: {"ECP5": {"COMB": 32 * 26, "FF": 32 * 22, "MULT": 0, "Fmax": 140}},
 }
+LOOPS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("", "reference with control loop", {}),
+    ("conventional", "and a conventional observer", {"synchronised": False}),
+    ("parallel", "and a parallel multiplier", {"multiplier": "parallel"}),
+)
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
 
@@ -269,6 +274,10 @@ CONFIGURATIONS = (
             f"axes-{axes}", f"axes of the reference: {axes}", AxesSpec(tachometer=REFERENCE, axes=axes), bars, False
         )
         for axes, bars in AXES_BARS.items()
+    ),
+    *(
+        Configuration(f"loop-{name}" if name else "loop", what, LoopSpec(tachometer=REFERENCE, **options), {}, False)
+        for name, what, options in LOOPS
     ),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),
 )

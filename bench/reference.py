@@ -9,7 +9,9 @@ from pages import markdown, write
 
 from tachometry.cli.group import cli
 from tachometry.cli.options.option import Option
-from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing, of_texts
+from tachometry.spec import METHODS, Encoder, Port, TachometerSpec, Timing, of_texts
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.registers.buses import BUSES
 from tachometry.spec.registers.map import RegisterMap
 from tachometry.spec.registers.page import tables
@@ -30,6 +32,8 @@ SPEED = {
     **{"ppr": "2500", "max-speed": "4000rpm", "clock": "100MHz", "tick": "50us", "max-time": "10ms"},
     **{"external-tick": "yes", "unit": "rpm", "lsb": "2^-4", "velocity-width": "18", "age": "yes"},
 }
+_HEADER = ["port", "when", "kind", "meaning"]
+_LOOP = LoopSpec(tachometer=of_texts("s", {"ppr": "500"}))
 _REGISTERS = """\
 # Registers
 
@@ -171,9 +175,7 @@ def ports() -> str:
     for method in METHODS:
         for spec in _cores(method):
             for port in spec.ports:
-                kind = "strobe" if port.is_strobe else f"with `{port.held_by}`" if port.held_by else port.direction
-                width = "signed" if port.signed else "1 bit" if port.width == 1 else "unsigned"
-                found.setdefault(port.name, [f"`{port.name}`", kind, width, port.help])
+                found.setdefault(port.name, _described(port))
                 if method not in has.setdefault(port.name, []):
                     has[port.name].append(method)
     rows = []
@@ -186,12 +188,22 @@ def ports() -> str:
             "Made by `make docs` from `spec.ports`. A *strobe* is high for one clock; an output *with* a strobe is new "
             "in its clocks, and held until the next. Widths depend on the options: the manifest NAME.json has those "
             "of your core.\n",
-            markdown(["port", "when", "kind", "meaning"], rows, left=range(4)),
+            markdown(_HEADER, rows, left=range(4)),
             "\nThe manifest states the latencies: a level sampled at clock c is counted in the window of c + "
             "`pin_to_count`, `tick` is high `tick_latency` clocks after the window's last clock, and `velocity_valid` "
             "`tick_to_velocity` clocks after `tick`.\n",
+            "## Of a control loop\n",
+            "With `--loop` a core has these as well. Commands and outputs are synchronous to the clock.\n",
+            markdown(_HEADER, [_described(port) for port in loop_ports(_LOOP)], left=range(4)),
         ]
     )
+
+
+def _described(port: Port) -> list[str]:
+    """A row of the table of ports."""
+    kind = "strobe" if port.is_strobe else f"with `{port.held_by}`" if port.held_by else port.direction
+    width = "signed" if port.signed else "1 bit" if port.width == 1 else "unsigned"
+    return [f"`{port.name}`", kind, width, port.help]
 
 
 def registers() -> str:

@@ -119,7 +119,7 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 - Fmax is that of the core in a wrapper, routed. It is the median over seeds 1 to 9; in brackets are the slowest and the
   fastest of them. A bar is met if the median meets it. The inputs come from a shift register. The outputs are
   registered, and then loaded into a shift register that ends in one pin.
-- Latency is from `tick` to `velocity_valid`.
+- Latency is from `tick` to `velocity_valid`; of a core with a control loop, from `control_tick` to `current_valid`.
 - The column "what limits Fmax" has the longest path of the median seed, from register to register, as `box.signal`.
 
 """

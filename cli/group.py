@@ -8,6 +8,7 @@ from tachometry.cli.commands.build import build
 from tachometry.cli.commands.compare import compare
 from tachometry.cli.commands.figures import figures
 from tachometry.cli.commands.generate import generate
+from tachometry.cli.commands.loop import loop
 from tachometry.cli.commands.monitor import monitor
 from tachometry.cli.commands.plan import plan
 from tachometry.cli.commands.program import program
@@ -56,6 +57,7 @@ cli.add_command(simulate)
 cli.add_command(replay)
 cli.add_command(compare)
 cli.add_command(sweep)
+cli.add_command(loop)
 cli.add_command(figures)
 cli.add_command(verify)
 cli.add_command(build)

@@ -13,7 +13,8 @@ from amaranth.lib import wiring
 from tachometry.hdl.bus_tachometer import BusTachometer
 from tachometry.hdl.core import core_of
 from tachometry.hdl.kit import kit
-from tachometry.spec import AxesSpec, CoreSpec, ParameterError
+from tachometry.spec import AxesSpec, ParameterError
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.manifest import manifest
 from tachometry.spec.provenance import LICENSE, generator, notice
 from tachometry.spec.registers.buses import Bus, bus_of, manifest_on
@@ -37,7 +38,7 @@ _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
 
 
 def export(
-    spec: CoreSpec,
+    spec: AnySpec,
     name: str = "tachometer",
     bus: str | None = None,
     baud: int | None = None,
@@ -53,7 +54,7 @@ def export(
 
     Parameters
     ----------
-    spec : TachometerSpec or AxesSpec
+    spec : TachometerSpec, AxesSpec or LoopSpec
     name : str
         Name of the module and of the files.
     bus : str or None
@@ -68,14 +69,15 @@ def export(
     ------
     ValueError
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
-        the target needs another bus or another core; if a core of many axes is to have either.
+        the target needs another bus or another core; if a core of many axes or with a loop is to have either.
     """
     bus = bus_for(target, bus)
     on = bus_of(bus, baud)
-    if isinstance(spec, AxesSpec):
+    if isinstance(spec, AxesSpec | LoopSpec):
         if on is not None or target in TARGETS:
             what = "target" if target in TARGETS else "bus"
-            raise ParameterError(what, "must not be given together with axes: registers and targets are for one axis")
+            other, whom = ("loop", "a tachometer alone") if isinstance(spec, LoopSpec) else ("axes", "one axis")
+            raise ParameterError(what, f"must not be given together with {other}: registers and targets are for {whom}")
         return _files(spec, name, core_of(spec), manifest(spec, name), None, {})
     described = manifest(spec, name)
     files: dict[str, str] = {}
@@ -94,7 +96,7 @@ def export(
 
 
 def _files(
-    spec: CoreSpec, name: str, top: wiring.Component, described: dict[str, Any], on: Bus | None, more: dict[str, str]
+    spec: AnySpec, name: str, top: wiring.Component, described: dict[str, Any], on: Bus | None, more: dict[str, str]
 ) -> dict[str, str]:
     """The core, its manifest, and what lies beside them."""
     described = {"generator": generator(), "license": LICENSE, **described}

@@ -3,7 +3,8 @@
 import textwrap
 from collections.abc import Sequence
 
-from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec import AxesSpec, TachometerSpec
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.port import Port
 from tachometry.spec.provenance import notice, version
 from tachometry.spec.registers.buses import Bus, ports_on
@@ -182,18 +183,20 @@ _STEPS_PER_TICK, _LONGEST_HOLD = 4, 5000
 Boxes = dict[str, tuple[str, ...]]
 
 
-def kit(spec: CoreSpec, name: str, bus: Bus | None = None) -> dict[str, str]:
+def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
     """Texts by file name: `NAME.core`, `NAME_inst.v`, `NAME_tb.sv`, `NAME.xdc`, `NAME.sdc`.
 
     Parameters
     ----------
-    spec : TachometerSpec or AxesSpec
+    spec : TachometerSpec, AxesSpec or LoopSpec
     name : str
         Of the module.
     bus : Bus or None
         On which its registers are.
     """
-    ports = spec.ports if isinstance(spec, AxesSpec) else ports_on(spec, bus)
+    ports = ports_on(spec, bus) if isinstance(spec, TachometerSpec) else spec.ports
+    # The commands of a loop are synchronous.
+    alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
     idle = bus.idle if bus else {}
 
     def filled(text: str, **parts: object) -> str:
@@ -213,8 +216,8 @@ def kit(spec: CoreSpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         # In a filter NAME is a property of Vivado.
         return filled(head) + "".join(part.replace(f"{{{name} =~", "{NAME =~") for part in parts)
 
-    of_pins, turning = _of_axes(spec) if isinstance(spec, AxesSpec) else _of_one(spec)
-    boxes: dict[str, tuple[str, ...]] = {pin.name: of_pins.get(pin.name, of_pins[""]) for pin in spec.pins}
+    of_pins, turning = _of_axes(alone) if isinstance(alone, AxesSpec) else _of_one(alone)
+    boxes: dict[str, tuple[str, ...]] = {pin.name: of_pins.get(pin.name, of_pins[""]) for pin in alone.pins}
     boxes |= dict.fromkeys(bus.asynchronous if bus else (), ("bridge",))
     bench = filled(
         _BENCH,

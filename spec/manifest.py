@@ -3,7 +3,9 @@
 import re
 from typing import Any
 
-from tachometry.spec.axes import AxesSpec, CoreSpec
+from tachometry.spec.axes import AxesSpec
+from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.control.ports import loop_entries
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import Port
 from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
@@ -54,7 +56,7 @@ def described_port(port: Port) -> dict[str, Any]:
     return {key: getattr(port, key) for key in _OF_PORTS}
 
 
-def manifest(spec: CoreSpec, name: str = "tachometer") -> dict[str, Any]:
+def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
     """All that a program or a driver must know of the exported core.
 
     Raises
@@ -64,6 +66,8 @@ def manifest(spec: CoreSpec, name: str = "tachometer") -> dict[str, Any]:
     """
     if isinstance(spec, AxesSpec):
         return _of_axes(spec, name)
+    if isinstance(spec, LoopSpec):
+        return _of_loop(spec, name)
     if name in {port.name for port in spec.ports}:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     recovery = spec.recovery_clocks
@@ -101,6 +105,19 @@ def manifest(spec: CoreSpec, name: str = "tachometer") -> dict[str, Any]:
             if spec.max_tick_cycles
             else {}
         ),
+        "ports": [described_port(port) for port in spec.ports],
+        "parameters": spec.parameters,
+    }
+
+
+def _of_loop(spec: LoopSpec, name: str) -> dict[str, Any]:
+    """What a core with a control loop says beside its tachometer."""
+    if name in {port.name for port in spec.ports}:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    found = manifest(spec.tachometer, name)
+    found.pop("recovery_cycles", None)  # filter and observer forget gradually
+    return found | {
+        "loop": loop_entries(spec),
         "ports": [described_port(port) for port in spec.ports],
         "parameters": spec.parameters,
     }

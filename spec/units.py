@@ -60,6 +60,10 @@ ANGLE = {**_decimal(rad=0, mrad=-3), "deg": Unit(pi=Fraction(1, 180))}
 DEGREES = {"deg": Unit()}
 BANDWIDTH = {"rad/s": Unit(), **{name: Unit(unit.size, Fraction(2)) for name, unit in FREQUENCY.items()}}
 FRACTION = {"": Unit(), "%": Unit(Fraction(1, 100))}
+PLAIN = {"": Unit()}
+CURRENT = _decimal(A=0, mA=-3)
+TORQUE_CONSTANT = {"Nm/A": Unit(), "mNm/A": Unit(Fraction(1, 1000))}
+TORQUE = _decimal(Nm=0, mNm=-3)
 
 
 def read_quantity(what: str, text: str, units: Units, default: str = "") -> tuple[Fraction, str]:
@@ -86,8 +90,9 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
     if match is None or unit not in units:
         names = ", ".join(filter(None, units))
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
-        allowed = f"or one in {names}" if "" in units else allowed
-        raise ParameterError(what, f"must be a number {allowed}, not {text!r}")
+        if "" in units:
+            allowed = names and f"or one in {names}"
+        raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed)))}, not {text!r}")
     value = Fraction(match[1])
     if value and not _LEAST <= abs(value) <= _GREATEST:
         raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")

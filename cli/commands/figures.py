@@ -33,8 +33,9 @@ Examples:
     "--only",
     default="all",
     metavar="LIST",
-    help="Figures to draw: all, or names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12 (Tsuji "
-    "2009), rairan2, rairan3, rairan5, rairan7 (Rairán 2013).",
+    help="Figures to draw: all, or names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12, "
+    "tsuji13, tsuji14, tsuji15 (Tsuji 2009), rairan2, rairan3, rairan5, rairan7 (Rairán 2013). The last three of Tsuji "
+    "need a C++ compiler; without one, all leaves them out.",
 )
 @option(
     _FIGURES,
@@ -85,7 +86,11 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
 def _chosen(only: str) -> list[Entry]:
     from tachometry.sim.figures import FIGURES
 
-    names = list(FIGURES) if only.strip() == "all" else list(dict.fromkeys(name.strip() for name in only.split(",")))
+    if only.strip() == "all":
+        from tachometry.sim.engines.build import find_compiler
+
+        return [entry for entry in FIGURES.values() if not entry.compiled or find_compiler() is not None]
+    names = list(dict.fromkeys(name.strip() for name in only.split(",")))
     for name in names:
         if name not in FIGURES:
             raise ValueError(f"--only must be of {', '.join(FIGURES)}, or all, not {name!r}")

@@ -11,9 +11,11 @@ import click
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import axes_options
 from tachometry.cli.options.core import core_options
+from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
-from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec import AxesSpec, TachometerSpec
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
 from tachometry.spec.registers.files import REGISTER_FILES
@@ -35,10 +37,13 @@ Examples:
       --max-speed 6000rpm --name spindle -o rtl
   tachometry generate --ppr 500 --clock 1MHz --tick 100us --max-time 5ms \\
       --testbench cocotb -o sim
-  tachometry generate --ppr 500 --max-speed 1000rad/s --axes 8 -o axes""",
+  tachometry generate --ppr 500 --max-speed 1000rad/s --axes 8 -o axes
+  tachometry generate --ppr 500 --max-speed 1000rad/s --loop --kp 6400 --kv 160 \\
+      --observer 320rad/s -o drive""",
 )
 @core_options
 @axes_options
+@loop_options
 @option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
 @option(
     "Files",
@@ -85,7 +90,7 @@ Examples:
 )
 @optional_motion_options
 def generate(
-    spec: CoreSpec,
+    spec: AnySpec,
     name: str,
     directory: Path,
     testbench: str | None,
@@ -128,6 +133,8 @@ def generate(
         raise ValueError("--motion must be given together with --testbench")
     if testbench is not None and isinstance(spec, AxesSpec):
         raise ValueError("--testbench must not be given together with --axes: it is of one axis")
+    if testbench is not None and isinstance(spec, LoopSpec):
+        raise ValueError("--testbench must not be given together with --loop: it is of a tachometer alone")
     files = [name + suffix for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")]
     if bus != "none":
         files += [name + suffix for suffix in REGISTER_FILES]
@@ -137,7 +144,7 @@ def generate(
         files += [f"test_{name}.py", f"{name}_vectors.json"]
     with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
         bench: dict[str, str] = {}
-        if testbench and not isinstance(spec, AxesSpec):  # first: what is wrong with a motion is found at once
+        if testbench and isinstance(spec, TachometerSpec):  # first: what is wrong with a motion is found at once
             from tachometry.sim.testbench.vectors import cocotb_bench
 
             bench = cocotb_bench(spec, name, None if record is None else record(spec).recording)
@@ -153,6 +160,10 @@ def generate(
         from tachometry.cli.reports.axes import print_axes_core
 
         print_axes_core(spec)
+    elif isinstance(spec, LoopSpec):
+        from tachometry.cli.reports.loop import print_loop_core
+
+        print_loop_core(spec)
     else:
         from tachometry.cli.reports.core import print_core
 

@@ -10,10 +10,11 @@ import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, tables_of
-from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
-from tachometry.cli.options.sweep import by_name, point_options
+from tachometry.cli.options.option import FilePath, option, output
+from tachometry.cli.options.sweep import point_options
 from tachometry.cli.reports.streams import INTERRUPTED
-from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
+from tachometry.cli.sweeping.command import VaryingCommand
+from tachometry.cli.sweeping.settings import Settings
 from tachometry.spec.units import parse_time, plural
 
 if TYPE_CHECKING:  # numpy, pyarrow and Dask are slow to import, and --help needs none of them
@@ -34,31 +35,9 @@ METRICS = {
 }
 
 
-class _Command(GroupedCommand):
-    """A command whose options may also stand in a file, and may vary; one that varies is read with its first value."""
-
-    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        own = super().get_params(ctx)
-        return [*own, *(option for option in point_options().values() if option not in own)]
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        raw, _, _ = self.make_parser(ctx).parse_args(list(args))
-        asked = self.get_help_option(ctx)
-        if asked is not None and raw.get(asked.name or ""):
-            return super().parse_args(ctx, args)
-        options = by_name(self) | point_options()
-        file = raw.get("file")
-        settings = of_command_line(raw, options)
-        if isinstance(file, str) and file:
-            settings = settings.over(of_file(Path(file), options))
-        ctx.obj = settings
-        first = {name: text for name, text in settings.first().items() if name in options}
-        words = [*arguments(first, options), *([file] if isinstance(file, str) else [])]
-        return super().parse_args(ctx, words)
-
-
 @click.command(
-    cls=_Command,
+    cls=VaryingCommand,
+    points=point_options,
     short_help="Run methods over ranges of options and speeds, on all processors.",
     epilog=f"""{FORMS}
 

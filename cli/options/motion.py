@@ -146,6 +146,18 @@ def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return all_of([_motion(required=True), *_OPTIONS], _recording(command))
 
 
+def disc_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: the motion, and what may be wrong with the disc and its edges where a loop is closed about them.
+
+    They are handed over as `motion`, `jitter`, `nonuniformity`, `phase_error_deg`, `duty_error_deg` and `seed`.
+    """
+    whole = click.Command(None)
+    all_of(_OPTIONS, whole)
+    named = dict(zip((parameter.opts[0] for parameter in whole.params[::-1]), _OPTIONS, strict=True))
+    kept = ("--jitter", "--nonuniformity", "--phase-error", "--duty-error", "--seed")
+    return all_of([_motion(required=True), *(named[name] for name in kept)], command)
+
+
 def optional_motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorator: as `motion_options`, but without a motion `record` is None."""
     return all_of([_motion(required=False), *_OPTIONS], _recording(command))

@@ -82,7 +82,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     everything = methods.strip() == "all"
     listed = [(name, name, {}) for name in METHODS] if everything else listed_methods(methods)
     _check_axes(settings, {method for _, method, _ in listed if method is not None})
-    own = [[name for name in settings.vary if _has(settings, str(method), name)] for _, method, _ in listed]
+    own = [[name for name in settings.vary if has_option(settings, str(method), name)] for _, method, _ in listed]
     count = sum(math.prod(len(settings.vary[name]) for name in names) for names in own)
     if count > _MOST:
         raise ValueError(f"--vary must give at most {_MOST} points, not {count}")
@@ -90,7 +90,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     found = Points({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
     for (name, method, given), names in zip(listed, own, strict=True):
         assert method is not None
-        fixed = {key: text for key, text in settings.fixed.items() if _has(settings, method, key)}
+        fixed = {key: text for key, text in settings.fixed.items() if has_option(settings, method, key)}
         for values in product(*(settings.vary[key] for key in names)):
             at = dict(zip(names, values, strict=True))
             try:
@@ -108,7 +108,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     return found
 
 
-def _has(settings: Settings, method: str, name: str) -> bool:
+def has_option(settings: Settings, method: str, name: str) -> bool:
     """Whether an option is for a method."""
     own_ticks = METHODS[method].own_ticks
     if name == "dt":

@@ -26,6 +26,7 @@ from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import packed
 from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import CoreSpec, Port
+from tachometry.spec.control import AnySpec
 
 DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
 
@@ -40,14 +41,14 @@ class Design:
 
     Parameters
     ----------
-    spec : CoreSpec
+    spec : AnySpec
     pins : list of Port
         Inputs, in the order of their levels.
     watched : Watched or None
         The core with shown signals, if there are any to be shown.
     """
 
-    spec: CoreSpec
+    spec: AnySpec
     pins: list[Port]
     watched: Watched | None = None
 
@@ -110,7 +111,7 @@ class CompiledEngine(ABC):
     every_clock = False  # none is skipped
 
     def __init__(self) -> None:
-        self._libraries: dict[CoreSpec, Path] = {}
+        self._libraries: dict[AnySpec, Path] = {}
 
     @abstractmethod
     def library(self, design: Design) -> Path:

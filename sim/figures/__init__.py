@@ -6,6 +6,7 @@
 from tachometry.sim.figures.rairan_algorithm import fig2, fig3
 from tachometry.sim.figures.rairan_runs import fig5, fig7
 from tachometry.sim.figures.result import Entry
+from tachometry.sim.figures.tsuji_loops import fig13, fig14, fig15
 from tachometry.sim.figures.tsuji_methods import fig06, fig07, fig08
 from tachometry.sim.figures.tsuji_runs import fig05, fig09, fig12
 
@@ -19,6 +20,9 @@ FIGURES: dict[str, Entry] = {
         Entry("tsuji8", fig08, 1),
         Entry("tsuji9", fig09, 1),
         Entry("tsuji12", fig12, 20),
+        Entry("tsuji13", fig13, 4, compiled=True),
+        Entry("tsuji14", fig14, 8, compiled=True),
+        Entry("tsuji15", fig15, 45, compiled=True),
         Entry("rairan2", fig2, 1),
         Entry("rairan3", fig3, 1),
         Entry("rairan5", fig5, 50),

@@ -21,6 +21,8 @@ class Lab:
         Whether the hardware is simulated where a figure asks for it; else its golden model alone.
     progress : callable or None
         Called with the share of the figure that is done.
+    whole : bool
+        Whether control loops are run with six seeds and all gains; else with one seed and a few gains.
 
     Attributes
     ----------
@@ -30,10 +32,14 @@ class Lab:
         The first of them in each signal.
     locked : int
         Clocks over which the hardware was compared.
+    seeds : range
+        Of runs of control loops.
     """
 
-    def __init__(self, hdl: bool = True, progress: Callable[[float], None] | None = None) -> None:
+    def __init__(self, hdl: bool = True, progress: Callable[[float], None] | None = None, whole: bool = True) -> None:
         self._hdl = hdl
+        self.whole = whole
+        self.seeds = range(6 if whole else 1)
         self._progress = progress
         self.mismatches = 0
         self.first: list[str] = []

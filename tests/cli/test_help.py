@@ -34,6 +34,7 @@ def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> N
         "replay",
         "compare",
         "sweep",
+        "loop",
         "figures",
         "build",
         "program",
@@ -69,6 +70,15 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
             ["Sweep", "Machines", "Motion", "Encoder faults", "Outputs"],
         ),
         (
+            "loop",
+            [
+                *"--kp --kv --observer --velocity-filter --synchronised --control-period --delay".split(),
+                *"--current-limit --inertia --friction --load --vary --methods --seeds --log --csv --seed".split(),
+                *FAULTS[:4],
+            ],
+            ["Controller", "Motor and load", "Sweep", "Motion", "Encoder faults", "Outputs"],
+        ),
+        (
             "replay",
             ["CAPTURE", "--a", "--b", "--z", "--tick-in", "--time", "--samplerate", *OUTPUTS],
             ["Capture", "Outputs"],
@@ -80,7 +90,7 @@ def test_every_option_is_explained(
 ) -> None:
     text = shown(capsys, command, "--help")
     words = text.replace(",", " ").split()
-    for option in [*CORE, *options, *(["--method"] if command != "sweep" else [])]:
+    for option in [*CORE, *options, *(["--method"] if command not in ("sweep", "loop") else [])]:
         assert option in words
     for group in ["Encoder", "Timing", "Core", *groups, "Examples"]:
         assert f"{group}:\n" in text
@@ -103,7 +113,7 @@ def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture
     assert text.count("[default: bound-decay]") == 1
 
 
-@pytest.mark.parametrize("command", ["simulate", "build", "program"])
+@pytest.mark.parametrize("command", ["simulate", "build", "program", "loop"])
 def test_help_loads_nothing_heavy(command: str) -> None:
     code = """
 import sys

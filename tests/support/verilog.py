@@ -12,6 +12,7 @@ from tachometry.sim.engines.verilator import Verilator
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import Port, TachometerSpec
+from tachometry.spec.control import AnySpec
 
 # The bench reads a line (clock, level of each pin) for every change, and writes a row (clock, value of each output) for
 # every clock with a strobe.
@@ -48,7 +49,7 @@ endmodule
 """
 
 
-def _ports(spec: TachometerSpec) -> tuple[list[Port], list[Port], list[str]]:
+def _ports(spec: AnySpec) -> tuple[list[Port], list[Port], list[str]]:
     """Pins, outputs and strobes."""
     return list(spec.pins), list(spec.outputs), list(spec.strobes)
 
@@ -83,16 +84,21 @@ class LintingVerilator(Verilator):
 
 def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
     """Compile the exported Verilog as Verilog-2001 with -Wall, any warning an error, and play a trace on it."""
+    return play_in_icarus(spec, folder, _changes(list(spec.pins), trace), trace.n_clocks)
+
+
+def play_in_icarus(spec: AnySpec, folder: Path, changes: np.ndarray, n_clocks: int) -> Run:
+    """The same with levels of all inputs: a row for each clock in which one changes, with the clock first."""
     pins, outputs, strobes = _ports(spec)
     bench = _filled(
         _ICARUS,
-        N_CLOCKS=trace.n_clocks,
+        N_CLOCKS=n_clocks,
         DECLARATIONS="\n  ".join(
-            [f"reg {pin.name};" for pin in pins]
+            [f"reg [{pin.width - 1}:0] {pin.name};" for pin in pins]
             + [f"wire{' signed' * port.signed} [{port.width - 1}:0] {port.name};" for port in outputs]
         ),
         CONNECTIONS=", ".join(f".{port.name}({port.name})" for port in [*pins, *outputs]),
-        FORMAT=" ".join(["%b"] * len(pins)),
+        FORMAT=" ".join(["%d"] * len(pins)),
         PINS=", ".join(pin.name for pin in pins),
         STROBES=" || ".join(strobes),
         FORMAT_OUT=" %0d" * len(outputs),
@@ -103,7 +109,7 @@ def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
     command = ["iverilog", "-g2001", "-Wall", "-s", "bench", "-o", "core.vvp", "core.v", "bench.v"]
     said = subprocess.run(command, cwd=folder, check=True, stderr=subprocess.PIPE, text=True).stderr
     assert said == "", f"warnings of Icarus:\n{said}"
-    np.savetxt(folder / "pins.txt", _changes(pins, trace), fmt="%d")
+    np.savetxt(folder / "pins.txt", changes, fmt="%d")
     subprocess.run(["vvp", "-n", "core.vvp"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     rows = np.loadtxt(folder / "rows.txt", dtype=np.int64, ndmin=2)
-    return observed(spec, trace.n_clocks, rows.reshape(-1, 1 + len(outputs)))
+    return observed(spec, n_clocks, rows.reshape(-1, 1 + len(outputs)))

@@ -6,6 +6,7 @@ from unittest.mock import patch
 
 from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
 from proofs.formal.buses import ON_BUSES
+from proofs.formal.control import CONTROL
 from proofs.formal.prove import Proof
 from proofs.formal.tracking import COUNTS_OF_A_TICK
 
@@ -389,4 +390,5 @@ PROOFS = [
     *COUNTS_OF_AXES,
     *POSITIONS_OF_AXES,
     *ON_BUSES,
+    *CONTROL,
 ]

@@ -16,6 +16,8 @@ from tachometry.hdl.bus.axi_lite import AxiLiteBridge
 from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.bus.tick_position import TickPosition
 from tachometry.hdl.bus.wishbone import WishboneBridge
+from tachometry.hdl.control.controller import Controller
+from tachometry.hdl.control.update_window import UpdateWindow
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
@@ -272,4 +274,9 @@ MUTANTS = [
     Mutant("two axes of four slots", "px_count", AxisCounters, "Mux(first, 0, before.count)", "before.count", 32),
     Mutant("three axes of five slots", "px_error", AxisCounters, "ready & illegal", "illegal"),
     Mutant("three axes of five slots", "px_complete", Rounds, "self.last.eq(clock.last)", "self.last.eq(self.first)"),
+    Mutant("control loop", "pc_total", Controller, "self.position << form.position_bits", "0"),
+    Mutant("control loop", "pc_word", Controller, "self.held << fine", "self.held"),
+    Mutant("control loop", "pc_state", Controller, "stored & due & to_y", "stored", 32),
+    Mutant("control loop", "pc_current", Controller, "Mux(enabled, limited, 0)", "Mux(enabled, short, 0)", 52),
+    Mutant("control loop", "pc_n", UpdateWindow, "self.n + 1", "self.n + 2", 52),
 ]

@@ -1,0 +1,138 @@
+"""The tables and the figure of docs/control.md: what a velocity loop about a core can do, mean of seeds."""
+
+import argparse
+import functools
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+from pages import markdown
+
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.engines.loop import Observer
+from tachometry.sim.figures.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
+from tachometry.sim.plots.usable_gain import Found, save_usable_gains
+from tachometry.sim.studies.control import Outcome, Task, each_seed, mean, outcome_of
+from tachometry.sim.studies.gate_check import check
+from tachometry.sim.studies.usable_gain import IDEAL, KINDS, REAL, TICKS, setting, usable, variants
+
+DISCS = {"ideal disc": IDEAL, "real disc": REAL}
+SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}
+
+
+def cells(outcome: Outcome) -> tuple[str, ...]:
+    """What tables say of an outcome."""
+    assert outcome.dip is not None
+    return tuple(f"{value:.3g}" for value in (outcome.rms, outcome.largest, outcome.dip, outcome.sound))
+
+
+HEADS = ("RMS error", "greatest", "dip", "current above 50 Hz")
+
+
+def usable_gains(seeds: Sequence[int], jobs: int) -> tuple[str, list[Found]]:
+    """A row per disc, method and tick: the usable gain, and what comes of it; and the same for the figure."""
+    rows, found = [], []
+    for disc, encoder in DISCS.items():
+        for kind in KINDS:
+            for seconds in TICKS:
+                if kind.method == "track" and seconds < kind.shortest:
+                    continue  # the core has a new velocity every 20 µs
+                best = usable(lambda kv: setting(kind, kv, seconds, encoder), seeds, jobs)  # noqa: B023
+                print(disc, kind.name, seconds, best, file=sys.stderr, flush=True)
+                name = (disc, kind.name, SHOWN_TICKS[seconds])
+                rows.append((*name, f"{best[0]:g}", *cells(best[1])) if best else (*name, *"-----"))
+                if best is not None:
+                    found.append(Found(disc, kind.name, seconds, *best))
+    return markdown(("disc", "method", "T_s", "usable k_v", *HEADS), rows, left=(0, 1, 2)), found
+
+
+def weights(seeds: Sequence[int], jobs: int) -> str:
+    """Ticks of 20 µs: the observer with every tick, and with every update, for S and M/T."""
+    rows = []
+    for disc, encoder in DISCS.items():
+        for kv in (40.0, 80.0, 160.0):
+            for kind in KINDS:
+                found = outcome_of(setting(kind, kv, 20e-6, encoder), seeds, jobs)
+                rows.append((disc, f"{kv:g}", kind.name, *cells(found)))
+    return markdown(("disc", "k_v", "method", *HEADS), rows, left=(0, 2))
+
+
+def assumptions(seeds: Sequence[int], jobs: int) -> str:
+    """What is changed against the real disc, ticks of 20 µs and 1 ms, k_v = 80 and 40."""
+    rows = []
+    for kv, seconds in ((40.0, 1e-3), (80.0, 20e-6)):
+        base = setting(KINDS[0], kv, seconds, REAL)
+        for name, varied in variants(base):
+            rows.append((SHOWN_TICKS[seconds], f"{kv:g}", name, *cells(outcome_of(varied, seeds, jobs))))
+        conventional = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
+        found = outcome_of(conventional, seeds, jobs)
+        rows.append((SHOWN_TICKS[seconds], f"{kv:g}", "the conventional observer", *cells(found)))
+    return markdown(("T_s", "k_v", "what is changed", *HEADS), rows, left=(0, 2))
+
+
+def in_gates(seeds: Sequence[int], jobs: int) -> str:
+    """The controller in gates against its golden model, and against double precision."""
+    held = setting(KINDS[0], 80.0, 20e-6, REAL)
+    cosine = replace(
+        setting(KINDS[0], 50.0, 20e-6, REAL), task=Task(motion=Cosine(10.0), noise=held.task.noise), begin=1.0
+    )
+    loops = {
+        "S, as in Fig. 15, k_v = 50, 10 s each": cosine,
+        "S, 39 rad/s, k_v = 80, 1.2 s each": held,
+        "M/T, 39 rad/s, k_v = 80, 1.2 s each": setting(KINDS[2], 80.0, 20e-6, REAL),
+    }
+    rows = []
+    for name, one in loops.items():
+        with ThreadPoolExecutor(jobs) as pool:
+            found = list(pool.map(functools.partial(check, one), seeds))
+        gates, double = mean([one.gates for one in found]), mean([one.double for one in found])
+        ticks, wrong = sum(one.ticks for one in found), sum(one.mismatches for one in found)
+        errors = (f"{gates.rms:.4g}", f"{double.rms:.4g}", f"{gates.sound:.4g}", f"{double.sound:.4g}")
+        rows.append((name, f"{ticks}", f"{wrong}", *errors))
+    heads = ("loop", "control ticks", "mismatches", "RMS error", "in double", "current above 50 Hz", "in double")
+    return markdown(heads, rows)
+
+
+def solutions(seeds: Sequence[int], jobs: int) -> str:
+    """The largest deviations of Fig. 14 with shorter ticks, mean of seeds: 1 s to 39 rad/s, from 2 s to 4 s."""
+    motion, rows = parse_motion("ramp:0:39rad/s:1s+constant:39rad/s:3s"), []
+    for seconds in (1e-3, 1e-4, 20e-6, 1e-6):
+        _, tick = TICKS[seconds]
+        found = []
+        for _, cancel, synchronised in SOLUTIONS:
+            logs = each_seed(solution(tick, motion, cancel, synchronised), seeds, jobs)
+            found.append(sum(deviation(log, 2.0) for log in logs) / len(seeds))
+        rows.append((SHOWN_TICKS[seconds], *(f"{value:.2f}" for value in found)))
+    return markdown(("T_s", "(a)", "(b)", "(c)"), rows)
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=6, metavar="N", help="seeds of what is random (%(default)s)")
+    parser.add_argument("--jobs", type=int, metavar="N", help="threads (one for each core)")
+    parser.add_argument(
+        "--only", choices=("gains", "weights", "assumptions", "gates", "solutions"), help="one of the tables"
+    )
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="figure of the usable gains")
+    given = parser.parse_args()
+    seeds = range(given.seeds)
+    if given.only in (None, "weights"):
+        sys.stdout.write(f"{weights(seeds, given.jobs)}\n")
+    if given.only in (None, "assumptions"):
+        sys.stdout.write(f"{assumptions(seeds, given.jobs)}\n")
+    if given.only in (None, "solutions"):
+        sys.stdout.write(f"{solutions(seeds, given.jobs)}\n")
+    if given.only in (None, "gates"):
+        sys.stdout.write(f"{in_gates(seeds, given.jobs)}\n")
+    if given.only in (None, "gains"):
+        table, found = usable_gains(seeds, given.jobs)
+        sys.stdout.write(f"{table}\n")
+        if given.plot is not None:
+            save_usable_gains(given.plot, found)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,279 @@
+"""Options of a control loop about a core: controller, motor, task and encoder."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tachometry.cli.options.core import core_click_options
+from tachometry.cli.options.motion import Quantity, disc_options
+from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.sweep import by_name
+from tachometry.spec import TachometerSpec
+from tachometry.spec.option import ParameterError
+from tachometry.spec.timing import whole_clocks
+from tachometry.spec.units import (
+    BANDWIDTH,
+    CURRENT,
+    TIME,
+    TORQUE,
+    TORQUE_CONSTANT,
+    format_time,
+    parse_time,
+    read_nearest,
+)
+
+if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
+    from tachometry.sim.studies.control import Load, Setting
+
+_LOOP, _MOTOR = "Controller", "Motor and load"
+_RATE, _TORQUE, _TIME = Quantity(BANDWIDTH, "rad/s"), Quantity(TORQUE, "Nm"), Quantity(TIME, "s")
+MOST_SECONDS = 100.0
+_MOST_SPEED = 1e6  # rad/s
+
+_OPTIONS = [
+    option(_LOOP, "--kp", type=float, default=100.0, metavar="K_P", help="Gain of the position, in 1/s²."),
+    option(_LOOP, "--kv", type=float, default=30.0, metavar="K_V", help="Gain of the velocity, in 1/s."),
+    option(
+        _LOOP,
+        "--observer",
+        type=_RATE,
+        default="40rad/s",
+        metavar="BANDWIDTH",
+        help="Bandwidth G_dis of the disturbance observer, in rad/s, Hz or kHz.",
+    ),
+    option(
+        _LOOP,
+        "--velocity-filter",
+        metavar="[BANDWIDTH|none]",
+        help="Bandwidth G_v of the low-pass filter of the velocity, or none. [default: that of --observer; none with "
+        "method track]",
+    ),
+    option(
+        _LOOP,
+        "--synchronised/--no-synchronised",
+        default=True,
+        help="Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
+        "with the velocity that is held (Fig. 2).",
+    ),
+    option(
+        _LOOP,
+        "--measured-acceleration",
+        is_flag=True,
+        help="The observer works at every control tick, with the acceleration that method track measures.",
+    ),
+    option(
+        _LOOP,
+        "--control-period",
+        metavar="TIME",
+        help="Time between two control ticks, a whole number of clocks; a plain number is clocks. [default: one tick]",
+    ),
+    option(
+        _LOOP,
+        "--delay",
+        metavar="TIME",
+        help="From a control tick until its current is commanded, at most a control tick. [default: none]",
+    ),
+    option(
+        _LOOP,
+        "--gates",
+        is_flag=True,
+        help="Run the controller in gates, too: the core that generate --loop makes with these options.",
+    ),
+    option(_LOOP, "--unfiltered", is_flag=True, help="K_V acts on the velocity before the low-pass filter."),
+    option(_LOOP, "--feed-forward", is_flag=True, help="Add the acceleration of the command."),
+    option(
+        _LOOP,
+        "--current-limit",
+        type=Quantity(CURRENT, "A"),
+        default="20A",
+        metavar="CURRENT",
+        help="Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
+    ),
+    option(_MOTOR, "--inertia", type=float, default=0.003, metavar="J", help="Of shaft and load, in kg m²."),
+    option(
+        _MOTOR,
+        "--torque-constant",
+        type=Quantity(TORQUE_CONSTANT, "Nm/A"),
+        default="60.3mNm/A",
+        metavar="KT",
+        help="Torque constant K_t of the motor, in Nm/A or mNm/A.",
+    ),
+    option(_MOTOR, "--driver-time", type=_TIME, default="100us", metavar="TIME", help="Time constant of the current."),
+    option(_MOTOR, "--friction", type=_TORQUE, default="5mNm", metavar="TORQUE", help="Coulomb friction, Nm or mNm."),
+    option(_MOTOR, "--viscous", type=float, default=0.0, metavar="B", help="Viscous friction in Nm/(rad/s)."),
+    option(
+        _MOTOR,
+        "--torque-noise",
+        type=_TORQUE,
+        default="5mNm",
+        metavar="TORQUE",
+        help="Standard deviation of a torque that is new every millisecond.",
+    ),
+    option(
+        _MOTOR,
+        "--load",
+        metavar="TORQUE:FROM:TIME",
+        help="A torque against the shaft for a time, such as 0.2Nm:7s:500ms. RMS and greatest error, and the current, "
+        "are then of the time before it.",
+    ),
+    option(
+        _LOOP,
+        "--from",
+        "start",
+        default="0s",
+        metavar="TIME",
+        help="Leave out what comes before this time: the start.",
+    ),
+]
+
+Make = Callable[[TachometerSpec], "Setting"]
+
+
+def _load(text: str | None) -> Load | None:
+    from tachometry.sim.studies.control import Load
+
+    if text is None:
+        return None
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise ValueError(f"--load must be TORQUE:FROM:TIME, such as 0.2Nm:7s:500ms, not {text!r}")
+    torque = read_nearest("torque of --load", parts[0], TORQUE, "Nm")
+    begin, seconds = (float(parse_time("time of --load", part)) for part in parts[1:])
+    return Load(torque=torque, begin=begin, seconds=seconds)
+
+
+def _filter(spec: TachometerSpec, text: str | None, observer: float) -> float:
+    if text is None:
+        return math.inf if spec.method == "track" else observer
+    return math.inf if text.strip() == "none" else read_nearest("velocity_filter", text, BANDWIDTH, "rad/s")
+
+
+def _setting_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: all options of a loop but those of its core, handed over as a function that makes a `Setting`."""
+
+    @functools.wraps(command)
+    def build(*, motion: str, seed: int, **given: Any) -> Any:
+        return command(lambda spec: _setting(spec, motion, seed, **given), motion, seed)
+
+    return disc_options(all_of(_OPTIONS, build))
+
+
+def _setting(
+    spec: TachometerSpec,
+    motion: str,
+    seed: int,
+    *,
+    jitter: float,
+    nonuniformity: float,
+    phase_error_deg: float,
+    duty_error_deg: float,
+    start: str,
+    load: str | None,
+    torque_noise: float,
+    gates: bool,
+    **given: Any,
+) -> Setting:
+    from tachometry.sim.encoder.motion import parse_motion
+    from tachometry.sim.encoder.virtual import VirtualEncoder
+    from tachometry.sim.studies.control import Setting, Task, in_gates
+
+    if not (torque_noise >= 0 and math.isfinite(torque_noise)):
+        raise ParameterError("torque_noise", f"must be at least 0 Nm, not {torque_noise:g}")
+    task = Task(motion=parse_motion(motion), load=_load(load), noise=torque_noise)
+    begin, duration = float(parse_time("from", start)), task.motion.duration
+    if not 0.01 <= duration <= MOST_SECONDS:
+        raise ParameterError("motion", f"must last from 10ms to {MOST_SECONDS:g}s in a loop, not {duration:.6g}s")
+    if not 0 <= begin <= duration - 0.002:
+        raise ValueError(f"--from must be from 0 to 2ms before the end of --motion, not {start}")
+    if task.load is not None and not begin + 0.002 <= task.load.begin < duration:
+        raise ValueError(f"--load must begin 2ms or more after --from, and within --motion, not {load}")
+    encoder = VirtualEncoder(
+        spec.encoder.pulses_per_rev,
+        jitter=jitter,
+        nonuniformity=nonuniformity,
+        phase_error_deg=phase_error_deg,
+        duty_error_deg=duty_error_deg,
+        seed=seed,
+    )
+    motor, gains = _motor_and_gains(spec, **given)
+    setting = Setting(spec=spec, gains=gains, task=task, motor=motor, encoder=encoder, begin=begin)
+    return in_gates(setting) if gates else setting
+
+
+def _motor_and_gains(
+    spec: TachometerSpec,
+    *,
+    kp: float,
+    kv: float,
+    observer: float,
+    velocity_filter: str | None,
+    synchronised: bool,
+    measured_acceleration: bool,
+    control_period: str | None,
+    delay: str | None,
+    unfiltered: bool,
+    feed_forward: bool,
+    current_limit: float,
+    inertia: float,
+    torque_constant: float,
+    driver_time: float,
+    friction: float,
+    viscous: float,
+) -> tuple[Any, Any]:
+    from tachometry.sim.engines.loop import Gains, Motor, Observer
+
+    if measured_acceleration and not hasattr(spec, "acceleration_per_lsb"):
+        raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
+    motor = Motor(
+        inertia=inertia,
+        torque_constant=torque_constant,
+        driver_seconds=driver_time,
+        viscous=viscous,
+        coulomb=friction,
+    )
+    hz = spec.timing.clock_hz
+    clocks = spec.timing.tick_cycles if control_period is None else whole_clocks("control_period", control_period, hz)
+    late = 0 if delay is None else whole_clocks("delay", delay, hz)
+    if not 1 <= clocks <= hz:
+        raise ParameterError("control_period", f"must be from a clock to 1s, not {control_period or clocks}")
+    if not 0 <= late <= clocks:
+        raise ParameterError(
+            "delay", f"must be at most a control tick, {format_time(spec.seconds(clocks))}, not {delay}"
+        )
+    way = Observer.SYNCHRONISED if synchronised else Observer.CONVENTIONAL
+    if measured_acceleration:
+        way = Observer.ACCELERATION
+    gains = Gains(
+        position=kp,
+        velocity=kv,
+        observer=observer,
+        filter=_filter(spec, velocity_filter, observer),
+        seconds=float(spec.seconds(clocks)),
+        way=way,
+        delay=float(spec.seconds(late)),
+        on_filtered=not unfiltered,
+        feed_forward=feed_forward,
+        inertia=inertia,
+        torque_constant=torque_constant,
+        current_limit=current_limit,
+    )
+    return motor, gains
+
+
+# Gives what makes a setting of a core, the motion in words, and the first seed.
+LOOP = click.command("loop")(_setting_options(lambda make, motion, seed: (make, motion, seed)))
+
+
+def loop_click_options() -> dict[str, click.Option]:
+    """All options of a loop but those of its core, by their names."""
+    return by_name(LOOP)
+
+
+def loop_options() -> dict[str, click.Option]:
+    """All options of a loop and its core that may vary, by their names."""
+    return core_click_options() | loop_click_options()

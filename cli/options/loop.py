@@ -1,0 +1,70 @@
+"""Options of cores with a control loop."""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+from tachometry.cli.options.option import all_of, option
+from tachometry.spec import AxesSpec, CoreSpec, ParameterError
+from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.option import Option, options_of, read_options
+
+_LOOP = "Loop"
+
+
+def _declared(about: Option) -> Callable[[Any], Any]:
+    if about.flag:
+        return option(_LOOP, f"--{about.name}/--no-{about.name}", default=None, help=f"{about.help} {_default(about)}")
+    metavar = about.metavar or f"[{'|'.join(about.choices)}]"
+    return option(_LOOP, f"--{about.name}", metavar=metavar, help=f"{about.help} {_default(about)}")
+
+
+def _default(about: Option) -> str:
+    return f"[default: {about.name if about.flag else about.shown}]"
+
+
+_OPTIONS = [
+    option(
+        _LOOP,
+        "--loop",
+        is_flag=True,
+        help="Add a disturbance observer and a controller of position and velocity, with commands as inputs and the "
+        "current as output.",
+    ),
+    *(_declared(about) for about in options_of(LoopSpec)),
+]
+
+
+def loop_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator below that of the axes: `spec` is that of a core with a control loop, if there is to be one."""
+
+    @functools.wraps(command)
+    def build(*, spec: CoreSpec, loop: bool, **others: Any) -> Any:
+        given = {about.name: others.pop(about.parameter) for about in options_of(LoopSpec)}
+        texts = {
+            name: ("no", "yes")[value] if isinstance(value, bool) else value
+            for name, value in given.items()
+            if value is not None
+        }
+        return command(spec=of_loop(spec, texts) if loop else _alone(spec, texts), **others)
+
+    return all_of(_OPTIONS, build)
+
+
+def _alone(spec: CoreSpec, texts: dict[str, str]) -> CoreSpec:
+    for name in texts:
+        raise ParameterError(name.replace("-", "_"), "must be given together with --loop")
+    return spec
+
+
+def of_loop(spec: CoreSpec, texts: dict[str, str]) -> AnySpec:
+    """A core with a control loop, from texts of its options by their names.
+
+    Raises
+    ------
+    ParameterError
+        If there cannot be such a core.
+    """
+    if isinstance(spec, AxesSpec):
+        raise ParameterError("axes", "must not be given together with --loop: it is of one axis")
+    return LoopSpec(tachometer=spec, **read_options(LoopSpec, texts))

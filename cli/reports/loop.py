@@ -1,0 +1,34 @@
+"""What `generate` prints of a core with a control loop."""
+
+from tachometry.cli.reports.core import configuration, short_time
+from tachometry.cli.reports.terminal import print_rows
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.units import plural
+
+
+def print_loop_core(spec: LoopSpec) -> None:
+    """Print the configuration of tachometer and loop."""
+    form, period = spec.form, spec.seconds
+    filtered = "none" if spec.filter is None else f"{float(spec.filter):.6g} rad/s"
+    when = "at updates of the velocity" if spec.synchronised else "at every control tick"
+    widths = ", ".join(
+        f"{port.name} {port.width}" for port in spec.ports[len(spec.tachometer.ports) :] if port.width > 1
+    )
+    rows = [
+        ("gains", f"kp {float(spec.position_gain):.6g} 1/s², kv {float(spec.velocity_gain):.6g} 1/s"),
+        ("observer", f"{float(spec.observer):.6g} rad/s, velocity filter {filtered}, {when}"),
+        ("motor", f"{float(spec.inertia):.6g} kg m², {float(spec.torque_constant):.6g} Nm/A"),
+        ("current", f"at most {float(form.current_limit * spec.amperes):.6g} A, in 2^{-spec.current_frac_bits} A"),
+        ("control period", f"{short_time(period)} ({plural(spec.period, 'clock')})"),
+        (
+            "command to current",
+            f"{plural(spec.latency, 'clock')} ({short_time(spec.tachometer.seconds(spec.latency))})",
+        ),
+        (
+            "multiplier",
+            f"{spec.multiplier}: words of {form.word_width} bits by coefficients of {form.factor_bits}, "
+            f"{plural(spec.product_clocks, 'clock')} a product",
+        ),
+        ("widths of the loop", widths),
+    ]
+    print_rows([*configuration(spec.tachometer), *rows])

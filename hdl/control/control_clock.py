@@ -1,0 +1,31 @@
+"""When the controller works."""
+
+from amaranth import Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import Out
+
+
+class ControlClock(wiring.Component):
+    """Strobes every `period` clocks, for the first time in clock `first` after reset.
+
+    Parameters
+    ----------
+    first : int
+    period : int
+
+    Members
+    -------
+    tick : Out(1)
+    """
+
+    def __init__(self, first: int, period: int) -> None:
+        self._first, self._period = first, period
+        super().__init__({"tick": Out(1)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        left = Signal(range(max(self._first, self._period)), init=self._first - 1)
+        m.d.sync += [left.eq(left - 1), self.tick.eq(left == 0)]
+        with m.If(left == 0):
+            m.d.sync += left.eq(self._period - 1)
+        return m

@@ -1,0 +1,247 @@
+"""Disturbance observer and controller: one multiplier, and a product after the other."""
+
+from collections.abc import Mapping
+
+from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.control.product import ParallelProduct, SerialProduct
+from tachometry.spec.control.form import GUARD_BITS, TABLED, ControlForm, Term
+from tachometry.spec.units import signed_width
+
+
+def _choose(m: Module, term: Signal, values: Mapping[Term, ValueLike], found: Signal) -> None:
+    """`found` is the value of a term; that of the last one stands for all others, which have none."""
+    *others, last = values
+    with m.Switch(term):
+        for one in others:
+            with m.Case(one):
+                m.d.comb += found.eq(values[one])
+        with m.Default():
+            m.d.comb += found.eq(values[last])
+
+
+class Controller(wiring.Component):
+    """Forms the products of `ControlForm` one by one at each control tick, and the current from them.
+
+    All inputs but `n` and `current_sum` are taken with `tick`; these hold until `clear`. Every run takes the same time,
+    whether there has been an update or not.
+
+    Latency: `valid` is high `LoopSpec.latency` clocks after `tick`. The next `tick` may come a clock later.
+
+    Parameters
+    ----------
+    form : ControlForm
+    multiplier : str
+        `serial` or `parallel`.
+
+    Members
+    -------
+    tick : In(1)
+    due : In(1)
+        There is an update: y and w are to be changed.
+    held, position : In(signed)
+    enable : In(1)
+    command_position, command_velocity, command_acceleration : In(signed)
+    n : In(range(longest + 1))
+    current_sum : In(signed)
+        ΣI.
+    clear : Out(1)
+        One clock: the update has been used.
+    valid : Out(1)
+        One clock: `current` is that of this control tick.
+    current : Out(signed)
+    saturated : Out(1)
+    y, w : Out(signed)
+        In step with `valid`.
+    """
+
+    def __init__(self, form: ControlForm, multiplier: str = "serial") -> None:
+        self._form = form
+        self._multiplier = multiplier
+        current = signed(signed_width(form.current_limit))
+        super().__init__(
+            {
+                "tick": In(1),
+                "due": In(1),
+                "held": In(signed(form.velocity_width)),
+                "position": In(signed(form.position_width)),
+                "enable": In(1),
+                "command_position": In(signed(form.position_width + form.position_bits)),
+                "command_velocity": In(signed(form.command_width)),
+                "command_acceleration": In(signed(form.acceleration_width)),
+                "n": In(range(form.longest + 1)),
+                "current_sum": In(signed(signed_width(form.most_sum))),
+                "clear": Out(1),
+                "valid": Out(1),
+                "current": Out(current),
+                "saturated": Out(1),
+                "y": Out(signed(signed_width(form.most_y))),
+                "w": Out(signed(signed_width(form.most_w))),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        form = self._form
+        # What is taken with a tick.
+        due = Signal()
+        enabled = Signal()
+        velocity = Signal.like(self.command_velocity, reset_less=True)
+        acceleration = Signal.like(self.command_acceleration, reset_less=True)
+        # First the position error, which wraps as positions do, then the sum that becomes the current.
+        total = Signal(signed(form.total_width), reset_less=True)
+
+        term = Signal(Term)
+        # In this order: a word is loaded, what is to be taken from it is, the product begins, and its result is stored.
+        again = Signal()
+        load = Signal()
+        subtract = Signal()
+        start = Signal()
+        stored = Signal()
+        # Then the sum is held within few bits, and within the limit.
+        finish = Signal()
+        limit = Signal()
+        word = Signal(signed(form.word_width), reset_less=True)
+        box = SerialProduct if self._multiplier == "serial" else ParallelProduct
+        m.submodules.product = product = box(form.word_width, form.factor_bits)
+        unfiltered = Term.FILTER not in form.terms
+        m.d.comb += [
+            load.eq(self.tick | again),
+            product.start.eq(start),
+            product.word.eq(word),
+            product.factor.eq(self._factor(m, term, load)),
+            stored.eq(product.done),
+        ]
+        step: Value = product.product
+        m.d.sync += start.eq(subtract)
+        if unfiltered:
+            skipped = Signal()
+            m.d.sync += [skipped.eq(subtract & (term == Term.FILTER)), start.eq(subtract & (term != Term.FILTER))]
+            m.d.comb += stored.eq(product.done | skipped)
+            step = Mux(skipped, word, product.product)
+        m.d.sync += [
+            subtract.eq(load),
+            again.eq(stored & (term != Term.DISTURBANCE)),
+            finish.eq(stored & (term == Term.DISTURBANCE)),
+            limit.eq(finish),
+            self.valid.eq(limit),
+        ]
+        # A clock later, what is to be taken from it.
+        less_filter = Signal()
+        less_velocity = Signal()
+        less = Mux(less_filter, self.y << self._shift(Term.FILTER), 0)
+        less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)
+        m.d.sync += [
+            less_filter.eq(term == Term.FILTER),
+            less_velocity.eq(term == Term.VELOCITY),
+        ]
+        loaded = self._word(m, term, total, velocity, acceleration)
+        with m.If(load):
+            m.d.sync += word.eq(loaded)
+        with m.Elif(subtract):
+            m.d.sync += word.eq(word - less)
+        with m.If(self.tick):
+            difference = self.command_position - (self.position << form.position_bits)
+            m.d.sync += [
+                due.eq(self.due),
+                enabled.eq(self.enable),
+                velocity.eq(self.command_velocity),
+                acceleration.eq(self.command_acceleration),
+                total.eq(difference[: len(self.command_position)].as_signed()),
+            ]
+        with m.If(stored):
+            m.d.sync += term.eq(term + 1)
+        self._store(m, term, stored, step, due, total)
+        with m.If(finish):
+            m.d.sync += term.eq(0)
+
+        wanted = Signal(signed(form.total_width - GUARD_BITS))
+        m.d.comb += wanted.eq(total >> GUARD_BITS)
+        # First within as many bits as the limit has, without a carry; then there are only these to be compared.
+        held, outside = saturate(m, wanted, (1 << form.current_limit.bit_length()) - 1)
+        short = Signal.like(held, reset_less=True)
+        beyond = Signal(reset_less=True)
+        m.d.sync += [short.eq(held), beyond.eq(outside)]
+        limited, changed = saturate(m, short, form.current_limit)
+        m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)
+        with m.If(limit):
+            m.d.sync += [self.current.eq(Mux(enabled, limited, 0)), self.saturated.eq((beyond | changed) & enabled)]
+        return m
+
+    def _factor(self, m: Module, term: Signal, load: Value) -> Value:
+        """The coefficient of a term, valid in the clock after `load`."""
+        form = self._form
+        values: dict[Term, ValueLike] = {one: each.values[0] for one, each in form.terms.items()}
+        if form.longest > 1:
+            tabled = self._tabled(m, term, load)
+            values |= dict.fromkeys(set(TABLED) & values.keys(), tabled)
+        factor = Signal(form.factor_bits)
+        _choose(m, term, values, factor)
+        return factor
+
+    def _tabled(self, m: Module, term: Signal, load: Value) -> Value:
+        """A coefficient that depends on n: equal tables are one."""
+        form = self._form
+        places: dict[tuple[int, ...], int] = {}
+        of_term = {one: form.terms[one].values for one in TABLED if one in form.terms}
+        for values in of_term.values():
+            places.setdefault(values, len(places))
+        # An entry for n = 0, which there is not, makes the address n itself.
+        init = [entry for values in places for entry in (0, *values)]
+        m.submodules.table = table = Memory(shape=form.factor_bits, depth=len(init), init=init)
+        read = table.read_port()
+        which = Signal(range(len(places)))
+        _choose(m, term, {one: places[values] for one, values in of_term.items()}, which)
+        m.d.comb += [read.addr.eq(Cat(self.n, which)), read.en.eq(load)]
+        return read.data
+
+    def _word(self, m: Module, term: Signal, total: Signal, velocity: Signal, acceleration: Signal) -> Value:
+        """What a term multiplies, or what y is still to be taken from."""
+        form = self._form
+        held, _ = saturate(m, total, form.most_error)
+        error = Signal.like(held, reset_less=True)
+        m.d.sync += error.eq(held)
+        fine = form.extra_bits
+        words: dict[Term, Value] = {
+            Term.FILTER: self.held << fine,
+            Term.OBSERVER: self.w,
+            Term.CURRENT: self.current_sum,
+            Term.POSITION: error,
+            Term.VELOCITY: velocity << (fine - form.command_bits),
+            Term.ACCELERATION: acceleration,
+            Term.DISTURBANCE: self.w,
+        }
+        word = Signal(signed(form.word_width), name="loaded")
+        _choose(m, term, {one: value << self._shift(one) for one, value in words.items()}, word)
+        return word
+
+    def _shift(self, term: Term) -> int:
+        found = self._form.terms.get(term)
+        return 0 if found is None else found.shift
+
+    def _store(self, m: Module, term: Signal, stored: Value, step: Value, due: Signal, total: Signal) -> None:
+        """Add a product to what it belongs to."""
+        # Where it goes is in registers: the term has been the same for some clocks.
+        to_y = Signal()
+        to_w = Signal()
+        minus = Signal()
+        first = Signal()
+        m.d.sync += [
+            to_y.eq(term == Term.FILTER),
+            to_w.eq(term <= Term.CURRENT),
+            minus.eq(term != Term.CURRENT),
+            first.eq(term == Term.POSITION),
+        ]
+        with m.If(stored & due & to_y):
+            m.d.sync += self.y.eq(self.y + step)
+        with m.If(stored & due & to_w):
+            # With one adder: w − step is w + ~step + 1, and the 1 comes from an additional bit at its end.
+            term_of_w = Cat(minus, step ^ minus.replicate(len(step))).as_signed()
+            m.d.sync += self.w.eq((Cat(1, self.w).as_signed() + term_of_w) >> 1)
+        with m.If(stored & ~to_w):
+            # The first one rounds the sum.
+            m.d.sync += total.eq(Mux(first, 1 << (GUARD_BITS - 1), total) + step)

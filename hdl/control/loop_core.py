@@ -1,0 +1,74 @@
+"""A tachometer and the control loop of its shaft."""
+
+from amaranth import Module
+from amaranth.lib import wiring
+
+from tachometry.hdl.arithmetic.ports import members
+from tachometry.hdl.control.control_clock import ControlClock
+from tachometry.hdl.control.controller import Controller
+from tachometry.hdl.control.sigma_delta import SigmaDelta
+from tachometry.hdl.control.update_window import UpdateWindow
+from tachometry.hdl.tachometer import Tachometer
+from tachometry.spec.control import LoopSpec
+
+_COMMANDS = ("enable", "command_position", "command_velocity", "command_acceleration")
+
+
+class LoopCore(wiring.Component):
+    """Encoder pins and commands in, current out, and all that the tachometer shows.
+
+    Parameters
+    ----------
+    spec : LoopSpec
+
+    Members
+    -------
+    The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain.
+    """
+
+    def __init__(self, spec: LoopSpec) -> None:
+        self._spec = spec
+        super().__init__(members(spec.ports))
+        self.tachometer = Tachometer(spec.tachometer)
+        self.control_clock = ControlClock(spec.first_tick, spec.period)
+        self.window = UpdateWindow(spec.form)
+        self.controller = Controller(spec.form, spec.multiplier)
+        self.sigma_delta = SigmaDelta(spec.current_width)
+
+    @property
+    def spec(self) -> LoopSpec:
+        """What this core was built from."""
+        return self._spec
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.tachometer = tachometer = self.tachometer
+        m.submodules.control_clock = clock = self.control_clock
+        m.submodules.window = window = self.window
+        m.submodules.controller = controller = self.controller
+        m.submodules.sigma_delta = sigma_delta = self.sigma_delta
+        for port in self._spec.tachometer.ports:
+            if port.name not in ("clk", "rst"):
+                inner, outer = getattr(tachometer, port.name), getattr(self, port.name)
+                m.d.comb += inner.eq(outer) if port.direction == "input" else outer.eq(inner)
+        m.d.comb += [
+            window.tick.eq(clock.tick),
+            window.update.eq(tachometer.velocity_valid),
+            window.velocity.eq(tachometer.velocity),
+            window.clear.eq(controller.clear),
+            window.add.eq(controller.valid),
+            window.current.eq(controller.current),
+            controller.tick.eq(clock.tick),
+            controller.position.eq(tachometer.position),
+            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
+            *(getattr(controller, name).eq(getattr(self, name)) for name in _COMMANDS),
+            self.control_tick.eq(clock.tick),
+            self.current_valid.eq(controller.valid),
+            self.current.eq(controller.current),
+            self.current_saturated.eq(controller.saturated),
+            self.filtered_velocity.eq(controller.y),
+            self.disturbance.eq(controller.w),
+            sigma_delta.value.eq(controller.current),
+            self.drive.eq(sigma_delta.drive),
+        ]
+        return m

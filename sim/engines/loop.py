@@ -1,0 +1,293 @@
+"""A core in a control loop: motor, encoder and controller run in the compiled engine, a whole run in one call."""
+
+import ctypes
+import math
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.engines.compiled import Design
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.spec import TachometerSpec
+from tachometry.spec.option import ParameterError
+
+PARTS = ("plant.h", "control.h", "loop.h")
+COLUMNS = ("time", "command", "speed", "angle", "held", "y", "z", "disturbance", "current", "driven", "position")
+FloatArray = NDArray[np.float64]
+Log = dict[str, FloatArray]
+
+
+class Observer(IntEnum):
+    """When and from what the disturbance is estimated: at each control tick with the held velocity (Fig. 2), with each
+    update of the velocity (Fig. 11), or at each control tick from an acceleration that the core measures."""
+
+    CONVENTIONAL = 0
+    SYNCHRONISED = 1
+    ACCELERATION = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motor:
+    """A motor with its driver and load.
+
+    Parameters
+    ----------
+    inertia : float, kg m²
+    torque_constant : float, Nm/A
+    driver_seconds : float
+        Time constant of the current.
+    viscous : float, Nm/(rad/s)
+    coulomb : float, Nm
+
+    Raises
+    ------
+    ParameterError
+        If one is out of range.
+    """
+
+    inertia: float = 0.003
+    torque_constant: float = 0.0603
+    driver_seconds: float = 1e-4
+    viscous: float = 0.0
+    coulomb: float = 0.0
+
+    def __post_init__(self) -> None:
+        _more_than_0(self, "inertia", "torque_constant")
+        _at_least_0(self, "driver_seconds", "viscous", "coulomb")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """A controller of velocity and position with a disturbance observer.
+
+    Parameters
+    ----------
+    position, velocity : float, 1/s², 1/s
+        k_p and k_v.
+    observer, filter : float, rad/s
+        G_dis, and G_v; with an infinite G_v there is no low-pass filter of the velocity.
+    seconds : float
+        Distance of control ticks.
+    way : Observer
+    delay : float, s
+        From a control tick until its current is commanded, at most `seconds`.
+    on_filtered : bool
+        Whether k_v acts on the velocity behind the filter, not before it.
+    feed_forward : bool
+        Whether the acceleration of the command is added.
+    inertia, torque_constant : float, kg m², Nm/A
+        As the controller knows them.
+    current_limit : float, A
+
+    Raises
+    ------
+    ParameterError
+        If one is out of range.
+    """
+
+    position: float
+    velocity: float
+    observer: float
+    filter: float
+    seconds: float
+    way: Observer = Observer.SYNCHRONISED
+    delay: float = 0.0
+    on_filtered: bool = True
+    feed_forward: bool = False
+    inertia: float = 0.003
+    torque_constant: float = 0.0603
+    current_limit: float = 8.0
+
+    def __post_init__(self) -> None:
+        _more_than_0(self, "observer", "seconds", "inertia", "torque_constant", "current_limit")
+        if not self.filter > 0:
+            raise ParameterError("velocity_filter", f"must be more than 0, not {self.filter:g}")
+        _at_least_0(self, "position", "velocity", "delay")
+        if self.delay > self.seconds:
+            raise ParameterError("delay", f"must be at most a control tick, {self.seconds:g} s, not {self.delay:g}")
+
+
+# What the parameters are called where they are given.
+_CALLED = {
+    "position": "kp",
+    "velocity": "kv",
+    "coulomb": "friction",
+    "driver_seconds": "driver_time",
+}
+
+
+def _more_than_0(what: object, *names: str) -> None:
+    for name in names:
+        if not 0 < getattr(what, name) < math.inf:
+            raise ParameterError(_CALLED.get(name, name), f"must be more than 0, not {getattr(what, name):g}")
+
+
+def _at_least_0(what: object, *names: str) -> None:
+    for name in names:
+        if not 0 <= getattr(what, name) < math.inf:
+            raise ParameterError(_CALLED.get(name, name), f"must be at least 0, not {getattr(what, name):g}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Course:
+    """What is commanded, and what comes in between; all at times `seconds` apart.
+
+    Parameters
+    ----------
+    seconds : float
+    speed, angle : float64 array, shape (n,), rad/s and rad
+        Commanded; between two times the speed is a line.
+    load : float64 array, shape (n,), Nm
+        Against the shaft, from each time to the next.
+    current : float64 array, shape (n,), A
+        Added to the command behind the controller, which does not know of it: a virtual disturbance.
+    """
+
+    seconds: float
+    speed: FloatArray
+    angle: FloatArray
+    load: FloatArray
+    current: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Where a disc's edges are met.
+
+    Parameters
+    ----------
+    offset : float64 array, shape (k,)
+        Of each edge, in pitches; the k-th after the last is the first again.
+    jitter : float64 array, shape (n,)
+        Of each passage, in gaps to the nearer neighbour, one after the other; after the last comes the first again.
+    """
+
+    offset: FloatArray
+    jitter: FloatArray
+
+
+class LoopDesign(Design):
+    """A core to be compiled with plant and controller."""
+
+    def source(self, model: str) -> str:
+        """See `Design.source`."""
+        head = f"#define N_COLUMNS {len(self.outputs)}\n#define GATES 0\n#include <cstdint>\n"
+        parts = [Path(__file__).with_name(part).read_text(encoding="utf-8") for part in PARTS]
+        return "\n".join([head, model, *parts])
+
+
+def struct(name: str, **members: Any) -> type[ctypes.Structure]:
+    return type(name, (ctypes.Structure,), {"_fields_": list(members.items())})
+
+
+_D, _I, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
+_MOTOR = struct("Motor", **{field.name: _D for field in fields(Motor)})
+_ENCODER = struct("Encoder", pitch=_D, offset=_P, n_edges=_I, jitter=_P, n_jitter=_I)
+CONTROLLER = struct(
+    "Controller",
+    **dict.fromkeys(("position", "velocity", "observer", "filter", "inertia", "torque_constant", "current_limit"), _D),
+    **dict.fromkeys(("way", "on_filtered", "feed_forward", "clocks", "first", "delay"), _I),
+)
+_CORE = struct(
+    "Core",
+    **dict.fromkeys(("rad_per_s", "rad_per_s2", "rad_per_count"), _D),
+    **dict.fromkeys(("velocity", "valid", "position", "acceleration"), _I),
+    clock_seconds=_D,
+)
+_COURSE = struct("Course", speed=_P, angle=_P, load=_P, current=_P, n=_I, clocks=_I)
+_LOOP = struct(
+    "Loop",
+    **{"motor": _MOTOR, "encoder": _ENCODER, "controller": CONTROLLER, "core": _CORE, "course": _COURSE},
+    **dict.fromkeys(("step", "end", "log"), _I),
+    rows=_P,
+    n_rows=_I,
+    stop=_P,
+    gates=_P,
+)
+
+
+class LoopSimulation:
+    """A core of a spec in loops; it is compiled once. Runs may go on in several threads at once.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    design : LoopDesign or None
+        What is compiled; None: the core of the spec alone.
+
+    Raises
+    ------
+    NoCompiler
+        If there is no C++ compiler.
+    """
+
+    def __init__(self, spec: TachometerSpec, design: LoopDesign | None = None) -> None:
+        self._spec = spec
+        self._design = design or LoopDesign(spec, list(spec.pins))
+        self._library = ctypes.CDLL(str(Cxxrtl().library(self._design)))
+        self._stop = _I(0)
+
+    def stop(self, ending: bool = True) -> None:
+        """End all runs at once, also those that begin later, until they may go on again."""
+        self._stop.value = ending
+
+    def run(
+        self, motor: Motor, edges: Edges, gains: Gains, course: Course, *, log: float = 1e-4, step: float = 1e-5
+    ) -> Log:
+        """A run as long as the course, from rest: a column of values at times `log` seconds apart for each name.
+
+        The motor goes on in steps of `step` seconds, or from event to event.
+        """
+        return self.call(motor, edges, self._controller(gains), course, log, step, None)
+
+    def call(
+        self, motor: Motor, edges: Edges, controller: Any, course: Course, log: float, step: float, gates: int | None
+    ) -> Log:
+        """See `run`; `gates` is where a controller in gates is described, in place of one in double precision."""
+        spec = self._spec
+        arrays = (edges.offset, edges.jitter, course.speed, course.angle, course.load, course.current)
+        offset, jitter, *tables = (np.ascontiguousarray(one, dtype=np.float64) for one in arrays)
+        end, apart = self.clocks(course.seconds) * (len(course.speed) - 1), self.clocks(log)
+        rows = np.zeros((end // apart + 1, len(COLUMNS)))
+        loop = _LOOP(
+            motor=_MOTOR(**{field.name: getattr(motor, field.name) for field in fields(Motor)}),
+            encoder=_ENCODER(
+                2 * np.pi / (4 * spec.encoder.pulses_per_rev),
+                *(offset.ctypes.data, len(offset), jitter.ctypes.data, len(jitter)),
+            ),
+            controller=controller,
+            core=self._core(),
+            course=_COURSE(*(one.ctypes.data for one in tables), len(course.speed), self.clocks(course.seconds)),
+            **{"step": self.clocks(step), "end": end, "log": apart, "rows": rows.ctypes.data},
+            stop=ctypes.addressof(self._stop),
+            gates=gates,
+        )
+        self._library.loop_run(ctypes.byref(loop))
+        return dict(zip(COLUMNS, rows[: loop.n_rows].T, strict=True))
+
+    def clocks(self, seconds: float) -> int:
+        """A time in whole clocks, at least one."""
+        return max(round(seconds * self._spec.timing.clock_hz), 1)
+
+    def _controller(self, gains: Gains) -> Any:
+        clocks, spec = self.clocks(gains.seconds), self._spec
+        # It comes when the velocity of a tick is there.
+        first = (spec.pin_to_count + spec.tick_latency + spec.tick_to_velocity + 1) % clocks
+        delay = min(round(gains.delay * spec.timing.clock_hz), clocks)
+        return CONTROLLER(
+            *(gains.position, gains.velocity, gains.observer, gains.filter),
+            *(gains.inertia, gains.torque_constant, gains.current_limit),
+            *(gains.way, gains.on_filtered, gains.feed_forward, clocks, first, delay),
+        )
+
+    def _core(self) -> Any:
+        spec, names = self._spec, [port.name for port in self._design.outputs]
+        acceleration = float(getattr(spec, "acceleration_per_lsb", 0.0))
+        columns = [names.index(name) for name in ("velocity", "velocity_valid", "position")]
+        columns.append(names.index("acceleration") if acceleration else -1)
+        per_count = 2 * np.pi / spec.encoder.counts_per_rev
+        return _CORE(spec.rad_per_s_per_lsb, acceleration, per_count, *columns, 1 / spec.timing.clock_hz)

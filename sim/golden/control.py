@@ -1,0 +1,169 @@
+"""Golden control loop: observer and controller, control tick by control tick, in exact integers."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.golden.front_end import count, decoded
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run, Table
+from tachometry.spec import TachometerSpec
+from tachometry.spec.control.form import GUARD_BITS, ControlForm, Term
+from tachometry.spec.control.loop import LoopSpec
+from tachometry.spec.control.ports import CONTROL, CURRENT
+from tachometry.spec.port import UPDATE
+
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Command:
+    """What is commanded in a control tick, in LSB of the ports.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : int
+    enable : bool
+    """
+
+    position: int = 0
+    velocity: int = 0
+    acceleration: int = 0
+    enable: bool = True
+
+
+class Control:
+    """The state of a loop between two control ticks.
+
+    Parameters
+    ----------
+    form : ControlForm
+
+    Attributes
+    ----------
+    y, w, z : int
+        In 2^−f of an LSB of the velocity; w = z − y.
+    current : int
+        Of the last control tick, in its LSB.
+    saturated : bool
+        Whether it was held within the limit.
+    """
+
+    def __init__(self, form: ControlForm) -> None:
+        self._form = form
+        self.y = self.w = self.current = 0
+        self.saturated = False
+        self._held = self._n = self._sum = 0
+        self._waits = self._ticked = False
+        # For each term the shift and the coefficients, as reading them takes most of the time.
+        self._terms = {term: (one.shift, one.values) for term, one in form.terms.items()}
+        self._half = 1 << (form.factor_bits - 1)
+        wraps = form.position_width + form.position_bits
+        self._turn, self._half_turn, self._most_error = 1 << wraps, 1 << (wraps - 1), form.most_error
+
+    @property
+    def z(self) -> int:
+        """The observer's filter."""
+        return self.y + self.w
+
+    def update(self, velocity: int) -> None:
+        """An update of the velocity, after the last control tick."""
+        if self._form.synchronised and self._waits:
+            return
+        self._held = velocity
+        self._waits = self._ticked
+
+    def tick(self, position: int, command: Command) -> int:
+        """A control tick at a position, in counts: the new current."""
+        form = self._form
+        if not form.synchronised:
+            self._observe(1)
+        elif self._waits or self._n == form.longest:
+            self._observe(self._n)
+        self._waits, self._ticked = False, True
+        error = (command.position - (position << form.position_bits) + self._half_turn) % self._turn - self._half_turn
+        error = max(-self._most_error, min(error, self._most_error))
+        speed = (command.velocity << (form.extra_bits - form.command_bits)) - self.y
+        total = (
+            self._product(Term.POSITION, error)
+            + self._product(Term.VELOCITY, speed)
+            + self._product(Term.ACCELERATION, command.acceleration)
+            + self._product(Term.DISTURBANCE, self.w)
+        )
+        wanted = (total + (1 << (GUARD_BITS - 1))) >> GUARD_BITS
+        held = max(-form.current_limit, min(wanted, form.current_limit))
+        self.saturated = command.enable and held != wanted
+        self.current = held if command.enable else 0
+        self._sum += self.current
+        self._n += 1
+        return self.current
+
+    def _observe(self, n: int) -> None:
+        """Eq. (22) for velocity and observer, with the currents of n control ticks."""
+        fine = self._held << self._form.extra_bits
+        z = self.z
+        if Term.FILTER in self._terms:
+            self.y += self._product(Term.FILTER, fine - self.y, n)
+        else:
+            self.y = fine
+        z -= self._product(Term.OBSERVER, z - self.y, n)
+        self.w = z + self._product(Term.CURRENT, self._sum, n) - self.y
+        self._sum = self._n = 0
+
+    def _product(self, term: Term, word: int, n: int = 1) -> int:
+        shift, values = self._terms[term]
+        return ((word << shift) * values[n - 1] + self._half) >> self._form.factor_bits
+
+
+def control(spec: LoopSpec, clock: IntArray, position: IntArray, updates: Table, commands: Sequence[Command]) -> Table:
+    """What the loop shows with `current_valid`, of a shaft whose motion does not follow from its currents.
+
+    Parameters
+    ----------
+    spec : LoopSpec
+    clock : int64 array, shape (n,)
+        Clocks of the control ticks.
+    position : int64 array, shape (n,)
+        What the tachometer shows in them.
+    updates : Table
+        Of the tachometer, with `velocity`.
+    commands : sequence of Command
+        One for each control tick.
+    """
+    loop = Control(spec.form)
+    rows: list[tuple[int, bool, int, int]] = []
+    velocity = updates.velocity.tolist()
+    # An update in the clock of a control tick comes after it.
+    before = np.searchsorted(updates.clock, clock, side="left").tolist()
+    done = 0
+    for until, place, command in zip(before, position.tolist(), commands, strict=True):
+        for row in range(done, until):
+            loop.update(velocity[row])
+        done = until
+        loop.tick(place, command)
+        rows.append((loop.current, loop.saturated, loop.y, loop.w))
+    columns = np.array(rows, dtype=np.int64).reshape(-1, 4).T
+    names = ("current", "current_saturated", "filtered_velocity", "disturbance")
+    return Table(clock + spec.latency, dict(zip(names, columns, strict=True)))
+
+
+def run_loop(
+    spec: LoopSpec,
+    trace: PinTrace,
+    commands: Sequence[Command],
+    tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]],
+) -> Run:
+    """What the core of `spec` must show for these pins; `tables` is the golden model of a tachometer.
+
+    There is a command for each control tick within the trace.
+    """
+    alone = spec.tachometer
+    clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
+    # The position is as late as a tick shows it.
+    places, _ = count(alone, decoded(alone, trace), clock - alone.tick_latency)
+    found = tables(alone, trace)
+    shown = control(spec, clock, places.position, found[UPDATE], commands)
+    found |= {CONTROL: Table(clock, {}), CURRENT: shown.rows(shown.clock < trace.n_clocks)}
+    return Run.of_ports(spec, trace.n_clocks, found)

@@ -1,0 +1,236 @@
+"""Formats and coefficients of the control loop, and how exact they are.
+
+The law is that of Tsuji 2009, Sec. III and V-E. At an update of the velocity u, n control ticks of T_c after the one
+before, with the mean Ī of the currents of these ticks and K_a = K_t/(J·G):
+
+    y ← y + c_v(n)·(u − y),   z ← z + c_d(n)·(K_a·Ī + y − z),   c(n) = 1 − e^(−G·n·T_c)   (eq. (22), Fig. 11)
+
+and at a control tick
+
+    I = (J·(k_p·(θ_cmd − θ) + k_v·(ω_cmd − y) + a_cmd) + J·G·(z − y))/K_t, held within the limit.
+
+So the disturbance is J·G·(z − y), and J·G·ω never has to be formed. Instead of z the hardware keeps w = z − y. y and w
+are in 2^−f of an LSB of the velocity, the sum that becomes I in 2^−4 of an LSB of the current. Each product is
+round(d·c / 2^p), d a word and c a coefficient of p bits; where a ratio is 1 or more, d is shifted left for it.
+
+What is not exact:
+
+- A product is rounded, by half a unit. In y and w that dies out by c(n) per update, so it adds up to ½·2^−f/c(1) LSB of
+  the velocity for each of one product (y) or two (w). 2^f is at least 4/c(1): at most ⅛ LSB in y, and ¼ in w.
+- I is a sum of four products, so it is off by at most 4·½·2^−4 = ⅛ LSB, and by ½ from its own rounding.
+- A coefficient is rounded to p bits: its relative error is at most 2^−12, as the least of them is at least 2^11. (One
+  just below 1 is cut to 1 − 2^−p.) This is as if J, K_t or a gain were off by so much.
+
+What cannot overflow, whatever the inputs: y stays between the old y and u, so |y| ≤ V, the greatest velocity. z is
+drawn towards y + K_a·Ī: |z| ≤ V + M, where c_d(n)·M is at least the greatest product with ΣI and one unit more, for
+every n. So |w| ≤ 2V + M. The position error is held within a limit at which its product is greater than all others
+together and the limit of the current: holding it changes no current.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from enum import IntEnum
+from fractions import Fraction
+from functools import cached_property
+
+from tachometry.spec.units import ceil_log2, signed_width
+
+GUARD_BITS = 4  # of the sum that becomes the current
+POSITION_FRAC_BITS = 8  # of the commanded position
+LEAST_COEFFICIENT = 11  # bits
+
+
+class Term(IntEnum):
+    """The products, in the order in which they are formed."""
+
+    FILTER = 0  # c_v·(u − y)
+    OBSERVER = 1  # c_d·w
+    CURRENT = 2  # c_d·K_a/n·ΣI
+    POSITION = 3
+    VELOCITY = 4
+    ACCELERATION = 5
+    DISTURBANCE = 6
+
+
+# Products whose coefficient depends on n.
+TABLED = (Term.FILTER, Term.OBSERVER, Term.CURRENT)
+
+
+def decay(exponent: Fraction) -> Fraction:
+    """e^−exponent to 60 digits."""
+    with localcontext() as context:
+        context.prec = 70
+        return Fraction((-Decimal(exponent.numerator) / Decimal(exponent.denominator)).exp())
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """The coefficients of a term, in 2^(shift − p) of a unit of its result: one for each n from 1 on, or a single one.
+
+    Parameters
+    ----------
+    values : tuple of int
+    shift : int
+        The word is shifted left by so many bits.
+    """
+
+    values: tuple[int, ...]
+    shift: int = 0
+
+
+@dataclass(frozen=True)
+class ControlForm:
+    """Numbers that hardware and golden model share.
+
+    Parameters
+    ----------
+    velocity_width, velocity_limit : int
+        Bits of the velocity, and V: its greatest magnitude, LSB.
+    extra_bits : int
+        f.
+    factor_bits : int
+        p.
+    terms : dict
+        The coefficients of each term; without `Term.FILTER` y is the velocity.
+    current_limit : int
+        In LSB of the current.
+    position_width, command_bits, acceleration_width : int
+        Bits of the position, fraction bits of the commanded velocity, bits of the commanded acceleration.
+    synchronised : bool
+        Whether filter and observer work at updates of the velocity, not at control ticks.
+    position_bits : int
+        Fraction bits of the commanded position.
+    """
+
+    velocity_width: int
+    velocity_limit: int
+    extra_bits: int
+    factor_bits: int
+    terms: dict[Term, Coefficients]
+    current_limit: int
+    position_width: int
+    command_bits: int
+    acceleration_width: int
+    synchronised: bool
+    position_bits: int = POSITION_FRAC_BITS
+
+    @property
+    def longest(self) -> int:
+        """The greatest n: then the velocity that is held is taken as an update."""
+        return len(self.terms[Term.CURRENT].values)
+
+    def product(self, term: Term, word: int, n: int = 1) -> int:
+        """round(word·c / 2^p) for the coefficient of n, with the term's shift."""
+        one = self.terms[term]
+        return (((word << one.shift) * one.values[n - 1]) + (1 << (self.factor_bits - 1))) >> self.factor_bits
+
+    @cached_property
+    def most_y(self) -> int:
+        """Greatest |y|."""
+        return self.velocity_limit << self.extra_bits
+
+    @cached_property
+    def most_lead(self) -> int:
+        """M: z leads |y| by no more."""
+        forgets, gains = self.terms[Term.OBSERVER].values, self.terms[Term.CURRENT]
+        one = 1 << self.factor_bits
+        return max(
+            -(-((n + 1) * (self.current_limit << gains.shift) * gain + one) // forget)
+            for n, (forget, gain) in enumerate(zip(forgets, gains.values, strict=True))
+        )
+
+    @cached_property
+    def most_w(self) -> int:
+        """Greatest |w|."""
+        return 2 * self.most_y + self.most_lead
+
+    @property
+    def most_sum(self) -> int:
+        """Greatest |ΣI|."""
+        return self.longest * self.current_limit
+
+    @property
+    def command_width(self) -> int:
+        """Bits of the commanded velocity."""
+        return self.velocity_width + self.command_bits
+
+    @property
+    def most_command(self) -> int:
+        """Greatest magnitude of the commanded velocity, in units of y."""
+        return 1 << (self.velocity_width - 1 + self.extra_bits)
+
+    @cached_property
+    def most_error(self) -> int:
+        """The position error is held within ±this, in units of the commanded position: all bits are 1."""
+        half = (1 << (self.position_width + self.position_bits - 1)) - 1
+        if not self.terms[Term.POSITION].values[0]:
+            return 1
+        enough = self._most_others + (self.current_limit << GUARD_BITS) + 1
+        limit = 1
+        while limit < half and self.product(Term.POSITION, limit) < enough:
+            limit = 2 * limit + 1
+        return min(limit, half)
+
+    @cached_property
+    def _most_others(self) -> int:
+        """Greatest magnitude of the sum without the position."""
+        words = {
+            Term.VELOCITY: self.most_command + self.most_y,
+            Term.ACCELERATION: 1 << (self.acceleration_width - 1),
+            Term.DISTURBANCE: self.most_w,
+        }
+        return sum(self.product(term, word) + 1 for term, word in words.items())
+
+    @cached_property
+    def most_total(self) -> int:
+        """Greatest magnitude of the sum that becomes the current."""
+        return self._most_others + self.product(Term.POSITION, self.most_error + 1) + 1
+
+    @cached_property
+    def word_width(self) -> int:
+        """Bits of a word that is multiplied, shifted."""
+        most = {
+            Term.FILTER: 2 * self.most_y,
+            Term.OBSERVER: self.most_w,
+            Term.CURRENT: self.most_sum,
+            Term.POSITION: self.most_error + 1,
+            Term.VELOCITY: self.most_command + self.most_y,
+            Term.ACCELERATION: 1 << (self.acceleration_width - 1),
+            Term.DISTURBANCE: self.most_w,
+        }
+        return max(signed_width(most[term] << one.shift) for term, one in self.terms.items())
+
+    @property
+    def total_width(self) -> int:
+        """Bits of the sum that becomes the current, and of the position error before it is held."""
+        return max(signed_width(self.most_total), self.position_width + self.position_bits)
+
+
+def ratios(rate: Fraction, seconds: Fraction, longest: int) -> list[Fraction]:
+    """c(n) for n from 1 to `longest`, eq. (22)."""
+    return [1 - decay(rate * seconds * n) for n in range(1, longest + 1)]
+
+
+def extra_bits(*least: Fraction) -> int:
+    """f: the least with 2^f ≥ 4/c(1), of each."""
+    return max(2, *(ceil_log2(4 / one) for one in least))
+
+
+def factor_bits(found: Sequence[Sequence[Fraction]]) -> int:
+    """p: so many that the least coefficient that is not 0 has its bits."""
+    least = min(min(each) / _one(each) for each in found if each[0])
+    return LEAST_COEFFICIENT + max(1, ceil_log2(1 / least))
+
+
+def _one(found: Sequence[Fraction]) -> int:
+    """The power of two, at least 1, that is greater than all of them."""
+    return 1 << math.floor(max(found)).bit_length()
+
+
+def coefficients(found: Sequence[Fraction], bits: int) -> Coefficients:
+    """Ratios as coefficients of so many bits."""
+    one = _one(found)
+    most = (1 << bits) - 1
+    return Coefficients(tuple(min(round(each / one * (1 << bits)), most) for each in found), one.bit_length() - 1)

@@ -1,0 +1,361 @@
+"""A tachometer and the control loop of its shaft as one core."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from tachometry.spec.axes import CoreSpec
+from tachometry.spec.control import form
+from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+from tachometry.spec.control.ports import loop_ports
+from tachometry.spec.option import Derived, ParameterError, option, options_of, settle
+from tachometry.spec.port import Port, strobes_of
+from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.timing import Timing, whole_clocks
+from tachometry.spec.units import CURRENT, PI, PLAIN, TORQUE_CONSTANT, Units, parse_bandwidth, plural, read_exactly
+
+MAX_PERIOD = 1 << 24
+MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
+MAX_EXTRA_BITS = 24
+MAX_FACTOR_BITS = 40
+MAX_WORD_WIDTH = 80
+ACCELERATION_WIDTH = 20
+MULTIPLIERS = ("serial", "parallel")
+_GROUP = "Loop"
+# Clocks of a product: to load the word, to subtract from it, to begin, to store the result; and between them one for
+# each bit of the coefficient, or one for the product and one to round it.
+_STEPS = 4
+_PARALLEL = 2
+_UNFILTERED = 3  # to load the velocity, to subtract, to store
+_LIMIT = 2  # to hold the sum within few bits, and within the limit
+
+
+def _clocks(what: str, text: str) -> Derived:
+    return Derived(lambda spec: whole_clocks(what, text, spec.timing.clock_hz))
+
+
+def _positive(units: Units) -> Any:
+    return lambda what, text: read_exactly(what, text, units)
+
+
+def _filter(what: str, text: str) -> Fraction | None:
+    return None if text.strip().lower() == "none" else parse_bandwidth(what, text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopSpec:
+    """A tachometer with a disturbance observer and a controller of position and velocity; see `ControlForm`.
+
+    Parameters
+    ----------
+    tachometer : TachometerSpec
+        Of any method.
+    inertia : Fraction
+        J in kg m².
+    torque_constant : Fraction
+        K_t in Nm/A.
+    position_gain, velocity_gain : Fraction
+        k_p in 1/s² and k_v in 1/s.
+    observer : Fraction
+        G_dis in rad/s.
+    filter : Fraction or None
+        G_v in rad/s. None: y is the velocity.
+    current_limit : Fraction
+        In A.
+    period : int
+        Clocks between two control ticks.
+    synchronised : bool
+        Filter and observer work at the updates of the velocity, as in Fig. 11, not at every control tick, as in Fig. 2.
+    current_width : int
+        Bits of `current`.
+    multiplier : str
+        `serial`: a bit a clock; `parallel`: a product at once, for which tools take multipliers of the FPGA.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range, the program is longer than the period, or a format is too wide.
+    """
+
+    tachometer: TachometerSpec
+    inertia: Fraction = option(  # noqa: RUF009
+        None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", group=_GROUP, parse=_positive(PLAIN)
+    )
+    torque_constant: Fraction = option(  # noqa: RUF009
+        None,
+        "Torque constant K_t of the motor, in Nm/A or mNm/A.",
+        text="60.3mNm/A",
+        metavar="KT",
+        group=_GROUP,
+        parse=_positive(TORQUE_CONSTANT),
+    )
+    position_gain: Fraction = option(  # noqa: RUF009
+        None,
+        "Gain k_p of the position error, in 1/s²; 0: the velocity alone is controlled.",
+        text="100",
+        name="kp",
+        metavar="KP",
+        group=_GROUP,
+        parse=_positive(PLAIN),
+    )
+    velocity_gain: Fraction = option(  # noqa: RUF009
+        None,
+        "Gain k_v of the velocity error, in 1/s.",
+        text="30",
+        name="kv",
+        metavar="KV",
+        group=_GROUP,
+        parse=_positive(PLAIN),
+    )
+    observer: Fraction = option(  # noqa: RUF009
+        None,
+        "Bandwidth G_dis of the disturbance observer, in rad/s, Hz or kHz.",
+        text="40rad/s",
+        metavar="BANDWIDTH",
+        unit="rad/s",
+        group=_GROUP,
+        parse=parse_bandwidth,
+    )
+    filter: Fraction | None = option(  # noqa: RUF009
+        Derived(lambda spec: None if spec.tachometer.method == "track" else spec.observer),
+        "Bandwidth G_v of the low-pass filter of the velocity, or none.",
+        shown="that of --observer; none with method track",
+        name="velocity-filter",
+        metavar="[BANDWIDTH|none]",
+        unit="rad/s",
+        group=_GROUP,
+        parse=_filter,
+    )
+    current_limit: Fraction = option(  # noqa: RUF009
+        None,
+        "Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
+        text="20A",
+        metavar="CURRENT",
+        group=_GROUP,
+        parse=_positive(CURRENT),
+    )
+    period: int = option(
+        Derived(lambda spec: int(spec.timing.tick_cycles)),
+        "Time between two control ticks, a whole number of clocks; a plain number is clocks.",
+        shown="one tick",
+        name="control-period",
+        metavar="TIME",
+        unit="clocks",
+        group=_GROUP,
+        parse=_clocks,
+    )
+    synchronised: bool = option(
+        True,
+        "Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
+        "(Fig. 2).",
+        group=_GROUP,
+    )
+    current_width: int = option(16, "Bits of current, 8 to 24.", metavar="N", group=_GROUP)
+    multiplier: str = option(
+        "serial",
+        "How products are formed: a bit a clock, or at once with multipliers of the FPGA.",
+        choices=MULTIPLIERS,
+        group=_GROUP,
+    )
+
+    def __post_init__(self) -> None:
+        settle(self)
+        positive = ("inertia", "torque_constant", "velocity_gain", "observer", "current_limit")
+        for about in options_of(LoopSpec):
+            value = getattr(self, about.field)
+            if about.field in positive and value <= 0:
+                raise ParameterError(about.parameter, f"must be greater than 0, not {float(value):.9g}")
+        if self.position_gain < 0:
+            raise ParameterError("kp", f"must be at least 0, not {float(self.position_gain):.9g}")
+        if self.filter is not None and self.filter <= 0:
+            raise ParameterError("velocity_filter", f"must be greater than 0, not {float(self.filter):.9g}")
+        if not 8 <= self.current_width <= 24:
+            raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
+        if self.multiplier not in MULTIPLIERS:
+            raise ParameterError("multiplier", f"must be serial or parallel, not {self.multiplier!r}")
+        if not 1 <= self.period <= MAX_PERIOD:
+            raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
+        self._check_formats()
+        if self.period < self.least_period:
+            raise ParameterError(
+                "control_period",
+                f"must be at least {plural(self.least_period, 'clock')}, as long as the controller computes with a "
+                f"{self.multiplier} multiplier, not {self.period}",
+            )
+
+    def _check_formats(self) -> None:
+        for rate, name in ((self.observer, "observer"), (self.filter, "velocity_filter")):
+            least = 4 / ((1 << MAX_EXTRA_BITS) * self.seconds)
+            most = 2 * PI * self.timing.clock_hz
+            if rate is not None and not least <= rate <= most:
+                raise ParameterError(
+                    name, f"must be from {float(least):.4g} to {float(most):.4g} rad/s here, not {float(rate):.9g}"
+                )
+        found = self._ratios
+        if form.factor_bits(list(found.values())) > MAX_FACTOR_BITS:
+            raise ParameterError(
+                "kv" if not self.position_gain else "kp",
+                f"must fit the other gains: coefficients would have {form.factor_bits(list(found.values()))} bits, and "
+                f"{MAX_FACTOR_BITS} are the most",
+            )
+        width = max(self.form.word_width, self.form.total_width)
+        if width > MAX_WORD_WIDTH:
+            raise ParameterError(
+                "velocity_width",
+                f"must be less with --loop here: words would have {width} bits, and {MAX_WORD_WIDTH} are the most; a "
+                "max_speed, a lower observer or lower gains help, too",
+            )
+
+    @property
+    def timing(self) -> Timing:
+        """Clock, tick and maximum time of the tachometer."""
+        return self.tachometer.timing
+
+    @property
+    def method(self) -> str:
+        """Name of the tachometer's method."""
+        return self.tachometer.method
+
+    @property
+    def seconds(self) -> Fraction:
+        """T_c, the time between two control ticks."""
+        return self.tachometer.seconds(self.period)
+
+    @property
+    def first_tick(self) -> int:
+        """The clock of the first control tick, from 0: one clock after the update of the first tick has come.
+
+        So a period of whole ticks meets each update when it is new.
+        """
+        spec = self.tachometer
+        return spec.timing.tick_cycles - 1 + spec.tick_latency + spec.tick_to_velocity + 1
+
+    @property
+    def longest(self) -> int:
+        """Most control ticks that an update can stand for; then the velocity that is held is taken as one."""
+        if not self.synchronised:
+            return 1
+        spec = self.tachometer
+        ticks = -(-(spec.timing.max_ticks * spec.longest_tick) // self.period) + 2
+        return min((1 << ticks.bit_length()) - 1, MAX_INTERVAL)
+
+    @property
+    def rad_per_s(self) -> Fraction:
+        """One LSB of the velocity in rad/s."""
+        spec = self.tachometer
+        counts = spec.encoder.counts_per_rev * spec.timing.tick_seconds * spec.per_count
+        return 2 * PI / (counts * Fraction(2) ** spec.frac_bits)
+
+    @property
+    def current_frac_bits(self) -> int:
+        """One LSB of `current` is 2^−this A."""
+        return math.floor(math.log2(((1 << (self.current_width - 1)) - 1) / self.current_limit))
+
+    @property
+    def amperes(self) -> Fraction:
+        """One LSB of `current` in A."""
+        return Fraction(2) ** -self.current_frac_bits
+
+    @property
+    def acceleration_frac_bits(self) -> int:
+        """One LSB of the commanded acceleration is 2^−this rad/s²: twice what the greatest current makes fits."""
+        most = 2 * self.torque_constant * self.current_limit / self.inertia
+        return math.floor(math.log2(((1 << (ACCELERATION_WIDTH - 1)) - 1) / most))
+
+    @property
+    def command_bits(self) -> int:
+        """Fraction bits of the commanded velocity, below an LSB of the velocity."""
+        return min(self._extra_bits, 8)
+
+    @cached_property
+    def _extra_bits(self) -> int:
+        least = [rate * self.seconds for rate in (self.observer, self.filter) if rate is not None]
+        return form.extra_bits(*(1 - form.decay(one) for one in least))
+
+    @cached_property
+    def _ratios(self) -> dict[Term, list[Fraction]]:
+        """What each term is multiplied by, in units of its result for one of its word."""
+        unit = self.rad_per_s / (1 << self._extra_bits)  # rad/s
+        part = self.amperes / (1 << GUARD_BITS)  # A
+        of_acceleration = self.inertia / self.torque_constant / part
+        angle = 2 * PI / self.tachometer.encoder.counts_per_rev / (1 << POSITION_FRAC_BITS)
+        observed = form.ratios(self.observer, self.seconds, self.longest)
+        per_current = self.torque_constant / (self.inertia * self.observer) * self.amperes / unit
+        found = {
+            Term.OBSERVER: observed,
+            Term.CURRENT: [one * per_current / n for n, one in enumerate(observed, 1)],
+            Term.POSITION: [of_acceleration * self.position_gain * angle],
+            Term.VELOCITY: [of_acceleration * self.velocity_gain * unit],
+            Term.ACCELERATION: [of_acceleration * Fraction(2) ** -self.acceleration_frac_bits],
+            Term.DISTURBANCE: [of_acceleration * self.observer * unit],
+        }
+        if self.filter is not None:
+            found[Term.FILTER] = form.ratios(self.filter, self.seconds, self.longest)
+        return found
+
+    @cached_property
+    def form(self) -> ControlForm:
+        """Formats and coefficients."""
+        bits = form.factor_bits(list(self._ratios.values()))
+        spec = self.tachometer
+        return ControlForm(
+            velocity_width=spec.velocity_width,
+            velocity_limit=spec.full_scale,
+            extra_bits=self._extra_bits,
+            factor_bits=bits,
+            terms={term: form.coefficients(found, bits) for term, found in self._ratios.items()},
+            current_limit=math.floor(self.current_limit / self.amperes),
+            position_width=spec.position_width,
+            command_bits=self.command_bits,
+            acceleration_width=ACCELERATION_WIDTH,
+            synchronised=self.synchronised,
+        )
+
+    @property
+    def product_clocks(self) -> int:
+        """Clocks from one product to the next."""
+        return _STEPS + (self.form.factor_bits if self.multiplier == "serial" else _PARALLEL)
+
+    @property
+    def latency(self) -> int:
+        """Clocks from `control_tick` to `current_valid`."""
+        unfiltered = _UNFILTERED if self.filter is None else 0
+        return (len(Term) - (self.filter is None)) * self.product_clocks + unfiltered + _LIMIT
+
+    @property
+    def least_period(self) -> int:
+        """Fewest clocks between two control ticks: the current is added to those before it."""
+        return self.latency + 1
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Ports of the exported core, in order: those of the tachometer first."""
+        return (*self.tachometer.ports, *loop_ports(self))
+
+    @property
+    def pins(self) -> tuple[Port, ...]:
+        """Inputs beside clock and reset."""
+        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
+
+    @property
+    def outputs(self) -> tuple[Port, ...]:
+        """Outputs of the exported core, in order."""
+        return tuple(port for port in self.ports if port.direction == "output")
+
+    @property
+    def strobes(self) -> dict[str, tuple[str, ...]]:
+        """Outputs that strobe, each with the names of the outputs that are new with it."""
+        return strobes_of(self.outputs)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Every option in canonical form, defaults included."""
+        own = {about.parameter: about.canonical(getattr(self, about.field)) for about in options_of(LoopSpec)}
+        return {**self.tachometer.parameters, "loop": own}
+
+
+AnySpec = CoreSpec | LoopSpec

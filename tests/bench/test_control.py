@@ -1,0 +1,42 @@
+"""The benchmark of control loops: its tables, its figure, and that a gain which is not usable is left out."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.script import load
+
+from tachometry.sim.studies.control import Outcome
+from tachometry.sim.studies.gate_check import Checked
+from tachometry.sim.studies.usable_gain import KINDS, TICKS
+
+bench = load("control")
+
+FINE = Outcome(rms=0.1234, largest=0.2, sound=0.3, limited=0.0, dip=0.4)
+
+
+def test_a_row_and_a_mark_for_every_gain_that_is_usable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but those of the conventional observer."""
+
+    def usable(at: Any, seeds: Any, jobs: Any) -> tuple[float, Outcome] | None:
+        return None if at(20.0).gains.way.name == "CONVENTIONAL" else (80.0, FINE)
+
+    monkeypatch.setattr(bench, "usable", usable)
+    table, found = bench.usable_gains(range(6), 1)
+    rows = table.splitlines()[2:]
+    n_track = sum(seconds >= 20e-6 for seconds in TICKS)
+    assert len(rows) == 2 * ((len(KINDS) - 1) * len(TICKS) + n_track)
+    assert "| real disc | S, synchronised | 20 µs | 80 | 0.123 | 0.2 | 0.4 | 0.3 |" in rows
+    assert "| ideal disc | S, conventional | 1 ms | - | - | - | - | - |" in rows
+    assert len(found) == 2 * (2 * len(TICKS) + n_track)
+    for name in ("one.png", "two.png"):
+        bench.save_usable_gains(tmp_path / name, found)
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
+
+
+def test_mismatches_of_all_seeds_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "check", lambda one, seed: Checked(1000, seed, FINE, FINE))
+    rows = bench.in_gates(range(6), 1).splitlines()[2:]
+    assert len(rows) == 3
+    for line in rows:
+        assert line.split(" | ")[1:] == ["6000", "15", "0.1234", "0.1234", "0.3", "0.3 |"]

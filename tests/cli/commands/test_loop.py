@@ -1,0 +1,134 @@
+"""`tachometry loop`."""
+
+import csv
+from pathlib import Path
+
+import pytest
+from support import command
+
+from tachometry.sim.engines import build
+from tachometry.sim.engines.loop import COLUMNS
+from tachometry.sim.studies import cluster
+
+CORE = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms".split()
+SHORT = [*CORE, "--motion", "ramp:0:4:30ms+constant:4:50ms", "--from", "40ms"]
+
+
+def run(*args: object) -> int:
+    return command.run("loop", *args)
+
+
+def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for folder in ("one", "two"):
+        files = ["--log", tmp_path / folder / "log.csv", "--csv", tmp_path / folder / "all.csv"]
+        files += ["--plot", tmp_path / folder / "loop.png"]
+        assert run(*SHORT, "--load", "20mNm:60ms:10ms", "--kv", "20", "--seeds", "2", "--seed", "7", *files) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert table[0].split()[:4] == ["seed", "RMS", "error", "(rad/s)"]
+    assert [line.split()[0] for line in table[1:4]] == ["7", "8", "mean"]
+    assert table[5] == "S method, eq. (21); ramp:0:4:30ms+constant:4:50ms"
+    for path in (tmp_path / "one").iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
+    with (tmp_path / "one" / "log.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [name.split()[0] for name in rows[0]] == list(COLUMNS)
+    assert len(rows) == 800
+    assert float(rows[-1]["speed (rad/s)"]) == pytest.approx(4, abs=1.5)
+    with (tmp_path / "one" / "all.csv").open() as file:
+        (whole,) = csv.DictReader(file)
+    assert whole["method"] == "s"
+    assert f"{float(whole['rms_error_rad_s']):.3g}" == table[3].split()[1]
+
+
+def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = ["--csv", tmp_path / "all.csv", "--plot", tmp_path / "loops.pdf"]
+    options = ["--methods", "s", "--vary", "kv=20,80", "--vary", "synchronised=yes,no"]
+    assert run(*SHORT, *options, "--seeds", "1", "--jobs", "1", *files) == 0
+    table = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert table[0][:3] == ["method", "kv", "synchronised"]
+    assert [row[1:3] for row in table[1:5]] == [[kv, o] for kv in ("20", "80") for o in ("yes", "no")]
+    assert " ".join(table[6]).startswith("4 loops with 1 seed each, run in ")
+    with (tmp_path / "all.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["kv"] for row in rows] == ["20", "20", "80", "80"]
+    assert (tmp_path / "loops.pdf").read_bytes().startswith(b"%PDF")
+    # One of them alone, in this process, is the same.
+    assert run(*SHORT, "--kv", "80", "--no-synchronised", "--seeds", "1", "--csv", tmp_path / "one.csv") == 0
+    with (tmp_path / "one.csv").open() as file:
+        (alone,) = csv.DictReader(file)
+    assert {name: rows[3][name] for name in alone} == alone
+
+
+def test_a_controller_in_gates(tmp_path: Path) -> None:
+    gains = "--kp 1600 --kv 80 --observer 160 --current-limit 8A --seeds 1".split()
+    for name, more in (("gates", ["--gates"]), ("double", [])):
+        assert run(*SHORT, *gains, *more, "--log", tmp_path / f"{name}.csv") == 0
+    current = {}
+    for name in ("gates", "double"):
+        with (tmp_path / f"{name}.csv").open() as file:
+            current[name] = [float(row["current (A)"]) for row in csv.DictReader(file)]
+    away = {name: max(abs(2048 * value - round(2048 * value)) for value in each) for name, each in current.items()}
+    assert away["gates"] < 1e-4  # whole LSB, but for what the file rounds
+    assert away["double"] > 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--kv -1", "--kv must be at least 0, not -1"),
+        ("--observer 0", "--observer must be more than 0, not 0"),
+        ("--velocity-filter 0", "--velocity-filter must be more than 0, not 0"),
+        ("--velocity-filter some", "--velocity-filter must be a number in rad/s"),
+        ("--delay 30us", "--delay must be at most a control tick, 20us, not 30us"),
+        ("--control-period 1ns", "--control-period must be a whole number of clocks"),
+        ("--control-period 2s", "--control-period must be from a clock to 1s, not 2s"),
+        ("--measured-acceleration", "--measured-acceleration must not be given with method s"),
+        ("--load 1Nm:2s", "--load must be TORQUE:FROM:TIME, such as 0.2Nm:7s:500ms, not '1Nm:2s'"),
+        ("--load 1Nm:41ms:1s", "--load must begin 2ms or more after --from, and within --motion"),
+        ("--from 79ms", "--from must be from 0 to 2ms before the end of --motion, not 79ms"),
+        ("--motion stop:101s", "--motion must last from 10ms to 100s in a loop, not 101s"),
+        ("--torque-noise -1Nm", "--torque-noise must be at least 0 Nm, not -1"),
+        ("--inertia 0", "--inertia must be more than 0, not 0"),
+        ("--friction -1Nm", "--friction must be at least 0, not -1"),
+        ("--gates --delay 1us", "--delay must not be given together with --gates"),
+        ("--gates --kv 0", "--kv must be greater than 0, not 0"),
+        ("--seeds 0", "--seeds must be from 1 to 1000, not 0"),
+        ("--jobs 0", "--jobs must be at least 1, not 0"),
+        ("--jobs 1 --scheduler tcp://nobody:1", "--jobs must not be given together with --scheduler"),
+        ("--vary kv=1,2 --log log.csv", "--log must be of one loop on this machine"),
+        ("--methods s,m --plot plot.png", "--vary must be given together with --plot of several loops"),
+        ("--vary speed=1,2", "--vary must be of ppr, decoding, clock, "),
+        ("--vary kv=1,-2", "--kv must be at least 0, not -2 (method s, kv=-2)"),
+        ("--min-time 1ms", "--min-time must be given with a method that has it: mt"),
+        ("--methods s,x", "--methods must be of s, m, t, mt, rairan, track, or all, not 'x'"),
+        ("--bounce 3:1ms", "No such option '--bounce'"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(
+    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = options.split()
+    fixed = [*CORE, "--motion", "stop:80ms", "--from", "40ms"]
+    given = [word for k, word in enumerate(fixed) if not {fixed[k], fixed[k - 1]} & {*words} & {"--motion", "--from"}]
+    assert run(*given, *words, "--csv", "all.csv") == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The files that were there stay, whether there is no compiler or no extra `sweep`."""
+    for name in ("log.csv", "all.csv"):
+        (tmp_path / name).write_text("old")
+
+    def missing(*_: object) -> None:
+        raise OSError("not installed")
+
+    monkeypatch.setattr(cluster, "require", missing)
+    assert run(*SHORT, "--vary", "kv=1,2", "--csv", tmp_path / "all.csv") == 2
+    monkeypatch.setattr(build, "find_compiler", lambda: None)
+    assert run(*SHORT, "--log", tmp_path / "log.csv", "--csv", tmp_path / "all.csv") == 2
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"log.csv": "old", "all.csv": "old"}

@@ -1,0 +1,92 @@
+"""docs/control.md: its commands run, and rows of its tables are what comes of them."""
+
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import pytest
+from support import command
+
+from tachometry.cli.commands.loop import loop
+from tachometry.cli.options.closed_loop import loop_options
+from tachometry.cli.options.sweep import by_name
+from tachometry.cli.sweeping.loops import loops_of
+from tachometry.cli.sweeping.settings import of_command_line
+from tachometry.sim.engines.loop import Observer
+from tachometry.sim.studies.control import Outcome, outcome_of, simulation_of
+from tachometry.sim.studies.usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
+
+PAGE = (Path(__file__).parents[3] / "docs" / "control.md").read_text(encoding="utf-8")
+COMMANDS = [
+    shlex.split(found.replace("\\\n", ""))
+    for found in re.findall(r"^    tachometry loop (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
+]
+
+
+def figures(found: Outcome) -> list[float]:
+    """What a row says of an outcome."""
+    assert found.dip is not None
+    return [float(f"{value:.3g}") for value in (found.rms, found.largest, found.dip, found.sound)]
+
+
+def row(*begin: str) -> list[float]:
+    """The numbers of the only row that begins so."""
+    (line,) = [line for line in PAGE.splitlines() if line.startswith(f"| {' | '.join(begin)} | ")]
+    return [float(cell) for cell in line.strip("| ").split(" | ")[len(begin) :]]
+
+
+@pytest.mark.parametrize("words", [words for words in COMMANDS if "--vary" not in words], ids=lambda words: words[-1])
+def test_commands_run(words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With one seed, for the time that it takes."""
+    monkeypatch.chdir(tmp_path)
+    given = words[: words.index("--seeds")] if "--seeds" in words else words
+    assert command.run("loop", *given, "--seeds", "1") == 0
+
+
+def test_the_command_with_axes_means_loops() -> None:
+    (words,) = [words for words in COMMANDS if "--vary" in words]
+    raw, _, _ = loop.make_parser(click.Context(loop)).parse_args(words)
+    found = loops_of(of_command_line(raw, by_name(loop) | loop_options()), str(raw["methods"]), 6)
+    assert [(point.method, found.at[key]["kv"]) for key, point in found.points.items()] == [
+        (method, kv) for method in ("s", "mt", "track") for kv in ("20", "40")
+    ]
+
+
+@pytest.mark.parametrize(("name", "place"), [("S, synchronised", 0), ("S, conventional", 1)])
+def test_rows_of_what_synchronising_does(name: str, place: int) -> None:
+    found = outcome_of(setting(KINDS[place], 80.0, 20e-6, REAL), range(6))
+    assert found.dip is not None
+    assert row("real disc", "80", name) == [
+        float(f"{x:.3g}") for x in (found.rms, found.largest, found.dip, found.sound)
+    ]
+
+
+def test_rows_of_usable_gains() -> None:
+    """Ticks of 1 ms, S: the gain of the table is usable, and the next one is not."""
+    gain, *rest = row("real disc", "S, synchronised", "1 ms")
+    above = GAINS[GAINS.index(gain) + 1]
+    found, other = (outcome_of(setting(KINDS[0], kv, 1e-3, REAL), range(6)) for kv in (gain, above))
+    assert is_usable(found)
+    assert not is_usable(other)
+    assert rest == figures(found)
+
+
+def test_rows_of_what_was_assumed() -> None:
+    base = setting(KINDS[0], 40.0, 1e-3, REAL)
+    every = {**dict(variants(base)), "the conventional observer": None}
+    assert len(re.findall(r"^\| 1 ms \| 40 \| ", PAGE, re.MULTILINE)) == len(every)
+    every["the conventional observer"] = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
+    for name, varied in list(every.items())[1::3]:
+        assert varied is not None
+        assert row("1 ms", "40", name) == figures(outcome_of(varied, range(6))), name
+
+
+def test_what_is_held_is_more_than_the_speed() -> None:
+    one = setting(KINDS[0], 80.0, 20e-6, REAL)
+    log = one.run(simulation_of(one.spec), 0)
+    steady = (log["time"] > 0.5) & (log["time"] < 0.8)
+    said = re.search(r"by ([\d.]+) rad/s with S", PAGE)
+    assert said is not None
+    assert (log["held"] - log["speed"])[steady].mean() == pytest.approx(float(said[1]), abs=0.1)

@@ -1,0 +1,108 @@
+"""A core with its control loop in gates, about a motor: what it commands is what the golden models say, bit for bit."""
+
+import functools
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.mutant import caught
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.engines.gate_loop import GateLoop, Through
+from tachometry.sim.engines.loop import Log, Observer
+from tachometry.sim.golden.control import Command, Control, run_loop
+from tachometry.sim.studies.control import Load, Outcome, Task, edges_of, in_gates, simulation_of
+from tachometry.sim.studies.gate_check import check
+from tachometry.sim.studies.usable_gain import KINDS, MOTOR, REAL, setting
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.option import ParameterError
+
+DOUBLE = replace(
+    setting(KINDS[0], 80.0, 20e-6, REAL),
+    task=Task(
+        motion=parse_motion("ramp:0:15:100ms+ramp:15:-5:150ms+constant:-5:150ms"),
+        load=Load(torque=0.1, begin=0.3, seconds=0.05),
+        noise=0.005,
+    ),
+    begin=0.05,
+)
+SPEC = LoopSpec(
+    tachometer=DOUBLE.spec,
+    position_gain=Fraction(1600),
+    velocity_gain=Fraction(80),
+    observer=Fraction(160),
+    current_limit=Fraction(8),
+)
+
+
+@functools.cache
+def through_gates() -> tuple[Log, Through]:
+    course = DOUBLE.task.course(MOTOR, 2)
+    return GateLoop(SPEC).run(MOTOR, edges_of(replace(REAL, seed=2)), course, feed_forward=True)
+
+
+def agrees(spec: LoopSpec) -> None:
+    """Each current, filtered velocity and disturbance, and its clock, with what the golden models make of the lines."""
+    _, through = through_gates()
+    n_ticks = len(range(spec.first_tick, through.trace.n_clocks, spec.period))
+    commands = [Command(*row) for row in through.commands[:n_ticks].tolist()]
+    expected = run_loop(spec, through.trace, commands, golden.tables).tables["current_valid"]
+    columns = (expected.clock, expected.current, expected.filtered_velocity, expected.disturbance)
+    np.testing.assert_array_equal(np.stack(columns, axis=1), through.currents)
+    assert len(through.currents) == 19_999
+
+
+def test_gates_and_golden_models_agree_in_every_bit() -> None:
+    agrees(SPEC)
+    current = through_gates()[1].currents[:, 1] * float(SPEC.amperes)
+    assert current.min() == -8
+    assert current.max() > 6
+
+
+def test_other_gains_are_noticed() -> None:
+    with caught():
+        agrees(replace(SPEC, velocity_gain=Fraction(80.1)))
+
+
+def test_the_log_is_that_of_the_ports() -> None:
+    log, through = through_gates()
+    clock = np.round(log["time"] * SPEC.timing.clock_hz).astype(np.int64)
+    last = np.searchsorted(through.currents[:, 0], clock, side="left") - 1
+    shown = last >= 0
+    np.testing.assert_allclose(log["current"][shown], through.currents[last[shown], 1] * float(SPEC.amperes))
+    per_lsb = float(SPEC.rad_per_s / (1 << SPEC.form.extra_bits))
+    np.testing.assert_allclose(log["y"][shown], through.currents[last[shown], 2] * per_lsb)
+    assert np.abs(log["disturbance"][-400:]).max() > 0.05  # the load
+
+
+def test_the_loop_does_what_one_in_double_precision_does() -> None:
+    gains = replace(DOUBLE.gains, feed_forward=True)
+    double = replace(DOUBLE, gains=gains)
+    found: list[Outcome] = [
+        double.outcome(log) for log in (through_gates()[0], double.run(simulation_of(DOUBLE.spec), 2))
+    ]
+    assert found[0].rms == pytest.approx(found[1].rms, rel=0.05)
+    assert found[0].sound == pytest.approx(found[1].sound, rel=0.05)
+    assert found[0].dip == pytest.approx(found[1].dip, rel=0.05)
+
+
+def test_the_core_of_a_setting_has_its_gains() -> None:
+    assert in_gates(DOUBLE).gates == SPEC
+    fast = in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, seconds=2e-6, way=Observer.CONVENTIONAL))).gates
+    assert fast is not None
+    assert (fast.period, fast.multiplier, fast.synchronised) == (96, "parallel", False)
+    for name, wrong in (("delay", {"delay": 1e-6}), ("unfiltered", {"on_filtered": False})):
+        with pytest.raises(ParameterError, match=f"{name} must not be given together with --gates"):
+            in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, **wrong)))
+    with pytest.raises(ParameterError, match="observer must be from"):
+        in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, observer=1e-9)))
+
+
+def test_a_check_counts_what_differs(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = check(DOUBLE, 1)
+    assert (found.ticks, found.mismatches) == (19_999, 0)
+    assert found.gates.rms == pytest.approx(found.double.rms, rel=0.05)
+    monkeypatch.setattr(Control, "update", lambda self, velocity: None)  # no velocity at all
+    assert check(DOUBLE, 1).mismatches > 19_999

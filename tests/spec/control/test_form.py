@@ -1,0 +1,171 @@
+"""Formats of the control loop: exact enough, and wide enough for whatever comes."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from itertools import product as combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tachometry.spec import Encoder, ParameterError, Speed, STachometer, Timing, TrackTachometer
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+
+CORE = STachometer(
+    encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
+)
+
+
+def random_spec(seed: int) -> LoopSpec:
+    """Gains, motors, clocks and units of all sizes."""
+    rng = np.random.default_rng(seed)
+
+    def about(middle: float, decades: float) -> Fraction:
+        return Fraction(float(f"{middle * 10 ** rng.uniform(-decades, decades):.3g}"))
+
+    core: dict[str, Any] = {
+        "encoder": Encoder(int(rng.choice([1, 100, 500, 20_000]))),
+        "timing": Timing(48_000_000, int(rng.choice([400, 960, 48_000])), int(rng.choice([2, 50, 500]))),
+    }
+    if rng.random() < 0.5:
+        core |= {"unit": "rad/s", "frac_bits": int(rng.choice([2, 8]))}
+    if rng.random() < 0.5:
+        core |= {"max_speed": Speed(Fraction(500))}
+    velocity = about(100, 1)
+    observer = about(200, 1)
+    return LoopSpec(
+        tachometer=STachometer(**core),
+        inertia=about(0.001, 2),
+        torque_constant=about(0.05, 1),
+        position_gain=velocity**2 / 4 if rng.random() < 0.8 else Fraction(0),
+        velocity_gain=velocity,
+        observer=observer,
+        filter=(observer, about(200, 1), None)[int(rng.integers(3))],
+        current_limit=about(10, 1),
+        synchronised=bool(rng.random() < 0.7),
+        current_width=int(rng.choice([8, 16, 24])),
+    )
+
+
+SPECS = [spec for seed in range(12) if (spec := random_spec(seed)).form]
+
+
+def fits(value: int, width: int) -> bool:
+    return -(1 << (width - 1)) <= value < 1 << (width - 1)
+
+
+def check_observer(form: ControlForm) -> None:
+    """From the extremes of y, z, u and ΣI no n leads beyond them.
+
+    Each of the sums rises with each of these, as coefficients are less than 1, so the extremes are enough.
+    """
+    most_y, most_z = form.most_y, form.most_y + form.most_lead
+    for n in {1, 2, form.longest // 2 + 1, form.longest} & {*range(1, form.longest + 1)}:
+        for sign_y, sign_z, sign_u, sign_i in combinations((-1, 1), repeat=4):
+            y, z, u = sign_y * most_y, sign_z * most_z, sign_u * form.most_y
+            new_y = u
+            if Term.FILTER in form.terms:
+                assert fits((u - y) << form.terms[Term.FILTER].shift, form.word_width)
+                new_y = y + form.product(Term.FILTER, u - y, n)
+            assert abs(new_y) <= most_y
+            w = z - new_y
+            assert abs(w) <= form.most_w
+            w -= form.product(Term.OBSERVER, w, n)
+            total = sign_i * n * form.current_limit
+            assert abs(total) <= form.most_sum
+            assert fits(total << form.terms[Term.CURRENT].shift, form.word_width)
+            w += form.product(Term.CURRENT, total, n)
+            assert abs(w) <= form.most_w
+            assert abs(new_y + w) <= most_z
+
+
+def check_current(form: ControlForm) -> None:
+    """All sums fit, and a position error that is held gives a current at its limit, whatever the other terms are."""
+    acceleration = 1 << (form.acceleration_width - 1)
+    for signs in combinations((-1, 1), repeat=4):
+        words = {
+            Term.POSITION: signs[0] * form.most_error,
+            Term.VELOCITY: signs[1] * (form.most_command + form.most_y),
+            Term.ACCELERATION: signs[2] * acceleration,
+            Term.DISTURBANCE: signs[3] * form.most_w,
+        }
+        total = 1 << (GUARD_BITS - 1)
+        for term, word in words.items():
+            assert fits(word << form.terms[term].shift, form.word_width)
+            total += form.product(term, word)
+            assert fits(total, form.total_width)
+        everything = (1 << (form.position_width + POSITION_FRAC_BITS - 1)) - 1
+        if form.terms[Term.POSITION].values[0] and form.most_error < everything:
+            assert abs(total >> GUARD_BITS) >= form.current_limit
+            assert (total > 0) == (signs[0] > 0)
+
+
+@pytest.mark.parametrize("number", range(len(SPECS)))
+def test_nothing_overflows(number: int) -> None:
+    check_observer(SPECS[number].form)
+    check_current(SPECS[number].form)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("most_lead", lambda form: form.most_lead // 2),
+        ("word_width", lambda form: form.word_width - 1),
+        ("total_width", lambda form: form.total_width - 12),
+        ("most_error", lambda form: form.most_error // 4),
+    ],
+)
+def test_formats_are_no_wider_than_needed(name: str, wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    form = LoopSpec(tachometer=CORE).form
+    less = wrong(form)
+    monkeypatch.setattr(ControlForm, name, property(lambda self: less), raising=True)
+    form = replace(form)
+    with pytest.raises(AssertionError):  # noqa: PT012
+        check_observer(form)
+        check_current(form)
+
+
+@pytest.mark.parametrize("number", range(len(SPECS)))
+def test_coefficients_are_those_of_the_equations(number: int) -> None:
+    spec = SPECS[number]
+    form = spec.form
+    time, unit = float(spec.seconds), float(spec.rad_per_s) / 2**form.extra_bits
+    part, inertia, constant = float(spec.amperes) / 16, float(spec.inertia), float(spec.torque_constant)
+    rate = float(spec.observer)
+    wanted = {
+        Term.OBSERVER: lambda n: -math.expm1(-rate * time * n),
+        Term.CURRENT: lambda n: -math.expm1(-rate * time * n) / n * constant / (inertia * rate) * part * 16 / unit,
+        Term.VELOCITY: lambda n: inertia * float(spec.velocity_gain) / constant * unit / part,
+        Term.DISTURBANCE: lambda n: inertia * rate / constant * unit / part,
+    }
+    if spec.filter is not None:
+        wanted[Term.FILTER] = lambda n: -math.expm1(-float(spec.filter or 0) * time * n)
+    for term, ratio in wanted.items():
+        found = form.terms[term]
+        for n in {1, len(found.values) // 2 + 1, len(found.values)}:
+            value = found.values[n - 1] * 2.0 ** (found.shift - form.factor_bits)
+            assert value == pytest.approx(ratio(n), rel=2**-12 * 1.01)
+    least = min(-math.expm1(-float(one) * time) for one in (spec.observer, spec.filter or spec.observer))
+    assert 4 <= least * 2**form.extra_bits < 8 or form.extra_bits == 2
+
+
+def test_a_tracking_core_has_no_filter() -> None:
+    core = TrackTachometer(encoder=Encoder(500), max_speed=Speed.parse("1000rad/s"), velocity_width=16)
+    assert LoopSpec(tachometer=core).filter is None
+    assert LoopSpec(tachometer=CORE).filter == 40
+    assert replace(LoopSpec(tachometer=CORE), observer=Fraction(80)).period == 960
+
+
+def test_a_long_measurement_is_cut_into_parts() -> None:
+    spec = LoopSpec(tachometer=replace(CORE, timing=Timing.parse("48MHz", "20us", "100ms")))
+    assert spec.longest == 1023
+    assert LoopSpec(tachometer=CORE).longest == 511
+
+
+def test_limits() -> None:
+    with pytest.raises(ParameterError, match=r"^observer must be from 0\.01192 to 3\.016e\+08 rad/s here, not 1e\+09$"):
+        LoopSpec(tachometer=CORE, observer=Fraction(10**9))
+    with pytest.raises(ParameterError, match=r"^current_width must be from 8 to 24, not 25$"):
+        LoopSpec(tachometer=CORE, current_width=25)

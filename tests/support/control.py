@@ -1,0 +1,178 @@
+"""A control loop without a tachometer: updates, positions and commands that a test makes up."""
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from support.simulate import clock_by_clock
+from tachometry.hdl.control import controller, loop_core, update_window
+from tachometry.sim import golden
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.golden.control import Command, control, run_loop
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run, Table, compare, observed
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.control.form import ControlForm
+
+SMALL = LoopSpec(
+    tachometer=STachometer(
+        encoder=Encoder(500), timing=Timing(1_000_000, 200, 2), frac_bits=8, max_speed=Speed.parse("60rad/s")
+    ),
+    position_gain=Fraction(9000),
+    velocity_gain=Fraction(200),
+    observer=Fraction(2000),
+    filter=Fraction(1000),
+    period=50,
+    multiplier="parallel",
+)
+CONVENTIONAL = replace(SMALL, synchronised=False, filter=Fraction(3000))
+UNFILTERED = replace(SMALL, filter=None)
+SERIAL = replace(SMALL, multiplier="serial", period=320)
+COLUMNS = ("current", "saturated", "y", "w")
+
+
+class Beside(wiring.Component):
+    """Window and controller, joined as in the core."""
+
+    def __init__(self, form: ControlForm, multiplier: str) -> None:
+        # By the names in their modules, where a mutant takes their place.
+        self.window = update_window.UpdateWindow(form)
+        self.controller = controller.Controller(form, multiplier)
+        commands = ("enable", "position", "command_position", "command_velocity", "command_acceleration")
+        self.inputs = {name: getattr(self.controller, name).shape() for name in commands}
+        super().__init__(
+            {
+                **{name: In(shape) for name, shape in self.inputs.items()},
+                "tick": In(1),
+                "update": In(1),
+                "velocity": In(self.window.velocity.shape()),
+                "valid": Out(1),
+                **{name: Out(getattr(self.controller, name).shape()) for name in COLUMNS},
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.window = window = self.window
+        m.submodules.controller = controller = self.controller
+        m.d.comb += [
+            *(window.tick.eq(self.tick), window.update.eq(self.update), window.velocity.eq(self.velocity)),
+            *(window.clear.eq(controller.clear), window.add.eq(controller.valid)),
+            *(window.current.eq(controller.current), controller.tick.eq(self.tick)),
+            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
+            *(getattr(controller, name).eq(getattr(self, name)) for name in self.inputs),
+            *(getattr(self, name).eq(getattr(controller, name)) for name in ("valid", *COLUMNS)),
+        ]
+        return m
+
+
+def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, Table, list[dict[str, int]]]:
+    """Updates and control ticks at random, the greatest numbers among them: updates, ticks, inputs by clock.
+
+    All numbers are 2^less times less than they can be.
+    """
+    rng = np.random.default_rng(seed)
+    form, period = spec.form, spec.period
+    spacing = np.where(rng.random(n_ticks) < 0.7, spec.least_period, period)
+    clock = 5 + np.cumsum(spacing)
+    n_clocks = int(clock[-1]) + spec.latency + 2
+    # Often none for longer than the longest measurement, often many between two control ticks.
+    rate = np.repeat([0.02, 0.0, 0.5, 0.002], -(-n_clocks // 4))[:n_clocks]
+    rate[:5] = 0.9  # before the first control tick
+    came = np.flatnonzero(rng.random(n_clocks) < rate)
+
+    def numbers(n: int, most: int) -> Any:
+        """At random, of any size, and often the greatest."""
+        most = max(most >> less, 1)
+        size = (most * 2.0 ** -rng.integers(0, 12, n)).astype(np.int64)
+        found = rng.integers(-size - 1, size + 2).clip(-most, most)
+        return np.where(rng.random(n) < 0.3, rng.choice([-most, most], n), found)
+
+    velocity = numbers(len(came), form.velocity_limit)
+    turn = 1 << (form.position_width - 1)
+    position = np.cumsum(numbers(n_ticks, 300)) % (2 * turn) - turn
+    away = numbers(n_ticks, min(form.most_error * 4, turn * 250))
+    wraps = turn << 8
+    commands = {
+        "position": position,
+        "command_position": ((position << 8) + away + wraps) % (2 * wraps) - wraps,
+        "command_velocity": numbers(n_ticks, (1 << (form.command_width - 1)) - 1),
+        "command_acceleration": numbers(n_ticks, (1 << (form.acceleration_width - 1)) - 1),
+        "enable": (rng.random(n_ticks) < 0.95).astype(np.int64),
+    }
+    rows: list[dict[str, int]] = [{"tick": 0, "update": 0} for _ in range(n_clocks)]
+    for k, at in enumerate(clock.tolist()):
+        rows[at] |= {"tick": 1, **{name: int(column[k]) for name, column in commands.items()}}
+        rows[at + 1] |= {name: int(column[k - 1]) for name, column in commands.items()}  # which is not taken
+    for at, value in zip(came.tolist(), velocity.tolist(), strict=True):
+        rows[at] |= {"update": 1, "velocity": value}
+    return Table(came, {"velocity": velocity}), Table(clock, commands), rows
+
+
+def check(spec: LoopSpec, n_ticks: int = 300, seed: int = 1, less: int = 0) -> Table:
+    """Hold window and controller against the golden model with made-up inputs: what they must show."""
+    updates, ticks, rows = made_up(spec, n_ticks, seed, less)
+    names = ("command_position", "command_velocity", "command_acceleration", "enable")
+    commands = [Command(*values) for values in zip(*(ticks[name].tolist() for name in names), strict=True)]
+    wanted = control(spec, ticks.clock, ticks.position, updates, commands)
+    seen = clock_by_clock(Beside(spec.form, spec.multiplier), rows, ["valid", *COLUMNS])
+    got = [(clock, *(row[name] for name in COLUMNS)) for clock, row in enumerate(seen) if row["valid"]]
+    columns = (wanted.clock, *wanted.columns.values())
+    assert got == list(zip(*(column.tolist() for column in columns), strict=True))
+    return wanted
+
+
+def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> tuple[PinTrace, list[Command], np.ndarray]:
+    """A motion and commands for a core: pins, commands by control tick, rows of a clock and all inputs."""
+    rng = np.random.default_rng(seed)
+    trace = stress(spec.tachometer, seed, n_edges)
+    clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
+    n, form = len(clock), spec.form
+
+    def numbers(width: int) -> Any:
+        most = (1 << (width - 1)) - 1
+        return np.where(rng.random(n) < 0.2, rng.choice([-most, most], n), rng.integers(-most, most + 1, n) >> 8)
+
+    ports = [port for port in spec.ports if port.name.startswith("command_")]
+    commands = {"enable": (rng.random(n) < 0.95).astype(np.int64), **{port.name: numbers(port.width) for port in ports}}
+    # About the position there, which the golden model need not know.
+    commands["command_position"] = np.where(
+        rng.random(n) < 0.2, commands["command_position"], rng.integers(-4000, 4000, n)
+    )
+    order = ("command_position", "command_velocity", "command_acceleration", "enable")
+    of_tick = [Command(*values) for values in zip(*(commands[name].tolist() for name in order), strict=True)]
+    # Commands are there for the clock of the control tick alone.
+    names = [port.name for port in spec.pins]
+    at = np.unique(np.concatenate([trace.clock, clock, clock + 1]))
+    at = at[at < trace.n_clocks]
+    held = np.searchsorted(trace.clock, at, side="right") - 1
+    columns: dict[str, Any] = {name: line[held] for name, line in trace.lines.items()}
+    tick = np.searchsorted(clock, at, side="right") - 1
+    for name, values in commands.items():
+        there = np.isin(at, clock)
+        columns[name] = np.where(there, values[tick], 1 - values[tick] if name == "enable" else ~values[tick])
+    columns["enable"] = columns["enable"] & 1
+    assert form.position_width < 48
+    return trace, of_tick, np.stack([at, *(columns[name].astype(np.int64) for name in names)], axis=1)
+
+
+def check_core(spec: LoopSpec, seed: int = 1, n_edges: int = 3) -> Run:
+    """Hold a whole core against the golden model: what it must show."""
+    trace, commands, changes = core_case(spec, seed, n_edges)
+    wanted = run_loop(spec, trace, commands, golden.tables)
+    names = [port.name for port in spec.pins]
+    rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
+    for clock, *values in changes.tolist():
+        rows[clock] = dict(zip(names, values, strict=True))
+    seen = clock_by_clock(loop_core.LoopCore(spec), rows, [port.name for port in spec.outputs])
+    strobes = list(spec.strobes)
+    found = [[clock, *row.values()] for clock, row in enumerate(seen) if any(row[name] for name in strobes)]
+    count, first = compare(wanted, observed(spec, trace.n_clocks, np.array(found)))
+    assert not count, first
+    return wanted
