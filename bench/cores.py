@@ -111,6 +111,10 @@ AXES_BARS: dict[int, Mapping[str, Mapping[str, float]]] = {
     8: {"ECP5": {"COMB": 8 * 60, "FF": 8 * 65, "MULT": 0, "Fmax": 140}},
     32: {"ECP5": {"COMB": 32 * 26, "FF": 32 * 22, "MULT": 0, "Fmax": 140}},
 }
+LOOP_BARS = {
+    "ECP5": {"COMB": 1150, "FF": 700, "DP16KD": 2, "MULT": 0, "Fmax": 100},
+    "UP5K": {"Fmax": 36},
+}
 LOOPS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("", "reference with control loop", {}),
     ("conventional", "and a conventional observer", {"synchronised": False}),
@@ -276,7 +280,13 @@ CONFIGURATIONS = (
         for axes, bars in AXES_BARS.items()
     ),
     *(
-        Configuration(f"loop-{name}" if name else "loop", what, LoopSpec(tachometer=REFERENCE, **options), {}, False)
+        Configuration(
+            f"loop-{name}" if name else "loop",
+            what,
+            LoopSpec(tachometer=REFERENCE, **options),
+            {} if "multiplier" in options else LOOP_BARS,
+            is_option=False,
+        )
         for name, what, options in LOOPS
     ),
     Configuration("paper", "48 MHz, 1 ms, 10 ms, 500 PPR x1, no max_speed", PAPER, is_option=False),

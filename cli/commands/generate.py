@@ -38,8 +38,8 @@ Examples:
   tachometry generate --ppr 500 --clock 1MHz --tick 100us --max-time 5ms \\
       --testbench cocotb -o sim
   tachometry generate --ppr 500 --max-speed 1000rad/s --axes 8 -o axes
-  tachometry generate --ppr 500 --max-speed 1000rad/s --loop --kp 6400 --kv 160 \\
-      --observer 320rad/s -o drive""",
+  tachometry generate --ppr 500 --max-speed 1000rad/s --loop --kp 6400 \\
+      --kv 160 --observer 320rad/s -o drive""",
 )
 @core_options
 @axes_options

@@ -57,7 +57,11 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
     ("command", "options", "groups"),
     [
         ("plan", ["--speeds", "--methods", "--plot", "--csv"], ["Range", "Outputs"]),
-        ("generate", ["--name", "--output", "-o", "--bus", "--baud", "--for"], ["Files"]),
+        (
+            "generate",
+            [*"--name --output -o --bus --baud --for --loop --kp --observer --control-period".split()],
+            ["Files", "Loop"],
+        ),
         (
             "simulate",
             [*"--motion --vibration --seed".split(), *FAULTS, *OUTPUTS],
