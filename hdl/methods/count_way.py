@@ -45,12 +45,12 @@ class CountWay(wiring.Component):
         # Bit 0 of a step tells that it is one, bit 1 its sign.
         counts, negative = self.step_before
         last = Mux(self.step[0], self.step[1], self.was_negative)
-        moves = Signal()
-        m.d.comb += moves.eq(counts & (negative == last if self._reversals else 1))
+        leads = Signal()
+        m.d.comb += leads.eq(counts & (negative == last if self._reversals else 1))
         m.d.sync += [
             self.step.eq(self.step_before),
-            self.moves.eq(moves),
-            self.forward.eq(moves & ~negative),
-            self.backward.eq(moves & negative),
+            self.moves.eq(leads),
+            self.forward.eq(leads & ~negative),
+            self.backward.eq(leads & negative),
         ]
         return m

@@ -235,6 +235,13 @@ _TIMED_PROBES = {
     "core_steps": "datapath.quotient_velocity.divider.left",
     "core_by": "datapath.quotient_velocity.divider.by",
 }
+_CLOCKED_PROBES = {
+    "core_came": "datapath.gap_timer.earlier",
+    "core_counted_step": "datapath.count_way.step",
+    "core_moves": "datapath.count_way.moves",
+    "core_forward": "datapath.count_way.forward",
+    "core_backward": "datapath.count_way.backward",
+}
 _WINDOW_OF_MT_PROBES = {
     "core_length": "datapath.length",
     "core_late": "datapath.late",
@@ -288,7 +295,7 @@ def timed(
     }
     probes = _TIMED_PROBES | _STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
     probes |= within("cycles", _CYCLES_OF_MT_PROBES, parameters["CYCLE"] > 1)
-    probes |= within("clocked", {"core_came": "datapath.gap_timer.earlier"}, not spec.on_lattice)
+    probes |= within("clocked", _CLOCKED_PROBES, not spec.on_lattice)
     probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
     held = {"core_back": "negative", "core_most": "most"}
@@ -313,8 +320,8 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
 
 # What can be said of M/T without what is divided; "travelled" takes as long as all the others.
 _MT_GIVEN = {
-    "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_since lemma_free lemma_running lemma_silent lemma_many "
-    "lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
+    "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_way lemma_since lemma_free lemma_running lemma_silent "
+    "lemma_many lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
     "lemma_window_free pt_update pt_held pt_spacing pt_rest",
     "travelled": "lemma_travelled",
 }

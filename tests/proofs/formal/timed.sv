@@ -254,6 +254,9 @@ module timed #(
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
         && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     lemma_fresh: assert (fresh && fresh_past);
+    lemma_began: assert (!fresh_division || fresh || (since != 0 && measuring));
+    lemma_settled: assert (SETTLED < 0 || ((!fresh_division || fresh_now)
+        && (fresh_division || !(fresh_due || fresh_before || fresh_past))));
     lemma_limit: assert (!fresh || velocity <= LIMIT && velocity >= -LIMIT && past == $signed(held[V+I+1-:V]));
   end
   generate
@@ -269,9 +272,15 @@ module timed #(
       always @* lemma_beyond: assert (since == 0 || core_beyond == many_now);
     end
     if (!LATTICE) begin : clocked
-      wire core_came;
+      wire core_came, core_moves, core_forward, core_backward;
+      wire signed [1:0] core_counted_step;
       assign shown_came = core_came;
-      always @* lemma_came: assert (came == core_came);
+      always @* begin
+        lemma_came: assert (came == core_came);
+        lemma_way: assert (core_counted_step == (!moved ? 0 : back ? -1 : 1)
+            && core_moves == (moved && back == last_negative)
+            && core_forward == (core_moves && !back) && core_backward == (core_moves && back));
+      end
     end else assign shown_came = 0;
     if (LATTICE) begin : lattice
       wire signed [$clog2(T-1):0] core_window;
