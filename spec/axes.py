@@ -12,7 +12,7 @@ from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.methods.s import MAX_TABLE, STachometer
 from tachometry.spec.option import ParameterError
-from tachometry.spec.port import INDEX, TICK, UPDATE, Port, held, pin, strobe, strobes_of
+from tachometry.spec.port import INDEX, TICK, UPDATE, HasPorts, Port, held, pin, strobe
 from tachometry.spec.tachometer import TachometerSpec
 from tachometry.spec.timing import Timing
 from tachometry.spec.units import Speed
@@ -48,7 +48,7 @@ _STROBES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxesSpec:
+class AxesSpec(HasPorts):
     """Several encoders, one S-method datapath.
 
     In a round each axis is looked at once, in its slot of one clock. So an axis is, to the bit, a core of its own whose
@@ -234,21 +234,6 @@ class AxesSpec:
 
     def _of_an_axis(self) -> tuple[Port, ...]:
         return self.axis.outputs
-
-    @property
-    def pins(self) -> tuple[Port, ...]:
-        """Inputs beside clock and reset."""
-        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
-
-    @property
-    def outputs(self) -> tuple[Port, ...]:
-        """Outputs of the exported core, in order."""
-        return tuple(port for port in self.ports if port.direction == "output")
-
-    @property
-    def strobes(self) -> dict[str, tuple[str, ...]]:
-        """Outputs that strobe, each with the names of the outputs that are new with it."""
-        return strobes_of(self.outputs)
 
     @property
     def parameters(self) -> dict[str, Any]:

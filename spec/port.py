@@ -6,7 +6,7 @@ documents. A port that is added here, and driven by hardware and golden model, a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -65,13 +65,35 @@ def held(by: str, name: str, width: int = 1, *, signed: bool = False, unit: str 
     return Port(name, "output", width, signed, by, unit, help)
 
 
-def strobes_of(outputs: Sequence[Port]) -> dict[str, tuple[str, ...]]:
-    """Outputs that strobe, each with the names of the outputs that are new with it."""
-    return {
-        strobe.name: tuple(port.name for port in outputs if port.held_by == strobe.name and port.name != strobe.name)
-        for strobe in outputs
-        if strobe.is_strobe
-    }
+class HasPorts:
+    """What follows from the ports of an exported core."""
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Ports of the exported core, in order."""
+        raise NotImplementedError
+
+    @property
+    def pins(self) -> tuple[Port, ...]:
+        """Inputs beside clock and reset."""
+        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
+
+    @property
+    def outputs(self) -> tuple[Port, ...]:
+        """Outputs of the exported core, in order."""
+        return tuple(port for port in self.ports if port.direction == "output")
+
+    @property
+    def strobes(self) -> dict[str, tuple[str, ...]]:
+        """Outputs that strobe, each with the names of the outputs that are new with it."""
+        outputs = self.outputs
+        return {
+            strobe.name: tuple(
+                port.name for port in outputs if port.held_by == strobe.name and port.name != strobe.name
+            )
+            for strobe in outputs
+            if strobe.is_strobe
+        }
 
 
 def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:

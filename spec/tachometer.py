@@ -9,7 +9,7 @@ from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
 from tachometry.spec.numbers import Numbers
 from tachometry.spec.option import ParameterError, is_derived, options_of, settle
-from tachometry.spec.port import UPDATE, Port, held, ports_of, strobes_of
+from tachometry.spec.port import UPDATE, HasPorts, Port, held, ports_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
 from tachometry.spec.units import PI, SpeedUnit, plural, signed_width
 
@@ -19,7 +19,7 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 
 @dataclass(frozen=True, kw_only=True)
-class TachometerSpec(Numbers):
+class TachometerSpec(HasPorts, Numbers):
     """From encoder pins to velocity, whatever the method; its parameters are those of `Parameters`.
 
     A method is a subclass: it declares the members below, and all code that depends on the method reads them.
@@ -278,21 +278,6 @@ class TachometerSpec(Numbers):
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order."""
         return ports_of(self)
-
-    @property
-    def pins(self) -> tuple[Port, ...]:
-        """Inputs beside clock and reset."""
-        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
-
-    @property
-    def outputs(self) -> tuple[Port, ...]:
-        """Outputs of the exported core, in order."""
-        return tuple(port for port in self.ports if port.direction == "output")
-
-    @property
-    def strobes(self) -> dict[str, tuple[str, ...]]:
-        """Outputs that strobe, each with the names of the outputs that are new with it."""
-        return strobes_of(self.outputs)
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from tachometry.spec.control import form
 from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
 from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.option import Derived, ParameterError, option, options_of, settle
-from tachometry.spec.port import Port, strobes_of
+from tachometry.spec.port import HasPorts, Port
 from tachometry.spec.tachometer import TachometerSpec
 from tachometry.spec.timing import Timing, whole_clocks
 from tachometry.spec.units import CURRENT, PI, PLAIN, TORQUE_CONSTANT, Units, parse_bandwidth, plural, read_exactly
@@ -47,7 +47,7 @@ def _filter(what: str, text: str) -> Fraction | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopSpec:
+class LoopSpec(HasPorts):
     """A tachometer with a disturbance observer and a controller of position and velocity; see `ControlForm`.
 
     Parameters
@@ -335,21 +335,6 @@ class LoopSpec:
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order: those of the tachometer first."""
         return (*self.tachometer.ports, *loop_ports(self))
-
-    @property
-    def pins(self) -> tuple[Port, ...]:
-        """Inputs beside clock and reset."""
-        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
-
-    @property
-    def outputs(self) -> tuple[Port, ...]:
-        """Outputs of the exported core, in order."""
-        return tuple(port for port in self.ports if port.direction == "output")
-
-    @property
-    def strobes(self) -> dict[str, tuple[str, ...]]:
-        """Outputs that strobe, each with the names of the outputs that are new with it."""
-        return strobes_of(self.outputs)
 
     @property
     def parameters(self) -> dict[str, Any]:
