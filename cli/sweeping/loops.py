@@ -2,16 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from itertools import product
-
-import click
 
 from tachometry.cli.options.closed_loop import LOOP, loop_click_options, loop_options
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.methods import listed_methods
-from tachometry.cli.options.option import told
-from tachometry.cli.sweeping.points import has_option
+from tachometry.cli.sweeping.points import Found
 from tachometry.cli.sweeping.settings import Settings, Text, arguments
 from tachometry.sim.studies.loops import LoopPoint, seeds_from
 from tachometry.spec import METHODS, methods_with, of_texts
@@ -19,26 +14,7 @@ from tachometry.spec import METHODS, methods_with, of_texts
 _MOST = 100_000  # points
 
 
-@dataclass(frozen=True)
-class Loops:
-    """Loops that are to be run.
-
-    Parameters
-    ----------
-    points : dict of str to LoopPoint
-        By their digests, in order.
-    at : dict of str to dict
-        Where each is: values of the axes that its method has.
-    axes : dict of str to list of str
-        All values of each axis.
-    left_out : dict of str to str
-        Methods of `all` that are impossible somewhere, and why.
-    """
-
-    points: dict[str, LoopPoint]
-    at: dict[str, dict[str, str]]
-    axes: dict[str, list[str]]
-    left_out: dict[str, str] = field(default_factory=dict)
+Loops = Found[LoopPoint]
 
 
 def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
@@ -70,25 +46,13 @@ def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
     if count > _MOST:
         raise ValueError(f"--vary must give at most {_MOST} loops, not {count}")
     found = Loops({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
-    for name, method, given in listed:
-        assert method is not None
-        names = [key for key in settings.vary if has_option(settings, method, key)]
-        fixed = {key: text for key, text in settings.fixed.items() if has_option(settings, method, key)}
-        for values in product(*(settings.vary[key] for key in names)):
-            at = dict(zip(names, values, strict=True))
-            try:
-                point = _point(name, method, given, fixed | at, n_seeds)
-            except (ValueError, click.UsageError) as error:
-                message = error.format_message() if isinstance(error, click.UsageError) else told(error)
-                where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
-                if everything or where:
-                    message += f" (method {name}{', ' * bool(where)}{where})"
-                if everything and name != listed[0][0]:
-                    found.left_out.setdefault(name, message)
-                    continue
-                raise ValueError(message) from None
-            found.points.setdefault(point.digest, point)
-            found.at.setdefault(point.digest, {key: text or "none" for key, text in at.items()})
+    found.fill(
+        settings,
+        listed,
+        lambda name, method, given, texts: _point(name, method, given, texts, n_seeds),
+        everything=everything,
+        alone=True,
+    )
     return found
 
 

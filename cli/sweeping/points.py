@@ -2,10 +2,11 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import product
+from typing import Generic, Protocol, TypeVar
 
 import click
 
@@ -27,13 +28,21 @@ _PLACE = re.compile(r"\{([^{}]*)\}")
 _UNITS = SPEED | TIME | FREQUENCY
 
 
+class _Digested(Protocol):
+    @property
+    def digest(self) -> str: ...
+
+
+Item = TypeVar("Item", bound=_Digested)
+
+
 @dataclass(frozen=True)
-class Points:
-    """The points of a sweep.
+class Found(Generic[Item]):
+    """What is to be run.
 
     Parameters
     ----------
-    points : dict of str to Point
+    points : dict of str to Item
         By their digests, in order.
     at : dict of str to dict
         Where each is: values of the axes that its method has.
@@ -43,10 +52,52 @@ class Points:
         Methods of `all` that are impossible somewhere, and why.
     """
 
-    points: dict[str, Point]
+    points: dict[str, Item]
     at: dict[str, dict[str, str]]
     axes: dict[str, list[str]]
     left_out: dict[str, str] = field(default_factory=dict)
+
+    def fill(
+        self,
+        settings: Settings,
+        listed: Sequence[tuple[str, str | None, Mapping[str, str]]],
+        make: Callable[[str, str, Mapping[str, str], Mapping[str, Text]], Item],
+        *,
+        everything: bool,
+        alone: bool = False,
+    ) -> None:
+        """Add the points of all methods at all values; with `everything`, a method that cannot be is left out.
+
+        `alone`: where there is one method and no axis, an error names neither.
+
+        Raises
+        ------
+        ValueError
+            If a point cannot be.
+        """
+        for name, method, given in listed:
+            assert method is not None
+            names = [key for key in settings.vary if has_option(settings, method, key)]
+            fixed = {key: text for key, text in settings.fixed.items() if has_option(settings, method, key)}
+            for values in product(*(settings.vary[key] for key in names)):
+                at = dict(zip(names, values, strict=True))
+                try:
+                    point = make(name, method, given, fixed | at)
+                except (ValueError, click.UsageError) as error:
+                    message = error.format_message() if isinstance(error, click.UsageError) else told(error)
+                    where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
+                    if everything or where or not alone:
+                        message += f" (method {name}{', ' * bool(where)}{where})"
+                    if everything and name != listed[0][0]:
+                        self.left_out.setdefault(name, message)
+                        continue
+                    raise ValueError(message) from None
+                self.points.setdefault(point.digest, point)
+                self.at.setdefault(point.digest, {key: text or "none" for key, text in at.items()})
+
+
+class Points(Found[Point]):
+    """The points of a sweep."""
 
     @property
     def unit(self) -> SpeedUnit:
@@ -88,23 +139,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
         raise ValueError(f"--vary must give at most {_MOST} points, not {count}")
     maker = _Maker(earliest, engine)
     found = Points({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
-    for (name, method, given), names in zip(listed, own, strict=True):
-        assert method is not None
-        fixed = {key: text for key, text in settings.fixed.items() if has_option(settings, method, key)}
-        for values in product(*(settings.vary[key] for key in names)):
-            at = dict(zip(names, values, strict=True))
-            try:
-                point = maker.point(name, method, given, fixed | at)
-            except (ValueError, click.UsageError) as error:
-                message = error.format_message() if isinstance(error, click.UsageError) else told(error)
-                where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
-                message += f" (method {name}{', ' * bool(where)}{where})"
-                if everything and name != listed[0][0]:
-                    found.left_out.setdefault(name, message)
-                    continue
-                raise ValueError(message) from None
-            found.points.setdefault(point.digest, point)
-            found.at.setdefault(point.digest, {key: text or "none" for key, text in at.items()})
+    found.fill(settings, listed, maker.point, everything=everything)
     return found
 
 
