@@ -19,7 +19,7 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 
 @dataclass(frozen=True, kw_only=True)
-class TachometerSpec(HasPorts, Numbers):
+class TachometerSpec(Numbers, HasPorts):
     """From encoder pins to velocity, whatever the method; its parameters are those of `Parameters`.
 
     A method is a subclass: it declares the members below, and all code that depends on the method reads them.
