@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 import pytest
+from distributed import LocalCluster
 from support import command
 
 from tachometry.sim.engines import build
@@ -57,6 +58,24 @@ def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureF
     with (tmp_path / "one.csv").open() as file:
         (alone,) = csv.DictReader(file)
     assert {name: rows[3][name] for name in alone} == alone
+
+
+def test_the_workers_of_a_scheduler_run_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also of a loop alone; here a worker in a thread of this process."""
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
+    ) as local:
+        given = ["--scheduler", local.scheduler_address]
+        assert run(*SHORT, "--seeds", "1", *given, "--csv", tmp_path / "there.csv") == 0
+        assert local.scheduler.transition_counter > 0
+    assert "1 loop with 1 seed each, run in " in " ".join(capsys.readouterr().out.split())
+    assert run(*SHORT, "--seeds", "1", "--csv", tmp_path / "here.csv") == 0
+    found = []
+    for name in ("here", "there"):
+        with (tmp_path / f"{name}.csv").open() as file:
+            found += list(csv.DictReader(file))
+    here, there = found
+    assert {name: there[name] for name in here} == here
 
 
 def test_a_controller_in_gates(tmp_path: Path) -> None:
