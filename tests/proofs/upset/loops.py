@@ -20,6 +20,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden.control import Command, control
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.signals.recording import PinTrace, merged
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.port import UPDATE
@@ -101,23 +102,34 @@ def _trace(spec: LoopSpec, seed: int) -> CommandedTrace:
     return CommandedTrace(clock, lines, pins.n_clocks, pins, commands)
 
 
-def _right(spec: LoopSpec, trace: CommandedTrace, ticks: int, control_ticks: int, away: int) -> NDArray[np.int64]:
-    """What the golden models show in every clock, 0 where nothing strobes, with windows and control ticks
-    of these phases, and a position that is so many counts off."""
-    alone = spec.tachometer
-    last = np.arange(ticks, trace.n_clocks - alone.tick_latency, alone.longest_tick, dtype=np.int64)
-    with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
-        updates = golden.tables(alone, trace.pins)[UPDATE]
-    clock = np.arange(control_ticks, trace.n_clocks, spec.period, dtype=np.int64)
-    # The position is as late as a tick shows it.
-    places, _ = count(alone, decoded(alone, trace.pins), clock - alone.tick_latency)
-    found = control(spec, clock, places.position + away, updates, trace.command(clock))
-    found = found.rows(found.clock < trace.n_clocks)
-    dense = np.zeros((trace.n_clocks, len(_COMPARED)), dtype=np.int64)
-    dense[clock, 0] = dense[found.clock, 1] = 1
-    for place, name in enumerate(_COMPARED[2:], 2):
-        dense[found.clock, place] = found[name]
-    return dense
+@dataclass(frozen=True)
+class _Right:
+    """What the golden models show: the clocks of control ticks, and the rows of `current_valid`."""
+
+    ticks: NDArray[np.int64]
+    currents: Table
+
+    @classmethod
+    def of(cls, spec: LoopSpec, trace: CommandedTrace, ticks: int, control_ticks: int, away: int) -> "_Right":
+        """With windows and control ticks of these phases, and a position that is so many counts off."""
+        alone = spec.tachometer
+        last = np.arange(ticks, trace.n_clocks - alone.tick_latency, alone.longest_tick, dtype=np.int64)
+        with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
+            updates = golden.tables(alone, trace.pins)[UPDATE]
+        clock = np.arange(control_ticks, trace.n_clocks, spec.period, dtype=np.int64)
+        # The position is as late as a tick shows it.
+        places, _ = count(alone, decoded(alone, trace.pins), clock - alone.tick_latency)
+        return cls(clock, control(spec, clock, places.position + away, updates, trace.command(clock)))
+
+    def dense(self, first: int, n: int) -> NDArray[np.int64]:
+        """In every one of these clocks, 0 where nothing strobes."""
+        found = np.zeros((n, len(_COMPARED)), dtype=np.int64)
+        for place, clock in enumerate((self.ticks, self.currents.clock)):
+            found[clock[(clock >= first) & (clock < first + n)] - first, place] = 1
+        rows = self.currents.rows((self.currents.clock >= first) & (self.currents.clock < first + n))
+        for place, name in enumerate(_COMPARED[2:], 2):
+            found[rows.clock - first, place] = rows[name]
+        return found
 
 
 def _allowed(spec: LoopSpec, trace: CommandedTrace) -> NDArray[np.int64]:
@@ -141,7 +153,7 @@ def upsets(name: str, n: int, seed: int = 1, only: str = "") -> Campaign:
     ports = [port.name for port in spec.outputs]
     compared = [ports.index(name) for name in _COMPARED]
     position, tick, control_tick = (ports.index(name) for name in ("position", "tick", "control_tick"))
-    expected: dict[tuple[int, int, int], NDArray[np.int64]] = {}
+    expected: dict[tuple[int, int, int], _Right] = {}
     alone = spec.tachometer
     steps = decoded(alone, trace.pins)
 
@@ -154,9 +166,9 @@ def upsets(name: str, n: int, seed: int = 1, only: str = "") -> Campaign:
         away = int(shown[ticks[-1], position] - right_position.position[0])
         key = (last % alone.longest_tick, (clock + int(controls[-1])) % spec.period, away)
         if key not in expected:
-            expected[key] = _right(spec, trace, *key)
+            expected[key] = _Right.of(spec, trace, *key)
         seen = shown[:, compared]
         seen[:, 2:] *= seen[:, 1:2]
-        return (seen != expected[key][clock : clock + len(shown)]).any(axis=1)
+        return (seen != expected[key].dense(clock, len(shown))).any(axis=1)
 
     return play(name, spec, core, trace, n, _allowed(spec, trace), seed, wrong, only)  # type: ignore[arg-type]
