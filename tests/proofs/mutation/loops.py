@@ -78,13 +78,12 @@ class LoopCase(Case):
         spec = self.spec
         program = [spec.first_tick + 2 * spec.period + clock for clock in range(spec.period)]
         while done < n_clocks:
-            # Some end early: the next reset comes in the middle.
             if program and rng.random() < _OFTEN:
-                trace = noise(spec.tachometer, rng, program.pop(), 3)
+                trace, resets = noise(spec.tachometer, rng, program.pop(), 3), 1
             else:
-                trace = self._motion(rng)
+                # Some end early: the next reset comes in the middle.
+                trace, resets = self._motion(rng), int(rng.choice([1, 1, 2, 5]))
                 trace = trace.until(int(rng.integers(1, trace.n_clocks)) if rng.random() < 0.5 else trace.n_clocks)
-            resets = int(rng.choice([1, 1, 2, 5]))
             played, commands = self._commanded(trace, rng)
             reset = np.zeros((resets, self.pins.n_words), dtype=np.uint64)
             reset[:, 0] = rng.integers(0, 256, resets).astype(np.uint64) | np.uint64(1)
