@@ -57,6 +57,11 @@ ARGUED = {
     ("loop, serial", "m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)", "A[0] const1"): (
         "what is cleared has been loaded, with its coefficient, in the clock in which the term begins"
     ),
+    (
+        "loop, conventional",
+        "m.d.sync += [self.n.eq(self.n + 1), self.current_sum.eq(self.current_sum + self.current)]",
+        "A[1] cnot1",
+    ): "that is if the sum is not 0: each control tick has cleared it when its current is added",
     ("t, in clocks", '"running": Out(1),', "running[0] const1"): _GOES_ON,
     **{("t, in clocks", _LEFT, f"left[{bit}] const1"): _GOES_ON for bit in range(3)},
     ("t, in clocks", "left.eq(left - 1),", "$40.Y[1] const1"): _GOES_ON,
