@@ -42,8 +42,11 @@ _HELD = (
     "it is inverted in every clock from a control tick to the next, and is read an even number of clocks after the tick"
 )
 _NO_TICKS = "of no control tick there is no coefficient but 0, and of this method one update comes before the first"
+_WHOLE = "without a filter y is the velocity: there is nothing below an LSB of it"
 
 ARGUED = {
+    ("loop, unfiltered", '"y": Out(signed(signed_width(form.most_y))),', "y[11] cnot1"): _WHOLE,
+    ("loop, unfiltered", "less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)", "Y[6] const0"): _WHOLE,
     **{
         ("loop, serial", "velocity = Signal.like(self.command_velocity, reset_less=True)", f"velocity[{what}"): _HELD
         for what in ("7] cnot0", "2] cnot1", "1] inv", "11] inv", "3] cnot0")

@@ -6,24 +6,20 @@ In Verilog; `{name}` is a register of the core by name, which may be the end of 
 from proofs.mutation import track_lemmas
 from proofs.mutation.inductive import Known
 
-from tachometry.spec import STachometer, TrackTachometer
-from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec import STachometer, TachometerSpec, TrackTachometer
 from tachometry.spec.methods.timed import TimedTachometer
 
 
-def lemmas(spec: AnySpec) -> list[str]:
+def lemmas(spec: TachometerSpec) -> list[str]:
     """Those for a core."""
     if isinstance(spec, STachometer):
         return [*_tick(spec), *_window(spec)]
     if isinstance(spec, TimedTachometer):
         return _gap(spec)
-    if isinstance(spec, LoopSpec) and spec.filter is None:
-        # y is the velocity: there is nothing below an LSB of it.
-        return [f"({{controller.y}} & {(1 << spec.form.extra_bits) - 1}) == 0"]
     return []
 
 
-def known(spec: AnySpec) -> Known | None:
+def known(spec: TachometerSpec) -> Known | None:
     """What a step of induction needs; None if that is not known of the method."""
     return track_lemmas.known(spec) if isinstance(spec, TrackTachometer) else None
 
