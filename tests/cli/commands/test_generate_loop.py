@@ -38,32 +38,3 @@ def test_files_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         f"loop.{key}.{inner}" for key, value in described["loop"].items() if isinstance(value, dict) for inner in value
     }
     assert found <= set(re.findall(r"^\| `([\w.]+)` \|", PAGE, re.MULTILINE))
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        ("--loop --kp -1", "--kp must be at least 0, not -1"),
-        ("--loop --inertia 0", "--inertia must be greater than 0, not 0"),
-        ("--loop --inertia 3mm", "--inertia must be a number, not '3mm'"),
-        ("--loop --velocity-filter 0Hz", "--velocity-filter must be greater than 0, not 0"),
-        ("--loop --current-width 30", "--current-width must be from 8 to 24, not 30"),
-        ("--loop --multiplier fast", "--multiplier must be serial or parallel, not 'fast'"),
-        ("--loop --control-period 17s", "--control-period must be from 1 to 16777216 clocks, not 816000000"),
-        ("--loop --control-period 4us", "--control-period must be at least 199 clocks, as long as the controller"),
-        ("--loop --observer 0.001rad/s", "--observer must be from 0.01192 to 3.016e+08 rad/s here, not 0.001"),
-        ("--loop --kp 1e-9", "--kp must fit the other gains: coefficients would have 48 bits, and 40 are the most"),
-        ("--loop --kp 1e29", "--velocity-width must be less with --loop here: words would have 93 bits, and 80 are"),
-        ("--loop --axes 2 --max-speed 9rad/s", "--axes must not be given together with --loop: it is of one axis"),
-        ("--loop --bus uart", "--bus must not be given together with loop: registers and targets are for a tachometer"),
-        ("--loop --for rio", "--for must not be given together with loop: registers and targets are for a tachometer"),
-        ("--loop --testbench cocotb", "--testbench must not be given together with --loop: it is of a tachometer"),
-        ("--loop --name current", "--name must not be that of a port, which 'current' is"),
-        ("--kp 3", "--kp must be given together with --loop"),
-        ("--no-synchronised", "--synchronised must be given together with --loop"),
-    ],
-)
-def test_what_is_refused(words: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("generate", "--ppr", "500", "-o", tmp_path / "out", *words.split()) == 2
-    assert capsys.readouterr().err.startswith(f"tachometry: error: {told}")
-    assert not (tmp_path / "out").exists()

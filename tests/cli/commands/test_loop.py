@@ -1,9 +1,11 @@
 """`tachometry loop`."""
 
 import csv
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from distributed import LocalCluster
 from support import command
 
 from tachometry.sim.engines import build
@@ -40,10 +42,23 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert f"{float(whole['rms_error_rad_s']):.3g}" == table[3].split()[1]
 
 
-def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture(scope="module")
+def cluster_here() -> Iterator[LocalCluster]:
+    """A scheduler with a worker, in threads of this process."""
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
+    ) as local:
+        yield local
+
+
+def test_many_loops_and_their_files(
+    cluster_here: LocalCluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     files = ["--csv", tmp_path / "all.csv", "--plot", tmp_path / "loops.pdf"]
     options = ["--methods", "s", "--vary", "kv=20,80", "--vary", "synchronised=yes,no"]
-    assert run(*SHORT, *options, "--seeds", "1", "--jobs", "1", *files) == 0
+    given = ["--scheduler", cluster_here.scheduler_address]
+    assert run(*SHORT, *options, "--seeds", "1", *given, *files) == 0
+    assert cluster_here.scheduler.transition_counter > 0
     table = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert table[0][:3] == ["method", "kv", "synchronised"]
     assert [row[1:3] for row in table[1:5]] == [[kv, o] for kv in ("20", "80") for o in ("yes", "no")]
@@ -57,6 +72,26 @@ def test_many_loops_are_run_on_all_cores(tmp_path: Path, capsys: pytest.CaptureF
     with (tmp_path / "one.csv").open() as file:
         (alone,) = csv.DictReader(file)
     assert {name: rows[3][name] for name in alone} == alone
+
+
+def test_a_loop_alone_may_be_run_elsewhere(
+    cluster_here: LocalCluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(*SHORT, "--kv", "80", "--seeds", "1", "--scheduler", cluster_here.scheduler_address) == 0
+    assert "1 loop with 1 seed each, run in " in " ".join(capsys.readouterr().out.split())
+
+
+def test_all_cores_of_this_machine_run_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes of their own are those of sweeps, see test_sweep.py; there are as many as wanted."""
+    asked = []
+
+    def none(*given: object) -> None:
+        asked.append(given)
+        raise ValueError("there is none")
+
+    monkeypatch.setattr(cluster, "cluster", none)
+    assert run(*SHORT, "--vary", "kv=20,80") == run(*SHORT, "--vary", "kv=20,80", "--jobs", "3") == 2
+    assert asked == [(None, None), (None, 3)]
 
 
 def test_a_controller_in_gates(tmp_path: Path) -> None:

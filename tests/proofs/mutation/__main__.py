@@ -1,6 +1,7 @@
 """How many wrong cores the tests' motions tell from the right one: `make mutate`.
 
-Names of methods as arguments choose those, `registers` what is around a core, and `axes` cores of many.
+Names of methods as arguments choose those, `registers` what is around a core, `axes` cores of many, and `loop` control
+loops.
 """
 
 import os
@@ -15,7 +16,7 @@ from support.report import chosen, row
 
 from tachometry.spec import METHODS
 
-GROUPS = (*METHODS, "registers", "axes")
+GROUPS = (*METHODS, "registers", "axes", "loop")
 LEAST = 0.99  # of the mutants that are not equivalent
 
 

@@ -38,8 +38,33 @@ _GOES_ON = (
     "end"
 )
 _LEFT = 'self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)'
+_HELD = (
+    "it is inverted in every clock from a control tick to the next, and is read an even number of clocks after the tick"
+)
+_NO_TICKS = "of no control tick there is no coefficient but 0, and of this method one update comes before the first"
+_WHOLE = "without a filter y is the velocity: there is nothing below an LSB of it"
 
 ARGUED = {
+    ("loop, unfiltered", '"y": Out(signed(signed_width(form.most_y))),', "y[11] cnot1"): _WHOLE,
+    ("loop, unfiltered", "less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)", "Y[6] const0"): _WHOLE,
+    **{
+        ("loop, serial", "velocity = Signal.like(self.command_velocity, reset_less=True)", f"velocity[{what}"): _HELD
+        for what in ("7] cnot0", "2] cnot1", "1] inv", "11] inv", "3] cnot0")
+    },
+    ("loop, serial", "enabled = Signal()", "A[0] inv"): _HELD,
+    ("loop, serial", "due = Signal()", "B[0] const1"): "a control tick sets it before a product is stored",
+    ("loop, serial", "ticked = Signal()  # before the first control tick there is no current", "ticked[0] const1"): (
+        _NO_TICKS
+    ),
+    ("loop, serial", "with m.If(self.update & (ticked | self.tick)):", "Y[0] const1"): _NO_TICKS,
+    ("loop, serial", "m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)", "A[0] const1"): (
+        "what is cleared has been loaded, with its coefficient, in the clock in which the term begins"
+    ),
+    (
+        "loop, conventional",
+        "m.d.sync += [self.n.eq(self.n + 1), self.current_sum.eq(self.current_sum + self.current)]",
+        "A[1] cnot1",
+    ): "that is if the sum is not 0: each control tick has cleared it when its current is added",
     ("t, in clocks", '"running": Out(1),', "running[0] const1"): _GOES_ON,
     **{("t, in clocks", _LEFT, f"left[{bit}] const1"): _GOES_ON for bit in range(3)},
     ("t, in clocks", "left.eq(left - 1),", "$40.Y[1] const1"): _GOES_ON,

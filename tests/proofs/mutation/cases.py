@@ -8,6 +8,8 @@ from amaranth.lib import wiring
 from proofs.mutation.stimulus import Stimulus, stimulus
 
 from tachometry.hdl import Tachometer
+from tachometry.sim import golden
+from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Port, Speed, TachometerSpec, Timing
 
 
@@ -78,6 +80,10 @@ class Case:
     def play(self, n_clocks: int) -> Stimulus:
         """What is played on the mutants."""
         return stimulus(self.spec, n_clocks)
+
+    def right(self, trace: Any) -> Run:
+        """What the golden model says of a part of what is played."""
+        return golden.run(self.spec, trace)
 
     @property
     def pins(self) -> Pins:

@@ -15,7 +15,6 @@ from proofs.mutation.netlist import GROUP, Mutant, exported, mutants
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus
 
-from tachometry.sim import golden
 from tachometry.sim.signals.run import compare, observed
 
 CLOCKS = 400_000  # of the stimulus
@@ -70,5 +69,5 @@ def _hold(case: Case, played: Stimulus, rows: NDArray[np.int64]) -> None:
     for trace, start in zip(played.traces, played.starts, strict=True):
         own = rows[(rows[:, 0] >= start) & (rows[:, 0] < start + trace.n_clocks)]
         own[:, 0] -= start
-        count, first = compare(golden.run(case.spec, trace), observed(case.spec, trace.n_clocks, own))
+        count, first = compare(case.right(trace), observed(case.spec, trace.n_clocks, own))
         assert count == 0, f"{case.name}, from clock {start}: {first[0]}"

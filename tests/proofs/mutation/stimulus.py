@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
-from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
 from tachometry.spec import TachometerSpec
 
@@ -16,6 +16,14 @@ _EDGES = 60  # of a motion, at each of its speeds
 _LONG = 100  # clocks of a tick with which motions have fewer edges, and lines change a few times in a tick
 _RATTLE = 40_000  # clocks
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
+
+
+class Part(Protocol):
+    """What is played from one reset to the next."""
+
+    @property
+    def n_clocks(self) -> int:
+        """Number of clocks."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +34,14 @@ class Stimulus:
     ----------
     pins : uint64 array, shape (clocks, words)
         Bit 0 is `rst`, above it the other inputs in the order of the ports.
-    traces : sequence of PinTrace or AxesTrace
+    traces : sequence of Part
         One after each reset.
     starts : list of int
         Clock in which each of them begins, the first one after a reset.
     """
 
     pins: NDArray[np.uint64]
-    traces: Sequence[Trace]
+    traces: Sequence[Part]
     starts: list[int]
 
 

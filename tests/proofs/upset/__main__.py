@@ -1,19 +1,29 @@
 """Single flip-flop upsets of every method, and how long they are seen: `make upset`.
 
-Names of methods as arguments choose those; `--upsets N` says how many of each.
+Names of methods as arguments choose those, `axes` a core of many, and `loop` those with a control loop; `--upsets N`
+says how many of each.
 """
 
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
+from proofs.upset import axes, loops
 from proofs.upset.campaign import Campaign, by_register, upsets
 from rich.console import Console
 from rich.progress import track
 from support.report import chosen, row
 
 from tachometry.spec import METHODS
+
+SUBJECTS: dict[str, Callable[[int], Campaign]] = {
+    **{method: partial(upsets, method) for method in METHODS},
+    "axes": axes.upsets,
+    **{name: partial(loops.upsets, name) for name in loops.LOOPS},
+}
+GROUPS = (*METHODS, "axes", "loop")
 
 
 def _ticks(campaign: Campaign, clocks: int) -> str:
@@ -23,24 +33,25 @@ def _ticks(campaign: Campaign, clocks: int) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     """Print the table; 1 if an upset was seen for longer than the bound."""
     parser = argparse.ArgumentParser(prog="upset", description="Upset flip-flops of every method's core.")
-    parser.add_argument("methods", nargs="*", metavar="METHOD", help=f"some of: {', '.join(METHODS)}")
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help=f"some of: {', '.join(GROUPS)}")
     parser.add_argument("--upsets", type=int, default=12_000, metavar="N", help="of each method (%(default)s)")
     options = parser.parse_args(words)
     if options.upsets < 1:
         parser.error(f"--upsets must be at least 1, not {options.upsets}")
     console, done = Console(stderr=True), []
-    methods = chosen("method", options.methods, METHODS)
-    for method in track(methods, "upsets", console=console, transient=True, disable=not console.is_terminal):
+    groups = chosen("method", options.methods, GROUPS)
+    subjects = [name for name in SUBJECTS if name.split(",")[0] in groups]
+    for name in track(subjects, "upsets", console=console, transient=True, disable=not console.is_terminal):
         start = time.monotonic()
-        done.append((upsets(method, options.upsets), time.monotonic() - start))
-    row("method", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
+        done.append((SUBJECTS[name](options.upsets), time.monotonic() - start))
+    row("core", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
     row("---", *["---:"] * 8, "---")
     for campaign, seconds in done:
         seen = sorted(campaign.clocks[campaign.clocks > 0].tolist()) or [0]
         bits = f"{campaign.bits.n_flip_flops}"
         memory = len(campaign.bits) - campaign.bits.n_flip_flops
         row(
-            campaign.spec.method,
+            campaign.name,
             f"{bits} and {memory} of memory" if memory else bits,
             len(campaign.clocks),
             int((campaign.clocks == 0).sum()),
@@ -54,7 +65,7 @@ def main(words: Sequence[str] | None = None) -> int:
     print("\nmean, 99 %, worst: ticks until the outputs were right again, of those that were seen")
     for campaign, _ in done:
         worst = [f"{name} {_ticks(campaign, clocks)}" for name, clocks in list(by_register(campaign))[:5]]
-        print(f"{campaign.spec.method}: seen longest in {', '.join(worst)}")
+        print(f"{campaign.name}: seen longest in {', '.join(worst)}")
     return int(not all(campaign.fine for campaign, _ in done))
 
 

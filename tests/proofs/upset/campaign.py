@@ -1,6 +1,6 @@
 """Upsets of a core's flip-flops, and the golden model to say when its outputs are right again."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from proofs.upset.simulate import Bits, Upsettable
 
 from tachometry.sim import golden
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
+from tachometry.spec.control import AnySpec
 
 TICK_CYCLES, MAX_TICKS = 100, 20
 _OPTIONS: dict[str, dict[str, Any]] = {
@@ -100,14 +102,16 @@ class Campaign:
 
     Parameters
     ----------
-    spec : TachometerSpec
+    name : str
+    spec : AnySpec
     bits : Bits
     bit, clocks, allowed : int64 arrays, shape (n,)
         The bit that was flipped, clocks until the outputs were right again (0: it was never seen), and clocks after
         which they must be.
     """
 
-    spec: TachometerSpec
+    name: str
+    spec: AnySpec
     bits: Bits
     bit: NDArray[np.int64]
     clocks: NDArray[np.int64]
@@ -168,36 +172,67 @@ def upsets(method: str, n: int, seed: int = 1) -> Campaign:
     spec = spec_of(method)
     trace = motion(spec, _CYCLES.get(method, 40), seed)
     core = Upsettable(spec, trace)
-    rng = np.random.default_rng(seed)
     end = allowed(spec, trace, np.arange(trace.n_clocks))
-    length = int(end[: trace.n_clocks // 2].max()) + 3 * spec.timing.tick_cycles
-    clock = np.sort(rng.integers(200 * TICK_CYCLES, trace.n_clocks - length, n))
-    bit = rng.permutation(np.resize(rng.permutation(len(core.bits)), n))
     outputs = [port.name for port in spec.ports if port.direction == "output"]
     compared = [outputs.index(name) for name in _compared(spec)]
     tick, age = (_compared(spec).index(name) for name in ("tick", "age"))
-    clocks = np.zeros(n, dtype=np.int64)
     expected: dict[int, NDArray[np.int64]] = {}
-    for number, at, rows in core.runs(clock, bit, length):
-        shown = rows[:, compared][np.searchsorted(at, np.arange(length), side="right") - 1]
+
+    def wrong(clock: int, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        shown = rows[:, compared]
         shown[:, age] *= shown[:, tick]
         phase = 0
         if not spec.own_ticks and shown[:, tick].any():
-            own = clock[number] + np.flatnonzero(shown[:, tick])[-1] - spec.tick_latency
+            own = clock + np.flatnonzero(shown[:, tick])[-1] - spec.tick_latency
             phase = int(own % spec.timing.tick_cycles)
         if phase not in expected:
             expected[phase] = _expected(spec, trace, phase)
-        right = expected[phase][clock[number] : clock[number] + length]
+        right = expected[phase][clock : clock + len(shown)]
         if "position_fine" in _compared(spec):
             _forgive(shown, right, _compared(spec).index("position_fine"), spec.parameters["fine_bits"])
-        wrong = np.flatnonzero((shown != right).any(axis=1))
-        clocks[number] = wrong[-1] + 1 if len(wrong) else 0
-    return Campaign(spec, core.bits, bit, clocks, end[clock])
+        return (shown != right).any(axis=1)
+
+    return play(method, spec, core, trace, n, end, seed, wrong)
+
+
+def play(
+    name: str,
+    spec: AnySpec,
+    core: Upsettable,
+    trace: Trace,
+    n: int,
+    allowed: NDArray[np.int64],
+    seed: int,
+    wrong: Callable[[int, NDArray[np.int64]], NDArray[np.bool_]],
+    only: str = "",
+) -> Campaign:
+    """Flip bits as in `upsets`.
+
+    Parameters
+    ----------
+    allowed : int64 array, shape (n_clocks,)
+        Clocks after which the outputs must be right, by the clock of the upset.
+    wrong : callable
+        Of the clock of an upset, and what was shown from it on, in which clocks it is wrong.
+    only : str
+        Bits of this register alone, by the end of its name.
+    """
+    rng = np.random.default_rng(seed)
+    places = [place for place, register in enumerate(core.bits.names) if register.endswith(only)]
+    length = int(allowed[: trace.n_clocks // 2].max()) + 3 * spec.timing.tick_cycles
+    clock = np.sort(rng.integers(200 * TICK_CYCLES, trace.n_clocks - length, n))
+    bit = rng.permutation(np.resize(rng.permutation(places), n))
+    clocks = np.zeros(n, dtype=np.int64)
+    for number, at, rows in core.runs(clock, bit, length):
+        shown = rows[np.searchsorted(at, np.arange(length), side="right") - 1]
+        late = np.flatnonzero(wrong(int(clock[number]), shown))
+        clocks[number] = late[-1] + 1 if len(late) else 0
+    return Campaign(name, spec, core.bits, bit, clocks, allowed[clock])
 
 
 def by_register(campaign: Campaign) -> Iterator[tuple[str, int]]:
     """Registers by the longest time that an upset of theirs was seen, longest first."""
-    names = [name for name, width in (*campaign.bits.flip_flops, *campaign.bits.memories) for _ in range(width)]
+    names = campaign.bits.names
     longest: dict[str, int] = {}
     for bit, clocks in zip(campaign.bit.tolist(), campaign.clocks.tolist(), strict=True):
         longest[names[bit]] = max(longest.get(names[bit], 0), clocks)

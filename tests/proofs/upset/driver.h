@@ -7,7 +7,7 @@
 struct Upsets {
   int64_t n_clocks;
   const int64_t *at;  // clock of each change of the pins
-  const uint8_t *level;
+  const void *level;  // as the model plays them
   int64_t n_changes;
   const int64_t *clock;  // of each upset, none before another
   const int64_t *bit;
@@ -17,7 +17,7 @@ struct Upsets {
 };
 
 static inline void play(Model &model, const Upsets &job, int64_t &next, int64_t clock) {
-  while (next < job.n_changes && job.at[next] <= clock) model.pins(job.level[next++]);
+  while (next < job.n_changes && job.at[next] <= clock) model.play(job.level, next++);
   model.settle();
 }
 
@@ -46,7 +46,7 @@ ENTRY __attribute__((flatten)) int64_t upsets_run(Upsets *job) {
         model.edge();
       }
       load(model, before);
-      model.pins(next ? job->level[next - 1] : 0);
+      if (next) model.play(job->level, next - 1);
     }
     play(model, *job, next, clock);
     model.edge();

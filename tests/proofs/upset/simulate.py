@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from tachometry.sim.engines import build
 from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.cxxrtl import State, headers, model_of, translate
-from tachometry.sim.engines.engine import driven_pins
-from tachometry.sim.signals.recording import PinTrace, packed
-from tachometry.spec import TachometerSpec, TrackTachometer
+from tachometry.sim.signals.axes import Trace
+from tachometry.spec import TrackTachometer
+from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.tracking_program import STATES
 
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
@@ -49,6 +49,11 @@ class Bits:
         """Bits in flip-flops."""
         return sum(width for _, width in self.flip_flops)
 
+    @property
+    def names(self) -> list[str]:
+        """The register or memory of each bit."""
+        return [name for name, width in (*self.flip_flops, *self.memories) for _ in range(width)]
+
     def __len__(self) -> int:
         return self.n_flip_flops + sum(width for _, width in self.memories)
 
@@ -58,13 +63,13 @@ class Upsettable:
 
     Parameters
     ----------
-    spec : TachometerSpec
-    trace : PinTrace
+    spec : AnySpec
+    trace : Trace
         The pins.
     """
 
-    def __init__(self, spec: TachometerSpec, trace: PinTrace) -> None:
-        self._design = design = Design(spec, driven_pins(spec, trace))
+    def __init__(self, spec: AnySpec, trace: Trace) -> None:
+        self._design = design = Design(spec, list(spec.pins))
         self._trace = trace
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         text = translate(netlist)
@@ -100,7 +105,7 @@ class Upsettable:
         columns = 2 + len(self._design.outputs)
         rows = np.empty((max(_ROWS // columns, length), columns), dtype=np.int64)
         at = np.ascontiguousarray(self._trace.clock)
-        level = packed([self._trace.lines[pin.name] for pin in self._design.pins])
+        level = self._design.levels(self._trace)
         done = 0
         while done < len(clock):
             clocks, bits = np.ascontiguousarray(clock[done:]), np.ascontiguousarray(bit[done:])
