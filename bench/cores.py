@@ -119,6 +119,7 @@ LOOPS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("", "reference with control loop", {}),
     ("conventional", "and a conventional observer", {"synchronised": False}),
     ("parallel", "and a parallel multiplier", {"multiplier": "parallel"}),
+    ("generator", "and a command generator", {"command": "generator"}),
 )
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
@@ -284,7 +285,7 @@ CONFIGURATIONS = (
             f"loop-{name}" if name else "loop",
             what,
             LoopSpec(tachometer=REFERENCE, **options),
-            {} if "multiplier" in options else LOOP_BARS,
+            {} if {"multiplier", "command"} & {*options} else LOOP_BARS,
             is_option=False,
         )
         for name, what, options in LOOPS

@@ -1,6 +1,7 @@
 """The reference pages of the documentation, docs/{options,ports,registers}.md, from what the code declares."""
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -195,8 +196,16 @@ def ports() -> str:
             "## Of a control loop\n",
             "With `--loop` a core has these as well. Commands and outputs are synchronous to the clock.\n",
             markdown(_HEADER, [_described(port) for port in loop_ports(_LOOP)], left=range(4)),
+            "\nWith `--command generator` it has these instead of the inputs of commands.\n",
+            markdown(_HEADER, [_described(port) for port in _generated()], left=range(4)),
         ]
     )
+
+
+def _generated() -> list[Port]:
+    """Ports that a command generator makes of the inputs of commands."""
+    there = {*loop_ports(_LOOP)}
+    return [port for port in loop_ports(replace(_LOOP, command="generator")) if port not in there]
 
 
 def _described(port: Port) -> list[str]:

@@ -4,6 +4,7 @@ from amaranth import Module
 from amaranth.lib import wiring
 
 from tachometry.hdl.arithmetic.ports import members
+from tachometry.hdl.control.command_generator import CommandGenerator
 from tachometry.hdl.control.control_clock import ControlClock
 from tachometry.hdl.control.controller import Controller
 from tachometry.hdl.control.sigma_delta import SigmaDelta
@@ -11,7 +12,8 @@ from tachometry.hdl.control.update_window import UpdateWindow
 from tachometry.hdl.tachometer import Tachometer
 from tachometry.spec.control import LoopSpec
 
-_COMMANDS = ("enable", "command_position", "command_velocity", "command_acceleration")
+_COMMANDS = ("command_position", "command_velocity", "command_acceleration")
+_DEMANDS = ("mode", "velocity", "acceleration", "amplitude", "rate")
 
 
 class LoopCore(wiring.Component):
@@ -34,6 +36,7 @@ class LoopCore(wiring.Component):
         self.window = UpdateWindow(spec.form)
         self.controller = Controller(spec.form, spec.multiplier)
         self.sigma_delta = SigmaDelta(spec.current_width)
+        self.generator = CommandGenerator(spec.generator, spec.multiplier) if spec.command == "generator" else None
 
     @property
     def spec(self) -> LoopSpec:
@@ -61,6 +64,7 @@ class LoopCore(wiring.Component):
             controller.tick.eq(clock.tick),
             controller.position.eq(tachometer.position),
             *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
+            controller.enable.eq(self.enable),
             *(getattr(controller, name).eq(getattr(self, name)) for name in _COMMANDS),
             self.control_tick.eq(clock.tick),
             self.current_valid.eq(controller.valid),
@@ -71,4 +75,13 @@ class LoopCore(wiring.Component):
             sigma_delta.value.eq(controller.current),
             self.drive.eq(sigma_delta.drive),
         ]
+        if self.generator is not None:
+            m.submodules.generator = generator = self.generator
+            m.d.comb += [
+                generator.tick.eq(clock.tick),
+                generator.enable.eq(self.enable),
+                generator.position.eq(tachometer.position),
+                *(getattr(generator, name).eq(getattr(self, f"generator_{name}")) for name in _DEMANDS),
+                *(getattr(self, name).eq(getattr(generator, name)) for name in _COMMANDS),
+            ]
         return m

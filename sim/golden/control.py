@@ -1,11 +1,11 @@
 """Golden control loop: observer and controller, control tick by control tick, in exact integers."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.command_generator import Command, Demand, generated
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
@@ -16,22 +16,7 @@ from tachometry.spec.control.ports import CONTROL, CURRENT
 from tachometry.spec.port import UPDATE
 
 IntArray = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Command:
-    """What is commanded in a control tick, in LSB of the ports.
-
-    Parameters
-    ----------
-    position, velocity, acceleration : int
-    enable : bool
-    """
-
-    position: int = 0
-    velocity: int = 0
-    acceleration: int = 0
-    enable: bool = True
+_COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 
 
 class Control:
@@ -152,18 +137,25 @@ def control(spec: LoopSpec, clock: IntArray, position: IntArray, updates: Table,
 def run_loop(
     spec: LoopSpec,
     trace: PinTrace,
-    commands: Sequence[Command],
+    commands: Sequence[Command] | Sequence[Demand],
     tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]],
 ) -> Run:
     """What the core of `spec` must show for these pins; `tables` is the golden model of a tachometer.
 
-    There is a command for each control tick within the trace.
+    There is a command for each control tick within the trace; of a core with a command generator, a demand.
     """
     alone = spec.tachometer
     clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
     # The position is as late as a tick shows it.
     places, _ = count(alone, decoded(alone, trace), clock - alone.tick_latency)
     found = tables(alone, trace)
-    shown = control(spec, clock, places.position, found[UPDATE], commands)
-    found |= {CONTROL: Table(clock, {}), CURRENT: shown.rows(shown.clock < trace.n_clocks)}
+    given = [one for one in commands if isinstance(one, Command)]
+    columns: dict[str, IntArray] = {}
+    if spec.command == "generator":
+        demands = [one for one in commands if isinstance(one, Demand)]
+        given = generated(spec.generator, places.position.tolist(), demands)
+        rows = np.array([(one.position, one.velocity, one.acceleration) for one in given], dtype=np.int64)
+        columns = dict(zip(_COMMANDS, rows.reshape(-1, 3).T, strict=True))
+    shown = control(spec, clock, places.position, found[UPDATE], given)
+    found |= {CONTROL: Table(clock, columns), CURRENT: shown.rows(shown.clock < trace.n_clocks)}
     return Run.of_ports(spec, trace.n_clocks, found)

@@ -39,6 +39,7 @@ from tachometry.spec.units import ceil_log2, signed_width
 
 GUARD_BITS = 4  # of the sum that becomes the current
 POSITION_FRAC_BITS = 8  # of the commanded position
+ACCELERATION_WIDTH = 20  # bits of the commanded acceleration
 LEAST_COEFFICIENT = 11  # bits
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 from tachometry.spec.axes import CoreSpec
 from tachometry.spec.control import form
-from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+from tachometry.spec.control.form import ACCELERATION_WIDTH, GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
 from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.option import Derived, ParameterError, option, options_of, settle
 from tachometry.spec.port import HasPorts, Port
@@ -23,8 +24,8 @@ MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
 MAX_EXTRA_BITS = 24
 MAX_FACTOR_BITS = 40
 MAX_WORD_WIDTH = 80
-ACCELERATION_WIDTH = 20
 MULTIPLIERS = ("serial", "parallel")
+COMMANDS = ("ports", "generator")
 _GROUP = "Loop"
 # Clocks of a product: to load the word, to subtract from it, to begin, to store the result; and between them one for
 # each bit of the coefficient, or one for the product and one to round it.
@@ -74,6 +75,9 @@ class LoopSpec(HasPorts):
         Bits of `current`.
     multiplier : str
         `serial`: a bit a clock; `parallel`: a product at once, for which tools take multipliers of the FPGA.
+    command : str
+        `ports`: position, velocity and acceleration are commanded from outside; `generator`: the core makes them, see
+        `GeneratorForm`.
 
     Raises
     ------
@@ -161,6 +165,12 @@ class LoopSpec(HasPorts):
         choices=MULTIPLIERS,
         group=_GROUP,
     )
+    command: str = option(
+        "ports",
+        "Where commands come from: from outside, or from a generator in the core of constant speeds, ramps and sines.",
+        choices=COMMANDS,
+        group=_GROUP,
+    )
 
     def __post_init__(self) -> None:
         settle(self)
@@ -177,6 +187,8 @@ class LoopSpec(HasPorts):
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:
             raise ParameterError("multiplier", f"must be serial or parallel, not {self.multiplier!r}")
+        if self.command not in COMMANDS:
+            raise ParameterError("command", f"must be ports or generator, not {self.command!r}")
         if not 1 <= self.period <= MAX_PERIOD:
             raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
         self._check_formats()
@@ -329,7 +341,12 @@ class LoopSpec(HasPorts):
     @property
     def least_period(self) -> int:
         """Fewest clocks between two control ticks: the current is added to those before it."""
-        return self.latency + 1
+        return max(self.latency + 1, generator_clocks(self.multiplier) if self.command == "generator" else 0)
+
+    @cached_property
+    def generator(self) -> GeneratorForm:
+        """Formats of the command generator."""
+        return generator_form(self)
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -13,7 +13,8 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.control import controller, loop_core, update_window
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
-from tachometry.sim.golden.control import Command, control, run_loop
+from tachometry.sim.golden.command_generator import Command, Demand
+from tachometry.sim.golden.control import control, run_loop
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table, compare, observed
 from tachometry.spec import Encoder, Speed, STachometer, Timing
@@ -34,6 +35,7 @@ SMALL = LoopSpec(
 CONVENTIONAL = replace(SMALL, synchronised=False, filter=Fraction(3000))
 UNFILTERED = replace(SMALL, filter=None)
 SERIAL = replace(SMALL, multiplier="serial", period=320)
+GENERATED = replace(SMALL, command="generator")
 COLUMNS = ("current", "saturated", "y", "w")
 
 
@@ -128,7 +130,25 @@ def check(spec: LoopSpec, n_ticks: int = 300, seed: int = 1, less: int = 0) -> T
     return wanted
 
 
-def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> tuple[PinTrace, list[Command], np.ndarray]:
+def random_demands(spec: LoopSpec, rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
+    """What a command generator is told in n control ticks, for some of them the same; the greatest numbers among it."""
+    found: dict[str, np.ndarray] = {}
+    widths = {port.name: port.width for port in spec.ports if port.name.startswith("generator_")}
+    for name, width in widths.items():
+        signed = name in ("generator_velocity", "generator_amplitude")
+        most, least = (1 << (width - signed)) - 1, -(1 << (width - 1)) if signed else 0
+        size = np.exp2(rng.uniform(0, width - signed, n)).astype(np.int64)
+        values = rng.integers(-size if signed else np.zeros_like(size), size + 1).clip(least, most)
+        found[name] = np.where(rng.random(n) < 0.15, rng.choice([least, most], n), values)
+    found["generator_mode"] = rng.integers(0, 4, n)
+    # They stay for some ticks, so that a ramp goes on and a sine swings.
+    kept = np.maximum.accumulate(np.where(rng.random(n) < 0.15, np.arange(n), 0))
+    return {name: values[kept] for name, values in found.items()}
+
+
+def core_case(
+    spec: LoopSpec, seed: int, n_edges: int = 12
+) -> tuple[PinTrace, list[Command] | list[Demand], np.ndarray]:
     """A motion and commands for a core: pins, commands by control tick, rows of a clock and all inputs."""
     rng = np.random.default_rng(seed)
     trace = stress(spec.tachometer, seed, n_edges)
@@ -139,27 +159,35 @@ def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> tuple[PinTrace, l
         most = (1 << (width - 1)) - 1
         return np.where(rng.random(n) < 0.2, rng.choice([-most, most], n), rng.integers(-most, most + 1, n) >> 8)
 
-    ports = [port for port in spec.ports if port.name.startswith("command_")]
-    commands = {"enable": (rng.random(n) < 0.95).astype(np.int64), **{port.name: numbers(port.width) for port in ports}}
-    # About the position there, which the golden model need not know.
-    commands["command_position"] = np.where(
-        rng.random(n) < 0.2, commands["command_position"], rng.integers(-4000, 4000, n)
-    )
-    order = ("command_position", "command_velocity", "command_acceleration", "enable")
-    of_tick = [Command(*values) for values in zip(*(commands[name].tolist() for name in order), strict=True)]
+    commands = {"enable": (rng.random(n) < 0.95).astype(np.int64)}
+    of_tick: list[Command] | list[Demand]
+    if spec.command == "generator":
+        commands |= random_demands(spec, rng, n)
+        order = [*[*commands][1:], "enable"]
+        of_tick = [Demand(*values) for values in zip(*(commands[name].tolist() for name in order), strict=True)]
+    else:
+        commands |= {port.name: numbers(port.width) for port in spec.ports if port.name.startswith("command_")}
+        # About the position there, which the golden model need not know.
+        commands["command_position"] = np.where(
+            rng.random(n) < 0.2, commands["command_position"], rng.integers(-4000, 4000, n)
+        )
+        order = ["command_position", "command_velocity", "command_acceleration", "enable"]
+        of_tick = [Command(*values) for values in zip(*(commands[name].tolist() for name in order), strict=True)]
     # Commands are there for the clock of the control tick alone.
     names = [port.name for port in spec.pins]
     at = np.unique(np.concatenate([trace.clock, clock, clock + 1]))
     at = at[at < trace.n_clocks]
     held = np.searchsorted(trace.clock, at, side="right") - 1
-    columns: dict[str, Any] = {name: line[held] for name, line in trace.lines.items()}
+    found: dict[str, Any] = {name: line[held] for name, line in trace.lines.items()}
     tick = np.searchsorted(clock, at, side="right") - 1
+    signed = {port.name for port in spec.ports if port.signed}
+    widths = {port.name: port.width for port in spec.ports}
     for name, values in commands.items():
         there = np.isin(at, clock)
-        columns[name] = np.where(there, values[tick], 1 - values[tick] if name == "enable" else ~values[tick])
-    columns["enable"] = columns["enable"] & 1
+        others = ~values[tick] if name in signed else values[tick] ^ ((1 << widths[name]) - 1)
+        found[name] = np.where(there, values[tick], others)
     assert form.position_width < 48
-    return trace, of_tick, np.stack([at, *(columns[name].astype(np.int64) for name in names)], axis=1)
+    return trace, of_tick, np.stack([at, *(found[name].astype(np.int64) for name in names)], axis=1)
 
 
 def check_core(spec: LoopSpec, seed: int = 1, n_edges: int = 3) -> Run:

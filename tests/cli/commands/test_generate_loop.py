@@ -9,7 +9,9 @@ import pytest
 from support.command import run
 from support.compiled import lint
 
+from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
+from tachometry.spec.control.ports import loop_entries
 from tachometry.spec.option import options_of
 
 CORE = "--ppr 25 --clock 1MHz --tick 250us --max-time 2ms --max-speed 500rad/s --loop".split()
@@ -37,6 +39,8 @@ def test_files_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     found |= {
         f"loop.{key}.{inner}" for key, value in described["loop"].items() if isinstance(value, dict) for inner in value
     }
+    generator = loop_entries(LoopSpec(tachometer=of_texts("s", {"ppr": "500"}), command="generator"))["generator"]
+    found |= {f"loop.generator.{key}.{inner}" for key, value in generator.items() for inner in value}
     assert found <= set(re.findall(r"^\| `([\w.]+)` \|", PAGE, re.MULTILINE))
 
 
@@ -49,6 +53,7 @@ def test_files_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         ("--loop --velocity-filter 0Hz", "--velocity-filter must be greater than 0, not 0"),
         ("--loop --current-width 30", "--current-width must be from 8 to 24, not 30"),
         ("--loop --multiplier fast", "--multiplier must be serial or parallel, not 'fast'"),
+        ("--loop --command line", "--command must be ports or generator, not 'line'"),
         ("--loop --control-period 17s", "--control-period must be from 1 to 16777216 clocks, not 816000000"),
         ("--loop --control-period 4us", "--control-period must be at least 199 clocks, as long as the controller"),
         ("--loop --observer 0.001rad/s", "--observer must be from 0.01192 to 3.016e+08 rad/s here, not 0.001"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from amaranth import Module, ResetInserter, Signal
-from support.control import SERIAL, SMALL, check_core, core_case
+from support.control import GENERATED, SERIAL, SMALL, check_core, core_case
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 from support.verilog import play_in_icarus
@@ -34,10 +34,10 @@ def test_as_the_golden_model() -> None:
 
 
 def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
-    """With another method and options of the tachometer, which change nothing about the loop."""
+    """With another method and options of the tachometer, which change nothing about the loop, and a generator."""
     options: dict[str, Any] = {"lowpass": Fraction(4000), "filter_clocks": 3, "index": True, "index_reset": True}
     tachometer = TTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 100, 3), frac_bits=6, **options)
-    spec = replace(SERIAL, tachometer=tachometer)
+    spec = replace(SERIAL, tachometer=tachometer, command="generator")
     trace, commands, changes = core_case(spec, 3, 15)
     wanted = run_loop(spec, trace, commands, golden.tables)
     assert len(wanted.tables["current_valid"]) > 20
@@ -51,16 +51,17 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
         (ControlClock, "left.eq(self._period - 1)", "left.eq(self._period)"),
         (ControlClock, "init=self._first - 1", "init=self._first - 2"),
         (LoopCore, "window.update.eq(tachometer.velocity_valid)", "window.update.eq(tachometer.tick)"),
+        (LoopCore, "generator.position.eq(tachometer.position)", "generator.position.eq(0)"),
     ],
 )
 def test_mutants_are_caught(box: Any, right: str, wrong: str) -> None:
     with mutant(box, right, wrong), caught():
-        check_core(CORE, n_edges=1)
+        check_core(replace(CORE, command="generator") if "generator" in right else CORE, n_edges=1)
 
 
 def test_the_first_control_tick_has_the_first_update() -> None:
     """A period of a tick meets each update a clock after it has come."""
-    spec = replace(CORE, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), period=50)
+    spec = replace(GENERATED, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), period=50)
     run = check_core(spec, n_edges=1)
     apart = run.updates.clock[:, None] - run.tables["control_tick"].clock
     assert set(apart[np.abs(apart) < 25].tolist()) == {-1}
