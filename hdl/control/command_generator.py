@@ -73,20 +73,20 @@ class CommandGenerator(wiring.Component):
         place = Signal(signed(form.place_width))
         speed = Signal(signed(form.velocity_bits + 1))
         change = Signal(signed(form.change_width))
-        away = Signal(signed(form.most_away.bit_length() + 1), reset_less=True)
+        toward = Signal(signed(form.most_away.bit_length() + 1), reset_less=True)
         # A sine has begun; it goes on, and this step is one of it; this step is one of a ramp.
         swings = Signal()
         swinging = Signal()
         ramp = Signal()
         bound = Signal(WORD, reset_less=True)
-        # Which of the products: of the way from the middle, of the velocity, of the acceleration.
+        # Which of the products: of the way to the middle, of the velocity, of the acceleration.
         stage = Signal(2)
         move = Signal()
         follow = Signal()
         again = Signal()
         box = SerialProduct if self._multiplier == "serial" else ParallelProduct
         m.submodules.product = product = box(form.word_width, FACTOR_BITS)
-        words = (away >> form.away_shift, _shifted(speed, form.velocity), _shifted(change, form.acceleration))
+        words = (toward >> form.away_shift, _shifted(speed, form.velocity), _shifted(change, form.acceleration))
         factors = (self.rate, form.velocity.factor, form.acceleration.factor)
         with m.Switch(stage):
             for number, (word, factor) in enumerate(zip(words, factors, strict=True)):
@@ -106,29 +106,33 @@ class CommandGenerator(wiring.Component):
                 change.eq(Mux(self.enable, wanted - speed, 0)),
             ]
             with m.If(~(sine & swings)):
-                m.d.sync += away.eq(-(self.amplitude << form.amplitude_shift))
+                m.d.sync += toward.eq(self.amplitude << form.amplitude_shift)
             with m.If(~self.enable):
                 m.d.sync += [place.eq(self.position << form.fraction), speed.eq(0)]
         done = product.done
         with m.If(done):
             m.d.sync += stage.eq(Mux(stage == 2, 0, stage + 1))
         m.d.sync += [move.eq(done & (stage == 0)), follow.eq(move), again.eq(move | (done & (stage == 1)))]
+        # Compared while the product is made.
+        above = Signal()
+        below = Signal()
+        m.d.sync += [above.eq(change > bound), below.eq(change < -bound)]
         with m.If(done & (stage == 0)):
             with m.If(swinging):
-                m.d.sync += change.eq(-product.product)
-            with m.Elif(ramp & (change > bound)):
+                m.d.sync += change.eq(product.product)
+            with m.Elif(ramp & above):
                 m.d.sync += change.eq(bound)
-            with m.Elif(ramp & (change < -bound)):
+            with m.Elif(ramp & below):
                 m.d.sync += change.eq(-bound)
         moved = Signal(signed(form.change_width + 1))
-        gone = Signal(signed(len(away) + 1))
-        m.d.comb += [moved.eq(speed + change), gone.eq(away + speed)]
+        gone = Signal(signed(len(toward) + 1))
+        m.d.comb += [moved.eq(speed + change), gone.eq(toward - speed)]
         held, _ = saturate(m, moved, form.most_velocity)
         with m.If(move):
             m.d.sync += speed.eq(held)
         held, _ = saturate(m, gone, form.most_away)
         with m.If(follow):
-            m.d.sync += [place.eq(place + speed), away.eq(held)]
+            m.d.sync += [place.eq(place + speed), toward.eq(held)]
         for number, command in enumerate((self.command_velocity, self.command_acceleration), 1):
             held, _ = saturate(m, product.product, (1 << (len(command) - 1)) - 1)
             with m.If(done & (stage == number)):

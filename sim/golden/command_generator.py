@@ -59,13 +59,13 @@ class Generator:
     ----------
     place, speed, change : int
         In 2^−F counts, counts per control tick, and counts per control tick squared; the place does not wrap.
-    away : int
-        From the middle of the sine.
+    toward : int
+        The way to the middle of the sine.
     """
 
     def __init__(self, form: GeneratorForm) -> None:
         self._form = form
-        self.place = self.speed = self.change = self.away = 0
+        self.place = self.speed = self.change = self.toward = 0
         self._swings = False
 
     def command(self, enable: bool = True) -> Command:
@@ -92,16 +92,16 @@ class Generator:
             return
         sine = demand.mode >= SINE
         if sine and self._swings:
-            self.change = -_product(self.away >> form.away_shift, demand.rate)
+            self.change = _product(self.toward >> form.away_shift, demand.rate)
         else:
             self.change = (0 if sine else demand.velocity << form.velocity_shift) - self.speed
-            self.away = -demand.amplitude << form.amplitude_shift
+            self.toward = demand.amplitude << form.amplitude_shift
             if demand.mode == RAMP:
                 self.change = _held(self.change, demand.acceleration)
         self._swings = sine
         self.speed = _held(self.speed + self.change, form.most_velocity)
         self.place += self.speed
-        self.away = _held(self.away + self.speed, form.most_away)
+        self.toward = _held(self.toward - self.speed, form.most_away)
 
 
 def generated(form: GeneratorForm, positions: Iterable[int], demands: Iterable[Demand]) -> list[Command]:

@@ -9,7 +9,7 @@ velocity has changed, in every bit. The modes say what α is:
 
 - constant: what takes ω to the wanted velocity at once;
 - ramp: the same, but no more than the acceleration;
-- sine: −c·x, where x is the way from the middle: x ← x + ω. Then x(k) = −R·cos((k + ½)·φ) with 2·sin(φ/2) = √c.
+- sine: c·x, where x is the way to the middle: x ← x − ω. Then x(k) = R·cos((k + ½)·φ) with 2·sin(φ/2) = √c.
 
 The last is a recurrence whose steps can be undone: x(k−1) is 2·x(k) − x(k+1) − round(c·x(k)), the same formula as
 forward. So there is no amplitude to which it decays or grows, whatever is rounded. It begins at rest at one end, so

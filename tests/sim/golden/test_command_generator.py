@@ -94,9 +94,9 @@ def test_nothing_overflows() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("self.change = -_product(self.away", "self.change = -2 * _product(self.away"),
-        ("self.away + self.speed, form.most_away", "self.away + self.speed // 2, form.most_away"),
-        ("-demand.amplitude << form", "demand.amplitude << form"),
+        ("self.change = _product(self.toward", "self.change = 2 * _product(self.toward"),
+        ("self.toward - self.speed", "self.toward - self.speed // 2"),
+        ("= demand.amplitude << form", "= -demand.amplitude << form"),
     ],
 )
 def test_mutants_of_a_sine_are_caught(right: str, wrong: str) -> None:
