@@ -197,15 +197,18 @@ def ports() -> str:
             "With `--loop` a core has these as well. Commands and outputs are synchronous to the clock.\n",
             markdown(_HEADER, [_described(port) for port in loop_ports(_LOOP)], left=range(4)),
             "\nWith `--command generator` it has these instead of the inputs of commands.\n",
-            markdown(_HEADER, [_described(port) for port in _generated()], left=range(4)),
+            markdown(_HEADER, [_described(port) for port in _beyond(command="generator")], left=range(4)),
+            "\nWith `--gains inputs` it has these as well. Then commands, too, are taken in the clock before "
+            "control_tick.\n",
+            markdown(_HEADER, [_described(port) for port in _beyond(gains="inputs")], left=range(4)),
         ]
     )
 
 
-def _generated() -> list[Port]:
-    """Ports that a command generator makes of the inputs of commands."""
-    there = {*loop_ports(_LOOP)}
-    return [port for port in loop_ports(replace(_LOOP, command="generator")) if port not in there]
+def _beyond(**options: str) -> list[Port]:
+    """Ports that options of a loop add, or make of others."""
+    there = {port.name: port.direction for port in loop_ports(_LOOP)}
+    return [port for port in loop_ports(replace(_LOOP, **options)) if there.get(port.name) != port.direction]
 
 
 def _described(port: Port) -> list[str]:

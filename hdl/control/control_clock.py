@@ -16,15 +16,18 @@ class ControlClock(wiring.Component):
     Members
     -------
     tick : Out(1)
+    coming : Out(1)
+        In the clock before.
     """
 
     def __init__(self, first: int, period: int) -> None:
         self._first, self._period = first, period
-        super().__init__({"tick": Out(1)})
+        super().__init__({"tick": Out(1), "coming": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         left = Signal(range(max(self._first, self._period)), init=self._first - 1)
+        m.d.comb += self.coming.eq(left == 0)
         m.d.sync += [left.eq(left - 1), self.tick.eq(left == 0)]
         with m.If(left == 0):
             m.d.sync += left.eq(self._period - 1)

@@ -40,6 +40,22 @@ class Demand:
     enable: bool = True
 
 
+@dataclass(frozen=True)
+class Gains:
+    """Gains and limit of a control tick, in LSB of the ports.
+
+    Parameters
+    ----------
+    position, velocity, acceleration, disturbance, limit : int
+    """
+
+    position: int
+    velocity: int
+    acceleration: int
+    disturbance: int
+    limit: int
+
+
 def _product(word: int, factor: int) -> int:
     return (word * factor + (1 << (FACTOR_BITS - 1))) >> FACTOR_BITS
 

@@ -27,9 +27,10 @@ every n. So |w| ≤ 2V + M. The position error is held within a limit at which i
 together and the limit of the current: holding it changes no current.
 
 Where gains are inputs, they are the upper bits of coefficients, from 0 on, and a word is shifted so far that a gain can
-be 16 times that of its option. Sums are as wide as the greatest of all gains make them, so nothing overflows, either. y,
-z and their bounds have no gain in them. The position error is held within a limit at which its product, with 1/16 of
-its option's gain, is as above; with a gain that is still less, or others that are greater, it is a limit of its own.
+be 16 times that of its option. Sums are as wide as the greatest of all gains make them, so nothing overflows here,
+either; y, z and their bounds have no gain in them. The position error is held within a limit at which its product,
+with 1/16 of its option's gain, is as above. With a gain that is still less, or others that are greater, holding it can
+change the current: then it is a limit of its own.
 """
 
 import math
@@ -213,7 +214,7 @@ class ControlForm:
     @property
     def _most_error_of_gains(self) -> int:
         """2^GAIN_HEADROOM times that of the options; where there is no gain of the position, of the usual one."""
-        usual = 1 << (self.factor_bits - GAIN_HEADROOM - 1)
+        usual = 1 << max(self.factor_bits - GAIN_HEADROOM - 1, 0)
         fixed = {term: self.terms[term] for term in self.terms}
         gain = min(fixed[Term.POSITION].values[0] or usual, usual)
         fixed[Term.POSITION] = replace(fixed[Term.POSITION], values=(gain,))

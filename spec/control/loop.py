@@ -176,8 +176,7 @@ class LoopSpec(HasPorts):
     )
     gains: str = option(
         "fixed",
-        "Whether gains and current limit are fixed, or inputs that begin with the options; --bus makes inputs "
-        "registers.",
+        "Whether gains and current limit are fixed, or inputs; a bus makes them registers that begin with the options.",
         choices=FIXED_OR_INPUTS,
         group=_GROUP,
     )
@@ -219,12 +218,11 @@ class LoopSpec(HasPorts):
                 raise ParameterError(
                     name, f"must be from {float(least):.4g} to {float(most):.4g} rad/s here, not {float(rate):.9g}"
                 )
-        bits = factor_bits(list(ratios_of(self).values()))
+        bits = factor_bits(list(self.ratios.values()))
         if bits > MAX_FACTOR_BITS:
             raise ParameterError(
                 "kv" if not self.position_gain else "kp",
-                f"must fit the other gains: coefficients would have {bits} bits, and "
-                f"{MAX_FACTOR_BITS} are the most",
+                f"must fit the other gains: coefficients would have {bits} bits, and {MAX_FACTOR_BITS} are the most",
             )
         width = max(self.form.word_width, self.form.total_width)
         if width > MAX_WORD_WIDTH:
@@ -296,6 +294,11 @@ class LoopSpec(HasPorts):
         return min(extra_bits_of(self), 8)
 
     @cached_property
+    def ratios(self) -> dict[Term, list[Fraction]]:
+        """What each term is multiplied by, in units of its result for one of its word."""
+        return ratios_of(self)
+
+    @cached_property
     def form(self) -> ControlForm:
         """Formats and coefficients."""
         return control_form(self)
@@ -325,6 +328,15 @@ class LoopSpec(HasPorts):
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order: those of the tachometer first."""
         return (*self.tachometer.ports, *loop_ports(self))
+
+    @property
+    def held_inputs(self) -> tuple[Port, ...]:
+        """Inputs that are taken in the clock before a control tick: commands, gains and limit, if gains are inputs."""
+        if self.gains == "fixed":
+            return ()
+        return tuple(
+            port for port in loop_ports(self) if port.direction == "input" and port.name not in ("enable", "freeze")
+        )
 
     @property
     def parameters(self) -> dict[str, Any]:

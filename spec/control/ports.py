@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tachometry.spec.control.form import POSITION_FRAC_BITS
+from tachometry.spec.control.coefficients import gain_per_lsb
+from tachometry.spec.control.form import GAINS, POSITION_FRAC_BITS, Term
 from tachometry.spec.control.generator import AMPLITUDE_WIDTH, MODE_WIDTH, RATE_FRAC_BITS, WORD
 from tachometry.spec.port import Port, held, strobe
 from tachometry.spec.units import signed_width
@@ -13,6 +14,15 @@ if TYPE_CHECKING:
     from tachometry.spec.control.loop import LoopSpec
 
 CONTROL, CURRENT = "control_tick", "current_valid"
+GAIN_PORTS = {term: f"gain_{term.name.lower()}" for term in GAINS}
+_TAKEN = {"fixed": "It is taken with control_tick.", "inputs": "It is taken in the clock before control_tick."}
+_GAIN_HELP = {
+    Term.POSITION: "Gain k_p of the position error.",
+    Term.VELOCITY: "Gain k_v of the velocity error.",
+    Term.ACCELERATION: "How much of the commanded acceleration becomes current.",
+    Term.DISTURBANCE: "How much of the estimated disturbance becomes current.",
+}
+_GAIN_UNIT = {Term.POSITION: " 1/s²", Term.VELOCITY: " 1/s"}
 
 
 def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
@@ -22,6 +32,7 @@ def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
     return (
         Port("enable", "input", help="The current is 0 unless this is high in the clock of control_tick."),
         *(_generated(spec) if spec.command == "generator" else _commands(spec)),
+        *(_gains(spec) if spec.gains == "inputs" else ()),
         strobe(CONTROL, "One clock for every control period: position and commands are taken."),
         strobe(CURRENT, "One clock for every new current."),
         held(
@@ -68,17 +79,38 @@ def _commands(spec: LoopSpec) -> tuple[Port, ...]:
         "velocity": "Commanded velocity.",
         "acceleration": "Commanded acceleration, or 0.",
     }
-    taken = "It is taken with control_tick."
+    taken = _TAKEN[spec.gains]
     return tuple(
         Port(f"command_{name}", "input", width, signed=True, unit=unit, help=f"{told[name]} {taken}")
         for name, (width, unit) in _units(spec).items()
     )
 
 
+def _gains(spec: LoopSpec) -> tuple[Port, ...]:
+    """Gains and limit from outside."""
+    form, taken = spec.form, _TAKEN[spec.gains]
+    return (
+        *(
+            Port(
+                *(GAIN_PORTS[term], "input", form.gain_bits),
+                unit=f"{float(gain_per_lsb(spec, term)):.9g}{_GAIN_UNIT.get(term, '')}",
+                help=f"{_GAIN_HELP[term]} {taken}",
+            )
+            for term in GAINS
+        ),
+        Port(
+            *("current_limit", "input", form.current_limit.bit_length()),
+            unit=f"2^{-spec.current_frac_bits} A",
+            help=f"Greatest current; a limit beyond that of the option is held at it. {taken}",
+        ),
+        Port("freeze", "input", help="Commands, gains and limit stay as they were, but enable does not."),
+    )
+
+
 def _generated(spec: LoopSpec) -> tuple[Port, ...]:
     """What the command generator is told, and what it commands."""
     form = spec.generator
-    taken = "It is taken with control_tick."
+    taken = _TAKEN[spec.gains]
     inputs = (
         Port(
             *("generator_mode", "input", MODE_WIDTH),
@@ -146,4 +178,23 @@ def loop_entries(spec: LoopSpec) -> dict[str, Any]:
             "torque_per_lsb": float(spec.inertia * spec.observer * spec.rad_per_s / (1 << form.extra_bits))
         },
         **generator,
+        **_gain_entries(spec),
     }
+
+
+def _gain_entries(spec: LoopSpec) -> dict[str, Any]:
+    """What raw values of the gains mean: raw = round(gain/per_lsb), from 0 to most."""
+    form = spec.form
+    if not form.gain_bits:
+        return {}
+    found: dict[str, Any] = {
+        GAIN_PORTS[term]: {
+            "per_lsb": float(gain_per_lsb(spec, term)),
+            "unit": _GAIN_UNIT.get(term, " 1").strip(),
+            "most": form.most_gain,
+            "option": form.reset_gains[term],
+        }
+        for term in GAINS
+    }
+    amperes = {"per_lsb": float(spec.amperes), "unit": "A", "most": form.current_limit, "option": form.current_limit}
+    return {"gains": found | {"current_limit": amperes}}

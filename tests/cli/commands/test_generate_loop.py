@@ -39,8 +39,9 @@ def test_files_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     found |= {
         f"loop.{key}.{inner}" for key, value in described["loop"].items() if isinstance(value, dict) for inner in value
     }
-    generator = loop_entries(LoopSpec(tachometer=of_texts("s", {"ppr": "500"}), command="generator"))["generator"]
-    found |= {f"loop.generator.{key}.{inner}" for key, value in generator.items() for inner in value}
+    more = loop_entries(LoopSpec(tachometer=of_texts("s", {"ppr": "500"}), command="generator", gains="inputs"))
+    found |= {f"loop.generator.{key}.{inner}" for key, value in more["generator"].items() for inner in value}
+    found |= {f"loop.gains.NAME.{inner}" for value in more["gains"].values() for inner in value}
     assert found <= set(re.findall(r"^\| `([\w.]+)` \|", PAGE, re.MULTILINE))
 
 
@@ -54,6 +55,7 @@ def test_files_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         ("--loop --current-width 30", "--current-width must be from 8 to 24, not 30"),
         ("--loop --multiplier fast", "--multiplier must be serial or parallel, not 'fast'"),
         ("--loop --command line", "--command must be ports or generator, not 'line'"),
+        ("--loop --gains none", "--gains must be fixed or inputs, not 'none'"),
         ("--loop --control-period 17s", "--control-period must be from 1 to 16777216 clocks, not 816000000"),
         ("--loop --control-period 4us", "--control-period must be at least 199 clocks, as long as the controller"),
         ("--loop --observer 0.001rad/s", "--observer must be from 0.01192 to 3.016e+08 rad/s here, not 0.001"),
