@@ -64,9 +64,7 @@ class Configuration:
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
         """Verilog and ports."""
         bus = bus_of(self.bus)
-        if isinstance(self.spec, AxesSpec | LoopSpec):
-            return export(self.spec, CORE)[f"{CORE}.v"], self.spec.ports
-        if self.demo and bus is not None:
+        if self.demo and bus is not None and isinstance(self.spec, TachometerSpec):
             registers = DemoMap(self.spec)
             described = {"generator": "", "license": "", **demo_manifest(registers, bus, CORE)}
             return verilog_of(Demo(registers, bus), described), demo_ports(registers, bus)

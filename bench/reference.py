@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import click
 from pages import markdown, write
@@ -205,7 +206,7 @@ def ports() -> str:
     )
 
 
-def _beyond(**options: str) -> list[Port]:
+def _beyond(**options: Any) -> list[Port]:
     """Ports that options of a loop add, or make of others."""
     there = {port.name: port.direction for port in loop_ports(_LOOP)}
     return [port for port in loop_ports(replace(_LOOP, **options)) if there.get(port.name) != port.direction]

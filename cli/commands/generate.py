@@ -163,7 +163,7 @@ def generate(
     elif isinstance(spec, LoopSpec):
         from tachometry.cli.reports.loop import print_loop_core
 
-        print_loop_core(spec)
+        print_loop_core(spec, bus)
     else:
         from tachometry.cli.reports.core import print_core
 
