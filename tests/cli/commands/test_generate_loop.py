@@ -92,7 +92,10 @@ def test_registers_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("--loop --axes 2 --max-speed 9rad/s", "--axes must not be given together with --loop: it is of one axis"),
         ("--loop --bus uart", "--gains must be inputs with a bus, which makes them registers, not fixed"),
         ("--loop --for rio", "--for must not be given together with loop: targets are for a tachometer alone"),
-        ("--loop --testbench cocotb", "--testbench must not be given together with --loop: it is of a tachometer"),
+        (
+            "--loop --gains inputs --bus spi --testbench cocotb",
+            "--testbench must not be given together with --loop and --bus: it drives no bus",
+        ),
         ("--loop --name current", "--name must not be that of a port, which 'current' is"),
         ("--kp 3", "--kp must be given together with --loop"),
         ("--no-synchronised", "--synchronised must be given together with --loop"),
