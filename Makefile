@@ -82,6 +82,7 @@ bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps
 
 verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks
 	$(BIN)/tachometry verify --clocks 1000000000 -o build/verify
+	$(BIN)/tachometry verify --engines cxxrtl-every-clock --clocks 1000000000 -o build/verify
 
 compare: $(VENV)/.run ## all methods and what others use in several situations, written to docs/compare.md
 	$(BIN)/python bench/compare.py

@@ -156,7 +156,7 @@ def loops(spec: TachometerSpec, trace: PinTrace, *options: str, debug: bool = Fa
             else translate(rtlil.convert(design.component, name="top", emit_src=False))
         )
     source = design.source(text + model_of(design, text)) + _LOOPS
-    key = build.digest("bench", source, build.compiler(), build.version(build.compiler()), build.FLAGS, options)
+    key = build.digest("bench", source, build.compiler(), build.version(build.compiler()), build.flags(), options)
     made = build.cached(key, ".so", lambda folder: build.compile_library(source, folder, f"-I{headers()}", *options))
     return ctypes.CDLL(str(made))
 

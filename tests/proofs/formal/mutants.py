@@ -70,7 +70,7 @@ MUTANTS = [
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
-    Mutant("x2, 7 clocks", "p3_overflow", saturate, "above.eq(value > ", "above.eq(value >= "),
+    Mutant("x2, 7 clocks", "p3_overflow", saturate, "beyond: Value = negative", "beyond: Value = ~negative"),
     Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & differs", ""),
     Mutant(
         "eq. (21), 1 clock",

@@ -113,6 +113,20 @@ def test_compilers_that_are_none(compiler: str, message: str, tmp_path: Path, mo
         compile_library("int x;", tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("version", "without"),
+    [
+        ("g++ (Debian 12.2.0-14) 12.2.0\nFree Software Foundation", True),
+        ("g++ (GCC) 11.1.0\nFree Software Foundation", True),
+        ("c++ (GCC) 10.2.1\nFree Software Foundation", False),
+        ("clang version 19.1.7", False),
+    ],
+)
+def test_a_pass_that_drops_inputs_is_off(version: str, without: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build, "version", lambda command: version)
+    assert ("-fno-ipa-modref" in build.flags()) == without
+
+
 def test_builds_at_the_same_time(folder: Path) -> None:
     """Each is given a whole file, whoever is first, and other processes find it."""
     found: list[bytes] = []
