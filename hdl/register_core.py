@@ -92,4 +92,7 @@ class RegisterCore(wiring.Component):
                 kept = Signal.like(value, name=f"kept_{name}")
                 shown = Mux(getattr(loop, strobe), value, kept)
                 m.d.sync += kept.eq(shown)
+                if hasattr(self.bank, "restart"):
+                    with m.If(self.bank.restart):
+                        m.d.sync += kept.eq(0)
                 m.d.comb += getattr(self.bank, name).eq(shown)

@@ -15,6 +15,8 @@ from tachometry.spec.control.loop import LoopSpec
 from tachometry.spec.control.ports import CONTROL, CURRENT
 from tachometry.spec.port import UPDATE
 
+__all__ = ["Command", "Control", "Demand", "Gains", "control", "run_loop"]
+
 IntArray = NDArray[np.int64]
 _COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 
