@@ -74,9 +74,8 @@ def test_passes_in_icarus(case: str, tmp_path: Path) -> None:
     assert play(tmp_path) == ""
 
 
-@pytest.mark.parametrize("case", LOOPS)
-def test_loops_pass_in_icarus(case: str, tmp_path: Path) -> None:
-    assert generate(tmp_path, *LOOP.split(), *LOOPS[case].split()) == 0
+def test_a_loop_passes_in_icarus(tmp_path: Path) -> None:
+    assert generate(tmp_path, *LOOP.split(), *LOOPS["generator"].split()) == 0
     vectors = json.loads((tmp_path / "spindle_vectors.json").read_text())
     assert len({row[1] for row in vectors["strobes"]["current_valid"]["rows"]}) > 20
     assert play(tmp_path) == ""

@@ -101,7 +101,7 @@ def compare(
     assert len(shown["CURRENT"]) > 5
 
 
-def check(spec: LoopSpec, seed: int, n_clocks: int = 1600) -> None:
+def check(spec: LoopSpec, seed: int, n_clocks: int = 1400) -> None:
     """In Amaranth's simulator."""
     registers, trace, accesses, captures, rows = case(spec, seed, n_clocks)
     box = register_core.RegisterCore(registers)
@@ -150,4 +150,4 @@ MUTANTS: dict[str, tuple[Any, str, str]] = {
 @pytest.mark.parametrize("name", MUTANTS)
 def test_mutants_are_caught(name: str) -> None:
     with mutant(*MUTANTS[name]), caught():
-        check(CORE, 1, 900)
+        check(CORE, 1, 700)

@@ -47,7 +47,7 @@ def check(spec: LoopSpec, n_ticks: int, seed: int = 1, *, fast: bool = False) ->
 
 
 def test_as_the_golden_model() -> None:
-    check(GENERATED, 900)
+    check(GENERATED, 600)
     check(GENERATED, 80, fast=True)
 
 
