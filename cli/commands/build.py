@@ -19,6 +19,7 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
+from tachometry.spec.registers.demo import demo_map
 
 if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
     from tachometry.boards.fpga.build import Built
@@ -100,6 +101,7 @@ def build(
     assert on is not None
     if on.baud:
         on.bit_cycles(spec.timing.clock_hz)
+    demo_map(spec)  # what cannot have registers is refused at once
     from tachometry.boards.fpga import build as builder
 
     builder.check_tools(board)

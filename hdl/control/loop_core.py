@@ -34,7 +34,7 @@ class LoopCore(wiring.Component):
         self._spec = spec
         super().__init__(members(spec.ports))
         self.tachometer = Tachometer(spec.tachometer)
-        self.control_clock = ControlClock(spec.first_tick, spec.period)
+        self.control_clock = ControlClock(spec.first_tick, spec.period, tells=bool(spec.held_inputs))
         self.window = UpdateWindow(spec.form)
         self.controller = Controller(spec.form, spec.multiplier)
         self.sigma_delta = SigmaDelta(spec.current_width)
@@ -57,26 +57,6 @@ class LoopCore(wiring.Component):
             if port.name not in ("clk", "rst"):
                 inner, outer = getattr(tachometer, port.name), getattr(self, port.name)
                 m.d.comb += inner.eq(outer) if port.direction == "input" else outer.eq(inner)
-        m.d.comb += [
-            window.tick.eq(clock.tick),
-            window.update.eq(tachometer.velocity_valid),
-            window.velocity.eq(tachometer.velocity),
-            window.clear.eq(controller.clear),
-            window.add.eq(controller.valid),
-            window.current.eq(controller.current),
-            controller.tick.eq(clock.tick),
-            controller.position.eq(tachometer.position),
-            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
-            controller.enable.eq(self.enable),
-            self.control_tick.eq(clock.tick),
-            self.current_valid.eq(controller.valid),
-            self.current.eq(controller.current),
-            self.current_saturated.eq(controller.saturated),
-            self.filtered_velocity.eq(controller.y),
-            self.disturbance.eq(controller.w),
-            sigma_delta.value.eq(controller.current),
-            self.drive.eq(sigma_delta.drive),
-        ]
         given: LoopCore | HeldInputs = self
         if self.held_inputs is not None:
             m.submodules.held_inputs = given = self.held_inputs
@@ -100,5 +80,25 @@ class LoopCore(wiring.Component):
                 *(getattr(generator, name).eq(getattr(given, f"generator_{name}")) for name in _DEMANDS),
                 *(getattr(self, name).eq(getattr(generator, name)) for name in _COMMANDS),
             ]
-        m.d.comb += [getattr(controller, name).eq(getattr(commands, name)) for name in _COMMANDS]
+        m.d.comb += [
+            window.tick.eq(clock.tick),
+            window.update.eq(tachometer.velocity_valid),
+            window.velocity.eq(tachometer.velocity),
+            window.clear.eq(controller.clear),
+            window.add.eq(controller.valid),
+            window.current.eq(controller.current),
+            controller.tick.eq(clock.tick),
+            controller.position.eq(tachometer.position),
+            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
+            controller.enable.eq(self.enable),
+            *(getattr(controller, name).eq(getattr(commands, name)) for name in _COMMANDS),
+            self.control_tick.eq(clock.tick),
+            self.current_valid.eq(controller.valid),
+            self.current.eq(controller.current),
+            self.current_saturated.eq(controller.saturated),
+            self.filtered_velocity.eq(controller.y),
+            self.disturbance.eq(controller.w),
+            sigma_delta.value.eq(controller.current),
+            self.drive.eq(sigma_delta.drive),
+        ]
         return m
