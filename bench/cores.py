@@ -64,9 +64,7 @@ class Configuration:
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
         """Verilog and ports."""
         bus = bus_of(self.bus)
-        if isinstance(self.spec, AxesSpec | LoopSpec):
-            return export(self.spec, CORE)[f"{CORE}.v"], self.spec.ports
-        if self.demo and bus is not None:
+        if self.demo and bus is not None and isinstance(self.spec, TachometerSpec):
             registers = DemoMap(self.spec)
             described = {"generator": "", "license": "", **demo_manifest(registers, bus, CORE)}
             return verilog_of(Demo(registers, bus), described), demo_ports(registers, bus)
@@ -119,6 +117,7 @@ LOOPS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("", "reference with control loop", {}),
     ("conventional", "and a conventional observer", {"synchronised": False}),
     ("parallel", "and a parallel multiplier", {"multiplier": "parallel"}),
+    ("generator", "and a command generator", {"command": "generator"}),
 )
 PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms", "10ms"))
 
@@ -284,7 +283,7 @@ CONFIGURATIONS = (
             f"loop-{name}" if name else "loop",
             what,
             LoopSpec(tachometer=REFERENCE, **options),
-            {} if "multiplier" in options else LOOP_BARS,
+            {} if {"multiplier", "command"} & {*options} else LOOP_BARS,
             is_option=False,
         )
         for name, what, options in LOOPS

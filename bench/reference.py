@@ -1,8 +1,10 @@
 """The reference pages of the documentation, docs/{options,ports,registers}.md, from what the code declares."""
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import click
 from pages import markdown, write
@@ -13,6 +15,7 @@ from tachometry.spec import METHODS, Encoder, Port, TachometerSpec, Timing, of_t
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.registers.buses import BUSES
+from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 from tachometry.spec.registers.page import tables
 
@@ -33,7 +36,35 @@ SPEED = {
     **{"external-tick": "yes", "unit": "rpm", "lsb": "2^-4", "velocity-width": "18", "age": "yes"},
 }
 _HEADER = ["port", "when", "kind", "meaning"]
-_LOOP = LoopSpec(tachometer=of_texts("s", {"ppr": "500"}))
+_LOOP = LoopSpec(tachometer=of_texts("s", {"ppr": "500", "max-speed": "1000rad/s"}))
+_OF_LOOPS = """
+## Of a control loop
+
+With `--loop --gains inputs` these are added: what the loop shows, its commands and its gains. The tables are of
+`--ppr 500 --max-speed 1000rad/s`.
+
+- A write has an effect with the next control tick, if it is two clocks or more before it: in the clock before a control
+  tick the loop takes all settings together, and a program that computes a current has one set of them. While
+  LOOP.freeze is set, the loop keeps what it has: set it, write what belongs together, and clear it. A position of two
+  registers is written so, too. LOOP.enable is never frozen.
+- A value beyond what a register can have is held at the nearest that it can, and is read so. A commanded position
+  wraps, as positions do.
+- No value makes the loop overflow. See [integration.md](integration.md#gains-that-can-be-changed) for what gains mean.
+- Current, filtered velocity and disturbance are those of the last `current_valid`, what a generator commands that of
+  the last `control_tick`.
+
+In C, `NAME_regs.h` has what one LSB is: `NAME_GAIN_POSITION_PER_LSB` and so on. In Python,
+`tachometry.boards.host.loop` has a client that takes values in their units, and freezes while it writes them:
+
+```python
+from tachometry.boards.host.loop import LoopClient
+
+client = LoopClient(read, write, json.load(file))
+client.set(gain_position=6400, gain_velocity=160, current_limit=8)
+client.enable(True)
+```
+
+"""
 _REGISTERS = """\
 # Registers
 
@@ -195,8 +226,19 @@ def ports() -> str:
             "## Of a control loop\n",
             "With `--loop` a core has these as well. Commands and outputs are synchronous to the clock.\n",
             markdown(_HEADER, [_described(port) for port in loop_ports(_LOOP)], left=range(4)),
+            "\nWith `--command generator` it has these instead of the inputs of commands.\n",
+            markdown(_HEADER, [_described(port) for port in _beyond(command="generator")], left=range(4)),
+            "\nWith `--gains inputs` it has these as well. Then commands, too, are taken in the clock before "
+            "control_tick.\n",
+            markdown(_HEADER, [_described(port) for port in _beyond(gains="inputs")], left=range(4)),
         ]
     )
+
+
+def _beyond(**options: Any) -> list[Port]:
+    """Ports that options of a loop add, or make of others."""
+    there = {port.name: port.direction for port in loop_ports(_LOOP)}
+    return [port for port in loop_ports(replace(_LOOP, **options)) if there.get(port.name) != port.direction]
 
 
 def _described(port: Port) -> list[str]:
@@ -209,9 +251,18 @@ def _described(port: Port) -> list[str]:
 def registers() -> str:
     """The page of the registers."""
     buses = "\n".join(f"| `{bus.name}` | {bus.help[0].upper()}{bus.help[1:]} |" for bus in BUSES.values())
-    return _REGISTERS.replace("@BUSES@", buses) + re.sub(
-        "^## ", "### ", tables(RegisterMap(of_texts("s", SPEED))), flags=re.MULTILINE
+    commanded = LoopMap(_LOOP.tachometer, replace(_LOOP, gains="inputs"))
+    generating = LoopMap(_LOOP.tachometer, replace(_LOOP, gains="inputs", command="generator"))
+    known = {one.name for one in RegisterMap(_LOOP.tachometer)}
+    added = [one for one in commanded if one.name not in known]
+    known |= {one.name for one in added if not one.name.startswith(("COMMAND", "LOOP"))}
+    instead = [one for one in generating if one.name not in known]
+    of_all, of_loop, of_generator = (
+        re.sub("^## ", "### ", tables(each), flags=re.MULTILINE)
+        for each in (RegisterMap(of_texts("s", SPEED)), added, instead)
     )
+    end = "\nWith `--command generator` there are these instead of the commands, and the others behind them.\n\n"
+    return _REGISTERS.replace("@BUSES@", buses) + of_all + _OF_LOOPS + of_loop + end + of_generator
 
 
 def _cores(method: str) -> list[TachometerSpec]:

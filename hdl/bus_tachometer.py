@@ -34,7 +34,7 @@ def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
 
 
 class BusTachometer(wiring.Component):
-    """A tachometer with its registers on a bus.
+    """A tachometer, maybe with a control loop, with its registers on a bus.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class BusTachometer(wiring.Component):
 
     Members
     -------
-    The ports of the spec, less `clk` and `rst`, and those of the bus.
+    `core_ports` of the registers, less `clk` and `rst`, and the ports of the bus.
 
     Raises
     ------
@@ -54,7 +54,7 @@ class BusTachometer(wiring.Component):
     def __init__(self, registers: RegisterMap, bus: Bus) -> None:
         self.core = RegisterCore(registers)
         self.bridge = bridge_on(registers, bus)
-        super().__init__(members((*registers.spec.ports, *bus.ports(registers))))
+        super().__init__(members((*registers.core_ports, *bus.ports(registers))))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

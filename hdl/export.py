@@ -13,13 +13,13 @@ from amaranth.lib import wiring
 from tachometry.hdl.bus_tachometer import BusTachometer
 from tachometry.hdl.core import core_of
 from tachometry.hdl.kit import kit
-from tachometry.spec import AxesSpec, ParameterError
+from tachometry.spec import ParameterError, TachometerSpec
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.manifest import manifest
 from tachometry.spec.provenance import LICENSE, generator, notice
 from tachometry.spec.registers.buses import Bus, bus_of, manifest_on
 from tachometry.spec.registers.files import register_files
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.targets.target import TARGETS, bus_for
 
 _HEADER = """\
@@ -69,28 +69,25 @@ def export(
     ------
     ValueError
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
-        the target needs another bus or another core; if a core of many axes or with a loop is to have either.
+        the target needs another bus or another core; if a core of many axes is to have either.
     """
     bus = bus_for(target, bus)
     on = bus_of(bus, baud)
-    if isinstance(spec, AxesSpec | LoopSpec):
-        if on is not None or target in TARGETS:
-            what = "target" if target in TARGETS else "bus"
-            other, whom = ("loop", "a tachometer alone") if isinstance(spec, LoopSpec) else ("axes", "one axis")
-            raise ParameterError(what, f"must not be given together with {other}: registers and targets are for {whom}")
-        return _files(spec, name, core_of(spec), manifest(spec, name), None, {})
-    described = manifest(spec, name)
+    if not isinstance(spec, TachometerSpec) and target in TARGETS:
+        other, whom = ("loop", "a tachometer alone") if isinstance(spec, LoopSpec) else ("axes", "one axis")
+        raise ParameterError("target", f"must not be given together with {other}: targets are for {whom}")
     files: dict[str, str] = {}
     top: wiring.Component
     if on is None:
+        described = manifest(spec, name)
         top = core_of(spec)
     else:
-        registers = RegisterMap(spec)
+        registers = registers_of(spec)
         described = manifest_on(registers, on, name)
         top = BusTachometer(registers, on)
         files = register_files(registers, name)
     texts = _files(spec, name, top, described, on, files)
-    if target in TARGETS:
+    if target in TARGETS and isinstance(spec, TachometerSpec):
         texts |= TARGETS[target].texts(spec, name, texts[f"{name}.v"])
     return texts
 

@@ -194,7 +194,7 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
     bus : Bus or None
         On which its registers are.
     """
-    ports = ports_on(spec, bus) if isinstance(spec, TachometerSpec) else spec.ports
+    ports = ports_on(spec, bus)
     # The commands of a loop are synchronous.
     alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
     idle = bus.idle if bus else {}

@@ -26,7 +26,14 @@ ARTY_A7_35 = Board(
             },
             ("pmod", 0),
         ),
-        Header("JD", {"spi_cs_n": "1", "spi_mosi": "2", "spi_miso": "3", "spi_sck": "4"}, ("pmod", 3)),
+        Header(
+            "JD",
+            {
+                **{"spi_cs_n": "1", "spi_mosi": "2", "spi_miso": "3", "spi_sck": "4"},
+                **{"drive": "7", "enable": "8"},
+            },
+            ("pmod", 3),
+        ),
     ),
     attributes={"IOSTANDARD": "LVCMOS33"},
     pull_up={"PULLUP": "TRUE"},

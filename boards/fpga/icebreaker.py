@@ -27,7 +27,14 @@ ICEBREAKER = Board(
             },
             ("pmod", 0),
         ),
-        Header("PMOD1B", {"spi_cs_n": "1", "spi_mosi": "2", "spi_miso": "3", "spi_sck": "4"}, ("pmod", 1)),
+        Header(
+            "PMOD1B",
+            {
+                **{"spi_cs_n": "1", "spi_mosi": "2", "spi_miso": "3", "spi_sck": "4"},
+                **{"drive": "7", "enable": "8"},
+            },
+            ("pmod", 1),
+        ),
     ),
     attributes={"IO_STANDARD": "SB_LVCMOS"},
     pull_up={"PULLUP": 1},

@@ -11,9 +11,10 @@ from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.capture_pin import CapturePin
 from tachometry.hdl.demo.demo import Demo
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.provenance import LICENSE, generator
 from tachometry.spec.registers.buses import Bus
-from tachometry.spec.registers.demo import DemoMap, demo_manifest
+from tachometry.spec.registers.demo import demo_manifest, demo_map
 
 # The lines of the UART are on the board's own bridge to USB.
 _UART = {"uart_rx": "rx", "uart_tx": "tx"}
@@ -21,20 +22,21 @@ _LEDS = "leds"
 _SHARED = {"spi_miso": "spi_cs_n"}  # outputs that are only driven while an input is low
 
 
-def component(spec: TachometerSpec, bus: Bus) -> wiring.Component:
+def component(spec: TachometerSpec | LoopSpec, bus: Bus) -> wiring.Component:
     """What is put on boards."""
-    return Demo(DemoMap(spec), bus)
+    return Demo(demo_map(spec), bus)
 
 
-def described(spec: TachometerSpec, bus: Bus, board: Board, name: str) -> dict[str, Any]:
+def described(spec: TachometerSpec | LoopSpec, bus: Bus, board: Board, name: str) -> dict[str, Any]:
     """The manifest of what `component` makes for a board.
 
     Raises
     ------
     ParameterError
-        If `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
+        If the gains of a loop are fixed; if `name` cannot be the name of a module; if the clock cannot make the bits of
+        the bus.
     """
-    found = {"generator": generator(), "license": LICENSE, **demo_manifest(DemoMap(spec), bus, name)}
+    found = {"generator": generator(), "license": LICENSE, **demo_manifest(demo_map(spec), bus, name)}
     ports = {port["name"] for port in found["ports"]}
     return found | {
         "board": {"name": board.name, "pins": {name: at for name, at in board.pins.items() if name in ports}}

@@ -13,10 +13,13 @@ from tachometry.boards.fpga.board import Board
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.board import board_argument, boards_help, default_folder
 from tachometry.cli.options.core import board_core_options
+from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
+from tachometry.spec.registers.demo import demo_map
 
 if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
     from tachometry.boards.fpga.build import Built
@@ -33,10 +36,13 @@ _SERIAL = ("uart", "spi")  # buses that leave the FPGA over a few pins
 Examples:
   tachometry build icebreaker --ppr 500
   tachometry build tang-nano-9k --ppr 2048 --filter 4 -o rig
+  tachometry build ulx3s-85f --ppr 500 --max-speed 1000rad/s --loop \\
+      --gains inputs -o drive
   tachometry program tang-nano-9k rig""",
 )
 @board_argument
 @board_core_options
+@loop_options
 @option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
 @option(
     "Files",
@@ -67,13 +73,16 @@ Examples:
 )
 def build(
     board: Board,
-    spec: TachometerSpec,
+    spec: TachometerSpec | LoopSpec,
     name: str,
     directory: Path | None,
     bus: str,
     baud: int | None,
 ) -> int:
     """Build a core for a board: with its registers on a UART or on SPI, and an emulated encoder beside it.
+
+    With --loop --gains inputs the current of the control loop is on the pin `drive`, as a stream of bits, unless the
+    pin `enable` is low or LOOP.enable is not set.
 
     \b
     DIR/NAME.bin, .bit or .fs  bitstream, where open tools make one
@@ -92,6 +101,7 @@ def build(
     assert on is not None
     if on.baud:
         on.bit_cycles(spec.timing.clock_hz)
+    demo_map(spec)  # what cannot have registers is refused at once
     from tachometry.boards.fpga import build as builder
 
     builder.check_tools(board)

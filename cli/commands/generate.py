@@ -39,7 +39,9 @@ Examples:
       --testbench cocotb -o sim
   tachometry generate --ppr 500 --max-speed 1000rad/s --axes 8 -o axes
   tachometry generate --ppr 500 --max-speed 1000rad/s --loop --kp 6400 \\
-      --kv 160 --observer 320rad/s -o drive""",
+      --kv 160 --observer 320rad/s -o drive
+  tachometry generate --ppr 500 --max-speed 1000rad/s --loop \\
+      --gains inputs --command generator --bus axi-lite -o drive""",
 )
 @core_options
 @axes_options
@@ -133,8 +135,8 @@ def generate(
         raise ValueError("--motion must be given together with --testbench")
     if testbench is not None and isinstance(spec, AxesSpec):
         raise ValueError("--testbench must not be given together with --axes: it is of one axis")
-    if testbench is not None and isinstance(spec, LoopSpec):
-        raise ValueError("--testbench must not be given together with --loop: it is of a tachometer alone")
+    if testbench is not None and isinstance(spec, LoopSpec) and bus != "none":
+        raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
     files = [name + suffix for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")]
     if bus != "none":
         files += [name + suffix for suffix in REGISTER_FILES]
@@ -144,10 +146,11 @@ def generate(
         files += [f"test_{name}.py", f"{name}_vectors.json"]
     with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
         bench: dict[str, str] = {}
-        if testbench and isinstance(spec, TachometerSpec):  # first: what is wrong with a motion is found at once
+        if testbench and not isinstance(spec, AxesSpec):  # first: what is wrong with a motion is found at once
             from tachometry.sim.testbench.vectors import cocotb_bench
 
-            bench = cocotb_bench(spec, name, None if record is None else record(spec).recording)
+            alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
+            bench = cocotb_bench(spec, name, None if record is None else record(alone).recording)
         from tachometry.hdl import export
 
         texts = export(spec, name, bus, baud, target) | bench
@@ -163,7 +166,7 @@ def generate(
     elif isinstance(spec, LoopSpec):
         from tachometry.cli.reports.loop import print_loop_core
 
-        print_loop_core(spec)
+        print_loop_core(spec, bus)
     else:
         from tachometry.cli.reports.core import print_core
 

@@ -123,6 +123,8 @@ def attached(port: str, core: CoreTexts, path: Path | None) -> Target:
         ) from error
     if bus != _BUS:
         raise ValueError(f"--manifest must be that of a board with --bus {_BUS}, not {bus}")
+    if "loop" in parameters:
+        raise ValueError("--manifest must be that of a board without --loop, whose registers other programs read")
     try:
         found = DemoMap(of_parameters(parameters))
         line = bus_of(_BUS, baud)

@@ -6,15 +6,17 @@ from fractions import Fraction
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.sim.studies.plan import default_range, plan_at
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.manifest import manifest
-from tachometry.spec.registers.map import WORD, RegisterMap
+from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.map import WORD
 from tachometry.spec.units import SPEED, SpeedUnit, format_time, plural
 
 
 def print_core(spec: TachometerSpec, bus: str = "none") -> None:
     """Print the configuration of a core, what it measures at low and at high speed, and its registers on a bus."""
-    print_rows([*configuration(spec), *_resolution(spec), *([] if bus == "none" else [_registers(spec, bus)])])
+    print_rows([*configuration(spec), *_resolution(spec), *([] if bus == "none" else [registers_row(spec, bus)])])
 
 
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
@@ -76,8 +78,9 @@ def _resolution(spec: TachometerSpec) -> list[tuple[str, str]]:
     return rows
 
 
-def _registers(spec: TachometerSpec, bus: str) -> tuple[str, str]:
-    registers = RegisterMap(spec)
+def registers_row(spec: AnySpec, bus: str) -> tuple[str, str]:
+    """How many registers a core has on a bus."""
+    registers = registers_of(spec)
     number = len(registers.registers)
     return "registers", f"{number} of {WORD} bits on {bus}, configuration 0x{registers.configuration:08x}"
 

@@ -1,13 +1,13 @@
 """What `generate` prints of a core with a control loop."""
 
-from tachometry.cli.reports.core import configuration, short_time
+from tachometry.cli.reports.core import configuration, registers_row, short_time
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.units import plural
 
 
-def print_loop_core(spec: LoopSpec) -> None:
-    """Print the configuration of tachometer and loop."""
+def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:
+    """Print the configuration of tachometer and loop, and the registers on a bus."""
     form, period = spec.form, spec.seconds
     filtered = "none" if spec.filter is None else f"{float(spec.filter):.6g} rad/s"
     when = "at updates of the velocity" if spec.synchronised else "at every control tick"
@@ -31,4 +31,4 @@ def print_loop_core(spec: LoopSpec) -> None:
         ),
         ("widths of the loop", widths),
     ]
-    print_rows([*configuration(spec.tachometer), *rows])
+    print_rows([*configuration(spec.tachometer), *rows, *([] if bus == "none" else [registers_row(spec, bus)])])

@@ -1,5 +1,6 @@
 """The registers of a core."""
 
+from collections.abc import Iterable
 from functools import reduce
 from operator import or_
 
@@ -54,7 +55,7 @@ class RegisterBank(wiring.Component):
                 **{port.name: In(signed(port.width) if port.signed else port.width) for port in registers.ports},
                 **{name: In(1) for name in registers.spec.strobes},
                 "written": Out(1),
-                **{field.port: Out(_shape(field)) for field in registers.settings},
+                **{name: Out(shape, init=init) for name, (shape, init) in _shapes(registers.settings).items()},
                 **{field.port: In(_shape(field)) for field in registers.live},
             }
         )
@@ -114,7 +115,8 @@ class RegisterBank(wiring.Component):
                     if field.single:
                         m.d.comb += value.eq(given)
                     else:
-                        m.d.sync += value.eq(given)
+                        part = value[field.shift : field.shift + field.kept]
+                        m.d.sync += part.eq(given if field.most is None else _held(m, field, given))
         return read
 
     def _counts(self, m: Module, *, lost: Value) -> dict[str, Value]:
@@ -132,6 +134,26 @@ class RegisterBank(wiring.Component):
 
 def _shape(field: Field) -> Shape:
     return Shape(field.width, field.signed)
+
+
+def _shapes(fields: Iterable[Field]) -> dict[str, tuple[Shape, int]]:
+    """Shapes and resets of the ports that fields set, some of them in two words, the upper one with the sign."""
+    found: dict[str, tuple[Shape, int]] = {}
+    for field in fields:
+        _, init = found.get(field.port, (None, 0))
+        found[field.port] = (Shape(field.shift + field.kept, field.signed), init | field.reset << field.shift)
+    return found
+
+
+def _held(m: Module, field: Field, given: Value) -> Value:
+    """What is written, held within what the field can have."""
+    assert field.least is not None
+    assert field.most is not None
+    word = given.as_signed() if field.signed else given
+    held = Signal(Shape(field.kept, field.signed), name=f"held_{field.port}")
+    beyond = Mux(word > field.most, field.most, word)
+    m.d.comb += held.eq(Mux(word < field.least, field.least, beyond) if field.signed else beyond)
+    return held
 
 
 def _word(m: Module, register: Register, shown: dict[str, Value]) -> Value:

@@ -12,19 +12,25 @@ class ControlClock(wiring.Component):
     ----------
     first : int
     period : int
+    tells : bool
+        It also tells of a tick in the clock before.
 
     Members
     -------
     tick : Out(1)
+    coming : Out(1)
+        In the clock before; only if it `tells`.
     """
 
-    def __init__(self, first: int, period: int) -> None:
+    def __init__(self, first: int, period: int, *, tells: bool = False) -> None:
         self._first, self._period = first, period
-        super().__init__({"tick": Out(1)})
+        super().__init__({"tick": Out(1), **({"coming": Out(1)} if tells else {})})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         left = Signal(range(max(self._first, self._period)), init=self._first - 1)
+        if "coming" in self.signature.members:
+            m.d.comb += self.coming.eq(left == 0)
         m.d.sync += [left.eq(left - 1), self.tick.eq(left == 0)]
         with m.If(left == 0):
             m.d.sync += left.eq(self._period - 1)

@@ -9,7 +9,8 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
-from tachometry.spec.control.form import GUARD_BITS, TABLED, ControlForm, Term
+from tachometry.spec.control.form import GAINS, GUARD_BITS, TABLED, ControlForm, Term
+from tachometry.spec.control.ports import GAIN_PORTS
 from tachometry.spec.units import signed_width
 
 
@@ -57,12 +58,19 @@ class Controller(wiring.Component):
     saturated : Out(1)
     y, w : Out(signed)
         In step with `valid`.
+    gain_position, gain_velocity, gain_acceleration, gain_disturbance : In(gain_bits)
+    current_limit : In
+        If `form` has gain bits; they must not change from `tick` to `valid`.
     """
 
     def __init__(self, form: ControlForm, multiplier: str = "serial") -> None:
         self._form = form
         self._multiplier = multiplier
         current = signed(signed_width(form.current_limit))
+        gains = {}
+        if form.gain_bits:
+            gains = dict.fromkeys(GAIN_PORTS.values(), In(form.gain_bits))
+            gains["current_limit"] = In(form.current_limit.bit_length())
         super().__init__(
             {
                 "tick": In(1),
@@ -81,6 +89,7 @@ class Controller(wiring.Component):
                 "saturated": Out(1),
                 "y": Out(signed(signed_width(form.most_y))),
                 "w": Out(signed(signed_width(form.most_w))),
+                **gains,
             }
         )
 
@@ -166,16 +175,32 @@ class Controller(wiring.Component):
         short = Signal.like(held, reset_less=True)
         beyond = Signal(reset_less=True)
         m.d.sync += [short.eq(held), beyond.eq(outside)]
-        limited, changed = saturate(m, short, form.current_limit)
+        if form.gain_bits:
+            limited, changed = self._limited(m, short)
+        else:
+            limited, changed = saturate(m, short, form.current_limit)
         m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)
         with m.If(limit):
             m.d.sync += [self.current.eq(Mux(enabled, limited, 0)), self.saturated.eq((beyond | changed) & enabled)]
         return m
 
+    def _limited(self, m: Module, value: Signal) -> tuple[Signal, Signal]:
+        """What `saturate` gives, with the limit that is an input."""
+        form = self._form
+        limit = Signal(range(form.current_limit + 1), name="most")
+        m.d.sync += limit.eq(Mux(self.current_limit > form.current_limit, form.current_limit, self.current_limit))
+        limited = Signal.like(value, name="limited")
+        changed = Signal()
+        above, below = value > limit, value < -limit
+        m.d.comb += [changed.eq(above | below), limited.eq(Mux(above, limit, Mux(below, -limit, value)))]
+        return limited, changed
+
     def _factor(self, m: Module, term: Signal, load: Value) -> Value:
         """The coefficient of a term, valid in the clock after `load`."""
         form = self._form
         values: dict[Term, ValueLike] = {one: each.values[0] for one, each in form.terms.items()}
+        if form.gain_bits:
+            values |= {one: getattr(self, GAIN_PORTS[one]) << form.gain_shift for one in GAINS}
         if form.longest > 1:
             tabled = self._tabled(m, term, load)
             values |= dict.fromkeys(set(TABLED) & values.keys(), tabled)

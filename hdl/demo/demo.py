@@ -8,6 +8,7 @@ from tachometry.hdl.bus.telemetry import TelemetrySender
 from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.bus_tachometer import bridge_on
 from tachometry.hdl.demo.emulator import EncoderEmulator
+from tachometry.hdl.front_end.synchronizer import Synchronizer
 from tachometry.hdl.register_core import RegisterCore
 from tachometry.spec.registers.buses import CAPTURE, Bus
 from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports
@@ -17,7 +18,9 @@ from tachometry.spec.registers.map import WORD
 class Demo(wiring.Component):
     """A tachometer on pins or on an emulated encoder, with its registers on a bus; telemetry if that is a UART.
 
-    The settings survive a restart, which resets tachometer, emulator and time.
+    The tachometer may have a control loop, whose current is a stream of bits.
+
+    The settings survive a restart, which resets tachometer, loop, emulator and time.
 
     Parameters
     ----------
@@ -85,6 +88,11 @@ class Demo(wiring.Component):
             else:
                 given = Mux(bank.emulated, period, given)  # the external tick
             m.d.comb += getattr(core, pin.name).eq(given)
+        if core.loop is not None:
+            # It comes from a pin, and many flip-flops follow it.
+            enable = Signal()
+            m.submodules.sync_enable = Synchronizer(self.enable, enable)
+            m.d.comb += [core.enable.eq(enable), self.drive.eq(core.drive)]
 
         for port in self._bus_ports:
             mine, its = getattr(self, port.name), getattr(bridge, port.name)

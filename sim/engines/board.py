@@ -72,9 +72,11 @@ class BoardSimulation:
     """
 
     def __init__(self, registers: DemoMap, bus: Bus) -> None:
-        spec = registers.spec
         uart_rx = next(port for port in bus.ports(registers) if port.name == "uart_rx")
-        design = _BoardDesign(spec, [*spec.pins, uart_rx], None, registers, bus)
+        pins = [port for port in registers.core_ports if port.direction == "input" and port.name not in ("clk", "rst")]
+        design = _BoardDesign(registers.spec, [*pins, uart_rx], None, registers, bus)
+        # The pins of an encoder are low; that which enables a drive has a pull-up.
+        self._lines = sum(1 << place for place, pin in enumerate(pins) if pin.name == "enable")
         self._library = ctypes.CDLL(str(Cxxrtl().library(design)))
         self._library.board_new.restype = ctypes.c_void_p
         self._board: Any = ctypes.c_void_p(self._library.board_new())
@@ -101,7 +103,9 @@ class BoardSimulation:
             What of `data` has not begun to be sent.
         """
         given, found = np.frombuffer(data, dtype=np.uint8), []
-        transfer = _Transfer(clocks=n_clocks, n_in=len(data), out=self._out.ctypes.data, capacity=_ROOM)
+        transfer = _Transfer(
+            clocks=n_clocks, n_in=len(data), lines=self._lines, out=self._out.ctypes.data, capacity=_ROOM
+        )
         setattr(transfer, "in", given.ctypes.data)
         with self._busy:
             while transfer.clocks and self._board is not None:

@@ -1,37 +1,24 @@
 """Golden control loop: observer and controller, control tick by control tick, in exact integers."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.command_generator import Command, Demand, Gains, generated
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.control.form import GUARD_BITS, ControlForm, Term
+from tachometry.spec.control.form import GAINS, GUARD_BITS, ControlForm, Term
 from tachometry.spec.control.loop import LoopSpec
 from tachometry.spec.control.ports import CONTROL, CURRENT
 from tachometry.spec.port import UPDATE
 
+__all__ = ["Command", "Control", "Demand", "Gains", "control", "run_loop"]
+
 IntArray = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Command:
-    """What is commanded in a control tick, in LSB of the ports.
-
-    Parameters
-    ----------
-    position, velocity, acceleration : int
-    enable : bool
-    """
-
-    position: int = 0
-    velocity: int = 0
-    acceleration: int = 0
-    enable: bool = True
+_COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 
 
 class Control:
@@ -59,6 +46,7 @@ class Control:
         self._waits = self._ticked = False
         # For each term the shift and the coefficients, as reading them takes most of the time.
         self._terms = {term: (one.shift, one.values) for term, one in form.terms.items()}
+        self._limit = form.current_limit
         self._half = 1 << (form.factor_bits - 1)
         wraps = form.position_width + form.position_bits
         self._turn, self._half_turn, self._most_error = 1 << wraps, 1 << (wraps - 1), form.most_error
@@ -67,6 +55,14 @@ class Control:
     def z(self) -> int:
         """The observer's filter."""
         return self.y + self.w
+
+    def set(self, gains: Gains) -> None:
+        """Gains from the next control tick on."""
+        form = self._form
+        raw = (gains.position, gains.velocity, gains.acceleration, gains.disturbance)
+        for term, one in zip(GAINS, raw, strict=True):
+            self._terms[term] = (form.terms[term].shift, (one << form.gain_shift,))
+        self._limit = min(gains.limit, form.current_limit)
 
     def update(self, velocity: int) -> None:
         """An update of the velocity, after the last control tick."""
@@ -93,7 +89,7 @@ class Control:
             + self._product(Term.DISTURBANCE, self.w)
         )
         wanted = (total + (1 << (GUARD_BITS - 1))) >> GUARD_BITS
-        held = max(-form.current_limit, min(wanted, form.current_limit))
+        held = max(-self._limit, min(wanted, self._limit))
         self.saturated = command.enable and held != wanted
         self.current = held if command.enable else 0
         self._sum += self.current
@@ -117,7 +113,14 @@ class Control:
         return ((word << shift) * values[n - 1] + self._half) >> self._form.factor_bits
 
 
-def control(spec: LoopSpec, clock: IntArray, position: IntArray, updates: Table, commands: Sequence[Command]) -> Table:
+def control(
+    spec: LoopSpec,
+    clock: IntArray,
+    position: IntArray,
+    updates: Table,
+    commands: Sequence[Command],
+    gains: Sequence[Gains] | None = None,
+) -> Table:
     """What the loop shows with `current_valid`, of a shaft whose motion does not follow from its currents.
 
     Parameters
@@ -131,6 +134,8 @@ def control(spec: LoopSpec, clock: IntArray, position: IntArray, updates: Table,
         Of the tachometer, with `velocity`.
     commands : sequence of Command
         One for each control tick.
+    gains : sequence of Gains or None
+        One for each control tick, where they are inputs.
     """
     loop = Control(spec.form)
     rows: list[tuple[int, bool, int, int]] = []
@@ -138,7 +143,9 @@ def control(spec: LoopSpec, clock: IntArray, position: IntArray, updates: Table,
     # An update in the clock of a control tick comes after it.
     before = np.searchsorted(updates.clock, clock, side="left").tolist()
     done = 0
-    for until, place, command in zip(before, position.tolist(), commands, strict=True):
+    for number, (until, place, command) in enumerate(zip(before, position.tolist(), commands, strict=True)):
+        if gains is not None:
+            loop.set(gains[number])
         for row in range(done, until):
             loop.update(velocity[row])
         done = until
@@ -152,18 +159,27 @@ def control(spec: LoopSpec, clock: IntArray, position: IntArray, updates: Table,
 def run_loop(
     spec: LoopSpec,
     trace: PinTrace,
-    commands: Sequence[Command],
+    commands: Sequence[Command] | Sequence[Demand],
     tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]],
+    gains: Sequence[Gains] | None = None,
 ) -> Run:
     """What the core of `spec` must show for these pins; `tables` is the golden model of a tachometer.
 
-    There is a command for each control tick within the trace.
+    There is a command for each control tick within the trace; of a core with a command generator, a demand;
+    and gains, where they are inputs.
     """
     alone = spec.tachometer
     clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
     # The position is as late as a tick shows it.
     places, _ = count(alone, decoded(alone, trace), clock - alone.tick_latency)
     found = tables(alone, trace)
-    shown = control(spec, clock, places.position, found[UPDATE], commands)
-    found |= {CONTROL: Table(clock, {}), CURRENT: shown.rows(shown.clock < trace.n_clocks)}
+    given = [one for one in commands if isinstance(one, Command)]
+    columns: dict[str, IntArray] = {}
+    if spec.command == "generator":
+        demands = [one for one in commands if isinstance(one, Demand)]
+        given = generated(spec.generator, places.position.tolist(), demands)
+        rows = np.array([(one.position, one.velocity, one.acceleration) for one in given], dtype=np.int64)
+        columns = dict(zip(_COMMANDS, rows.reshape(-1, 3).T, strict=True))
+    shown = control(spec, clock, places.position, found[UPDATE], given, gains)
+    found |= {CONTROL: Table(clock, columns), CURRENT: shown.rows(shown.clock < trace.n_clocks)}
     return Run.of_ports(spec, trace.n_clocks, found)

@@ -9,7 +9,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.port import INDEX, TICK, UPDATE
-from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Register, RegisterMap
+from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,29 @@ class Access:
     clock: int
     address: int
     data: int | None = None
+
+
+def initial(registers: RegisterMap) -> dict[str, int]:
+    """Settings after a reset, by their ports."""
+    found = dict.fromkeys((field.port for field in registers.settings), 0)
+    for field in registers.settings:
+        found[field.port] |= field.reset << field.shift
+    return found
+
+
+def written(field: Field, data: int, before: int) -> int:
+    """A setting after a word was written to one of its fields."""
+    value = data >> field.low & (1 << field.width) - 1
+    if field.most is not None and field.least is not None:
+        value = value - (1 << WORD) if field.signed and value >> (WORD - 1) else value
+        value = max(field.least, min(value, field.most))
+    value &= (1 << field.kept) - 1
+    if field.signed and value >> (field.kept - 1):
+        value -= 1 << field.kept
+    below = (1 << field.shift) - 1
+    # The lower word of two leaves the upper one as it is.
+    above = 0 if field.shift or field.signed or field.bits else before >> WORD << WORD
+    return value << field.shift | before & below | above
 
 
 class GoldenBank:
@@ -52,6 +75,7 @@ class GoldenBank:
             "overflows": ticks.clock[ticks.overflow],
             "tick_errors": self._tables["tick_error"].clock,
         }
+        self._strobes: tuple[str, ...] = (TICK, UPDATE, INDEX)
         self._swallowed = decoded(registers.spec, trace).swallowed
         self._events = {name: clocks for name, clocks in strobes.items() if name in registers.counted}
 
@@ -66,7 +90,7 @@ class GoldenBank:
         self._known = False
         self._captures: list[int] = []
         self._cleared, hold = -1, 0
-        self._settings = {field.port: 0 for field in self._map.settings}
+        self._settings = initial(self._map)
         self._changed = 0
         left = sorted(captures)
         found: list[tuple[int | None, bool]] = []
@@ -92,7 +116,7 @@ class GoldenBank:
         self._changed = clock
         for field in register.fields:
             if not field.single:
-                self._settings[field.port] = data >> field.low & (1 << field.width) - 1
+                self._settings[field.port] = written(field, data, self._settings[field.port])
 
     def _capture(self, clock: int) -> None:
         """Take what there is in a clock."""
@@ -100,7 +124,7 @@ class GoldenBank:
             return
         before = self._captures[-1] if self._captures else -1
         taken: dict[str, int] = {}
-        for strobe in (TICK, UPDATE, INDEX):
+        for strobe in self._strobes:
             table = self._tables[strobe]
             row = int(np.searchsorted(table.clock, clock, side="right")) - 1
             for name, column in table.columns.items():

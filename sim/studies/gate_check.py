@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden.control import Command, run_loop
+from tachometry.sim.golden.command_generator import Command
+from tachometry.sim.golden.control import run_loop
 from tachometry.sim.studies.control import Outcome, Setting, in_gates, simulation_of
 
 

@@ -13,7 +13,10 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import Recording, check_ticks
 from tachometry.sim.signals.run import Run
+from tachometry.sim.testbench.loop_inputs import changes as loop_changes
+from tachometry.sim.testbench.loop_inputs import loop_inputs
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.option import ParameterError
 from tachometry.spec.provenance import LICENSE, generator, notice
 
@@ -23,12 +26,13 @@ _FEWEST_TICKS, _MOST_TICKS = 3, 1000
 _MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 
 
-def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = None) -> dict[str, str]:
+def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recording | None = None) -> dict[str, str]:
     """A bench for cocotb as texts by file name: `test_NAME.py` and `NAME_vectors.json`.
 
     Parameters
     ----------
-    spec : TachometerSpec
+    core : TachometerSpec or LoopSpec
+        The inputs of a loop are given numbers of all sizes.
     name : str
         Of the module; `NAME.v` and its manifest `NAME.json` must lie beside the bench.
     recording : Recording or None
@@ -39,20 +43,27 @@ def cocotb_bench(spec: TachometerSpec, name: str, recording: Recording | None = 
     ValueError
         If it does not last for a tick, or for too many.
     """
+    spec = core.tachometer if isinstance(core, LoopSpec) else core
     recording = usual_motion(spec) if recording is None else recording
     check_ticks(recording.duration, spec, _MOST_BENCH_TICKS)
     trace = recording.place(spec.timing.clock_hz)
     if spec.max_tick_cycles:
         trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
-    run = golden.run(spec, trace)
+    pins = list(trace.lines)
+    changes: list[NDArray[Any]] = [trace.clock, *trace.lines.values()]
+    if isinstance(core, LoopSpec):
+        inputs, run = loop_inputs(core, trace)
+        pins, changes = [*pins, *inputs], [*loop_changes(core, trace, inputs)]
+    else:
+        run = golden.run(spec, trace)
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {trace.n_clocks} clocks")
     vectors = {
         "generator": generator(),
         "license": LICENSE,
         "clocks": trace.n_clocks,
-        "pins": list(trace.lines),
-        "changes": _rows(trace.clock, *trace.lines.values()),
+        "pins": pins,
+        "changes": _rows(*changes),
         "strobes": strobe_rows(run),
     }
     text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"

@@ -25,11 +25,17 @@ What cannot overflow, whatever the inputs: y stays between the old y and u, so |
 drawn towards y + K_a·Ī: |z| ≤ V + M, where c_d(n)·M is at least the greatest product with ΣI and one unit more, for
 every n. So |w| ≤ 2V + M. The position error is held within a limit at which its product is greater than all others
 together and the limit of the current: holding it changes no current.
+
+Where gains are inputs, they are the upper bits of coefficients, from 0 on, and a word is shifted so far that a gain can
+be 16 times that of its option. Sums are as wide as the greatest of all gains make them, so nothing overflows here,
+either; y, z and their bounds have no gain in them. The position error is held within a limit at which its product,
+with 1/16 of its option's gain, is as above. With a gain that is still less, or others that are greater, holding it can
+change the current: then it is a limit of its own.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal, localcontext
 from enum import IntEnum
 from fractions import Fraction
@@ -39,7 +45,10 @@ from tachometry.spec.units import ceil_log2, signed_width
 
 GUARD_BITS = 4  # of the sum that becomes the current
 POSITION_FRAC_BITS = 8  # of the commanded position
+ACCELERATION_WIDTH = 20  # bits of the commanded acceleration
 LEAST_COEFFICIENT = 11  # bits
+MOST_GAIN_BITS = 24  # of a gain that is an input
+GAIN_HEADROOM = 4  # such a gain can be 2^this times that of the option, or more
 
 
 class Term(IntEnum):
@@ -54,8 +63,9 @@ class Term(IntEnum):
     DISTURBANCE = 6
 
 
-# Products whose coefficient depends on n.
+# Products whose coefficient depends on n, and those whose coefficient can be an input.
 TABLED = (Term.FILTER, Term.OBSERVER, Term.CURRENT)
+GAINS = (Term.POSITION, Term.VELOCITY, Term.ACCELERATION, Term.DISTURBANCE)
 
 
 def decay(exponent: Fraction) -> Fraction:
@@ -102,6 +112,9 @@ class ControlForm:
         Whether filter and observer work at updates of the velocity, not at control ticks.
     position_bits : int
         Fraction bits of the commanded position.
+    gain_bits : int
+        Bits of each of `GAINS`, which are inputs, as is the limit of the current, up to `current_limit`; 0: they are
+        fixed.
     """
 
     velocity_width: int
@@ -115,6 +128,22 @@ class ControlForm:
     acceleration_width: int
     synchronised: bool
     position_bits: int = POSITION_FRAC_BITS
+    gain_bits: int = 0
+
+    @property
+    def gain_shift(self) -> int:
+        """A coefficient is a gain shifted left so far."""
+        return self.factor_bits - self.gain_bits
+
+    @property
+    def most_gain(self) -> int:
+        """The greatest gain."""
+        return (1 << self.gain_bits) - 1
+
+    @property
+    def reset_gains(self) -> dict[Term, int]:
+        """Gains of the options."""
+        return {term: self.terms[term].values[0] >> self.gain_shift for term in GAINS}
 
     @property
     def longest(self) -> int:
@@ -161,10 +190,19 @@ class ControlForm:
         """Greatest magnitude of the commanded velocity, in units of y."""
         return 1 << (self.velocity_width - 1 + self.extra_bits)
 
+    def _most(self, term: Term, word: int) -> int:
+        """The product of a word with the greatest coefficient that a term can have."""
+        if not self.gain_bits:
+            return self.product(term, word)
+        one = replace(self.terms[term], values=(self.most_gain << self.gain_shift,))
+        return replace(self, terms={term: one}).product(term, word)
+
     @cached_property
     def most_error(self) -> int:
         """The position error is held within ±this, in units of the commanded position: all bits are 1."""
         half = (1 << (self.position_width + self.position_bits - 1)) - 1
+        if self.gain_bits:
+            return min(self._most_error_of_gains, half)
         if not self.terms[Term.POSITION].values[0]:
             return 1
         enough = self._most_others + (self.current_limit << GUARD_BITS) + 1
@@ -172,6 +210,15 @@ class ControlForm:
         while limit < half and self.product(Term.POSITION, limit) < enough:
             limit = 2 * limit + 1
         return min(limit, half)
+
+    @property
+    def _most_error_of_gains(self) -> int:
+        """2^GAIN_HEADROOM times that of the options; where there is no gain of the position, of the usual one."""
+        usual = 1 << max(self.factor_bits - GAIN_HEADROOM - 1, 0)
+        fixed = {term: self.terms[term] for term in self.terms}
+        gain = min(fixed[Term.POSITION].values[0] or usual, usual)
+        fixed[Term.POSITION] = replace(fixed[Term.POSITION], values=(gain,))
+        return (replace(self, terms=fixed, gain_bits=0).most_error + 1 << GAIN_HEADROOM) - 1
 
     @cached_property
     def _most_others(self) -> int:
@@ -181,12 +228,12 @@ class ControlForm:
             Term.ACCELERATION: 1 << (self.acceleration_width - 1),
             Term.DISTURBANCE: self.most_w,
         }
-        return sum(self.product(term, word) + 1 for term, word in words.items())
+        return sum(self._most(term, word) + 1 for term, word in words.items())
 
     @cached_property
     def most_total(self) -> int:
         """Greatest magnitude of the sum that becomes the current."""
-        return self._most_others + self.product(Term.POSITION, self.most_error + 1) + 1
+        return self._most_others + self._most(Term.POSITION, self.most_error + 1) + 1
 
     @cached_property
     def word_width(self) -> int:
@@ -227,6 +274,13 @@ def factor_bits(found: Sequence[Sequence[Fraction]]) -> int:
 def _one(found: Sequence[Fraction]) -> int:
     """The power of two, at least 1, that is greater than all of them."""
     return 1 << math.floor(max(found)).bit_length()
+
+
+def gain(found: Fraction, usual: Fraction, bits: int, gain_bits: int) -> Coefficients:
+    """A ratio as a coefficient of so many bits that is a gain of fewer; its range is for the usual one."""
+    one = _one([usual * (1 << GAIN_HEADROOM)])
+    raw = min(round(found / one * (1 << gain_bits)), (1 << gain_bits) - 1)
+    return Coefficients((raw << (bits - gain_bits),), one.bit_length() - 1)
 
 
 def coefficients(found: Sequence[Fraction], bits: int) -> Coefficients:

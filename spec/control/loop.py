@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.axes import CoreSpec
-from tachometry.spec.control import form
-from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+from tachometry.spec.control.coefficients import control_form, extra_bits_of, ratios_of
+from tachometry.spec.control.form import ACCELERATION_WIDTH, ControlForm, Term, factor_bits
+from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
 from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.option import Derived, ParameterError, option, options_of, settle
 from tachometry.spec.port import HasPorts, Port
@@ -23,8 +24,9 @@ MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
 MAX_EXTRA_BITS = 24
 MAX_FACTOR_BITS = 40
 MAX_WORD_WIDTH = 80
-ACCELERATION_WIDTH = 20
 MULTIPLIERS = ("serial", "parallel")
+COMMANDS = ("ports", "generator")
+FIXED_OR_INPUTS = ("fixed", "inputs")
 _GROUP = "Loop"
 # Clocks of a product: to load the word, to subtract from it, to begin, to store the result; and between them one for
 # each bit of the coefficient, or one for the product and one to round it.
@@ -74,6 +76,11 @@ class LoopSpec(HasPorts):
         Bits of `current`.
     multiplier : str
         `serial`: a bit a clock; `parallel`: a product at once, for which tools take multipliers of the FPGA.
+    command : str
+        `ports`: position, velocity and acceleration are commanded from outside; `generator`: the core makes them, see
+        `GeneratorForm`.
+    gains : str
+        `fixed`, or `inputs`, which a bus makes registers.
 
     Raises
     ------
@@ -161,6 +168,18 @@ class LoopSpec(HasPorts):
         choices=MULTIPLIERS,
         group=_GROUP,
     )
+    command: str = option(
+        "ports",
+        "Where commands come from: from outside, or from a generator in the core of constant speeds, ramps and sines.",
+        choices=COMMANDS,
+        group=_GROUP,
+    )
+    gains: str = option(
+        "fixed",
+        "Whether gains and current limit are fixed, or inputs; a bus makes them registers that begin with the options.",
+        choices=FIXED_OR_INPUTS,
+        group=_GROUP,
+    )
 
     def __post_init__(self) -> None:
         settle(self)
@@ -177,6 +196,10 @@ class LoopSpec(HasPorts):
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:
             raise ParameterError("multiplier", f"must be serial or parallel, not {self.multiplier!r}")
+        if self.command not in COMMANDS:
+            raise ParameterError("command", f"must be ports or generator, not {self.command!r}")
+        if self.gains not in FIXED_OR_INPUTS:
+            raise ParameterError("gains", f"must be fixed or inputs, not {self.gains!r}")
         if not 1 <= self.period <= MAX_PERIOD:
             raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
         self._check_formats()
@@ -195,12 +218,11 @@ class LoopSpec(HasPorts):
                 raise ParameterError(
                     name, f"must be from {float(least):.4g} to {float(most):.4g} rad/s here, not {float(rate):.9g}"
                 )
-        found = self._ratios
-        if form.factor_bits(list(found.values())) > MAX_FACTOR_BITS:
+        bits = factor_bits(list(self.ratios.values()))
+        if bits > MAX_FACTOR_BITS:
             raise ParameterError(
                 "kv" if not self.position_gain else "kp",
-                f"must fit the other gains: coefficients would have {form.factor_bits(list(found.values()))} bits, and "
-                f"{MAX_FACTOR_BITS} are the most",
+                f"must fit the other gains: coefficients would have {bits} bits, and {MAX_FACTOR_BITS} are the most",
             )
         width = max(self.form.word_width, self.form.total_width)
         if width > MAX_WORD_WIDTH:
@@ -269,51 +291,17 @@ class LoopSpec(HasPorts):
     @property
     def command_bits(self) -> int:
         """Fraction bits of the commanded velocity, below an LSB of the velocity."""
-        return min(self._extra_bits, 8)
+        return min(extra_bits_of(self), 8)
 
     @cached_property
-    def _extra_bits(self) -> int:
-        least = [rate * self.seconds for rate in (self.observer, self.filter) if rate is not None]
-        return form.extra_bits(*(1 - form.decay(one) for one in least))
-
-    @cached_property
-    def _ratios(self) -> dict[Term, list[Fraction]]:
+    def ratios(self) -> dict[Term, list[Fraction]]:
         """What each term is multiplied by, in units of its result for one of its word."""
-        unit = self.rad_per_s / (1 << self._extra_bits)  # rad/s
-        part = self.amperes / (1 << GUARD_BITS)  # A
-        of_acceleration = self.inertia / self.torque_constant / part
-        angle = 2 * PI / self.tachometer.encoder.counts_per_rev / (1 << POSITION_FRAC_BITS)
-        observed = form.ratios(self.observer, self.seconds, self.longest)
-        per_current = self.torque_constant / (self.inertia * self.observer) * self.amperes / unit
-        found = {
-            Term.OBSERVER: observed,
-            Term.CURRENT: [one * per_current / n for n, one in enumerate(observed, 1)],
-            Term.POSITION: [of_acceleration * self.position_gain * angle],
-            Term.VELOCITY: [of_acceleration * self.velocity_gain * unit],
-            Term.ACCELERATION: [of_acceleration * Fraction(2) ** -self.acceleration_frac_bits],
-            Term.DISTURBANCE: [of_acceleration * self.observer * unit],
-        }
-        if self.filter is not None:
-            found[Term.FILTER] = form.ratios(self.filter, self.seconds, self.longest)
-        return found
+        return ratios_of(self)
 
     @cached_property
     def form(self) -> ControlForm:
         """Formats and coefficients."""
-        bits = form.factor_bits(list(self._ratios.values()))
-        spec = self.tachometer
-        return ControlForm(
-            velocity_width=spec.velocity_width,
-            velocity_limit=spec.full_scale,
-            extra_bits=self._extra_bits,
-            factor_bits=bits,
-            terms={term: form.coefficients(found, bits) for term, found in self._ratios.items()},
-            current_limit=math.floor(self.current_limit / self.amperes),
-            position_width=spec.position_width,
-            command_bits=self.command_bits,
-            acceleration_width=ACCELERATION_WIDTH,
-            synchronised=self.synchronised,
-        )
+        return control_form(self)
 
     @property
     def product_clocks(self) -> int:
@@ -329,12 +317,26 @@ class LoopSpec(HasPorts):
     @property
     def least_period(self) -> int:
         """Fewest clocks between two control ticks: the current is added to those before it."""
-        return self.latency + 1
+        return max(self.latency + 1, generator_clocks(self.multiplier) if self.command == "generator" else 0)
+
+    @cached_property
+    def generator(self) -> GeneratorForm:
+        """Formats of the command generator."""
+        return generator_form(self)
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order: those of the tachometer first."""
         return (*self.tachometer.ports, *loop_ports(self))
+
+    @property
+    def held_inputs(self) -> tuple[Port, ...]:
+        """Inputs that are taken in the clock before a control tick: commands, gains and limit, if gains are inputs."""
+        if self.gains == "fixed":
+            return ()
+        return tuple(
+            port for port in loop_ports(self) if port.direction == "input" and port.name not in ("enable", "freeze")
+        )
 
     @property
     def parameters(self) -> dict[str, Any]:

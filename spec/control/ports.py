@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tachometry.spec.control.form import POSITION_FRAC_BITS
+from tachometry.spec.control.coefficients import gain_per_lsb
+from tachometry.spec.control.form import GAINS, POSITION_FRAC_BITS, Term
+from tachometry.spec.control.generator import AMPLITUDE_WIDTH, MODE_WIDTH, RATE_FRAC_BITS, WORD
 from tachometry.spec.port import Port, held, strobe
 from tachometry.spec.units import signed_width
 
@@ -12,38 +14,25 @@ if TYPE_CHECKING:
     from tachometry.spec.control.loop import LoopSpec
 
 CONTROL, CURRENT = "control_tick", "current_valid"
+GAIN_PORTS = {term: f"gain_{term.name.lower()}" for term in GAINS}
+_TAKEN = {"fixed": "It is taken with control_tick.", "inputs": "It is taken in the clock before control_tick."}
+_GAIN_HELP = {
+    Term.POSITION: "Gain k_p of the position error.",
+    Term.VELOCITY: "Gain k_v of the velocity error.",
+    Term.ACCELERATION: "How much of the commanded acceleration becomes current.",
+    Term.DISTURBANCE: "How much of the estimated disturbance becomes current.",
+}
+_GAIN_UNIT = {Term.POSITION: " 1/s²", Term.VELOCITY: " 1/s"}
 
 
 def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
     """Ports beside those of the tachometer."""
     form, tachometer = spec.form, spec.tachometer
-
-    def command(name: str, width: int, unit: str, help: str) -> Port:
-        return Port(
-            f"command_{name}", "input", width, width > 1, unit=unit, help=f"{help} It is taken with control_tick."
-        )
-
     fine = f"2^{-tachometer.frac_bits - form.extra_bits} {tachometer.unit}"
     return (
         Port("enable", "input", help="The current is 0 unless this is high in the clock of control_tick."),
-        command(
-            "position",
-            tachometer.position_width + POSITION_FRAC_BITS,
-            f"2^{-POSITION_FRAC_BITS} counts",
-            "Commanded position; it wraps as position does.",
-        ),
-        command(
-            "velocity",
-            form.command_width,
-            f"2^{-tachometer.frac_bits - form.command_bits} {tachometer.unit}",
-            "Commanded velocity.",
-        ),
-        command(
-            "acceleration",
-            form.acceleration_width,
-            f"2^{-spec.acceleration_frac_bits} rad/s²",
-            "Commanded acceleration, or 0.",
-        ),
+        *(_generated(spec) if spec.command == "generator" else _commands(spec)),
+        *(_gains(spec) if spec.gains == "inputs" else ()),
         strobe(CONTROL, "One clock for every control period: position and commands are taken."),
         strobe(CURRENT, "One clock for every new current."),
         held(
@@ -73,9 +62,104 @@ def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
     )
 
 
+def _units(spec: LoopSpec) -> dict[str, tuple[int, str]]:
+    """Bits and unit of the commanded position, velocity and acceleration."""
+    form, tachometer = spec.form, spec.tachometer
+    return {
+        "position": (tachometer.position_width + POSITION_FRAC_BITS, f"2^{-POSITION_FRAC_BITS} counts"),
+        "velocity": (form.command_width, f"2^{-tachometer.frac_bits - form.command_bits} {tachometer.unit}"),
+        "acceleration": (form.acceleration_width, f"2^{-spec.acceleration_frac_bits} rad/s²"),
+    }
+
+
+def _commands(spec: LoopSpec) -> tuple[Port, ...]:
+    """Commands from outside."""
+    told = {
+        "position": "Commanded position; it wraps as position does.",
+        "velocity": "Commanded velocity.",
+        "acceleration": "Commanded acceleration, or 0.",
+    }
+    taken = _TAKEN[spec.gains]
+    return tuple(
+        Port(f"command_{name}", "input", width, signed=True, unit=unit, help=f"{told[name]} {taken}")
+        for name, (width, unit) in _units(spec).items()
+    )
+
+
+def _gains(spec: LoopSpec) -> tuple[Port, ...]:
+    """Gains and limit from outside."""
+    form, taken = spec.form, _TAKEN[spec.gains]
+    return (
+        *(
+            Port(
+                *(GAIN_PORTS[term], "input", form.gain_bits),
+                unit=f"{float(gain_per_lsb(spec, term)):.9g}{_GAIN_UNIT.get(term, '')}",
+                help=f"{_GAIN_HELP[term]} {taken}",
+            )
+            for term in GAINS
+        ),
+        Port(
+            *("current_limit", "input", form.current_limit.bit_length()),
+            unit=f"2^{-spec.current_frac_bits} A",
+            help=f"Greatest current; a limit beyond that of the option is held at it. {taken}",
+        ),
+        Port("freeze", "input", help="Commands, gains and limit stay as they were, but enable does not."),
+    )
+
+
+def _generated(spec: LoopSpec) -> tuple[Port, ...]:
+    """What the command generator is told, and what it commands."""
+    form = spec.generator
+    taken = _TAKEN[spec.gains]
+    inputs = (
+        Port(
+            *("generator_mode", "input", MODE_WIDTH),
+            help=f"0: a constant velocity; 1: a ramp to it; 2 or 3: a sine, which begins here at rest. {taken}",
+        ),
+        Port(
+            *("generator_velocity", "input", WORD, True),
+            unit=f"2^{form.velocity_shift - form.fraction} counts per control tick",
+            help=f"Velocity of constant and ramp. {taken}",
+        ),
+        Port(
+            *("generator_acceleration", "input", WORD),
+            unit=f"2^{-form.fraction} counts per control tick squared",
+            help=f"Most by which the velocity of a ramp changes. {taken}",
+        ),
+        Port(
+            *("generator_amplitude", "input", AMPLITUDE_WIDTH, True),
+            unit=f"2^{-POSITION_FRAC_BITS} counts",
+            help=f"How far the middle of a sine is from where it begins. {taken} It counts when the sine begins.",
+        ),
+        Port(
+            *("generator_rate", "input", WORD),
+            unit=f"2^{-RATE_FRAC_BITS}",
+            help=f"4·sin²(π·f·T) of a sine of frequency f, control ticks of T. {taken}",
+        ),
+    )
+    told = {
+        "position": "Commanded position; where enable is low, the position.",
+        "velocity": "How far the commanded position has gone since the control tick before.",
+        "acceleration": "How much the commanded velocity has changed since the control tick before.",
+    }
+    return inputs + tuple(
+        held(CONTROL, f"command_{name}", width, signed=True, unit=unit, help=told[name])
+        for name, (width, unit) in _units(spec).items()
+    )
+
+
 def loop_entries(spec: LoopSpec) -> dict[str, Any]:
     """What the manifest says of the loop."""
     form = spec.form
+    generator: dict[str, Any] = {}
+    if spec.command == "generator":
+        made = spec.generator
+        generator["generator"] = {
+            "velocity": {"counts_per_tick_per_lsb": 2.0 ** (made.velocity_shift - made.fraction)},
+            "acceleration": {"counts_per_tick2_per_lsb": 2.0**-made.fraction},
+            "amplitude": {"counts_per_lsb": 2.0**-POSITION_FRAC_BITS},
+            "rate": {"per_lsb": 2.0**-RATE_FRAC_BITS},
+        }
     return {
         "period_cycles": int(spec.period),
         "first_tick": spec.first_tick,
@@ -93,4 +177,24 @@ def loop_entries(spec: LoopSpec) -> dict[str, Any]:
         "disturbance": {
             "torque_per_lsb": float(spec.inertia * spec.observer * spec.rad_per_s / (1 << form.extra_bits))
         },
+        **generator,
+        **_gain_entries(spec),
     }
+
+
+def _gain_entries(spec: LoopSpec) -> dict[str, Any]:
+    """What raw values of the gains mean: raw = round(gain/per_lsb), from 0 to most."""
+    form = spec.form
+    if not form.gain_bits:
+        return {}
+    found: dict[str, Any] = {
+        GAIN_PORTS[term]: {
+            "per_lsb": float(gain_per_lsb(spec, term)),
+            "unit": _GAIN_UNIT.get(term, " 1").strip(),
+            "most": form.most_gain,
+            "option": form.reset_gains[term],
+        }
+        for term in GAINS
+    }
+    amperes = {"per_lsb": float(spec.amperes), "unit": "A", "most": form.current_limit, "option": form.current_limit}
+    return {"gains": found | {"current_limit": amperes}}

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from tachometry.spec.control import AnySpec
 from tachometry.spec.manifest import described_port, manifest
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import Port
 from tachometry.spec.registers.frames import QUIET_BITS, SPI_SCK_CYCLES
+from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import WORD, RegisterMap
-from tachometry.spec.tachometer import TachometerSpec
 
 
 @dataclass(frozen=True)
@@ -202,9 +203,12 @@ def bus_of(name: str, baud: int | None = None) -> Bus | None:
     return replace(bus, baud=baud)
 
 
-def ports_on(spec: TachometerSpec, bus: Bus | None) -> tuple[Port, ...]:
+def ports_on(spec: AnySpec, bus: Bus | None) -> tuple[Port, ...]:
     """All ports of a core, with those of the bus on which its registers are."""
-    return spec.ports if bus is None else (*spec.ports, *bus.ports(RegisterMap(spec)))
+    if bus is None:
+        return spec.ports
+    registers = registers_of(spec)
+    return (*registers.core_ports, *bus.ports(registers))
 
 
 def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
@@ -218,8 +222,8 @@ def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> d
     ports = bus.ports(registers)
     if name in {port.name for port in ports}:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
-    described = manifest(registers.spec, name)
-    described["ports"] += [described_port(port) for port in ports]
+    described = manifest(registers.core, name)
+    described["ports"] = [described_port(port) for port in (*registers.core_ports, *ports)]
     described |= {"bus": bus.name, "registers": registers.described()}
     if bus.baud:
         described |= {"baud": bus.baud, "bit_cycles": bus.bit_cycles(registers.spec.timing.clock_hz)}

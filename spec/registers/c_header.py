@@ -54,6 +54,7 @@ def numbers(registers: RegisterMap) -> tuple[Macro, ...]:
         ("RAD_PER_S_PER_LSB", repr(radians), "One LSB of velocity in rad/s."),
         ("RAD_PER_COUNT", repr(2 * math.pi / spec.encoder.counts_per_rev), "One count of position in rad."),
         *_of_method(spec),
+        *((name, repr(value), told) for name, value, told in registers.quantities),
     )
 
 

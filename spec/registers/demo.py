@@ -5,14 +5,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.emulator import BOUNCE_WIDTH, DROP_WIDTH, ERROR_WIDTH, JITTER_WIDTH, RATE_SHIFT
 from tachometry.spec.manifest import described_port
 from tachometry.spec.option import ParameterError
 from tachometry.spec.port import TICK, Port, held
 from tachometry.spec.registers.buses import Bus, manifest_on
+from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
+from tachometry.spec.tachometer import TachometerSpec
 
 ENCODER_LINES = ("a", "b", "z")
+DRIVE = "drive"  # the current of a loop, as a stream of bits
 LEDS = 4
 PERIOD_WIDTH = 16  # bits of the telemetry's period
 
@@ -39,7 +43,8 @@ class DemoMap(RegisterMap):
     def emulated(self) -> tuple[Field, ...]:
         """Settings of the emulator."""
         others = ("telemetry_period", "emulated", "restart")
-        return tuple(field for field in self.settings if field.port not in others)
+        own = (field for _, _, fields, _ in DemoMap._added(self) for field in fields if field.writable)
+        return tuple(field for field in own if field.port not in others)
 
     def _added(self) -> Iterable[Draft]:
         telemetry = "Nominal ticks from a frame of telemetry to the next; 0: there are none."
@@ -73,16 +78,48 @@ class DemoMap(RegisterMap):
         yield "NOISE", "Where the emulated edges are wrong, at random.", fields, {}
 
 
+@dataclass(frozen=True)
+class DemoLoopMap(LoopMap, DemoMap):
+    """All registers of a demo of a core with a control loop: those of the loop come before those of the demo.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    loop : LoopSpec
+
+    Raises
+    ------
+    ParameterError
+        If the gains of the loop are fixed.
+    """
+
+    def _added(self) -> Iterable[Draft]:
+        yield from LoopMap._added(self)
+        yield from DemoMap._added(self)
+
+
+def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
+    """All registers of the demo of a core.
+
+    Raises
+    ------
+    ParameterError
+        If the gains of a loop are fixed.
+    """
+    return DemoLoopMap(spec.tachometer, spec) if isinstance(spec, LoopSpec) else DemoMap(spec)
+
+
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
     """All ports of a demo on a bus."""
-    inputs = [port for port in registers.spec.ports if port.direction == "input"]
+    inputs = [port for port in registers.core_ports if port.direction == "input"]
+    of_loop = [port for port in registers.core_ports if port.name == DRIVE]
     emulated = [
         Port(f"emulated_{pin.name}", "output", help=f"Line {pin.name.upper()} of the emulated encoder.")
         for pin in inputs
         if pin.name in ENCODER_LINES
     ]
     lights = "The shaft turns; it turned backward at the last update; something went wrong; the clock runs."
-    return (*inputs, *bus.ports(registers), *emulated, Port("leds", "output", LEDS, help=lights))
+    return (*inputs, *bus.ports(registers), *emulated, *of_loop, Port("leds", "output", LEDS, help=lights))
 
 
 def demo_manifest(registers: DemoMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.control import AnySpec
 from tachometry.spec.manifest import manifest
 from tachometry.spec.port import INDEX, TICK, UPDATE, Port
 from tachometry.spec.tachometer import TachometerSpec
@@ -55,6 +56,10 @@ class Field:
         The port that it shows, if it shows one. If it is writable, that which it sets.
     shift : int
         The bit of the port that is its lowest.
+    bits : int
+        Of a field of a whole register, so many are kept of what is written, and extended by sign or zeros; 0: all.
+    least, most : int or None
+        What is written is held within these.
     """
 
     name: str
@@ -68,6 +73,14 @@ class Field:
     unit: str = ""
     port: str = ""
     shift: int = 0
+    bits: int = 0
+    least: int | None = None
+    most: int | None = None
+
+    @property
+    def kept(self) -> int:
+        """Bits that are kept."""
+        return self.bits or self.width
 
     @property
     def mask(self) -> int:
@@ -156,6 +169,21 @@ class RegisterMap:
         """Bits of the address of a byte; at the highest address there is no register."""
         return (len(self.registers) * WORD // 8).bit_length()
 
+    @property
+    def core(self) -> AnySpec:
+        """What the registers are of."""
+        return self.spec
+
+    @property
+    def core_ports(self) -> tuple[Port, ...]:
+        """Ports that the core has beside those of the bus."""
+        return self.core.ports
+
+    @property
+    def quantities(self) -> tuple[tuple[str, float, str], ...]:
+        """Numbers that drivers need beside those of every tachometer: name, value, and what it means."""
+        return ()
+
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Outputs of the core that are captured."""
@@ -189,7 +217,7 @@ class RegisterMap:
     @cached_property
     def configuration(self) -> int:
         """A hash of all that a driver relies on: a driver that was made for one core refuses another."""
-        described = [manifest(self.spec), [(name, help) for name, help, *_ in self._captured()]]
+        described = [manifest(self.core), [(name, help) for name, help, *_ in self._captured()]]
         return int.from_bytes(hashlib.sha256(json.dumps(described, sort_keys=True).encode()).digest()[:4], "big")
 
     def described(self) -> dict[str, Any]:
@@ -209,7 +237,8 @@ class RegisterMap:
                         {
                             **{key: getattr(field, key) for key in ("name", "low", "width", "access", "reset")},
                             **{key: getattr(field, key) for key in ("signed", "unit", "port", "shift")},
-                            "port_width": widths.get(field.port, field.width),
+                            "port_width": widths.get(field.port, field.kept + field.shift),
+                            **({} if field.most is None else {"least": field.least, "most": field.most}),
                         }
                         for field in register.fields
                     ],

@@ -1,6 +1,6 @@
 """The registers as a page of Markdown."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from tachometry.spec.provenance import notice
 from tachometry.spec.registers.map import Register, RegisterMap
@@ -29,8 +29,9 @@ def page(registers: RegisterMap, name: str) -> str:
     )
 
 
-def tables(registers: RegisterMap) -> str:
+def tables(registers: Iterable[Register]) -> str:
     """The tables of registers and of their fields."""
+    registers = list(registers)
     rows = [
         [f"`0x{one.offset:02x}`", f"`{one.name}`", _kind(one), f"`0x{one.reset:08x}`", sentences(one)]
         for one in registers

@@ -70,5 +70,9 @@ def _sentences(register: Register) -> Iterator[str]:
         yield from in_unit(field)
         if field.signed:
             yield "It is in two's complement."
+        if field.most is not None:
+            yield f"What is written is held within {field.least} and {field.most}."
+        elif field.kept < WORD:
+            yield f"It wraps: {field.kept} bits are kept."
     if register.captures:
         yield "Reading it captures, unless CONTROL.hold is set."

@@ -1,5 +1,6 @@
 """A control loop without a tachometer: updates, positions and commands that a test makes up."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -13,12 +14,14 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.control import controller, loop_core, update_window
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
-from tachometry.sim.golden.control import Command, control, run_loop
+from tachometry.sim.golden.command_generator import Command, Demand, Gains
+from tachometry.sim.golden.control import control, run_loop
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table, compare, observed
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.control.form import ControlForm
+from tachometry.spec.control.form import GAINS, ControlForm
+from tachometry.spec.control.ports import GAIN_PORTS
 
 SMALL = LoopSpec(
     tachometer=STachometer(
@@ -34,6 +37,8 @@ SMALL = LoopSpec(
 CONVENTIONAL = replace(SMALL, synchronised=False, filter=Fraction(3000))
 UNFILTERED = replace(SMALL, filter=None)
 SERIAL = replace(SMALL, multiplier="serial", period=320)
+WITH_INPUTS = replace(SMALL, gains="inputs")
+GENERATED = replace(SMALL, command="generator")
 COLUMNS = ("current", "saturated", "y", "w")
 
 
@@ -44,7 +49,8 @@ class Beside(wiring.Component):
         # By the names in their modules, where a mutant takes their place.
         self.window = update_window.UpdateWindow(form)
         self.controller = controller.Controller(form, multiplier)
-        commands = ("enable", "position", "command_position", "command_velocity", "command_acceleration")
+        commands = ["enable", "position", "command_position", "command_velocity", "command_acceleration"]
+        commands += [*GAIN_PORTS.values(), "current_limit"] if form.gain_bits else []
         self.inputs = {name: getattr(self.controller, name).shape() for name in commands}
         super().__init__(
             {
@@ -106,13 +112,35 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
         "command_acceleration": numbers(n_ticks, (1 << (form.acceleration_width - 1)) - 1),
         "enable": (rng.random(n_ticks) < 0.95).astype(np.int64),
     }
+    gains = random_gains(form, rng, n_ticks) if form.gain_bits else {}
     rows: list[dict[str, int]] = [{"tick": 0, "update": 0} for _ in range(n_clocks)]
     for k, at in enumerate(clock.tolist()):
-        rows[at] |= {"tick": 1, **{name: int(column[k]) for name, column in commands.items()}}
+        rows[at] |= {"tick": 1, **{name: int(column[k]) for name, column in (commands | gains).items()}}
         rows[at + 1] |= {name: int(column[k - 1]) for name, column in commands.items()}  # which is not taken
+    commands |= gains
     for at, value in zip(came.tolist(), velocity.tolist(), strict=True):
         rows[at] |= {"update": 1, "velocity": value}
     return Table(came, {"velocity": velocity}), Table(clock, commands), rows
+
+
+def random_gains(form: ControlForm, rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
+    """Gains and limits of n control ticks by their ports: those of the options, none, the greatest, and others."""
+    most = {GAIN_PORTS[term]: (form.most_gain, form.reset_gains[term]) for term in GAINS}
+    most["current_limit"] = ((1 << form.current_limit.bit_length()) - 1, form.current_limit)
+    return {
+        name: np.where(
+            rng.random(n) < 0.5,
+            rng.choice([0, greatest, option], n, p=[0.1, 0.1, 0.8]),
+            rng.integers(0, np.minimum(2 * option, greatest) + 1, n),
+        )
+        for name, (greatest, option) in most.items()
+    }
+
+
+def gains_of(columns: Mapping[str, np.ndarray]) -> list[Gains]:
+    """The same for the golden model."""
+    order = (*GAIN_PORTS.values(), "current_limit")
+    return [Gains(*values) for values in zip(*(columns[name].tolist() for name in order), strict=True)]
 
 
 def check(spec: LoopSpec, n_ticks: int = 300, seed: int = 1, less: int = 0) -> Table:
@@ -120,7 +148,8 @@ def check(spec: LoopSpec, n_ticks: int = 300, seed: int = 1, less: int = 0) -> T
     updates, ticks, rows = made_up(spec, n_ticks, seed, less)
     names = ("command_position", "command_velocity", "command_acceleration", "enable")
     commands = [Command(*values) for values in zip(*(ticks[name].tolist() for name in names), strict=True)]
-    wanted = control(spec, ticks.clock, ticks.position, updates, commands)
+    gains = gains_of(ticks.columns) if spec.form.gain_bits else None
+    wanted = control(spec, ticks.clock, ticks.position, updates, commands, gains)
     seen = clock_by_clock(Beside(spec.form, spec.multiplier), rows, ["valid", *COLUMNS])
     got = [(clock, *(row[name] for name in COLUMNS)) for clock, row in enumerate(seen) if row["valid"]]
     columns = (wanted.clock, *wanted.columns.values())
@@ -128,8 +157,36 @@ def check(spec: LoopSpec, n_ticks: int = 300, seed: int = 1, less: int = 0) -> T
     return wanted
 
 
-def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> tuple[PinTrace, list[Command], np.ndarray]:
-    """A motion and commands for a core: pins, commands by control tick, rows of a clock and all inputs."""
+def random_demands(spec: LoopSpec, rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
+    """What a command generator is told in n control ticks, for some of them the same; the greatest numbers among it."""
+    found: dict[str, np.ndarray] = {}
+    widths = {port.name: port.width for port in spec.ports if port.name.startswith("generator_")}
+    for name, width in widths.items():
+        signed = name in ("generator_velocity", "generator_amplitude")
+        most, least = (1 << (width - signed)) - 1, -(1 << (width - 1)) if signed else 0
+        size = np.exp2(rng.uniform(0, width - signed, n)).astype(np.int64)
+        values = rng.integers(-size if signed else np.zeros_like(size), size + 1).clip(least, most)
+        found[name] = np.where(rng.random(n) < 0.15, rng.choice([least, most], n), values)
+    found["generator_mode"] = rng.integers(0, 4, n)
+    # They stay for some ticks, so that a ramp goes on and a sine swings.
+    kept = np.maximum.accumulate(np.where(rng.random(n) < 0.15, np.arange(n), 0))
+    return {name: values[kept] for name, values in found.items()}
+
+
+def told(spec: LoopSpec, columns: Mapping[str, np.ndarray]) -> list[Command] | list[Demand]:
+    """What the golden model is told in each control tick."""
+    if spec.command == "generator":
+        order = [*(f"generator_{name}" for name in ("mode", "velocity", "acceleration", "amplitude", "rate")), "enable"]
+        return [Demand(*values) for values in zip(*(columns[name].tolist() for name in order), strict=True)]
+    order = ["command_position", "command_velocity", "command_acceleration", "enable"]
+    return [Command(*values) for values in zip(*(columns[name].tolist() for name in order), strict=True)]
+
+
+Case = tuple[PinTrace, list[Command] | list[Demand], list[Gains] | None, np.ndarray]
+
+
+def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> Case:
+    """A motion and commands for a core: pins, commands and gains by control tick, rows of a clock and all inputs."""
     rng = np.random.default_rng(seed)
     trace = stress(spec.tachometer, seed, n_edges)
     clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
@@ -139,33 +196,45 @@ def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> tuple[PinTrace, l
         most = (1 << (width - 1)) - 1
         return np.where(rng.random(n) < 0.2, rng.choice([-most, most], n), rng.integers(-most, most + 1, n) >> 8)
 
-    ports = [port for port in spec.ports if port.name.startswith("command_")]
-    commands = {"enable": (rng.random(n) < 0.95).astype(np.int64), **{port.name: numbers(port.width) for port in ports}}
-    # About the position there, which the golden model need not know.
-    commands["command_position"] = np.where(
-        rng.random(n) < 0.2, commands["command_position"], rng.integers(-4000, 4000, n)
-    )
-    order = ("command_position", "command_velocity", "command_acceleration", "enable")
-    of_tick = [Command(*values) for values in zip(*(commands[name].tolist() for name in order), strict=True)]
-    # Commands are there for the clock of the control tick alone.
+    commands = {"enable": (rng.random(n) < 0.95).astype(np.int64)}
+    if spec.command == "generator":
+        commands |= random_demands(spec, rng, n)
+    else:
+        commands |= {port.name: numbers(port.width) for port in spec.ports if port.name.startswith("command_")}
+        # About the position there, which the golden model need not know.
+        commands["command_position"] = np.where(
+            rng.random(n) < 0.2, commands["command_position"], rng.integers(-4000, 4000, n)
+        )
+    taken, gains = commands, None
+    if spec.form.gain_bits:
+        commands |= random_gains(form, rng, n) | {"freeze": (rng.random(n) < 0.3).astype(np.int64)}
+        held = np.maximum.accumulate(np.where(commands["freeze"] == 0, np.arange(n), 0))
+        taken = {name: np.where(held | (commands["freeze"] == 0), values[held], 0) for name, values in commands.items()}
+        taken["enable"] = commands["enable"]
+        gains = gains_of(taken)
+    of_tick = told(spec, taken)
+    # Commands are there for the clock of the control tick alone, or for the one before, in which they are taken.
     names = [port.name for port in spec.pins]
-    at = np.unique(np.concatenate([trace.clock, clock, clock + 1]))
+    at = np.unique(np.concatenate([trace.clock, clock - 1, clock, clock + 1]))
     at = at[at < trace.n_clocks]
     held = np.searchsorted(trace.clock, at, side="right") - 1
-    columns: dict[str, Any] = {name: line[held] for name, line in trace.lines.items()}
-    tick = np.searchsorted(clock, at, side="right") - 1
+    found: dict[str, Any] = {name: line[held] for name, line in trace.lines.items()}
+    signed = {port.name for port in spec.ports if port.signed}
+    widths = {port.name: port.width for port in spec.ports}
     for name, values in commands.items():
-        there = np.isin(at, clock)
-        columns[name] = np.where(there, values[tick], 1 - values[tick] if name == "enable" else ~values[tick])
-    columns["enable"] = columns["enable"] & 1
+        early = form.gain_bits > 0 and name != "enable"
+        tick = np.searchsorted(clock - early, at, side="right") - 1
+        there = np.isin(at, clock - early)
+        others = ~values[tick] if name in signed else values[tick] ^ ((1 << widths[name]) - 1)
+        found[name] = np.where(there, values[tick], others)
     assert form.position_width < 48
-    return trace, of_tick, np.stack([at, *(columns[name].astype(np.int64) for name in names)], axis=1)
+    return trace, of_tick, gains, np.stack([at, *(found[name].astype(np.int64) for name in names)], axis=1)
 
 
 def check_core(spec: LoopSpec, seed: int = 1, n_edges: int = 3) -> Run:
     """Hold a whole core against the golden model: what it must show."""
-    trace, commands, changes = core_case(spec, seed, n_edges)
-    wanted = run_loop(spec, trace, commands, golden.tables)
+    trace, commands, gains, changes = core_case(spec, seed, n_edges)
+    wanted = run_loop(spec, trace, commands, golden.tables, gains)
     names = [port.name for port in spec.pins]
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
     for clock, *values in changes.tolist():

@@ -6,9 +6,11 @@ from typing import Any
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.sim.engines.board import BoardSimulation
 from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers import frames
 from tachometry.spec.registers.buses import Bus, bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_manifest
+from tachometry.spec.registers.demo import demo_map as map_of
 
 BOARD = "icebreaker"
 CLOCK_HZ = 12_000_000
@@ -108,13 +110,13 @@ class DemoPort:
 
     Parameters
     ----------
-    spec : TachometerSpec
+    spec : TachometerSpec or LoopSpec
     n_clocks : int
         Of a read.
     """
 
-    def __init__(self, spec: TachometerSpec, n_clocks: int = 4000) -> None:
-        self.board = BoardSimulation(DemoMap(spec), uart())
+    def __init__(self, spec: TachometerSpec | LoopSpec, n_clocks: int = 4000) -> None:
+        self.board = BoardSimulation(map_of(spec), uart())
         self._n_clocks = n_clocks
         self._waiting = b""
 

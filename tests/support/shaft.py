@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden.control import Command, Control
+from tachometry.sim.golden.command_generator import Command
+from tachometry.sim.golden.control import Control
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.form import POSITION_FRAC_BITS
 

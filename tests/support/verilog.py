@@ -89,7 +89,20 @@ def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
 
 def play_in_icarus(spec: AnySpec, folder: Path, changes: np.ndarray, n_clocks: int) -> Run:
     """The same with levels of all inputs: a row for each clock in which one changes, with the clock first."""
-    pins, outputs, strobes = _ports(spec)
+    rows = play(export(spec)["tachometer.v"], *_ports(spec), folder, changes, n_clocks)
+    return observed(spec, n_clocks, rows)
+
+
+def play(
+    text: str,
+    pins: list[Port],
+    outputs: list[Port],
+    strobes: list[str],
+    folder: Path,
+    changes: np.ndarray,
+    n_clocks: int,
+) -> np.ndarray:
+    """Outputs of a module in each clock in which there is a strobe, behind the clock."""
     bench = _filled(
         _ICARUS,
         N_CLOCKS=n_clocks,
@@ -104,7 +117,7 @@ def play_in_icarus(spec: AnySpec, folder: Path, changes: np.ndarray, n_clocks: i
         FORMAT_OUT=" %0d" * len(outputs),
         OUTPUTS=", ".join(port.name for port in outputs),
     )
-    (folder / "core.v").write_text(export(spec)["tachometer.v"])
+    (folder / "core.v").write_text(text)
     (folder / "bench.v").write_text(bench)
     command = ["iverilog", "-g2001", "-Wall", "-s", "bench", "-o", "core.vvp", "core.v", "bench.v"]
     said = subprocess.run(command, cwd=folder, check=True, stderr=subprocess.PIPE, text=True).stderr
@@ -112,4 +125,4 @@ def play_in_icarus(spec: AnySpec, folder: Path, changes: np.ndarray, n_clocks: i
     np.savetxt(folder / "pins.txt", changes, fmt="%d")
     subprocess.run(["vvp", "-n", "core.vvp"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     rows = np.loadtxt(folder / "rows.txt", dtype=np.int64, ndmin=2)
-    return observed(spec, n_clocks, rows.reshape(-1, 1 + len(outputs)))
+    return rows.reshape(-1, 1 + len(outputs))

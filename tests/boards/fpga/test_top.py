@@ -22,6 +22,7 @@ from tachometry.boards.fpga.build import build, prepared
 from tachometry.boards.fpga.capture_pin import CapturePin
 from tachometry.boards.fpga.top import BoardTop, component
 from tachometry.spec import of_texts
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers.buses import BUSES, bus_of
 
 EVERYTHING = {"ppr": "9", "index": "yes", "external-tick": "yes", "max-speed": "1000rad/s"}
@@ -29,10 +30,11 @@ OF_EVERY_KIND = [name for name in BOARDS if not name.startswith("ulx3s") or name
 LIT_BY_ZERO = {"tang-nano-9k", "icebreaker"}
 
 
-def core(board: Board, bus: str, **texts: str) -> Any:
+def core(board: Board, bus: str, *, loop: bool = False, **texts: str) -> Any:
     on = bus_of(bus)
     assert on is not None
-    return component(of_texts("s", {**EVERYTHING, **texts, "clock": str(board.clock_hz)}), on)
+    spec = of_texts("s", {**EVERYTHING, **texts, "clock": str(board.clock_hz)})
+    return component(LoopSpec(tachometer=spec, gains="inputs") if loop else spec, on)
 
 
 class Platform:
@@ -183,14 +185,15 @@ PULL_UP = {
 @pytest.mark.parametrize("bus", ["uart", "spi"])
 @pytest.mark.parametrize("name", OF_EVERY_KIND)
 def test_every_board_has_pins_for_every_port(name: str, bus: str) -> None:
+    """Of a core with a control loop where the bus is a UART."""
     board = BOARDS[name]
-    design = core(board, bus)
+    design = core(board, bus, loop=bus == "uart")
     wanted = {"a", "b", "z", "tick_in", "capture", "emulated_a", "emulated_b", "emulated_z"}
-    wanted |= {line.name for line in BUSES[bus].lines} if bus == "spi" else set()
+    wanted |= {line.name for line in BUSES[bus].lines} if bus == "spi" else {"drive", "enable"}
     assert wanted == board.pins.keys() & design.signature.members.keys()
     plan = prepared(design, board)
     lines = [*lines_of(plan.files)]
-    inputs = wanted - {"spi_miso", "emulated_a", "emulated_b", "emulated_z"}
+    inputs = wanted - {"spi_miso", "emulated_a", "emulated_b", "emulated_z", "drive"}
     for port in wanted:
         signal = f"tachometer_0__{port}__io"
         assert any(signal in line for line in lines), port
@@ -264,6 +267,7 @@ from tachometry.boards.fpga.boards import BOARDS
 from tachometry.boards.fpga.build import prepared
 from tachometry.boards.fpga.top import component
 from tachometry.spec import of_texts
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers.buses import bus_of
 board = BOARDS["icebreaker"]
 spec = of_texts("s", {"ppr": "9", "index": "yes", "age": "yes", "bounds": "yes", "clock": str(board.clock_hz)})

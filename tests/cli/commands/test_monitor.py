@@ -221,6 +221,7 @@ def test_files_that_are_no_manifests(
     [
         ({"bus": "spi"}, "--manifest must be that of a board with --bus uart, not spi"),
         ({"parameters": {"method": "x"}}, ": method must be one of s, m, t, mt, rairan, track, not 'x'"),
+        ({"parameters": {"method": "s", "loop": {}}}, "--manifest must be that of a board without --loop, whose"),
         ({"registers": {"configuration": 5}}, "must be that of a demo which this version of tachometry makes: its "),
         ({"baud": 0}, ": baud must be at least 1, not 0"),
         ({"baud": "fast"}, "--manifest "),

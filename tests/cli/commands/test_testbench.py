@@ -12,6 +12,7 @@ import pytest
 from support.mutant import mutant
 
 from tachometry.cli.main import main
+from tachometry.hdl.control.controller import Controller
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
 from tachometry.hdl.front_end.position_counter import PositionCounter
@@ -31,6 +32,11 @@ CASES = {
     "mt": "--method mt --index --age --external-tick --max-tick-period 12us",
     "rairan": "--method rairan --bounds --filter 1",
 }
+LOOP = (
+    "--ppr 25 --clock 1MHz --tick 100us --max-time 1ms --max-speed 2000rad/s --loop --multiplier parallel "
+    "--inertia 1e-5 --motion ramp:0:300rad/s:8ms+sine:40rad/s:300Hz:7ms+stop:5ms"
+)
+LOOPS = {"commands": "--index --no-synchronised", "generator": "--command generator --gains inputs"}
 
 
 def generate(folder: Path, *words: str) -> int:
@@ -66,6 +72,19 @@ def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
 def test_passes_in_icarus(case: str, tmp_path: Path) -> None:
     assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
     assert play(tmp_path) == ""
+
+
+def test_a_loop_passes_in_icarus(tmp_path: Path) -> None:
+    assert generate(tmp_path, *LOOP.split(), *LOOPS["generator"].split()) == 0
+    vectors = json.loads((tmp_path / "spindle_vectors.json").read_text())
+    assert len({row[1] for row in vectors["strobes"]["current_valid"]["rows"]}) > 20
+    assert play(tmp_path) == ""
+
+
+def test_a_loop_with_a_wrong_sign_fails(tmp_path: Path) -> None:
+    with mutant(Controller, "minus.eq(term != Term.CURRENT)", "minus.eq(1)"):
+        assert generate(tmp_path, *LOOP.split(), *LOOPS["commands"].split()) == 0
+    assert "with current_valid" in play(tmp_path)
 
 
 def test_unknown_simulator_is_told_in_a_line(tmp_path: Path) -> None:

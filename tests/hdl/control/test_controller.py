@@ -1,10 +1,12 @@
 """Observer and controller against the golden ones, with made-up updates, positions and commands."""
 
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
-from support.control import CONVENTIONAL, SERIAL, SMALL, UNFILTERED, check
+from support.control import CONVENTIONAL, SERIAL, SMALL, UNFILTERED, WITH_INPUTS, check
 from support.mutant import caught, mutant
 
 from tachometry.hdl.control.controller import Controller
@@ -12,7 +14,7 @@ from tachometry.hdl.control.product import ParallelProduct, SerialProduct
 from tachometry.hdl.control.update_window import UpdateWindow
 from tachometry.spec.control import LoopSpec
 
-SPECS = {"synchronised": SMALL, "conventional": CONVENTIONAL, "unfiltered": UNFILTERED}
+SPECS = {"synchronised": SMALL, "conventional": CONVENTIONAL, "unfiltered": UNFILTERED, "inputs": WITH_INPUTS}
 
 
 @pytest.mark.parametrize("name", SPECS)
@@ -34,6 +36,9 @@ def test_with_a_serial_multiplier() -> None:
     check(SERIAL, 40, less=8)
 
 
+# Coefficients of more bits than gains, and a limit that is not all ones.
+FEW_BITS = replace(WITH_INPUTS, observer=Fraction(2), filter=None)
+ODD_LIMIT = replace(WITH_INPUTS, current_limit=Fraction(17))
 MUTANTS: dict[str, tuple[Any, str, str, LoopSpec, int]] = {
     "the last update counts": (UpdateWindow, "self.update & (~waits | self.tick)", "self.update", SMALL, 8),
     "waits for ever": (UpdateWindow, "waits | (self.n == self._longest)", "waits", SMALL, 8),
@@ -85,6 +90,16 @@ MUTANTS: dict[str, tuple[Any, str, str, LoopSpec, int]] = {
     ),
     "no step without a filter": (Controller, "Mux(skipped, word, product.product)", "product.product", UNFILTERED, 8),
     "the table of another term": (Controller, "{one: places[values] for one", "{one: 0 for one", SMALL, 8),
+    "a gain is its lower bits": (Controller, "GAIN_PORTS[one]) << form.gain_shift", "GAIN_PORTS[one])", FEW_BITS, 8),
+    "a limit beyond that of the option": (
+        Controller,
+        "Mux(self.current_limit > form.current_limit, form.current_limit, self.current_limit)",
+        "self.current_limit",
+        ODD_LIMIT,
+        0,
+    ),
+    "a limit of one side": (Controller, "Mux(below, -limit, value)", "value", WITH_INPUTS, 8),
+    "not saturated below": (Controller, "changed.eq(above | below)", "changed.eq(above)", WITH_INPUTS, 8),
     "a product is not rounded": (ParallelProduct, "whole + (1 << (bits - 1))", "whole", SMALL, 8),
     "a serial product is not rounded": (SerialProduct, "Cat(last, Mux", "Cat(0, Mux", SERIAL, 8),
     "a bit is left out": (SerialProduct, "left.eq(bits - 1)", "left.eq(bits - 2)", SERIAL, 8),

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from amaranth import Module, ResetInserter, Signal
-from support.control import SERIAL, SMALL, check_core, core_case
+from support.control import GENERATED, SERIAL, SMALL, check_core, core_case
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 from support.verilog import play_in_icarus
 
 from tachometry.hdl.control.control_clock import ControlClock
+from tachometry.hdl.control.held_inputs import HeldInputs
 from tachometry.hdl.control.loop_core import LoopCore
 from tachometry.hdl.control.sigma_delta import SigmaDelta
 from tachometry.sim import golden
@@ -25,6 +26,12 @@ from tachometry.spec.control import LoopSpec
 CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)))
 
 
+OTHERS = {
+    "generator": replace(CORE, command="generator"),
+    **dict.fromkeys(("given", "self"), replace(CORE, gains="inputs")),
+}
+
+
 def test_as_the_golden_model() -> None:
     run = check_core(CORE)
     current = run.tables["current_valid"]
@@ -34,12 +41,12 @@ def test_as_the_golden_model() -> None:
 
 
 def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
-    """With another method and options of the tachometer, which change nothing about the loop."""
+    """With a generator, gains as inputs, and a method and options of the tachometer that change nothing about it."""
     options: dict[str, Any] = {"lowpass": Fraction(4000), "filter_clocks": 3, "index": True, "index_reset": True}
     tachometer = TTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 100, 3), frac_bits=6, **options)
-    spec = replace(SERIAL, tachometer=tachometer)
-    trace, commands, changes = core_case(spec, 3, 15)
-    wanted = run_loop(spec, trace, commands, golden.tables)
+    spec = replace(SERIAL, tachometer=tachometer, command="generator", gains="inputs")
+    trace, commands, gains, changes = core_case(spec, 3, 15)
+    wanted = run_loop(spec, trace, commands, golden.tables, gains)
     assert len(wanted.tables["current_valid"]) > 20
     count, first = compare(wanted, play_in_icarus(spec, tmp_path, changes, trace.n_clocks))
     assert not count, first
@@ -51,16 +58,19 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
         (ControlClock, "left.eq(self._period - 1)", "left.eq(self._period)"),
         (ControlClock, "init=self._first - 1", "init=self._first - 2"),
         (LoopCore, "window.update.eq(tachometer.velocity_valid)", "window.update.eq(tachometer.tick)"),
+        (LoopCore, "generator.position.eq(tachometer.position)", "generator.position.eq(0)"),
+        (LoopCore, "given.coming.eq(clock.coming)", "given.coming.eq(clock.tick)"),
+        (HeldInputs, "self.coming & ~self.freeze", "self.coming"),
     ],
 )
 def test_mutants_are_caught(box: Any, right: str, wrong: str) -> None:
     with mutant(box, right, wrong), caught():
-        check_core(CORE, n_edges=1)
+        check_core(OTHERS.get(right.split(".")[0], CORE), n_edges=1)
 
 
 def test_the_first_control_tick_has_the_first_update() -> None:
     """A period of a tick meets each update a clock after it has come."""
-    spec = replace(CORE, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), period=50)
+    spec = replace(GENERATED, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), period=50)
     run = check_core(spec, n_edges=1)
     apart = run.updates.clock[:, None] - run.tables["control_tick"].clock
     assert set(apart[np.abs(apart) < 25].tolist()) == {-1}
@@ -81,7 +91,7 @@ class Restarted(LoopCore):
 
 def test_a_reset_amid_a_program() -> None:
     """From a reset on the core shows what it shows after the first one, wherever the program was."""
-    _, _, changes = core_case(CORE, 5, 1)
+    *_, changes = core_case(CORE, 5, 1)
     names = [port.name for port in CORE.pins]
     rows: list[dict[str, int]] = [{} for _ in range(700)]
     for clock, *values in changes[changes[:, 0] < len(rows)].tolist():

@@ -1,5 +1,6 @@
 """What is proven of the control loop."""
 
+from dataclasses import replace
 from functools import partial
 
 from proofs.formal.prove import Proof
@@ -51,9 +52,8 @@ def _packed(term: Term) -> int:
     return values[0] if len(values) == 1 else sum(value << 8 * n for n, value in enumerate(values, 1))
 
 
-def _control(name: str) -> Proof:
+def _control(name: str, checker: str, form: ControlForm) -> Proof:
     """PC: no state and no sum wraps, and what is computed is what the equations say."""
-    form = _FORM
     parameters = {
         "VELOCITY_WIDTH": form.velocity_width,
         "V": form.velocity_limit,
@@ -78,10 +78,17 @@ def _control(name: str) -> Proof:
         "MOST_Z": form.most_y + form.most_lead,
         "MOST_ERROR": form.most_error,
         **{f"{term.name}S".replace("TYS", "TIES"): _packed(term) for term in Term},
+        "GAIN_WIDTH": max(form.gain_bits, 1),
+        "GAIN_SHIFT": form.gain_shift,
+        "LIMIT_WIDTH": form.current_limit.bit_length(),
         **{f"S_{term.name}": form.terms[term].shift for term in Term if term >= Term.CURRENT},
     }
     made = partial(Beside, form, "parallel")
-    return Proof(name, _SPEC, "control", parameters, _PROBES, depth=7, box=made)
+    probes = _PROBES | ({"core_most": "controller.most"} if form.gain_bits else {})
+    return Proof(name, _SPEC, checker, parameters, probes, depth=7, box=made)
 
 
-CONTROL = [_control("control loop")]
+CONTROL = [
+    _control("control loop", "control", _FORM),
+    _control("control loop, any gains", "control_gains", replace(_FORM, gain_bits=2)),
+]

@@ -278,5 +278,13 @@ MUTANTS = [
     Mutant("control loop", "pc_word", Controller, "self.held << fine", "self.held"),
     Mutant("control loop", "pc_state", Controller, "stored & due & to_y", "stored", 32),
     Mutant("control loop", "pc_current", Controller, "Mux(enabled, limited, 0)", "Mux(enabled, short, 0)", 52),
+    Mutant(
+        "control loop, any gains",
+        "pc_limit",
+        Controller,
+        "form.current_limit, form.current_limit, self.current_limit)",
+        "form.current_limit, self.current_limit, self.current_limit)",
+    ),
+    Mutant("control loop, any gains", "pc_total", Controller, "GAIN_PORTS[one])", "GAIN_PORTS[Term.VELOCITY])", 32),
     Mutant("control loop", "pc_n", UpdateWindow, "self.n + 1", "self.n + 2", 52),
 ]

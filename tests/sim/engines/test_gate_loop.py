@@ -12,7 +12,8 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.gate_loop import GateLoop, Through
 from tachometry.sim.engines.loop import Log, Observer
-from tachometry.sim.golden.control import Command, Control, run_loop
+from tachometry.sim.golden.command_generator import Command
+from tachometry.sim.golden.control import Control, run_loop
 from tachometry.sim.studies.control import Load, Outcome, Task, edges_of, in_gates, simulation_of
 from tachometry.sim.studies.gate_check import check
 from tachometry.sim.studies.usable_gain import KINDS, MOTOR, REAL, setting

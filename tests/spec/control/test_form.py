@@ -1,6 +1,7 @@
 """Formats of the control loop: exact enough, and wide enough for whatever comes."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product as combinations
@@ -11,14 +12,15 @@ import pytest
 
 from tachometry.spec import Encoder, ParameterError, Speed, STachometer, Timing, TrackTachometer
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.control.form import GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+from tachometry.spec.control.coefficients import gain_per_lsb
+from tachometry.spec.control.form import GAINS, GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
 
 CORE = STachometer(
     encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
 )
 
 
-def random_spec(seed: int) -> LoopSpec:
+def random_spec(seed: int, gains: str = "fixed") -> LoopSpec:
     """Gains, motors, clocks and units of all sizes."""
     rng = np.random.default_rng(seed)
 
@@ -46,10 +48,20 @@ def random_spec(seed: int) -> LoopSpec:
         current_limit=about(10, 1),
         synchronised=bool(rng.random() < 0.7),
         current_width=int(rng.choice([8, 16, 24])),
+        gains=gains,
     )
 
 
 SPECS = [spec for seed in range(12) if (spec := random_spec(seed)).form]
+
+
+def with_gains(form: ControlForm, raw: Mapping[Term, int]) -> ControlForm:
+    """A form whose gains are inputs, with these gains; its formats are those of the options all the same."""
+    terms = {term: replace(form.terms[term], values=(one << form.gain_shift,)) for term, one in raw.items()}
+    made = replace(form, terms=form.terms | terms)
+    for name in ("most_error", "most_total", "word_width"):
+        made.__dict__[name] = getattr(form, name)
+    return made
 
 
 def fits(value: int, width: int) -> bool:
@@ -81,8 +93,8 @@ def check_observer(form: ControlForm) -> None:
             assert abs(new_y + w) <= most_z
 
 
-def check_current(form: ControlForm) -> None:
-    """All sums fit, and a position error that is held gives a current at its limit, whatever the other terms are."""
+def check_current(form: ControlForm, *, held: bool = True) -> None:
+    """All sums fit, and a position error that is `held` gives a current at its limit, whatever the other terms are."""
     acceleration = 1 << (form.acceleration_width - 1)
     for signs in combinations((-1, 1), repeat=4):
         words = {
@@ -97,7 +109,7 @@ def check_current(form: ControlForm) -> None:
             total += form.product(term, word)
             assert fits(total, form.total_width)
         everything = (1 << (form.position_width + POSITION_FRAC_BITS - 1)) - 1
-        if form.terms[Term.POSITION].values[0] and form.most_error < everything:
+        if held and form.terms[Term.POSITION].values[0] and form.most_error < everything:
             assert abs(total >> GUARD_BITS) >= form.current_limit
             assert (total > 0) == (signs[0] > 0)
 
@@ -106,6 +118,30 @@ def check_current(form: ControlForm) -> None:
 def test_nothing_overflows(number: int) -> None:
     check_observer(SPECS[number].form)
     check_current(SPECS[number].form)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_nothing_overflows_with_gains_as_inputs(seed: int) -> None:
+    """Whatever the gains are; and with a sixteenth of that of the position, holding its error changes no current."""
+    form = random_spec(seed, "inputs").form
+    rng = np.random.default_rng(seed + 100)
+    some = {term: int(rng.choice([0, form.most_gain, int(rng.integers(form.most_gain))])) for term in GAINS}
+    greatest = dict.fromkeys(GAINS, form.most_gain)
+    for raw in (some, greatest):
+        check_observer(with_gains(form, raw))
+        check_current(with_gains(form, raw), held=False)
+    check_current(with_gains(form, form.reset_gains | {Term.POSITION: -(-form.reset_gains[Term.POSITION] >> 4)}))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_gains_of_the_options(seed: int) -> None:
+    """A gain is that of the option to half an LSB, and can be 16 times it."""
+    spec = random_spec(seed, "inputs")
+    nominal = {Term.POSITION: spec.position_gain, Term.VELOCITY: spec.velocity_gain}
+    for term, raw in spec.form.reset_gains.items():
+        lsb, wanted = gain_per_lsb(spec, term), nominal.get(term, Fraction(1))
+        assert abs(raw * lsb - wanted) <= lsb / 2
+        assert spec.form.most_gain * lsb > 15.9 * wanted
 
 
 @pytest.mark.parametrize(

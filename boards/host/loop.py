@@ -1,0 +1,115 @@
+"""A client of a core with a control loop: its commands and gains, in their units."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tachometry.boards.host.client import Client, Read, Write
+
+_GENERATOR = {
+    "velocity": "counts_per_tick_per_lsb",
+    "acceleration": "counts_per_tick2_per_lsb",
+    "amplitude": "counts_per_lsb",
+    "rate": "per_lsb",
+}
+_COMMANDS = {
+    "command_position": "counts_per_lsb",
+    "command_velocity": "rad_per_s_per_lsb",
+    "command_acceleration": "rad_per_s2_per_lsb",
+}
+
+
+class LoopClient(Client):
+    """A core with a control loop on a bus.
+
+    Parameters
+    ----------
+    read, write, manifest
+        See `Client`.
+
+    Raises
+    ------
+    ValueError
+        If the manifest is that of a core without registers or without a loop.
+    WrongBoard
+        If what answers is not the core of the manifest.
+    """
+
+    def __init__(self, read: Read, write: Write, manifest: Mapping[str, Any]) -> None:
+        if "loop" not in manifest:
+            raise ValueError("manifest must be that of a core with a control loop, which --loop makes")
+        super().__init__(read, write, manifest)
+        fields = [(one["name"], field) for one in manifest["registers"]["map"] for field in one["fields"]]
+        # Registers of each setting, the lowest word first.
+        self._parts: dict[str, list[tuple[str, Mapping[str, Any]]]] = {}
+        for name, field in fields:
+            if field["access"] == "rw" and field["port"] and name != "LOOP":
+                self._parts.setdefault(field["port"], []).append((name, field))
+        self._scales = {name: scale for name, scale in _scales(manifest["loop"]) if name in self._parts}
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Names that `set` takes."""
+        return tuple(self._scales)
+
+    def raw(self, name: str, value: float) -> int:
+        """What stands in the registers for a value.
+
+        Raises
+        ------
+        KeyError
+            If there is no such setting.
+        ValueError
+            If it does not fit.
+        """
+        lsb, (_, upper) = self._scales[name], self._parts[name][-1]
+        raw, shift = round(value / lsb), upper["shift"]
+        width = upper["width"]
+        least, most = (-(1 << width - 1), (1 << width - 1) - 1) if upper["signed"] else (0, (1 << width) - 1)
+        if "most" in upper:
+            least, most = upper["least"], upper["most"]
+        elif upper["port_width"] < width + shift:
+            most = (1 << upper["port_width"] - shift - 1) - 1
+            least = -most - 1
+        if not least << shift <= raw < (most + 1) << shift:
+            raise ValueError(
+                f"{name} must be from {(least << shift) * lsb:.9g} to {((most + 1 << shift) - 1) * lsb:.9g}, "
+                f"not {value:.9g}"
+            )
+        return raw
+
+    def set(self, *, mode: int | None = None, **values: float) -> None:
+        """Write settings that the loop takes at once, with its next control tick; `mode` is that of the generator.
+
+        Raises
+        ------
+        KeyError
+            If there is no such setting.
+        ValueError
+            If one does not fit; then none is written.
+        """
+        raws = {name: self.raw(name, value) for name, value in values.items()}
+        frozen = {"freeze": 1}
+        done = {"freeze": 0} | ({} if mode is None else {"mode": mode})
+        word = self._word("LOOP")
+        loop = self.registers.offset("LOOP")
+        after = self.registers.with_fields("LOOP", word, done)
+        self._write(loop, self.registers.with_fields("LOOP", word, frozen))
+        for name, raw in raws.items():
+            for register, field in self._parts[name]:
+                self._write(self.registers.offset(register), raw >> field["shift"] & self.registers.word_mask)
+        self._write(loop, after)
+
+    def enable(self, on: bool) -> None:
+        """Let the loop command a current, if the input `enable` is high, too."""
+        word = self.registers.with_fields("LOOP", self._word("LOOP"), {"enable": int(on)})
+        self._write(self.registers.offset("LOOP"), word)
+
+
+def _scales(loop: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """What one LSB of each setting is."""
+    for name, gain in loop["gains"].items():
+        yield name, gain["per_lsb"]
+    for name, key in _COMMANDS.items():
+        yield name, loop[name][key]
+    for name, key in _GENERATOR.items() if "generator" in loop else ():
+        yield f"generator_{name}", loop["generator"][name][key]

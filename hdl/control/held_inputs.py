@@ -1,0 +1,47 @@
+"""Inputs that change only between two programs."""
+
+from collections.abc import Iterable
+
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.ports import members
+from tachometry.spec.port import Port
+
+
+class HeldInputs(wiring.Component):
+    """Takes all inputs together in the clock before a control tick, unless they are frozen.
+
+    Parameters
+    ----------
+    ports : iterable of Port
+
+    Members
+    -------
+    coming : In(1)
+        A control tick is in the next clock.
+    freeze : In(1)
+    given_… : In
+        One for each port.
+    … : Out
+        What was taken, by the names of the ports.
+    """
+
+    def __init__(self, ports: Iterable[Port]) -> None:
+        self._ports = tuple(ports)
+        shapes = {name: member.shape for name, member in members(self._ports).items()}
+        super().__init__(
+            {
+                "coming": In(1),
+                "freeze": In(1),
+                **{f"given_{name}": In(shape) for name, shape in shapes.items()},
+                **{name: Out(shape) for name, shape in shapes.items()},
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        with m.If(self.coming & ~self.freeze):
+            m.d.sync += [getattr(self, port.name).eq(getattr(self, f"given_{port.name}")) for port in self._ports]
+        return m

@@ -1,0 +1,130 @@
+"""Golden command generator: constant speeds, ramps and sines, control tick by control tick, in exact integers."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from tachometry.spec.control.generator import FACTOR_BITS, RAMP, SINE, GeneratorForm, Scale
+
+
+@dataclass(frozen=True)
+class Command:
+    """What is commanded in a control tick, in LSB of the ports.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : int
+    enable : bool
+    """
+
+    position: int = 0
+    velocity: int = 0
+    acceleration: int = 0
+    enable: bool = True
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What the generator is told in a control tick, in LSB of the ports.
+
+    Parameters
+    ----------
+    mode, velocity, acceleration, amplitude, rate : int
+    enable : bool
+    """
+
+    mode: int = 0
+    velocity: int = 0
+    acceleration: int = 0
+    amplitude: int = 0
+    rate: int = 0
+    enable: bool = True
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains and limit of a control tick, in LSB of the ports.
+
+    Parameters
+    ----------
+    position, velocity, acceleration, disturbance, limit : int
+    """
+
+    position: int
+    velocity: int
+    acceleration: int
+    disturbance: int
+    limit: int
+
+
+def _product(word: int, factor: int) -> int:
+    return (word * factor + (1 << (FACTOR_BITS - 1))) >> FACTOR_BITS
+
+
+def _held(value: int, most: int) -> int:
+    return max(-most, min(value, most))
+
+
+class Generator:
+    """The state of a generator between two control ticks.
+
+    Parameters
+    ----------
+    form : GeneratorForm
+
+    Attributes
+    ----------
+    place, speed, change : int
+        In 2^−F counts, counts per control tick, and counts per control tick squared; the place does not wrap.
+    toward : int
+        The way to the middle of the sine.
+    """
+
+    def __init__(self, form: GeneratorForm) -> None:
+        self._form = form
+        self.place = self.speed = self.change = self.toward = 0
+        self._swings = False
+
+    def command(self, enable: bool = True) -> Command:
+        """What is commanded."""
+        form = self._form
+        wide = form.place_width
+        place = (self.place + (1 << (wide - 1))) % (1 << wide) - (1 << (wide - 1))
+        return Command(
+            place >> form.amplitude_shift,
+            self._shown(self.speed, form.velocity, form.command_width),
+            self._shown(self.change, form.acceleration, form.acceleration_width),
+            enable,
+        )
+
+    def _shown(self, value: int, scale: Scale, width: int) -> int:
+        word = value >> scale.shift if scale.shift >= 0 else value << -scale.shift
+        return _held(_product(word, scale.factor), (1 << (width - 1)) - 1)
+
+    def tick(self, position: int, demand: Demand) -> None:
+        """A control tick at a position, in counts: on to the next."""
+        form = self._form
+        if not demand.enable:
+            self.place, self.speed, self.change, self._swings = position << form.fraction, 0, 0, False
+            return
+        sine = demand.mode >= SINE
+        if sine and self._swings:
+            self.change = _product(self.toward >> form.away_shift, demand.rate)
+        else:
+            self.change = (0 if sine else demand.velocity << form.velocity_shift) - self.speed
+            self.toward = demand.amplitude << form.amplitude_shift
+            if demand.mode == RAMP:
+                self.change = _held(self.change, demand.acceleration)
+        self._swings = sine
+        self.speed = _held(self.speed + self.change, form.most_velocity)
+        self.place += self.speed
+        self.toward = _held(self.toward - self.speed, form.most_away)
+
+
+def generated(form: GeneratorForm, positions: Iterable[int], demands: Iterable[Demand]) -> list[Command]:
+    """What is commanded in each control tick, from the positions and demands in them."""
+    generator = Generator(form)
+    found = []
+    for position, demand in zip(positions, demands, strict=True):
+        found.append(generator.command(demand.enable))
+        generator.tick(position, demand)
+    return found

@@ -1,0 +1,142 @@
+"""Registers of a core with a control loop: those of its tachometer, what the loop shows, its commands and gains."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from tachometry.spec.axes import AxesSpec
+from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.control.form import GAINS
+from tachometry.spec.control.ports import CONTROL, CURRENT, GAIN_PORTS, loop_entries
+from tachometry.spec.option import ParameterError
+from tachometry.spec.port import Port
+from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
+
+_MODE, _POSITION = "generator_mode", "command_position"
+_WORDS = ((0, "_LOW", "Lower word. "), (WORD, "_HIGH", "Upper word. "))
+
+
+@dataclass(frozen=True)
+class LoopMap(RegisterMap):
+    """All registers of a core with a control loop.
+
+    What is written is taken with all else in the clock before a control tick, unless LOOP.freeze is set. A value that
+    does not fit is held at the nearest that does, but a position wraps.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    loop : LoopSpec
+
+    Raises
+    ------
+    ParameterError
+        If the gains of the loop are fixed.
+    """
+
+    loop: LoopSpec
+
+    def __post_init__(self) -> None:
+        if self.loop.gains != "inputs":
+            raise ParameterError("gains", "must be inputs with a bus, which makes them registers, not fixed")
+
+    @property
+    def core(self) -> LoopSpec:
+        """See `RegisterMap.core`."""
+        return self.loop
+
+    @cached_property
+    def core_ports(self) -> tuple[Port, ...]:
+        """See `RegisterMap.core_ports`: `enable` stays, as no program is to be needed to switch a drive off."""
+        written = {field.port for field in self.settings}
+        return tuple(port for port in self.loop.ports if port.name not in written)
+
+    @cached_property
+    def ports(self) -> tuple[Port, ...]:
+        """See `RegisterMap.ports`."""
+        shown = (port for port in self.loop.outputs if port.held_by in (CONTROL, CURRENT) and not port.is_strobe)
+        return (*super().ports, *shown)
+
+    @property
+    def quantities(self) -> tuple[tuple[str, float, str], ...]:
+        """See `RegisterMap.quantities`."""
+        entries = loop_entries(self.loop)
+        units = {
+            "current": ("amperes_per_lsb", "AMPERES_PER_LSB", "A"),
+            "command_position": ("counts_per_lsb", "COUNTS_PER_LSB", "counts"),
+            "command_velocity": ("rad_per_s_per_lsb", "RAD_PER_S_PER_LSB", "rad/s"),
+            "command_acceleration": ("rad_per_s2_per_lsb", "RAD_PER_S2_PER_LSB", "rad/s²"),
+            "filtered_velocity": ("rad_per_s_per_lsb", "RAD_PER_S_PER_LSB", "rad/s"),
+            "disturbance": ("torque_per_lsb", "TORQUE_PER_LSB", "Nm"),
+        }
+        found = [
+            (f"{name.upper()}_{macro}", entries[name][key], f"One LSB of {name} in {unit}.")
+            for name, (key, macro, unit) in units.items()
+        ]
+        for name, gain in entries["gains"].items():
+            found.append(
+                (f"{name.upper()}_PER_LSB", gain["per_lsb"], f"One LSB of {name}; the unit is {gain['unit']}.")
+            )
+        return tuple(found)
+
+    def _added(self) -> Iterable[Draft]:
+        inputs = {port.name: port for port in self.loop.held_inputs}
+        enable = "The current is 0 unless this is set and the input `enable` is high in the clock of a control tick."
+        freeze = "Commands, gains and limit stay as they were, so that several can be written and taken at once."
+        fields = [
+            Field("enable", 1, 0, enable, writable=True, port="loop_enable"),
+            Field("freeze", 1, 1, freeze, writable=True, port="freeze"),
+        ]
+        if mode := inputs.pop(_MODE, None):
+            fields.append(Field("mode", mode.width, 4, mode.help, writable=True, port=mode.name))
+        yield "LOOP", "What the control loop does.", tuple(fields), {}
+        for port in inputs.values():
+            if port.width <= WORD:
+                yield port.name.upper(), port.help, (self._whole(port),), {}
+                continue
+            for shift, end, which in _WORDS:
+                yield f"{port.name.upper()}{end}", f"{which}{port.help}", (self._part(port, shift),), {}
+
+    def _reset(self, port: Port) -> int:
+        form = self.loop.form
+        if port.name == "current_limit":
+            return form.current_limit
+        gains = {GAIN_PORTS[term]: form.reset_gains[term] for term in GAINS}
+        return gains.get(port.name, 0)
+
+    def _whole(self, port: Port) -> Field:
+        """A port of a word or less."""
+        field = replace(_field(port), bits=port.width, signed=port.signed, reset=self._reset(port))
+        if port.name == "current_limit":
+            return replace(field, least=0, most=self.loop.form.current_limit)
+        return field if port.width == WORD else _ranged(field)
+
+    def _part(self, port: Port, shift: int) -> Field:
+        """A word of a port of two."""
+        if not shift:
+            return _field(port)
+        upper = replace(_field(port), shift=shift, bits=port.width - WORD, signed=port.signed)
+        return upper if port.name == _POSITION else _ranged(upper)
+
+
+def _field(port: Port) -> Field:
+    return Field("value", WORD, 0, port.help, writable=True, unit=port.unit, port=port.name)
+
+
+def _ranged(field: Field) -> Field:
+    """What is written is held within what there are bits for."""
+    most = (1 << (field.kept - field.signed)) - 1
+    return replace(field, least=-most - 1 if field.signed else 0, most=most)
+
+
+def registers_of(spec: AnySpec) -> RegisterMap:
+    """All registers of a core.
+
+    Raises
+    ------
+    ParameterError
+        If it can have none.
+    """
+    if isinstance(spec, AxesSpec):
+        raise ParameterError("bus", "must not be given together with axes: registers and targets are for one axis")
+    return LoopMap(spec.tachometer, spec) if isinstance(spec, LoopSpec) else RegisterMap(spec)

@@ -1,0 +1,81 @@
+"""The command generator against the golden one, with demands at random."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support.control import GENERATED, random_demands
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.control import command_generator
+from tachometry.hdl.control.command_generator import CommandGenerator
+from tachometry.sim.golden.command_generator import Demand, generated
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.control.generator import AMPLITUDE_WIDTH, SINE, WORD, generator_clocks
+
+COMMANDS = ("command_position", "command_velocity", "command_acceleration")
+
+
+def check(spec: LoopSpec, n_ticks: int, seed: int = 1, *, fast: bool = False) -> None:
+    """Hold a generator against the golden one, with ticks as close as they may be, or not.
+
+    If it is `fast`, it has no bound of the velocity that would keep a sine from its greatest way.
+    """
+    form = replace(spec.generator, velocity_bits=58, velocity_shift=27) if fast else spec.generator
+    rng = np.random.default_rng(seed)
+    given = {name.removeprefix("generator_"): values for name, values in random_demands(spec, rng, n_ticks).items()}
+    if fast:  # it leaves the middle of the greatest sine at its greatest velocity
+        given["mode"][:60] = SINE
+        given["amplitude"][:60] = -1 << (AMPLITUDE_WIDTH - 1)
+        given["rate"][:60] = np.where(abs(np.arange(60) - 32) > 17, (1 << WORD) - 1, 0)
+    given["enable"] = ((rng.random(n_ticks) < 0.93) | (fast & (np.arange(n_ticks) < 60))).astype(np.int64)
+    turn = 1 << (spec.tachometer.position_width - 1)
+    position = rng.integers(-turn, turn, n_ticks)
+    clock = 2 + np.cumsum(generator_clocks(spec.multiplier) + rng.integers(0, 2, n_ticks))
+    rows: list[dict[str, int]] = [{"tick": 0, "position": 1, **dict.fromkeys(given, 0)} for _ in range(clock[-1] + 1)]
+    for k, at in enumerate(clock.tolist()):
+        rows[at] |= {"tick": 1, "position": int(position[k]), **{name: int(given[name][k]) for name in given}}
+    demands = [Demand(*values) for values in zip(*(column.tolist() for column in given.values()), strict=True)]
+    wanted = generated(form, position.tolist(), demands)
+    box = command_generator.CommandGenerator(form, spec.multiplier)
+    seen = [row for row, told in zip(clock_by_clock(box, rows, COMMANDS), rows, strict=True) if told["tick"]]
+    assert [tuple(row[name] for name in COMMANDS) for row in seen] == [
+        (one.position, one.velocity, one.acceleration) for one in wanted
+    ]
+
+
+def test_as_the_golden_model() -> None:
+    check(GENERATED, 600)
+    check(GENERATED, 80, fast=True)
+
+
+def test_with_a_serial_multiplier() -> None:
+    """And with other units."""
+    tachometer = replace(GENERATED.tachometer, unit="rad/s", frac_bits=4)
+    check(replace(GENERATED, multiplier="serial", period=320, tachometer=tachometer), 100)
+
+
+MUTANTS: dict[str, tuple[Any, str, str]] = {
+    "a sine goes on from the one before": (CommandGenerator, "swings.eq(sine & self.enable)", "swings.eq(sine)"),
+    "a sine begins in its middle": (CommandGenerator, "toward.eq(self.amplitude", "toward.eq(0 & self.amplitude"),
+    "every step is one of a sine": (CommandGenerator, "swinging.eq(sine & swings & self.enable)", "swinging.eq(sine)"),
+    "a sine from its middle outward": (CommandGenerator, "change.eq(product.product)", "change.eq(-product.product)"),
+    "a ramp without a bound": (CommandGenerator, "ramp & above", "ramp & 0"),
+    "a ramp downward without a bound": (CommandGenerator, "ramp & below", "ramp & 0"),
+    "ramps only": (CommandGenerator, "ramp.eq(self.mode == RAMP)", "ramp.eq(1)"),
+    "disabled, the position is not that of the shaft": (CommandGenerator, "place.eq(self.position", "place.eq(0"),
+    "disabled, it moves": (CommandGenerator, "speed.eq(0)]", "speed.eq(speed)]"),
+    "the velocity wraps": (CommandGenerator, "speed.eq(held)", "speed.eq(moved)"),
+    "the way to the middle wraps": (CommandGenerator, "toward.eq(held)", "toward.eq(gone)"),
+    "the position follows the change": (CommandGenerator, "place.eq(place + speed)", "place.eq(place + change)"),
+    "a command wraps": (CommandGenerator, "command.eq(held)", "command.eq(product.product)"),
+    "the bound of the latest clock": (CommandGenerator, "bound.eq(self.acceleration)", "bound.eq(bound)"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(*MUTANTS[name]), caught():
+        check(GENERATED, 300, fast=name == "the way to the middle wraps")

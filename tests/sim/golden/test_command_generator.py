@@ -1,0 +1,110 @@
+"""The golden command generator against what a shaft would do, in double precision."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+
+from tachometry.sim.golden import command_generator
+from tachometry.sim.golden.command_generator import Demand
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.control.generator import CONSTANT, RAMP, RATE_FRAC_BITS, SINE, GeneratorForm
+
+CORE = STachometer(
+    encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
+)
+SPEC = LoopSpec(tachometer=CORE, velocity_gain=Fraction(80), command="generator")
+FORM = SPEC.generator
+
+
+def states(form: GeneratorForm, demands: list[Demand], position: int = 0) -> np.ndarray:
+    """Place, speed and change in each control tick, in counts and control ticks."""
+    generator = command_generator.Generator(form)
+    found = []
+    for demand in [Demand(enable=False), *demands]:
+        generator.tick(position, demand)
+        found.append((generator.place, generator.speed, generator.change))
+    return np.array(found, dtype=np.int64)
+
+
+def check_sine(hertz: float, amplitude: float, n: int) -> None:
+    """A sine is one for ever, and place and speed are sums, in every bit."""
+    turn = math.pi * hertz * float(SPEC.seconds)
+    rate = round(4 * math.sin(turn) ** 2 * 2**RATE_FRAC_BITS)
+    angle = 2 * math.asin(math.sqrt(rate / 2**RATE_FRAC_BITS) / 2)
+    found = states(FORM, [Demand(SINE, amplitude=round(amplitude * 256), rate=rate)] * n, 7)
+    place, speed, change = found.T
+    assert np.array_equal(np.diff(place), speed[1:])
+    assert np.array_equal(np.diff(speed), change[1:])
+    # It begins with the second of these, for which there is no step.
+    k = np.arange(n)
+    wanted = 7 + amplitude * (1 - np.cos((k + 0.5) * angle) / math.cos(angle / 2))
+    assert np.abs(place[1:] / 2**FORM.fraction - wanted).max() < 1e-5 * abs(amplitude)
+
+
+@pytest.mark.parametrize(("hertz", "amplitude"), [(2, 1000), (40, -3.5), (900, 20)])
+def test_a_sine(hertz: float, amplitude: float) -> None:
+    check_sine(hertz, amplitude, 30_000)
+
+
+def check_ramp() -> None:
+    """It takes as long as it must, and goes no faster."""
+    wanted = 3 << 22
+    demands = [Demand(RAMP, wanted, 1 << 24)] * 300 + [Demand(CONSTANT, -wanted)] * 2 + [Demand(RAMP, 5, 1 << 25)] * 200
+    _, speed, change = states(FORM, demands).T
+    target = wanted << FORM.velocity_shift
+    steps = -(-target // (1 << 24))
+    assert (change[1:steps] == 1 << 24).all()
+    assert speed[min(steps, 300)] == min(target, 300 << 24)
+    assert speed[301] == -target
+    assert change[301] == -target - speed[300]
+    assert change[303] == min(1 << 25, (5 << FORM.velocity_shift) + target)
+
+
+def test_a_ramp() -> None:
+    check_ramp()
+
+
+def test_the_commands_are_in_the_units_of_the_ports() -> None:
+    """To half an LSB, and a sixteenth."""
+    count = 2 * math.pi / CORE.encoder.counts_per_rev
+    tick, velocity = float(SPEC.seconds), float(SPEC.rad_per_s / (1 << SPEC.command_bits))
+    generator = command_generator.Generator(FORM)
+    for raw in (123_456_789, -1_000_000_007, 3):
+        generator.tick(0, Demand(RAMP, raw, 1 << 30))
+        command = generator.command()
+        speed = generator.speed / 2**FORM.fraction * count / tick / velocity
+        assert command.velocity == pytest.approx(speed, abs=0.57)
+        change = generator.change / 2**FORM.fraction * count / tick**2 * 2.0**SPEC.acceleration_frac_bits
+        assert command.acceleration == pytest.approx(np.clip(change, -(1 << 19), 1 << 19), abs=1.1)
+
+
+def test_nothing_overflows() -> None:
+    """The fastest sine of the greatest amplitude stays within the bounds of the velocity."""
+    form = replace(FORM, velocity_bits=40, velocity_shift=9)
+    demands = [Demand(SINE, amplitude=-1 << 27, rate=(1 << 32) - 1)] * 100 + [Demand(SINE, rate=0)] * 5
+    _, speed, _ = states(form, demands).T
+    assert np.abs(speed).max() == form.most_velocity
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("self.change = _product(self.toward", "self.change = 2 * _product(self.toward"),
+        ("self.toward - self.speed", "self.toward - self.speed // 2"),
+        ("= demand.amplitude << form", "= -demand.amplitude << form"),
+    ],
+)
+def test_mutants_of_a_sine_are_caught(right: str, wrong: str) -> None:
+    with mutant(command_generator.Generator, right, wrong), caught():
+        check_sine(40, -3.5, 2000)
+
+
+def test_a_ramp_without_a_bound_is_caught() -> None:
+    right = "self.change = _held(self.change, demand.acceleration)"
+    with mutant(command_generator.Generator, right, "pass"), caught():
+        check_ramp()
