@@ -60,6 +60,11 @@ class RegisterCore(wiring.Component):
         names = {port.name for port in self._map.ports} - {*_OTHERWISE}
         same = [*(port.name for port in spec.outputs if port.name in names), *spec.strobes]
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
+        written = {field.port for field in self._map.settings}
+        for pin in self._map.core.pins:
+            given = getattr(bank if pin.name in written else self, pin.name)
+            switched = given & bank.loop_enable if pin.name == "enable" else given
+            m.d.comb += getattr(whole, pin.name).eq(switched)
         m.d.comb += [
             *(getattr(self, port.name).eq(getattr(whole, port.name)) for port in self._map.core.outputs),
             *(getattr(bank, name).eq(getattr(whole, name)) for name in same),
@@ -71,11 +76,6 @@ class RegisterCore(wiring.Component):
         ]
         if self.loop is not None:
             self._keep(m, self.loop)
-        written = {field.port for field in self._map.settings}
-        for pin in self._map.core.pins:
-            given = getattr(bank if pin.name in written else self, pin.name)
-            switched = given & bank.loop_enable if pin.name == "enable" else given
-            m.d.comb += getattr(whole, pin.name).eq(switched)
         if core.update_age is not None:
             m.d.comb += bank.age.eq(core.update_age.after)
         if open_sum is not None:

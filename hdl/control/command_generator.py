@@ -1,6 +1,6 @@
 """Commands that the core makes itself: constant speeds, ramps and sines."""
 
-from amaranth import Module, Mux, Signal, Value, signed
+from amaranth import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -81,8 +81,11 @@ class CommandGenerator(wiring.Component):
         bound = Signal(WORD, reset_less=True)
         # Which of the products: of the way to the middle, of the velocity, of the acceleration.
         stage = Signal(2)
+        # One after the other, behind the first product.
         move = Signal()
+        settle = Signal()
         follow = Signal()
+        close = Signal()
         again = Signal()
         box = SerialProduct if self._multiplier == "serial" else ParallelProduct
         m.submodules.product = product = box(form.word_width, FACTOR_BITS)
@@ -112,7 +115,8 @@ class CommandGenerator(wiring.Component):
         done = product.done
         with m.If(done):
             m.d.sync += stage.eq(Mux(stage == 2, 0, stage + 1))
-        m.d.sync += [move.eq(done & (stage == 0)), follow.eq(move), again.eq(move | (done & (stage == 1)))]
+        m.d.sync += [move.eq(done & (stage == 0)), settle.eq(move), follow.eq(settle), close.eq(follow)]
+        m.d.sync += again.eq(settle | (done & (stage == 1)))
         # Compared while the product is made.
         above = Signal()
         below = Signal()
@@ -124,15 +128,18 @@ class CommandGenerator(wiring.Component):
                 m.d.sync += change.eq(bound)
             with m.Elif(ramp & below):
                 m.d.sync += change.eq(-bound)
-        moved = Signal(signed(form.change_width + 1))
-        gone = Signal(signed(len(toward) + 1))
-        m.d.comb += [moved.eq(speed + change), gone.eq(toward - speed)]
-        held, _ = saturate(m, moved, form.most_velocity)
-        with m.If(move):
+        # One adder: the velocity and its change, then the way to the middle less the velocity; and the carry of a less.
+        total = Signal(signed(max(form.change_width, len(toward)) + 1), reset_less=True)
+        augend, addend = Mux(follow, toward, speed), Mux(follow, ~speed, change)
+        m.d.sync += total.eq((Cat(follow, augend).as_signed() + Cat(follow, addend).as_signed()) >> 1)
+        held, _ = saturate(m, total, form.most_velocity)
+        with m.If(settle):
             m.d.sync += speed.eq(held)
-        held, _ = saturate(m, gone, form.most_away)
         with m.If(follow):
-            m.d.sync += [place.eq(place + speed), toward.eq(held)]
+            m.d.sync += place.eq(place + speed)
+        held, _ = saturate(m, total, form.most_away)
+        with m.If(close):
+            m.d.sync += toward.eq(held)
         for number, command in enumerate((self.command_velocity, self.command_acceleration), 1):
             held, _ = saturate(m, product.product, (1 << (len(command) - 1)) - 1)
             with m.If(done & (stage == number)):

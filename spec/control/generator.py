@@ -41,7 +41,7 @@ FACTOR_BITS = 32  # of every product
 MOST_FRACTION = 36
 _SCALE_BITS = 28  # of the factor of a scale
 # Clocks of the three products and of what is between them.
-_SERIAL, _PARALLEL = 3 * (FACTOR_BITS + 1) + 4, 3 * 3 + 4
+_SERIAL, _PARALLEL = 3 * (FACTOR_BITS + 1) + 5, 3 * 3 + 5
 
 
 @dataclass(frozen=True)

@@ -285,6 +285,5 @@ MUTANTS = [
         "form.current_limit, form.current_limit, self.current_limit)",
         "form.current_limit, self.current_limit, self.current_limit)",
     ),
-    Mutant("control loop, any gains", "pc_total", Controller, "GAIN_PORTS[one])", "GAIN_PORTS[Term.VELOCITY])", 32),
     Mutant("control loop", "pc_n", UpdateWindow, "self.n + 1", "self.n + 2", 52),
 ]

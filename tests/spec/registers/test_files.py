@@ -15,11 +15,13 @@ from support.rdl import read_rdl
 from tachometry.boards.host.client import Client
 from tachometry.hdl import export
 from tachometry.spec import METHODS, TachometerSpec, of_texts
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.manifest import manifest
 from tachometry.spec.provenance import LICENSE, generator
 from tachometry.spec.registers.c_driver import c_driver
 from tachometry.spec.registers.c_header import c_header
 from tachometry.spec.registers.files import REGISTER_FILES, register_files
+from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import Register, RegisterMap
 from tachometry.spec.registers.page import page
 from tachometry.spec.registers.rdl import rdl
@@ -183,6 +185,15 @@ def test_every_register_and_field_is_there(text: str, method: str, tmp_path: Pat
     make, check = TEXTS[text]
     for registers in maps(method):
         check(registers, make(registers, "spindle"), tmp_path)
+
+
+@pytest.mark.parametrize("command", ["ports", "generator"])
+@pytest.mark.parametrize("text", ["RDL", "header", "page"])
+def test_every_register_of_a_control_loop_is_there(text: str, command: str, tmp_path: Path) -> None:
+    make, check = TEXTS[text]
+    core = of_texts("s", BASE | {"max-speed": "500rad/s"})
+    spec = LoopSpec(tachometer=core, gains="inputs", command=command, multiplier="parallel")
+    check(registers_of(spec), make(registers_of(spec), "spindle"), tmp_path)
 
 
 def test_the_configurations_have_all_kinds() -> None:
