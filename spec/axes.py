@@ -200,6 +200,17 @@ class AxesSpec(HasPorts):
         return COUNT_LATENCY + 1 + self.parallel
 
     @property
+    def recovery_clocks(self) -> int:
+        """Clocks after which, from any state, all outputs are right again; position aside. See `TachometerSpec`.
+
+        Each axis is a core of its own whose clock is a round. Before that the slots go on to the end of their register,
+        and turns that have begun end; after it each axis has its turn.
+        """
+        own = self.axis.recovery_clocks
+        assert own is not None  # there is no low-pass filter
+        return own * self.slots + (1 << (self.slots - 1).bit_length()) + 2 * self.longest_tick
+
+    @property
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order."""
         return (*self._inputs(), *self._strobed(), *(self._held() if self.parallel else ()))

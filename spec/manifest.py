@@ -129,7 +129,6 @@ def _of_axes(spec: AxesSpec, name: str) -> dict[str, Any]:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     alone, axis = spec.tachometer, spec.axis
     found = manifest(alone, name)
-    del found["recovery_cycles"]
     of_velocity = {
         "width": axis.velocity_width,
         "full_scale": axis.full_scale * 2.0**-axis.frac_bits,
@@ -137,6 +136,7 @@ def _of_axes(spec: AxesSpec, name: str) -> dict[str, Any]:
     }
     return found | {
         "velocity": found["velocity"] | of_velocity,
+        "recovery_cycles": spec.recovery_clocks,
         "axes": {
             "axes": spec.axes,
             "parallel": spec.parallel,

@@ -84,6 +84,15 @@ def test_manifest() -> None:
         manifest(spec_of(5, parallel=True), "position_4")
 
 
+def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
+    """In rounds; and two ticks and a round for what all axes share."""
+    for spec in (spec_of(), spec_of(3, tick=1000)):
+        own = spec.axis.recovery_clocks
+        assert own is not None
+        shared = 2 * spec.timing.tick_cycles + {8: 8, 4: 4}[spec.slots]
+        assert spec.recovery_clocks == manifest(spec, "t")["recovery_cycles"] == spec.slots * own + shared
+
+
 @pytest.mark.parametrize(
     ("axes", "options", "told"),
     [

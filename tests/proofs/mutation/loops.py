@@ -76,7 +76,7 @@ class LoopCase(Case):
         pins, traces, starts = list[NDArray[np.uint64]](), list[Commanded](), list[int]()
         done = 0
         spec = self.spec
-        program = [spec.first_tick + 2 * spec.period + clock for clock in range(spec.period)]
+        program = [spec.first_tick + 2 * spec.period + clock for clock in range(spec.period)] * 3
         while done < n_clocks:
             if program and rng.random() < _OFTEN:
                 trace, resets = noise(spec.tachometer, rng, program.pop(), 3), 1

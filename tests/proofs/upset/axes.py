@@ -57,21 +57,11 @@ def _dense(spec: AxesSpec, run: Run, first: int) -> NDArray[np.int64]:
     return found
 
 
-def _bound(spec: AxesSpec) -> int:
-    """Clocks after which all is right: each axis is a core of its own, whose clock is a round.
-
-    The slots go on to the end of their register first, and each axis has its turn once more.
-    """
-    own = spec.axis.recovery_clocks
-    assert own is not None
-    return own * spec.slots + (1 << (spec.slots - 1).bit_length()) + 2 * spec.longest_tick
-
-
 def upsets(n: int, seed: int = 1, only: str = "") -> Campaign:
     """See `campaign.upsets`."""
     spec, trace = SPEC, _trace(SPEC, seed)
     core = Upsettable(spec, trace)
-    bound = _bound(spec)
+    bound = spec.recovery_clocks
     ports = [port.name for port in spec.outputs]
     columns = [(ports.index(name), ports.index(strobe)) for name, strobe in _columns(spec)]
     compared, strobes = (np.array(places) for places in zip(*columns, strict=True))
