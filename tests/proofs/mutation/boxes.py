@@ -12,6 +12,7 @@ from amaranth.lib import wiring
 from numpy.typing import NDArray
 from proofs.mutation.axes import AXES
 from proofs.mutation.cases import Case, Pins
+from proofs.mutation.commands import COMMANDS
 from proofs.mutation.loops import LOOPS
 from proofs.mutation.stimulus import Stimulus, noise_lines, stimulus
 from support.serial import SpiHost, UartHost
@@ -280,4 +281,5 @@ BOXES: list[Case] = [
     Box("telemetry", _SPEC, 60, bus="uart", demo=True, lines=_settings, sources="hdl/bus/telemetry.py*"),
     *AXES,
     *LOOPS,
+    *COMMANDS,
 ]

@@ -1,0 +1,99 @@
+"""The command generator, mutated: demands of all sizes, some of which stay, at ticks as close as they may be or not."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+from proofs.mutation.cases import Case, Pins
+from proofs.mutation.stimulus import Stimulus
+from support.control import GENERATED, random_demands
+
+from tachometry.hdl.control.command_generator import CommandGenerator
+from tachometry.spec import Port
+from tachometry.spec.control.generator import generator_clocks
+
+_COMMANDS = ("command_position", "command_velocity", "command_acceleration")
+
+
+class Shown(wiring.Component):
+    """A generator whose commands are shown as they are with a tick, since only then they are read."""
+
+    def __init__(self) -> None:
+        self.box = CommandGenerator(GENERATED.generator, GENERATED.multiplier)
+        members = self.box.signature.members
+        self.names = [name for name in members if members[name].flow == In]
+        super().__init__(
+            {name: In(members[name].shape) for name in self.names}
+            | {name: Out(members[name].shape) for name in _COMMANDS}
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.box = self.box
+        m.d.comb += [getattr(self.box, name).eq(getattr(self, name)) for name in self.names]
+        with m.If(self.tick):
+            m.d.sync += [getattr(self, name).eq(getattr(self.box, name)) for name in _COMMANDS]
+        return m
+
+
+@cache
+def _shown() -> Shown:
+    return Shown()
+
+
+@dataclass(frozen=True)
+class GeneratorCase(Case):
+    """The command generator alone."""
+
+    selection = "a:src=*hdl/control/* t:* %i"
+
+    @property
+    def group(self) -> str:
+        """Which row of the last table."""
+        return "loop"
+
+    @property
+    def component(self) -> wiring.Component:
+        """The generator."""
+        return _shown()
+
+    @property
+    def pins(self) -> Pins:
+        """Ports of the box."""
+        ports: dict[str, list[Port]] = {"input": [Port("rst", "input", 1)], "output": []}
+        box = _shown()
+        for name, member in box.signature.members.items():
+            direction = "input" if member.flow == In else "output"
+            ports[direction].append(Port(name, direction, len(getattr(box, name))))
+        return Pins(tuple(ports["input"]), tuple(ports["output"]))
+
+    def play(self, n_clocks: int) -> Stimulus:
+        """Ticks and demands, with a reset now and then."""
+        rng = np.random.default_rng(1)
+        least = generator_clocks(GENERATED.multiplier)
+        tick = np.cumsum(least + rng.integers(0, 2, n_clocks // least))
+        tick = tick[tick < n_clocks]
+        demands = random_demands(GENERATED, rng, len(tick))
+        levels = {name.removeprefix("generator_"): values for name, values in demands.items()}
+        levels["enable"] = (rng.random(len(tick)) < 0.95).astype(np.int64)
+        width = GENERATED.tachometer.position_width
+        levels["position"] = rng.integers(0, 1 << width, len(tick))
+        pins = self.pins
+        found = np.zeros((n_clocks, pins.n_words), dtype=np.uint64)
+        for port, (word, bit) in zip(pins.inputs, pins.places, strict=True):
+            level = np.zeros(n_clocks, dtype=np.uint64)
+            if port.name == "rst":
+                level = (rng.random(n_clocks) < 1e-3).astype(np.uint64)
+                level[0] = 1
+            elif port.name == "tick":
+                level[tick] = 1
+            else:
+                level[tick] = (levels[port.name] & ((1 << port.width) - 1)).astype(np.uint64)
+            found[:, word] |= level << np.uint64(bit)
+        return Stimulus(found, [], [])
+
+
+COMMANDS: list[Case] = [GeneratorCase("loop, command generator", GENERATED.tachometer, 200)]
