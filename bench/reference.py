@@ -60,7 +60,7 @@ In C, `NAME_regs.h` has what one LSB is: `NAME_GAIN_POSITION_PER_LSB` and so on.
 from tachometry.boards.host.loop import LoopClient
 
 client = LoopClient(read, write, json.load(file))
-client.set(gain_position=6400, gain_velocity=160, current_limit=8)
+client.set(gain_position=400, gain_velocity=40, current_limit=8)
 client.enable(True)
 ```
 

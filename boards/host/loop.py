@@ -1,5 +1,6 @@
 """A client of a core with a control loop: its commands and gains, in their units."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -11,6 +12,7 @@ _GENERATOR = {
     "amplitude": "counts_per_lsb",
     "rate": "per_lsb",
 }
+_MODES = 4  # of the generator
 _COMMANDS = {
     "command_position": "counts_per_lsb",
     "command_velocity": "rad_per_s_per_lsb",
@@ -61,6 +63,10 @@ class LoopClient(Client):
         ValueError
             If it does not fit.
         """
+        if name not in self._scales:
+            raise KeyError(f"there is no setting {name!r}; there are {', '.join(self.settings)}")
+        if not math.isfinite(value):
+            raise ValueError(f"{name} must be a finite number, not {value}")
         lsb, (_, upper) = self._scales[name], self._parts[name][-1]
         raw, shift = round(value / lsb), upper["shift"]
         width = upper["width"]
@@ -87,6 +93,10 @@ class LoopClient(Client):
         ValueError
             If one does not fit; then none is written.
         """
+        if mode is not None and "generator_velocity" not in self._scales:
+            raise KeyError("there is no setting 'mode': the core has no command generator")
+        if mode not in (None, *range(_MODES)):
+            raise ValueError(f"mode must be from 0 to {_MODES - 1}, not {mode!r}")
         raws = {name: self.raw(name, value) for name, value in values.items()}
         frozen = {"freeze": 1}
         done = {"freeze": 0} | ({} if mode is None else {"mode": mode})

@@ -131,6 +131,17 @@ _OPTIONS = [
     ),
 ]
 
+_LOOKS = 1000  # at the speed of a motion
+# Least and greatest, in the units of the options' helps.
+_SIZES = {
+    "kp": (1e-12, 1e12),
+    "kv": (1e-9, 1e9),
+    "observer": (1e-6, 1e9),
+    "inertia": (1e-12, 1e6),
+    "torque_constant": (1e-9, 1e6),
+    "current_limit": (1e-9, 1e9),
+}
+
 Make = Callable[[TachometerSpec], "Setting"]
 
 
@@ -178,13 +189,22 @@ def _setting(
     gates: bool,
     **given: Any,
 ) -> Setting:
+    import numpy as np
+
     from tachometry.sim.encoder.motion import parse_motion
     from tachometry.sim.encoder.virtual import VirtualEncoder
     from tachometry.sim.studies.control import Setting, Task, in_gates
 
     if not (torque_noise >= 0 and math.isfinite(torque_noise)):
         raise ParameterError("torque_noise", f"must be at least 0 Nm, not {torque_noise:g}")
+    _check_sizes(given)
     task = Task(motion=parse_motion(motion), load=_load(load), noise=torque_noise)
+    fastest = max(map(abs, task.motion.speed(np.linspace(0, task.motion.duration, _LOOKS)).tolist()))
+    most = 2 * math.pi * spec.timing.clock_hz / spec.encoder.counts_per_rev
+    if fastest > most:
+        raise ParameterError(
+            "motion", f"must stay below {most:.6g} rad/s, a count per clock, and it reaches {fastest:.6g}"
+        )
     begin, duration = float(parse_time("from", start)), task.motion.duration
     if not 0.01 <= duration <= MOST_SECONDS:
         raise ParameterError("motion", f"must last from 10ms to {MOST_SECONDS:g}s in a loop, not {duration:.6g}s")
@@ -203,6 +223,14 @@ def _setting(
     motor, gains = _motor_and_gains(spec, **given)
     setting = Setting(spec=spec, gains=gains, task=task, motor=motor, encoder=encoder, begin=begin)
     return in_gates(setting) if gates else setting
+
+
+def _check_sizes(given: dict[str, float]) -> None:
+    """What no drive has is a slip of the pen."""
+    for name, (least, most) in _SIZES.items():
+        # What is 0, negative, or no number is told by what takes it.
+        if 0 < given[name] < least or most < given[name] < math.inf:
+            raise ParameterError(name, f"must be of a size from {least:g} to {most:g}, not {given[name]:g}")
 
 
 def _motor_and_gains(

@@ -73,6 +73,11 @@ class LoopMap(RegisterMap):
             (f"{name.upper()}_{macro}", entries[name][key], f"One LSB of {name} in {unit}.")
             for name, (key, macro, unit) in units.items()
         ]
+        for name, per_lsb in entries.get("generator", {}).items():
+            ((key, value),) = per_lsb.items()
+            unit = key.removesuffix("per_lsb").rstrip("_").replace("_per_", "/").replace("tick2", "tick²") or "1"
+            text = f"One LSB of generator_{name} in {unit}; a tick is a control tick."
+            found.append((f"GENERATOR_{name.upper()}_{key.upper()}", value, text))
         for name, gain in entries["gains"].items():
             found.append(
                 (f"{name.upper()}_PER_LSB", gain["per_lsb"], f"One LSB of {name}; the unit is {gain['unit']}.")

@@ -1,5 +1,6 @@
 """The client of a core with a control loop, with registers that keep what is written."""
 
+import math
 from typing import Any
 
 import pytest
@@ -50,6 +51,12 @@ def check() -> None:
         client.set(gain_velocity=1.0, current_limit=20.5)
     with pytest.raises(ValueError, match=r"^command_position must be from -2\.14748365e\+09 to "):
         client.set(command_position=3e9)
+    with pytest.raises(ValueError, match=r"^gain_velocity must be a finite number, not inf$"):
+        client.set(gain_velocity=math.inf)
+    with pytest.raises(KeyError, match=r"there is no setting 'bogus'; there are gain_position, "):
+        client.set(bogus=1)
+    with pytest.raises(KeyError, match=r"there is no setting 'mode': the core has no command generator"):
+        client.set(mode=2)
     assert not there.written
 
 
@@ -60,6 +67,8 @@ def test_settings() -> None:
 def test_a_generator() -> None:
     there = Registers(command="generator")
     assert "command_position" not in there.client.settings
+    with pytest.raises(ValueError, match=r"^mode must be from 0 to 3, not 4$"):
+        there.client.set(mode=4)
     there.client.set(mode=1, generator_velocity=-0.25, generator_acceleration=2.0**-20)
     fraction, shift = there.spec.generator.fraction, there.spec.generator.velocity_shift
     assert there.written[1:] == [

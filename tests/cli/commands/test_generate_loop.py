@@ -57,7 +57,8 @@ def test_registers_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert done.stdout.startswith("PASS: position 24")
     (tmp_path / "main.c").write_text(
         '#include "servo_driver.h"\n'
-        "int main(void) { return SERVO_GAIN_POSITION_PER_LSB * SERVO_GAIN_POSITION_RESET < 399.9; }\n"
+        "int main(void) { return SERVO_GAIN_POSITION_PER_LSB * SERVO_GAIN_POSITION_RESET < 399.9 || "
+        "SERVO_GENERATOR_AMPLITUDE_COUNTS_PER_LSB != 1.0 / 256 || SERVO_GENERATOR_RATE_PER_LSB >= 1e-6; }\n"
     )
     strict = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion")
     build.run([*build.compiler(), *strict, "main.c", "-o", "main"], "compiler", tmp_path)
