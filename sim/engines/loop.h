@@ -38,6 +38,7 @@ struct Loop {
   int64_t step, end, log;  // clocks: of the plant at most, of the run, between two rows of the log
   double *rows;
   int64_t n_rows;
+  int64_t away;  // clock in which the shaft ran away; -1: it did not
   const volatile int64_t *stop;  // whether to end at once
   Gates *gates;
 };
@@ -180,12 +181,18 @@ ENTRY __attribute__((flatten)) void loop_run(Loop *loop) {
     double before = shaft.angle;
     shaft.move(double(until - clock) * core.clock_seconds, driven + course.current[at], course.load[at]);
     // Edges on the way, in order; each changes a line in the clock in which it is passed.
+    int64_t most = 2 * (until - clock) + 2;  // no core counts as many, and far away none may be the last
     while (int turn = shaft.passing()) {
+      if (most-- == 0) break;
       double way = shaft.angle - before, part = way == 0 ? 0 : ((turn > 0 ? shaft.above : shaft.below) - before) / way;
       int64_t change = clock + int64_t(std::clamp(part, 0.0, 1.0) * double(until - clock));
       watch.to(std::min(change, until - 1));
       shaft.pass(turn);
       watch.lines(shaft.lines());
+    }
+    if (most < 0 || !std::isfinite(shaft.angle)) {
+      loop->away = clock;
+      return;
     }
     watch.to(until);
     clock = until;

@@ -205,6 +205,7 @@ _LOOP = struct(
     **dict.fromkeys(("step", "end", "log"), _I),
     rows=_P,
     n_rows=_I,
+    away=_I,
     stop=_P,
     gates=_P,
 )
@@ -241,6 +242,11 @@ class LoopSimulation:
         """A run as long as the course, from rest: a column of values at times `log` seconds apart for each name.
 
         The motor goes on in steps of `step` seconds, or from event to event.
+
+        Raises
+        ------
+        ValueError
+            If the shaft runs away.
         """
         return self.call(motor, edges, self._controller(gains), course, log, step, None)
 
@@ -263,10 +269,17 @@ class LoopSimulation:
             core=self._core(),
             course=_COURSE(*(one.ctypes.data for one in tables), len(course.speed), self.clocks(course.seconds)),
             **{"step": self.clocks(step), "end": end, "log": apart, "rows": rows.ctypes.data},
+            away=-1,
             stop=ctypes.addressof(self._stop),
             gates=gates,
         )
         self._library.loop_run(ctypes.byref(loop))
+        if loop.away >= 0:
+            time = loop.away / spec.timing.clock_hz
+            raise ValueError(
+                f"the shaft ran away {time:.6g} s after the start, by more than two edges in a clock; "
+                "gains, motor and load must be those of a drive"
+            )
         return dict(zip(COLUMNS, rows[: loop.n_rows].T, strict=True))
 
     def clocks(self, seconds: float) -> int:

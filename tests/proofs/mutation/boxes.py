@@ -112,12 +112,8 @@ class Box(Case):
         if self.demo:  # settings would not live long
             of_core = of_core & ~np.uint64(1) | (rng.random(n_clocks) < 2e-5).astype(np.uint64)
             of_core[0] |= np.uint64(1)
-        pins = self.pins
-        found = np.zeros((n_clocks, pins.n_words), dtype=np.uint64)
-        for place, (port, (word, bit)) in enumerate(zip(pins.inputs, pins.places, strict=True)):
-            level = levels[port.name] if port.name in levels else of_core >> np.uint64(place) & np.uint64(1)
-            found[:, word] |= level << np.uint64(bit)
-        return Stimulus(found, [], [])
+        ports = {port.name: of_core >> np.uint64(place) for place, port in enumerate(self.pins.inputs)}
+        return Stimulus(self.pins.words(n_clocks, ports | levels), [], [])
 
 
 def _held(rng: np.random.Generator, width: int, begins: NDArray[np.bool_]) -> NDArray[np.uint64]:

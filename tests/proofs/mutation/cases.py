@@ -1,10 +1,13 @@
 """What is mutated: small cores in which, method by method, all hardware is there."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 from amaranth.lib import wiring
+from numpy.typing import NDArray
 from proofs.mutation.stimulus import Stimulus, stimulus
 
 from tachometry.hdl import Tachometer
@@ -45,6 +48,15 @@ class Pins:
     def n_words(self) -> int:
         """Words of all inputs in a clock."""
         return self.places[-1][0] + 1
+
+    def words(self, n_clocks: int, levels: Mapping[str, NDArray[Any]]) -> NDArray[np.uint64]:
+        """What is played, shape (n_clocks, n_words), from the level of each input in every clock; others are 0."""
+        found = np.zeros((n_clocks, self.n_words), dtype=np.uint64)
+        for port, (word, bit) in zip(self.inputs, self.places, strict=True):
+            if port.name in levels:
+                level = levels[port.name].astype(np.uint64) & np.uint64((1 << port.width) - 1)
+                found[:, word] |= level << np.uint64(bit)
+        return found
 
 
 @dataclass(frozen=True)

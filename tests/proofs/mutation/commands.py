@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from amaranth import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+from numpy.typing import NDArray
 from proofs.mutation.cases import Case, Pins
 from proofs.mutation.stimulus import Stimulus
 from support.control import GENERATED, random_demands
@@ -77,23 +79,17 @@ class GeneratorCase(Case):
         tick = np.cumsum(least + rng.integers(0, 2, n_clocks // least))
         tick = tick[tick < n_clocks]
         demands = random_demands(GENERATED, rng, len(tick))
-        levels = {name.removeprefix("generator_"): values for name, values in demands.items()}
-        levels["enable"] = (rng.random(len(tick)) < 0.95).astype(np.int64)
+        taken = {name.removeprefix("generator_"): values for name, values in demands.items()}
+        taken["enable"] = (rng.random(len(tick)) < 0.95).astype(np.int64)
         width = GENERATED.tachometer.position_width
-        levels["position"] = rng.integers(0, 1 << width, len(tick))
-        pins = self.pins
-        found = np.zeros((n_clocks, pins.n_words), dtype=np.uint64)
-        for port, (word, bit) in zip(pins.inputs, pins.places, strict=True):
-            level = np.zeros(n_clocks, dtype=np.uint64)
-            if port.name == "rst":
-                level = (rng.random(n_clocks) < 1e-3).astype(np.uint64)
-                level[0] = 1
-            elif port.name == "tick":
-                level[tick] = 1
-            else:
-                level[tick] = (levels[port.name] & ((1 << port.width) - 1)).astype(np.uint64)
-            found[:, word] |= level << np.uint64(bit)
-        return Stimulus(found, [], [])
+        taken["position"] = rng.integers(0, 1 << width, len(tick))
+        levels: dict[str, NDArray[Any]] = {name: np.zeros(n_clocks, dtype=np.int64) for name in taken}
+        for name, values in taken.items():
+            levels[name][tick] = values
+        levels["tick"] = np.isin(np.arange(n_clocks), tick)
+        levels["rst"] = rng.random(n_clocks) < 1e-3
+        levels["rst"][0] = True
+        return Stimulus(self.pins.words(n_clocks, levels), [], [])
 
 
 COMMANDS: list[Case] = [GeneratorCase("loop, command generator", GENERATED.tachometer, 200)]

@@ -123,13 +123,8 @@ class LoopCase(Case):
                 of_any_size = rng.integers(-most, most, trace.n_clocks) >> rng.integers(0, less + 1, trace.n_clocks)
                 ends = rng.choice([-most, most - 1], trace.n_clocks) >> less
                 levels[port.name] = np.where(rng.random(trace.n_clocks) < 0.1, ends, of_any_size)
-        words = np.zeros((trace.n_clocks, self.pins.n_words), dtype=np.uint64)
-        for port, (word, bit) in zip(self.pins.inputs, self.pins.places, strict=True):
-            if port.name in levels:
-                level = levels[port.name] & ((1 << port.width) - 1)
-                words[:, word] |= level.astype(np.uint64) << np.uint64(bit)
         taken = zip(*(levels[name][clock].tolist() for name in _COMMANDS), strict=True)
-        return words, [Command(*command) for command in taken]
+        return self.pins.words(trace.n_clocks, levels), [Command(*command) for command in taken]
 
 
 class _Short(LoopSpec):

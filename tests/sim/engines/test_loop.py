@@ -220,6 +220,14 @@ def test_a_run_can_be_stopped() -> None:
 
 
 @pytest.mark.parametrize(
+    "motor", [Motor(inertia=1e-12), Motor(viscous=1e20), Motor(torque_constant=1e300), Motor(torque_constant=1e308)]
+)
+def test_a_shaft_that_runs_away_ends_the_run(motor: Motor) -> None:
+    with pytest.raises(ValueError, match=r"^the shaft ran away [0-9.e-]+ s after the start, by more than two edges"):
+        driven(np.full(20, 100.0), motor)
+
+
+@pytest.mark.parametrize(
     ("wrong", "message"),
     [
         ({"velocity": -1.0}, "kv must be at least 0, not -1"),
