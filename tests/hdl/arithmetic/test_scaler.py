@@ -125,7 +125,7 @@ def test_without_slack_the_mutant_whose_negative_is_the_complement_is_caught(tmp
 
 def check_ends(kind: type[scaler.SerialScaler | scaler.WideSerialScaler], max_speed: str | None) -> None:
     """The sum for odd q that are no reciprocals: those with which it is as near to the next result as it can be."""
-    spec = default_spec(**({"max_speed": Speed.parse(max_speed)} if max_speed else {}))
+    spec = default_spec(max_speed=max_speed and Speed.parse(max_speed))
     form = spec.reciprocal
     assert isinstance(form, DividedReciprocal)
     assert form.is_wide(spec.velocity_width) == (kind is scaler.WideSerialScaler)
