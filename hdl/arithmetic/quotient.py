@@ -10,7 +10,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.arithmetic.reciprocal import DividedReciprocal, LookedUpReciprocal
 from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
-from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
+from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler, WideSerialScaler
 from tachometry.spec.formats import carried_reciprocal, reciprocal
 
 
@@ -101,11 +101,16 @@ class Quotient(wiring.Component):
             self.reciprocal = DividedReciprocal(shape)
         else:
             self.reciprocal = LookedUpReciprocal(shape)
-        scaler: Callable[..., _Scaler] = SerialScaler if serial else PipelinedScaler
-        if isinstance(self.reciprocal, CarriedReciprocal):
-            scaler = RemainderScaler
+
+        def scaler(width: int) -> Callable[..., _Scaler]:
+            if isinstance(shape, carried_reciprocal.CarriedReciprocal):
+                return RemainderScaler
+            if not serial:
+                return PipelinedScaler
+            return WideSerialScaler if shape.is_wide(width) else SerialScaler
+
         self.scalers = {
-            name: scaler(
+            name: scaler(width)(
                 shape,
                 base_width=width - shape.frac_bits,
                 numerator_width=numerator_width,

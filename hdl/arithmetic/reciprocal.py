@@ -46,7 +46,7 @@ class LookedUpReciprocal(wiring.Component):
 class DividedReciprocal(wiring.Component):
     """q(m) found by a subtraction a clock.
 
-    Latency: q is there `reciprocal.steps` and three clocks after `moves`, or after the reset, and stays until it moves.
+    Latency: q is there `reciprocal.steps` and two clocks after `moves`, or after the reset, and stays until it moves.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class DividedReciprocal(wiring.Component):
         1 … max_m.
     moves : In(1)
         This is the last clock with this m.
-    q : Out(steps + 1)
+    q : Out(steps)
     """
 
     def __init__(self, reciprocal: spec.DividedReciprocal) -> None:
@@ -68,22 +68,18 @@ class DividedReciprocal(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         # The first digit is 1 in any case, and has gone through all others when the division is done.
-        digits = Signal(self._reciprocal.steps + 1)
-        remainder = Signal(signed(len(self.m) + 1))
-        first = Signal(init=1)
-        adds = remainder[-1]
+        digits = Signal(self._reciprocal.steps)
+        less_one = Signal(signed(len(self.m) + 1))  # R − 1
+        adds = less_one[-1]
         multiple = Cat(self.m ^ (~adds).replicate(len(self.m)), ~adds).as_signed()
-        m.d.sync += first.eq(0)
         with m.If(~digits[-1]):
-            m.d.sync += [
-                digits.eq(Cat(~adds, digits)),
-                # −m is ~m + 1.
-                remainder.eq((Cat(~adds, first, remainder).as_signed() + Cat(~adds, multiple).as_signed()) >> 1),
-            ]
+            # −m is ~m + 1.
+            total = Cat(~adds, Const(1, 1), less_one).as_signed() + Cat(~adds, multiple).as_signed()
+            m.d.sync += [digits.eq(Cat(~adds, digits)), less_one.eq(total >> 1)]
         # A clock later: what tells that m moves comes late in its clock.
         moved = Signal()
         m.d.sync += moved.eq(self.moves)
         with m.If(moved):
-            m.d.sync += [digits.eq(0), remainder.eq(0), first.eq(1)]
+            m.d.sync += [digits.eq(0), less_one.eq(0)]
         m.d.comb += self.q.eq(Cat(Const(1, 1), digits[:-1]))
         return m

@@ -1,8 +1,8 @@
 """base + N·q, rounded: the arithmetic that turns a reciprocal into a velocity.
 
-Both scalers form base·2^f + ⌊(N·q + C) / 2^k⌋, which spec/formats/reciprocal.py shows to be correctly rounded. One
-takes N in digits −2 … 2 of radix 4 (Booth), the greatest first, a clock for each, with a single adder. The other has an
-adder for every bit of N, and accepts any update rate.
+All scalers form base·2^f + ⌊(N·q + C) / 2^k⌋, which spec/formats/reciprocal.py shows to be correctly rounded. Two are
+serial: they take N in digits −2 … 2 of radix 4 (Booth), a clock for each. The pipelined one has an adder for every bit
+of N, and accepts any update rate.
 """
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
@@ -16,7 +16,7 @@ from tachometry.spec.formats.reciprocal import Reciprocal
 
 
 class _Scaler(wiring.Component):
-    """What both scalers share.
+    """What all scalers share.
 
     Parameters
     ----------
@@ -52,6 +52,7 @@ class _Scaler(wiring.Component):
     ) -> None:
         self._bits = numerator_width
         self._digits = reciprocal.digits
+        self._is_odd = reciprocal.is_odd
         self._rounding = reciprocal.rounding(towards)
         self._frac_bits = reciprocal.frac_bits
         self._scale_bits = reciprocal.scale_bits
@@ -68,7 +69,7 @@ class _Scaler(wiring.Component):
         )
 
 
-class SerialScaler(_Scaler):
+class _SerialScaler(_Scaler):
     """A digit of N a clock.
 
     `q` and `tag` must stay as they are until the result. `start` may come again as soon as the result has.
@@ -80,40 +81,108 @@ class SerialScaler(_Scaler):
         m = Module()
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
-        n_digits = self._digits
-        run = Signal(n_digits)  # bit i: the product of digit i is added, the greatest being digit 0
+        run = Signal(self._digits)  # bit i: the product of the digit that comes after i others is added
         m.d.sync += [run.eq(Cat(self.start, run)), self.results.valid.eq(run[-1])]
 
         # A digit is told by two bits of N and the one below them.
-        digits = Signal(signed(2 * n_digits), reset_less=True)
-        m.d.sync += digits.eq(digits << 2)
-        with m.If(self.load):
-            m.d.sync += digits.eq(self.numerator)
-        below, low, high = digits[-3] if n_digits > 1 else Const(0, 1), digits[-2], digits[-1]
+        below, low, high = self._next_digit(m)
         twice = (high ^ low) & ~(low ^ below)
-        # Its product with q; −q is ~q + 1. The reset is the digit 0.
-        addend = Signal(signed(len(self.q) + 2), reset_less=True)
+        # Its product with q; −q is ~q + 1. Of an odd q that is all bits but the last inverted.
+        product = Cat(Mux(twice, self.q << 1, self.q) ^ high.replicate(len(self.q) + 1), high)
+        if self._is_odd:
+            product = Cat(Mux(twice, 0, 1), Mux(twice, 1, self.q[1]) ^ (high & ~twice), product[2:])
+        addend = Signal(signed(len(product)), reset_less=True)
         carry = Signal(reset_less=True)
-        product = Mux(twice, self.q << 1, self.q)
-        m.d.sync += [addend.eq(Cat(product ^ high.replicate(len(product)), high).as_signed()), carry.eq(high)]
+        m.d.sync += [addend.eq(product), carry.eq(0 if self._is_odd else high)]
+        # The reset is the digit 0.
         with m.If((high == low) & (low == below)):
             m.d.sync += [addend.eq(0), carry.eq(0)]
 
-        # The sum begins without the low bits of what rounds: two of them come with every digit, 0 where the carry is.
+        quotient = self._sum(m, run[:-1].any(), addend, carry)
+        with m.If(run[-1]):
+            m.d.sync += [result.quotient.eq(quotient), result.tag.eq(self.tag)]
+        return m
+
+    def _next_digit(self, m: Module) -> Value:
+        """The two bits that tell a digit, and the one below them first; another digit in every clock after `load`."""
+        raise NotImplementedError
+
+    def _sum(self, m: Module, adds: Value, addend: Value, carry: Value) -> Value:
+        """The quotient from the sum of all products, of which `addend` and `carry` are the last.
+
+        Where `adds` is high, they are added to what is kept.
+        """
+        raise NotImplementedError
+
+
+class SerialScaler(_SerialScaler):
+    """A digit of N a clock, the greatest first, with one adder."""
+
+    def _next_digit(self, m: Module) -> Value:
+        digits = Signal(signed(2 * self._digits), reset_less=True)
+        m.d.sync += digits.eq(digits << 2)
+        with m.If(self.load):
+            m.d.sync += digits.eq(self.numerator)
+        return Cat(digits[-3] if self._digits > 1 else 0, digits[-2:])
+
+    def _sum(self, m: Module, adds: Value, addend: Value, carry: Value) -> Value:
+        # The sum begins without the low bits of what rounds: two of them come with every digit.
         shifted_in = self._rounding & 2
-        begin = self._rounding >> (2 * n_digits)
-        assert self._rounding == (begin << 2 * n_digits) + shifted_in * ((1 << 2 * n_digits) - 1) // 3
-        low_bits = self._frac_bits + self._scale_bits - 2 * n_digits
-        total = Signal(signed(len(result.quotient) + self._scale_bits))
+        begin = self._rounding >> (2 * self._digits)
+        assert self._rounding == (begin << 2 * self._digits) + shifted_in * ((1 << 2 * self._digits) - 1) // 3
+        low_bits = self._frac_bits + self._scale_bits - 2 * self._digits
+        total = Signal(signed(len(self.results.p.quotient) + self._scale_bits))
         part = Signal(signed(len(total) - 2), reset_less=True)
-        m.d.comb += total.eq(Cat(carry, Const(shifted_in >> 1, 1), part).as_signed() + addend)
-        with m.If(run[:-1].any()):
+        low = Cat(carry, shifted_in >> 1)
+        free = 0 if not self._is_odd else 1 if shifted_in else 2  # low bits to which nothing is added
+        m.d.comb += total.eq(Cat(addend[:free], Cat(low[free:], part).as_signed() + addend[free:].as_signed()))
+        with m.If(adds):
             m.d.sync += part.eq(total)
         with m.If(self.load):
             m.d.sync += part.eq(Cat(Const(begin, low_bits), self.base).as_signed())
-        with m.If(run[-1]):
-            m.d.sync += [result.quotient.eq(total >> self._scale_bits), result.tag.eq(self.tag)]
-        return m
+        return total >> self._scale_bits
+
+
+class WideSerialScaler(_SerialScaler):
+    """A digit of N a clock, the least significant first, with two adders.
+
+    The sum moves down by two bits with each digit. So what the lower adder carries can wait for a clock: it is added to
+    the two bits that move down then. All bits of the result but two come from the lower adder. q must be odd.
+    """
+
+    def _next_digit(self, m: Module) -> Value:
+        digits = Signal(signed(self._bits + 1), reset_less=True)
+        m.d.sync += digits.eq(digits >> 2)
+        with m.If(self.load):
+            m.d.sync += digits.eq(self.numerator << 1)
+        return digits[:3]
+
+    def _sum(self, m: Module, adds: Value, addend: Value, carry: Value) -> Value:
+        low_bits = self._scale_bits - 2 * self._digits  # of the last sum, once it has moved down
+        n_lower = low_bits + len(self.results.p.quotient)
+        first = Cat(Const(self._rounding, self._frac_bits + self._scale_bits), self.base).as_signed()
+        n_upper = len(first) + 1 - n_lower
+        lower = Signal(n_lower - 2, reset_less=True)
+        upper = Signal(signed(n_upper + 2), reset_less=True)
+        waits = Signal(reset_less=True)
+        between, carried = _increment(upper[:2], waits)
+        lower_sum = Signal(n_lower + 1)
+        upper_sum = Signal(signed(n_upper))
+        m.d.comb += [
+            lower_sum.eq(Cat(lower, between) + addend[:n_lower]),
+            upper_sum.eq((Cat(carried, upper[2:]).as_signed() + Cat(carried, addend[n_lower:]).as_signed()) >> 1),
+        ]
+        with m.If(adds):
+            m.d.sync += [lower.eq(lower_sum[2:n_lower]), waits.eq(lower_sum[-1]), upper.eq(upper_sum)]
+        with m.If(self.load):
+            m.d.sync += [lower.eq(first), waits.eq(0), upper.eq(first[n_lower - 2 :].as_signed())]
+        top, _ = _increment(upper_sum[:2], lower_sum[-1])
+        return Cat(lower_sum[2 + low_bits : n_lower], top)
+
+
+def _increment(bits: Value, by: Value) -> tuple[Value, Value]:
+    """Two bits with another one added, and what is carried: without an adder, whose chain would be longer."""
+    return Cat(bits[0] ^ by, bits[1] ^ (bits[0] & by)), bits[0] & bits[1] & by
 
 
 class PipelinedScaler(_Scaler):

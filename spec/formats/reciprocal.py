@@ -29,6 +29,9 @@ from tachometry.spec.units import signed_width
 # Up to this many m are tried.
 _MAX_TRIED = 2048
 
+# Bits of the longest sum that one adder forms.
+_LONG_SUM = 40
+
 
 @dataclass(frozen=True)
 class Reciprocal:
@@ -106,6 +109,18 @@ class Reciprocal:
         return self.slack + (0 if towards else 1 << (self.scale_bits - 1))
 
     @property
+    def is_odd(self) -> bool:
+        """Whether every q(m) is odd, so that −q is q with all bits but the last inverted, and nothing is carried."""
+        return False
+
+    def is_wide(self, result_width: int) -> bool:
+        """Whether the sum for a result of so many bits takes two adders: the carries of one would limit the clock.
+
+        They need an odd q, because the carry of −q would need a place of its own.
+        """
+        return self.is_odd and result_width + self.scale_bits > _LONG_SUM
+
+    @property
     def depth(self) -> int:
         """Entries of the table, a power of two; q(m) is at address m modulo depth."""
         return 1 << (self.max_m - 1).bit_length()
@@ -127,8 +142,9 @@ class Reciprocal:
 class DividedReciprocal(Reciprocal):
     """q(m) as a divider of one subtraction a bit finds it, whose digits are 1 and −1.
 
-    From 1 = Q·m + R with Q = 1, each step doubles this: Q ← 2Q ± 1 and R ← 2R ∓ m, where the sign is that of R. So R
-    stays within −m … m − 1, and after f + g steps Q·m + R = 2^(f+g): q = Q is odd, and |δ| = |R|/m ≤ 1.
+    From 1 = Q·m + R with Q = 0, each step doubles this: Q ← 2Q + 1 and R ← 2R − m if R > 0, else Q ← 2Q − 1 and
+    R ← 2R + m. So R stays within 1 − m … m, and after f + g steps Q·m + R = 2^(f+g): q = Q is odd, and |δ| = |R|/m ≤ 1.
+    The first step makes Q = 1, and q has f + g bits, since q(1) = 2^(f+g) − 1.
     """
 
     @property
@@ -152,13 +168,17 @@ class DividedReciprocal(Reciprocal):
         """Doublings, f + g."""
         return self.frac_bits + self.guard_bits
 
+    @property
+    def is_odd(self) -> bool:
+        return True
+
     def value(self, m: int) -> int:
         return odd_quotient(self.steps, m)
 
 
 def odd_quotient(bits: int, m: int) -> int:
-    """The odd number Q with 2^bits = Q·m + R and −m ≤ R < m."""
-    return ((1 << bits) // (2 * m) << 1) + 1
+    """The odd number Q with 2^bits = Q·m + R and −m < R ≤ m."""
+    return (((1 << bits) - 1) // (2 * m) << 1) + 1
 
 
 @dataclass(frozen=True)

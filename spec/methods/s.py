@@ -124,7 +124,7 @@ class STachometer(TachometerSpec):
 
     def _busy_clocks(self, reciprocal: Reciprocal) -> int:
         # One clock to start over with a new m_s, then a table takes two, and a division as many as its bits.
-        found = reciprocal.steps + 2 if isinstance(reciprocal, DividedReciprocal) else 2
+        found = reciprocal.steps + 1 if isinstance(reciprocal, DividedReciprocal) else 2
         return self._serial_latency(reciprocal) + 1 + found
 
     @property
@@ -143,7 +143,7 @@ class STachometer(TachometerSpec):
     def division(self) -> str:
         reciprocal = self.reciprocal
         if isinstance(reciprocal, DividedReciprocal):
-            return f"divided in {reciprocal.steps + 2} clocks between two ticks"
+            return f"divided in {reciprocal.steps + 1} clocks between two ticks"
         return ""
 
     @property

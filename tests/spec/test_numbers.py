@@ -54,8 +54,8 @@ def test_ports_that_have_a_sign_and_those_of_16_bits() -> None:
     assert {port.name for port in spec.ports if port.is_strobe} == set(spec.strobes)
 
 
-# An update takes 8 clocks and one to start over; then the reciprocal, with 16 + 21 bits behind the point, takes 39.
-BUSY = 8 + 1 + 39
+# An update takes 8 clocks and one to start over; then the reciprocal, with 16 + 21 bits behind the point, takes 38.
+BUSY = 8 + 1 + 38
 
 
 def test_counts_per_tick() -> None:

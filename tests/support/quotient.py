@@ -125,7 +125,7 @@ def every_quotient(
     form = spec.reciprocal
     serial = isinstance(form, Reciprocal)
     max_m = spec.timing.max_ticks
-    wait = form.steps + 1 if isinstance(form, DividedReciprocal) else 2
+    wait = form.steps if isinstance(form, DividedReciprocal) else 2
     distance = form.digits + 2 if serial else 1
     shift = 1 + form.halvings
     main = _MAIN.format(

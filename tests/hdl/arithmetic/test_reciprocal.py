@@ -19,7 +19,7 @@ def test_every_reciprocal_two_clocks_after_m(max_m: int) -> None:
 def check_division(max_m: int) -> None:
     """From the reset on, and then from each move on; a move in the midst of a division begins anew."""
     described = spec.DividedReciprocal(max_m, max_numerator=7, frac_bits=4, halvings=1)
-    clocks = described.steps + 3
+    clocks = described.steps + 2
     rows: list[dict[str, int]] = [{"m": 1, "moves": 0}] * (clocks - 1)
     for m in range(1, max_m + 1):
         rows += [{"moves": 1}, *[{"m": m, "moves": 0}] * (clocks - 1)]
@@ -42,9 +42,9 @@ def test_every_division(max_m: int) -> None:
 
 MUTANTS = {
     "subtracts what it should add": ("(~adds).replicate(len(self.m))", "adds.replicate(len(self.m))"),
-    "no first digit": ("first = Signal(init=1)", "first = Signal()"),
-    "digits of the last division": ("digits.eq(0), remainder", "remainder"),
-    "remainder of the last division": ("remainder.eq(0), first", "first"),
+    "begins with another remainder": ("Const(1, 1), less_one", "Const(0, 1), less_one"),
+    "digits of the last division": ("digits.eq(0), less_one", "less_one"),
+    "remainder of the last division": ("digits.eq(0), less_one.eq(0)", "digits.eq(0)"),
 }
 
 

@@ -96,11 +96,11 @@ def test_ties_base_and_tag() -> None:
 
 MUTANTS = {
     "half-even rounding": (
-        "(total >> self._scale_bits)",
-        "((total >> self._scale_bits) & ~~total[: self._scale_bits - 1].any())",
+        "total >> self._scale_bits",
+        "(total >> self._scale_bits) & ~~total[: self._scale_bits - 1].any()",
     ),
-    "no negative digit": ("product ^ high.replicate(len(product))", "product"),
-    "twice is once": ("Mux(twice, self.q << 1, self.q)", "self.q"),
+    "no negative digit": ("^ high.replicate(len(self.q) + 1)", ""),
+    "twice is once": ("Mux(twice, self.q << 1, self.q)", "Cat(self.q, Const(0, 1))"),
     "the digit 0 is −1 after another": ("(high == low) & (low == below)", "~(high | low | below)"),
     "half down": ("shifted_in = self._rounding & 2", "shifted_in, self._rounding = 0, self._rounding >> 13 << 13"),
 }
@@ -112,15 +112,93 @@ def test_mutants_are_caught(name: str) -> None:
         check_ties()
 
 
-def check_narrow(tmp_path: Path) -> None:
-    spec = default_spec(max_speed=Speed.parse("1000rad/s"), reciprocal_source="table")
+def check_reference(tmp_path: Path, source: str) -> None:
+    spec = default_spec(max_speed=Speed.parse("1000rad/s"), reciprocal_source=source)
     base, n, m, got = every_quotient(spec, range(-28, 29), tmp_path)
     assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
 
 
 def test_without_slack_the_mutant_whose_negative_is_the_complement_is_caught(tmp_path: Path) -> None:
-    with mutant(scaler.SerialScaler, "carry.eq(high)", "carry.eq(0)"), caught():
-        check_narrow(tmp_path)
+    with mutant(scaler.SerialScaler, "carry.eq(0 if self._is_odd else high)", "carry.eq(0)"), caught():
+        check_reference(tmp_path, "table")
+
+
+def check_ends(kind: type[scaler.SerialScaler | scaler.WideSerialScaler], max_speed: str | None) -> None:
+    """The sum for odd q that are no reciprocals: those with which it is as near to the next result as it can be."""
+    spec = default_spec(max_speed=max_speed and Speed.parse(max_speed))
+    form = spec.reciprocal
+    assert isinstance(form, DividedReciprocal)
+    assert form.is_wide(spec.velocity_width) == (kind is scaler.WideSerialScaler)
+    base_width, scale = spec.velocity_width - 16, 1 << form.scale_bits
+    dut = kind(form, base_width=base_width, numerator_width=spec.numerator_width, tag=data.StructLayout({"mark": 1}))
+    rng = np.random.default_rng(1)
+    numerators = {sign * int(n) | 1 for n in rng.integers(0, spec.max_numerator, 60) for sign in (-1, 1)}
+    pairs = [
+        (n, (end - form.rounding()) * pow(n, -1, scale) % scale + scale * int(rng.integers(1 << form.width - 23)))
+        for n in numerators
+        for end in (-1, 1)
+    ]
+    rows: list[dict[str, int]] = []
+    for n, q in pairs:
+        rows += [{"load": 1, "start": 0, "numerator": n, "base": base(n), "q": q}, {"load": 0, "start": 1}]
+        rows += [{"load": 0, "start": 0}] * (form.digits + 1)
+    seen = clock_by_clock(dut, rows, ["results.valid", "results.p.quotient"])
+    found = [row["results.p.quotient"] for row in seen if row["results.valid"]]
+    assert found == [(base(n) << 16) + ((n * q + form.rounding()) >> form.scale_bits) for n, q in pairs]
+
+
+SERIAL = [(scaler.SerialScaler, "1000rad/s"), (scaler.WideSerialScaler, None)]
+
+
+@pytest.mark.parametrize(("kind", "max_speed"), SERIAL)
+def test_every_bit_of_the_sum_counts(kind: Any, max_speed: str | None) -> None:
+    check_ends(kind, max_speed)
+
+
+@pytest.mark.parametrize(("kind", "max_speed"), SERIAL)
+@pytest.mark.parametrize(
+    ("right", "wrong"), [("Cat(Mux(twice, 0, 1)", "Cat(1"), ("(high & ~twice)", "high"), ("~(low ^ below)", "~below")]
+)
+def test_a_mutant_with_an_odd_reciprocal_is_caught(kind: Any, max_speed: str | None, right: str, wrong: str) -> None:
+    with mutant(kind, right, wrong):
+        changed = getattr(scaler, kind.__name__)
+        with caught():
+            check_ends(changed, max_speed)
+
+
+def check_wide(tmp_path: Path) -> None:
+    """N at the ends of all digits, with every m."""
+    spec = default_spec()
+    assert isinstance(spec.reciprocal, Reciprocal)
+    assert spec.reciprocal.is_wide(spec.velocity_width)
+    ends = [sign * (4**k // 2 + off) for k in range(7) for off in (-1, 0, 1) for sign in (-1, 1)]
+    numerators = [*ends, -spec.max_numerator, spec.max_numerator]
+    base, n, m, got = every_quotient(spec, numerators, tmp_path)
+    assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
+
+
+def test_what_is_wide(tmp_path: Path) -> None:
+    check_wide(tmp_path)
+    assert not any(
+        one.reciprocal.is_wide(one.velocity_width)  # type: ignore[union-attr]
+        for one in (default_spec(max_speed=Speed.parse("1000rad/s")), default_spec(reciprocal_source="table"))
+    )
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("waits.eq(lower_sum[-1])", "waits.eq(0)"),
+        ("bits[1] ^ (bits[0] & by)", "bits[1]"),
+        ("bits[0] & bits[1] & by", "bits[0] & by"),
+        ("Cat(carried, upper[2:])", "Cat(0, upper[2:])"),
+        ("_increment(upper_sum[:2], lower_sum[-1])", "(upper_sum[:2], 0)"),
+        ("self.numerator << 1)", "self.numerator)"),
+    ],
+)
+def test_a_mutant_of_the_wide_sum_is_caught(tmp_path: Path, right: str, wrong: str) -> None:
+    with mutant(scaler.WideSerialScaler, right, wrong), caught():
+        check_wide(tmp_path)
 
 
 @pytest.mark.parametrize("towards", [-1, 0, 1])

@@ -156,7 +156,7 @@ def kind(spec: STachometer) -> type:
 
 def test_the_reciprocal_of_s() -> None:
     """Divided where a tick leaves the time, or from a table of up to 2048 ticks; otherwise it is carried along."""
-    assert [kind(s(tick)) for tick in (960, 20, 19, 7, 6, 1)] == [
+    assert [kind(s(tick)) for tick in (960, 19, 18, 7, 6, 1)] == [
         *(
             DividedReciprocal,
             DividedReciprocal,
@@ -172,23 +172,23 @@ def test_the_reciprocal_of_s() -> None:
         CarriedReciprocal,
     ]
     # Ties and bounds take a general one.
-    assert [kind(s(19, ticks)) for ticks in (15, 16)] == [NarrowReciprocal, Reciprocal]
-    assert kind(s(19, bounds=True)) is Reciprocal
+    assert [kind(s(18, ticks)) for ticks in (15, 16)] == [NarrowReciprocal, Reciprocal]
+    assert kind(s(18, bounds=True)) is Reciprocal
     assert [kind(s(960, ticks, reciprocal_source="table")) for ticks in (2048, 2049)] == [Reciprocal, DividedReciprocal]
-    assert kind(s(19, 2049)) is CarriedReciprocal
+    assert kind(s(18, 2049)) is CarriedReciprocal
     assert s(1, 5001).reciprocal.entry == 2501  # type: ignore[union-attr]
-    assert [one.memory and one.memory[:2] for one in (s(960), s(19), s(1, 5000))] == [
+    assert [one.memory and one.memory[:2] for one in (s(960), s(18), s(1, 5000))] == [
         *(None, ("table", 16), ("table and carried on", 4))
     ]
 
 
 def test_what_is_told_of_the_reciprocal() -> None:
-    assert [one.division for one in (s(19), s(20))] == ["", "divided in 14 clocks between two ticks"]
+    assert [one.division for one in (s(18), s(19))] == ["", "divided in 13 clocks between two ticks"]
     assert [
-        one.notes for one in (s(20), s(19, reciprocal_source="table"), s(960, 2048, reciprocal_source="table"))
+        one.notes for one in (s(19), s(18, reciprocal_source="table"), s(960, 2048, reciprocal_source="table"))
     ] == [()] * 3
     short = "a tick of {} is too short to divide between two"
-    assert s(19).notes == (f"reciprocal from a table: {short.format('19 clocks')}",)
+    assert s(18).notes == (f"reciprocal from a table: {short.format('18 clocks')}",)
     assert s(1, reciprocal_source="table").notes == (f"reciprocal carried along: {short.format('1 clock')}",)
     assert s(960, 2049, reciprocal_source="table").notes == ("reciprocal divided: a table has at most 2048 entries",)
     with pytest.raises(ValueError, match=r"^reciprocal must be serial or table, not 'none'$"):
@@ -199,9 +199,9 @@ def test_latencies_of_s() -> None:
     """80 has 7 bits, so N has 8: four digits, one clock each, and one to start."""
     assert [s(tick).serial for tick in (7, 18)] == [True, True]
     assert [s(6).serial, s(18, 2049).serial] == [False, False]
-    assert [s(18).datapath_latency, s(7).datapath_latency, s(20).datapath_latency] == [4 + 1, 3 + 1, 4 + 1]
+    assert [s(18).datapath_latency, s(7).datapath_latency, s(19).datapath_latency] == [4 + 1, 3 + 1, 4 + 1]
     # A table takes three clocks more: m_s, the table, its register. A division one for every bit, and one to begin.
-    assert [s(19).busy_clocks, s(20).busy_clocks] == [5 + 3, 5 + 1 + 14]
+    assert [s(18).busy_clocks, s(19).busy_clocks] == [5 + 3, 5 + 1 + 13]
     # One for each bit of N and each digit of N·R/m, and one each for the table, its register, and to round.
     fast = s(1, 5000)
     assert (fast.max_numerator, fast.datapath_latency) == (4, 4 + 2 + 3)
