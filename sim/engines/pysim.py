@@ -66,9 +66,8 @@ class PySim:
         top = Module()
         top.submodules.core = core
         outputs = spec.outputs
-        strobe = Signal()
-        top.d.comb += strobe.eq(Cat(getattr(core, port.name) for port in outputs if port.is_strobe).any())
-        values = _packed(top, [getattr(core, port.name) for port in outputs])
+        strobe = Cat(getattr(core, port.name) for port in outputs if port.is_strobe).any()
+        values = _packed(top, [strobe, *(getattr(core, port.name) for port in outputs)])
         seen = shown(core) if vcd is not None else {}
         seen_values = _packed(top, list(seen.values()))
         simulator = Simulator(top)
@@ -83,9 +82,9 @@ class PySim:
 
         async def collect(ctx: Any) -> None:
             clock = 0
-            async for _, _, any_strobe, packed in ctx.tick().sample(strobe, values):
-                if any_strobe:
-                    rows.append((clock, packed))
+            async for _, _, packed in ctx.tick().sample(values):
+                if packed & 1:
+                    rows.append((clock, packed >> 1))
                 clock += 1
 
         simulator.add_process(collect)
