@@ -4,7 +4,7 @@ from amaranth import Module, Signal
 from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.delay import delay
-from tachometry.hdl.arithmetic.idle import HasIdleCounters, IdleCounter
+from tachometry.hdl.arithmetic.idle import HasIdleCounters, IdleCounter, IdleDivision
 from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
@@ -79,8 +79,8 @@ class Tachometer(wiring.Component):
         return self._spec
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter, ...]:
-        """See `IdleCounter`."""
+    def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
+        """See `IdleCounter` and `IdleDivision`."""
         boxes: dict[str, object] = {"datapath": self.datapath}
         if not self._spec.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock

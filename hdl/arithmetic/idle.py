@@ -1,4 +1,4 @@
-"""What a simulation may skip: clocks in which counters count, and nothing else happens."""
+"""What a simulation may skip: clocks in which counters count or a division goes on, and nothing else happens."""
 
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
@@ -27,15 +27,48 @@ class IdleCounter:
     stops: tuple[int, ...] = ()
     order: tuple[int, ...] = ()
 
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        return (self.path,)
+
     def within(self, box: str) -> "IdleCounter":
         """The same from outside of a box."""
         return replace(self, path=f"{box}.{self.path}")
 
 
-@runtime_checkable
-class HasIdleCounters(Protocol):
-    """A box with such counters."""
+@dataclass(frozen=True)
+class IdleDivision:
+    """A division of `spec.formats.reciprocal.DividedReciprocal`, on whose steps nothing depends until it is done.
+
+    Parameters
+    ----------
+    digits, less_one, m : str
+        Names of the signals, as that of an `IdleCounter`. m stands still as long as the division goes on.
+    steps : int
+        At most 62.
+    """
+
+    digits: str
+    less_one: str
+    m: str
+    steps: int
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter, ...]:
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        return (self.digits, self.less_one)
+
+    def within(self, box: str) -> "IdleDivision":
+        """The same from outside of a box."""
+        digits, less_one, m = (f"{box}.{path}" for path in (self.digits, self.less_one, self.m))
+        return replace(self, digits=digits, less_one=less_one, m=m)
+
+
+@runtime_checkable
+class HasIdleCounters(Protocol):
+    """A box with such counters, or such a division."""
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
         """With paths within the box."""

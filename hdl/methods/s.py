@@ -4,11 +4,13 @@ from amaranth import Module, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.idle import IdleDivision
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
 from tachometry.hdl.methods.interval import IntervalAccumulator
 from tachometry.spec import STachometer
+from tachometry.spec.formats.reciprocal import DividedReciprocal
 
 
 class SMethod(wiring.Component):
@@ -74,6 +76,15 @@ class SMethod(wiring.Component):
             "m_s": self.interval_accumulator.m_s,
             "numerator": self.interval_accumulator.numerator,
         }
+
+    @property
+    def idle_counters(self) -> tuple[IdleDivision, ...]:
+        """See `IdleDivision`: q is read from the next tick on."""
+        found = self._spec.reciprocal
+        if not isinstance(found, DividedReciprocal) or found.steps > 62:
+            return ()
+        box = "quotient.reciprocal"
+        return (IdleDivision(f"{box}.digits", f"{box}.less_one", "interval.m_s", found.steps),)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -18,7 +18,7 @@ from amaranth.lib import wiring
 from numpy.typing import NDArray
 
 from tachometry.hdl import Tachometer, core_of
-from tachometry.hdl.arithmetic.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import IdleCounter, IdleDivision
 from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
@@ -84,7 +84,7 @@ class Design:
         return 0 if self.watched is None else self.watched.n_words
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter, ...]:
+    def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
         """Counters that may be moved on; none where signals are shown, as these change with them."""
         return self.component.idle_counters if isinstance(self.component, Tachometer) else ()
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from amaranth.back import rtlil
 
+from tachometry.hdl.arithmetic.idle import IdleDivision
 from tachometry.sim.engines import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
@@ -51,6 +52,34 @@ static inline void follow_on(Counter &counter, const uint16_t *order, const uint
   if (counter.next == counter.curr) return;
   counter.curr.set(order[place[counter.curr.template get<uint16_t>()] + clocks]);
   counter.next = counter.curr;
+}}
+// The registers of a division by m, after so many steps but none.
+struct Division {{
+  uint64_t digits, less_one;
+  Division(int done, uint64_t m)
+      : digits((((1ull << done) - 1) / (2 * m)) + (1ull << done >> 1)),
+        less_one((1ull << done) - (2 * digits - (1ull << done) + 1) * m - 1) {{}}
+}};
+// What is left of it, as of a counter.
+template <class Digits, class Rest, class Integer>
+static inline int64_t divides(const Digits &digits, const Rest &less_one, const Integer &m, int steps, uint64_t mask) {{
+  if (digits.next == digits.curr && less_one.next == less_one.curr) return INT64_MAX;
+  uint64_t now = digits.curr.template get<uint64_t>();
+  int done = now == 0 ? 0 : 64 - __builtin_clzll(now);
+  Division next(done + 1, m.curr.template get<uint64_t>());
+  if (digits.next.template get<uint64_t>() != next.digits ||
+      less_one.next.template get<uint64_t>() != (next.less_one & mask)) return 0;
+  return steps - done;
+}}
+template <class Digits, class Rest, class Integer>
+static inline void divide_on(Digits &digits, Rest &less_one, const Integer &m, uint64_t mask, int64_t clocks) {{
+  if (digits.next == digits.curr && less_one.next == less_one.curr) return;
+  uint64_t now = digits.curr.template get<uint64_t>();
+  Division then(int(clocks) + (now == 0 ? 0 : 64 - __builtin_clzll(now)), m.curr.template get<uint64_t>());
+  digits.curr.set(then.digits);
+  less_one.curr.set(then.less_one & mask);
+  digits.next = digits.curr;
+  less_one.next = less_one.curr;
 }}
 {orders}
 struct Model {{
@@ -175,7 +204,7 @@ class State:
 
 def _idle(design: Design, state: State) -> dict[str, str]:
     """`idle` and `move_on` of the struct `Model`, and the orders of states that they need."""
-    counters = {mangled(counter.path): counter for counter in design.idle_counters}
+    counters = {mangled(path): counter for counter in design.idle_counters for path in counter.paths}
     assert counters.keys() <= state.flip_flops.keys(), f"no such signals: {counters.keys() - state.flip_flops.keys()}"
     if not counters or state.written:
         return {"idle": "return 0;", "move_on": "", "orders": ""}
@@ -183,6 +212,13 @@ def _idle(design: Design, state: State) -> dict[str, str]:
     idle = [f"if (strobe() || {still}) return 0;", "int64_t clocks = INT64_MAX;"]
     move, orders = [], []
     for wire, counter in counters.items():
+        if isinstance(counter, IdleDivision):
+            if wire == mangled(counter.digits):
+                registers = ", ".join(f"top.{mangled(path)}" for path in (*counter.paths, counter.m))
+                mask = f"{(1 << state.flip_flops[mangled(counter.less_one)]) - 1}u"
+                idle.append(f"clocks = std::min(clocks, divides({registers}, {counter.steps}, {mask}));")
+                move.append(f"divide_on({registers}, {mask}, clocks);")
+            continue
         if counter.order:
             name = f"{wire}_order, {wire}_place"
             places = [0] * (1 << state.flip_flops[wire])

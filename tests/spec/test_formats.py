@@ -73,6 +73,13 @@ def test_every_quotient_of_the_reference(kind: type[Reciprocal]) -> None:
     assert wrong_quotients(form, [form.value(m) for m in range(1, 501)]) == 0
 
 
+def test_a_sum_of_more_than_40_bits_takes_two_adders_if_the_reciprocal_is_odd() -> None:
+    """N·q has 14 bits behind the point of the result, which are dropped."""
+    shape = (500, 28, 16, 1)
+    assert [DividedReciprocal(*shape).is_wide(width) for width in (26, 27)] == [False, True]
+    assert not any(kind(*shape).is_wide(60) for kind in (Reciprocal, NarrowReciprocal))
+
+
 @pytest.mark.parametrize("halvings", [0, 1, 2])
 @pytest.mark.parametrize(
     ("max_m", "max_numerator", "frac_bits"), [(1, 1, 4), (12, 7, 7), (30, 5, 6), (17, 16, 6), (60, 28, 8), (25, 40, 7)]

@@ -142,6 +142,7 @@ CASES = [
     _case("s", "carried", 3, 6, 1, 340, age=True),
     _case("s", "table", 15, 16, 2, 340, frac_bits=6, reciprocal_source="table", **_FRONT),
     _case("s", "divided", 31, 16, 2, 340, frac_bits=6),
+    _case("s", "divided, wide", 47, 16, None, 340, frac_bits=24),
     _case("s", "carried, bounds", 3, 9, 1, 340, max_table=4, bounds=True, cancel=False),
     _case("m", "of 3", 3, 2, 2, average=3, bounds=True, age=True),
     _case(

@@ -13,6 +13,7 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.rairan import RairanMethod
+from tachometry.hdl.methods.s import SMethod
 from tachometry.hdl.tachometer import Tachometer
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.cxxrtl import Cxxrtl
@@ -45,7 +46,7 @@ def cores_with_counters(method: str) -> list[TachometerSpec]:
     found = defaultdict(list)
     for spec in map(spec_of, configurations(method)):
         if counters := Tachometer(spec).idle_counters:
-            found[tuple(counter.path for counter in counters)].append(spec)
+            found[tuple(counter.paths for counter in counters)].append(spec)
     ordered = [sorted(alike, key=lambda spec: spec.timing.tick_cycles) for alike in found.values()]
     return [spec for alike in ordered for spec in ([alike[0], alike[-1]] if len(alike) > 1 else alike)]
 
@@ -102,6 +103,7 @@ def test_slow_shafts(method: str) -> None:
         (SamplingClock, "order=self.states", "order=self.states[1:] + self.states[:1]", "s"),
         (SamplingClock, "order=self.states", "order=self.states[1:] + self.states[:1]", "m"),
         (SamplingClock, '("left", -1, (-1,))', '("left", -1, (-2,))', "long"),
+        (SMethod, '"interval.m_s", found.steps)', '"interval.m_s", found.steps + 1)', "s"),
         (RairanMethod, '"counters.left", -1, (-1,)', '"counters.left", -1, (-2,)', "rairan"),
         (GapTimer, "self.age == self._max_periods - 1", "self.age == self._max_periods - 2", "t"),
         (MTMethod, "(self._min_periods, self._patient_periods)", "(self._min_periods + 3,)", "mt"),
