@@ -55,10 +55,10 @@ makes the motion and the golden model:
 
 {whole}
 In an idle clock no strobe is high, and no flip-flop changes but counters on which nothing depends before they come to
-a stop, such as the one that waits for the end of the tick, and the division of S. CXXRTL finds that out by comparing all
-flip-flops with what they would become, and then moves these on to the next stop or to the next change of a pin at once. What is
-gained depends on the motion: with an edge in every hundredth clock there is little to be skipped. The program of the
-tracking method is at work in most clocks of a tick of 20 us.
+a stop, such as the one that waits for the end of the tick, and the division of S. CXXRTL finds that out by comparing
+all flip-flops with what they would become, and then moves these on to the next stop or to the next change of a pin at
+once. What is gained depends on the motion: with an edge in every hundredth clock there is little to be skipped. The
+program of the tracking method is at work in most clocks of a tick of 20 us.
 
 A golden model's time depends on the numbers of edges, ticks and updates, not on clocks. That of the tracking method
 follows its recursion tick by tick.
