@@ -142,9 +142,11 @@ class STachometer(TachometerSpec):
     @property
     def division(self) -> str:
         reciprocal = self.reciprocal
-        if isinstance(reciprocal, DividedReciprocal):
-            return f"divided in {reciprocal.steps + 1} clocks between two ticks"
-        return ""
+        if not isinstance(reciprocal, DividedReciprocal):
+            return ""
+        bits = self.native_width + reciprocal.scale_bits
+        two = f"; two adders for sums of {bits} bits" if reciprocal.is_wide(self.native_width) else ""
+        return f"divided in {reciprocal.steps + 1} clocks between two ticks{two}"
 
     @property
     def notes(self) -> tuple[str, ...]:

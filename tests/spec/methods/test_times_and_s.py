@@ -184,6 +184,9 @@ def test_the_reciprocal_of_s() -> None:
 
 def test_what_is_told_of_the_reciprocal() -> None:
     assert [one.division for one in (s(18), s(19))] == ["", "divided in 13 clocks between two ticks"]
+    # 11 + 16 bits of the velocity, and 22 behind them.
+    wide = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
+    assert wide.division == "divided in 38 clocks between two ticks; two adders for sums of 49 bits"
     assert [
         one.notes for one in (s(19), s(18, reciprocal_source="table"), s(960, 2048, reciprocal_source="table"))
     ] == [()] * 3
