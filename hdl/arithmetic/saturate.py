@@ -1,6 +1,6 @@
 """A number held within bounds."""
 
-from amaranth import Module, Mux, Signal, Value, signed
+from amaranth import Cat, Module, Mux, Signal, Value, signed
 
 
 def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
@@ -14,6 +14,33 @@ def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
         changed.eq(_beyond(value, limit)),
         # Not by which bound it is: most bits of the bounds are 0, and a register needs only its reset for these.
         held.eq(Mux(changed, Mux(value[-1], -limit, limit), value)),
+    ]
+    return held, changed
+
+
+def raised_for(most: int, limit: int) -> int:
+    """By how much a sum within −most … +most should be kept higher, so that `saturate_raised` can hold it.
+
+    That is the least power of two above `limit`, or 0 where nothing saturates.
+    """
+    return 1 << limit.bit_length() if limit < most else 0
+
+
+def saturate_raised(m: Module, raised: Signal, limit: int) -> tuple[Signal, Signal]:
+    """As `saturate`, of `raised` − `raised_for(…)`, with half of the cells.
+
+    All numbers within the bounds have the same upper bits, 0, so none of these is compared with a sign.
+    """
+    place = limit.bit_length()
+    within = Signal(signed(place + 1))
+    far = Signal()
+    held = Signal(signed(place + 1))
+    changed = Signal()
+    m.d.comb += [
+        within.eq(Cat(raised[:place], ~raised[place])),
+        far.eq(raised[place + 1 :].any()),
+        changed.eq(far | _beyond(within, limit)),
+        held.eq(Mux(changed, Mux(raised[-1] | ~(far | raised[place]), -limit, limit), within)),
     ]
     return held, changed
 

@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.delay import delay
-from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.arithmetic.saturate import raised_for, saturate_raised
 
 
 class PulseCounter(wiring.Component):
@@ -79,12 +79,17 @@ class PulseCounter(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         most = self._max_count + 1 if self._stretched else self._tick_cycles
+        start = 0 if self._stretched else raised_for(self._tick_cycles, self._max_count)
         count = Signal(signed(most.bit_length() + 1))
+        raised = count
+        if start:
+            raised = Signal(signed((most + start).bit_length() + 1), init=start)
+            m.d.comb += count.eq(raised - start)
         step = Signal.like(count)
         complete = Signal()
         new, last = delay(m, self.step, self.last, clocks=int(self._staged))
         m.d.comb += step.eq(new)
-        m.d.sync += [complete.eq(last), self.tick.eq(self.coming), count.eq(count + step)]
+        m.d.sync += [complete.eq(last), self.tick.eq(self.coming), raised.eq(raised + step)]
         held: Value = count
         overflow: Value = Const(0)
         if self._stretched:
@@ -96,10 +101,10 @@ class PulseCounter(wiring.Component):
             with m.If(left):
                 m.d.sync += count.eq(count)
             held, overflow = Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond
-        elif self._max_count < self._tick_cycles:
-            held, overflow = saturate(m, count, self._max_count)
+        elif start:
+            held, overflow = saturate_raised(m, raised, self._max_count)
         with m.If(complete):
-            m.d.sync += count.eq(step)
+            m.d.sync += raised.eq(start + step)
         coming: Value = complete
         open_sum: Value = count
         if self._staged:

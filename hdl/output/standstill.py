@@ -42,21 +42,32 @@ class Standstill(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        shown = Signal()
-        # Nominal ticks that may be empty after this one; negative, if this one must not be. So a sign is the flag, and
-        # nothing has to be compared. Where the length of a tick comes with it, its own ticks are still among them.
         differs = "shift" in self.signature.members
-        most = self._max_ticks if differs else self._max_ticks - 1
-        left = Signal(signed(most.bit_length() + 1), init=most - 1)
-        less = Signal.like(left)
+        shown = Signal()
         silent = ~self.m_e.any()
-        none = less[-1] if differs else left[-1]
-        m.d.comb += [
-            less.eq(left - (1 << self.shift if differs else 1)),
-            self.stalled.eq(Mux(self.tick, silent & (shown | none), shown)),
-        ]
+        # Nominal ticks that may still be empty; negative, if none may. So a sign is the flag, and nothing has to be
+        # compared.
+        if differs:
+            # The length of a tick comes with it, so its own ticks are among them.
+            most = self._max_ticks
+            left = Signal(signed(most.bit_length() + 1), init=most - 1)
+            less = Signal.like(left)
+            m.d.comb += less.eq(left - (1 << self.shift))
+            none = silent & (shown | less[-1])
+            with m.If(self.tick):
+                m.d.sync += left.eq(Mux(silent, Mux(less[-1], left, less), most))
+        else:
+            # They follow m_e a tick later, so that a count loads what reset loads: no bit needs a gate for it.
+            most = self._max_ticks - 2
+            left = Signal(signed(most.bit_length() + 1), init=most)
+            was_silent = Signal(init=1)
+            none = silent & was_silent & left[-1]
+            with m.If(self.tick):
+                m.d.sync += was_silent.eq(silent)
+            with m.If(self.tick & ~left[-1]):
+                m.d.sync += left.eq(left - 1)
+            with m.If(self.tick & ~was_silent):
+                m.d.sync += left.eq(most)
+        m.d.comb += self.stalled.eq(Mux(self.tick, none, shown))
         m.d.sync += shown.eq(self.stalled)
-        # m_e decides nothing but what is loaded: an enable would come too late.
-        with m.If(self.tick):
-            m.d.sync += left.eq(Mux(silent, Mux(none, left, less), most))
         return m

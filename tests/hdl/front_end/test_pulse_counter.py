@@ -2,26 +2,34 @@ import itertools
 
 import numpy as np
 import pytest
-from amaranth import Module, signed
+from amaranth import Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
-from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.arithmetic.saturate import raised_for, saturate, saturate_raised
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 
 
 class Held(wiring.Component):
-    """A number held within bounds."""
+    """A number held within bounds, which may be raised for it."""
 
-    def __init__(self, width: int, limit: int) -> None:
+    def __init__(self, width: int, limit: int, *, raised: bool = False) -> None:
         self._limit = limit
+        self._raised = raised
         super().__init__({"value": In(signed(width)), "held": Out(signed(limit.bit_length() + 1)), "changed": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        held, changed = saturate(m, self.value, self._limit)
+        if self._raised:
+            most = 1 << (len(self.value) - 1)
+            start = raised_for(most, self._limit)
+            raised = Signal(signed((most + start).bit_length() + 1))
+            m.d.comb += raised.eq(self.value + start)
+            held, changed = saturate_raised(m, raised, self._limit)
+        else:
+            held, changed = saturate(m, self.value, self._limit)
         m.d.comb += [self.held.eq(held), self.changed.eq(changed)]
         return m
 
@@ -61,7 +69,7 @@ def test_full_speed_both_ways(forward: float) -> None:
 
 
 def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
-    with mutant(PulseCounter, "m.d.sync += count.eq(step)", "m.d.sync += count.eq(0)"), caught():
+    with mutant(PulseCounter, "raised.eq(start + step)", "raised.eq(start)"), caught():
         check_counts(5, 5, seed=0)
 
 
@@ -78,11 +86,29 @@ def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
 def test_mutants_of_the_bounds_are_caught(right: str, wrong: str) -> None:
     with mutant(saturate, right, wrong), caught():
         check_bounds(5, 5)
+    with mutant(saturate_raised, right, wrong), caught():
+        check_bounds(5, 5, raised=True)
 
 
-def check_bounds(width: int, limit: int) -> None:
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("place + 1 :]", "place + 2 :]"),
+        ("far | _beyond(", "_beyond("),
+        ("~(far | raised[place])", "~raised[place]"),
+        ("raised[-1] | ~", "~"),
+        ("~raised[place]))", "raised[place]))"),
+    ],
+)
+def test_mutants_of_what_is_raised_are_caught(right: str, wrong: str) -> None:
+    with mutant(saturate_raised, right, wrong), caught():
+        check_bounds(5, 5, raised=True)
+
+
+def check_bounds(width: int, limit: int, *, raised: bool = False) -> None:
     values = range(-(1 << (width - 1)), 1 << (width - 1))
-    seen = clock_by_clock(Held(width, limit), [{"value": value} for value in values], ["held", "changed"])
+    box = Held(width, limit, raised=raised)
+    seen = clock_by_clock(box, [{"value": value} for value in values], ["held", "changed"])
     for value, row in zip(values, seen, strict=True):
         inside = max(-limit, min(limit, value))
         assert row == {"held": inside, "changed": int(inside != value)}, value
@@ -91,6 +117,8 @@ def check_bounds(width: int, limit: int) -> None:
 @pytest.mark.parametrize(("width", "limit"), [(2, 1), (2, 2), (3, 3), (5, 1), (5, 6), (5, 7), (5, 8), (5, 15), (5, 16)])
 def test_every_value_within_its_bound(width: int, limit: int) -> None:
     check_bounds(width, limit)
+    if raised_for(1 << (width - 1), limit):
+        check_bounds(width, limit, raised=True)
 
 
 def test_bad_max_count() -> None:

@@ -57,6 +57,10 @@ def check_box(max_ticks: int = 5) -> None:
     check(Standstill(max_ticks, WIDTH), max_ticks, "m_e", 1)
 
 
+def check_long_ticks(max_ticks: int = 5) -> None:
+    check(Standstill(max_ticks, WIDTH, max_shift=2), max_ticks, "m_e", 1, shifts=True)
+
+
 def check_s(max_ticks: int = 5) -> None:
     for clocks in (3, 40):
         box = SMethod(STachometer(encoder=Encoder(25), timing=Timing(1_000_000, clocks, max_ticks)))
@@ -70,7 +74,7 @@ def test_after_the_maximum_time(max_ticks: int) -> None:
     check_box(max_ticks)
     check_s(max_ticks)
     check(Standstill(max_ticks, WIDTH), max_ticks, "m_e", 0)
-    check(Standstill(max_ticks, WIDTH, max_shift=2), max_ticks, "m_e", 1, shifts=True)
+    check_long_ticks(max_ticks)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -90,10 +94,14 @@ def test_every_method(method: str) -> None:
 
 
 MUTANTS = {
-    "a tick late": (Standstill, "init=most - 1", "init=most", check_box),
-    "a tick early": (Standstill, "less), most)", "less), most - 1)", check_box),
-    "in spite of a count": (Standstill, "silent & (shown", "(shown", check_box),
-    "not held": (Standstill, "none), shown)", "none), 0)", check_box),
+    "a tick early after reset": (Standstill, "init=most)", "init=most - 1)", check_box),
+    "a tick early": (Standstill, "left.eq(most)", "left.eq(most - 1)", check_box),
+    "in spite of a count": (Standstill, "silent & was_silent", "was_silent", check_box),
+    "at once after a count": (Standstill, "silent & was_silent", "silent", check_box),
+    "not held": (Standstill, "none, shown)", "none, 0)", check_box),
+    "long ticks: early after reset": (Standstill, "init=most - 1)", "init=most - 3)", check_long_ticks),
+    "long ticks: a tick early": (Standstill, "less), most)", "less), most - 1)", check_long_ticks),
+    "long ticks: in spite of a count": (Standstill, "silent & (shown", "(shown", check_long_ticks),
     "S: without the opening tick": (
         IntervalAccumulator,
         "longest & ~opening.any() & was_silent",

@@ -10,6 +10,7 @@ from proofs.formal.control import CONTROL
 from proofs.formal.prove import Proof
 from proofs.formal.tracking import COUNTS_OF_A_TICK
 
+from tachometry.hdl.arithmetic.saturate import raised_for
 from tachometry.spec import (
     Encoder,
     MTachometer,
@@ -21,6 +22,7 @@ from tachometry.spec import (
     TTachometer,
 )
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal as CarriedSpec
+from tachometry.spec.units import signed_width
 
 
 def core(
@@ -36,10 +38,7 @@ def core(
     )
 
 
-_FRONT_PROBES = {
-    "core_clocks": "conditioner.clocks_since_reset",
-    "core_count": "pulse_counter.count",
-}
+_FRONT_PROBES = {"core_clocks": "conditioner.clocks_since_reset"}
 _WINDOW_PROBES = {"core_left": "sampling_clock.left"}
 _FILTER_PROBES = {
     "core_held_a": "conditioner.filter_a.held",
@@ -50,7 +49,6 @@ _FILTER_PROBES = {
     "core_known_b": "conditioner.filter_b.known",
 }
 _METHOD_PROBES = {
-    "core_count": "pulse_counter.count",
     "core_m_s": "datapath.interval.m_s",
     "core_longest": "datapath.interval.longest",
     "core_opening": "datapath.interval.opening",
@@ -68,7 +66,11 @@ _CARRIED_PROBES = {
     "core_less": "datapath.quotient.reciprocal.less",
     "core_carried_q": "datapath.quotient.reciprocal.carried_q",
 }
-_STANDSTILL_PROBES = {"core_rests": "standstill.shown", "core_empty": "standstill.left"}
+_STANDSTILL_PROBES = {
+    "core_rests": "standstill.shown",
+    "core_empty": "standstill.left",
+    "core_silent": "standstill.was_silent",
+}
 _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_longest")} | _CARRIED_PROBES
 
 
@@ -77,9 +79,17 @@ def within(block: str, probes: dict[str, str], there: bool) -> dict[str, str]:
     return {f"{block}.{wire}": path for wire, path in probes.items() if there}
 
 
+def _sum(spec: STachometer) -> tuple[dict[str, int], dict[str, str]]:
+    """The sum of a window's steps: how it is kept, and where."""
+    start = raised_for(spec.longest_tick, spec.max_count)
+    width = signed_width(spec.longest_tick + start)
+    return {"START": start, "SUM_WIDTH": width}, {"core_sum": f"pulse_counter.{'raised' if start else 'count'}"}
+
+
 def front(name: str, spec: STachometer) -> Proof:
     """P1, P2, P3, P6: the front end."""
-    parameters = {
+    kept, probes = _sum(spec)
+    parameters = kept | {
         "DECODING": spec.encoder.decoding,
         "FILTER": spec.filter_clocks,
         "T": spec.timing.tick_cycles,
@@ -88,7 +98,7 @@ def front(name: str, spec: STachometer) -> Proof:
         "COUNT_WIDTH": spec.count_width,
         "POSITION_WIDTH": spec.position_width,
     }
-    probes = _FRONT_PROBES | within("glitch", _FILTER_PROBES, spec.filter_clocks > 0)
+    probes |= _FRONT_PROBES | within("glitch", _FILTER_PROBES, spec.filter_clocks > 0)
     probes |= within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
     return Proof(name, spec, "front", parameters, probes, depth=3 + spec.tick_latency)
 
@@ -100,7 +110,8 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
     carried = {}
     if isinstance(used, CarriedSpec):
         carried = {"CARRIED": used.depth, "C": used.scale}
-    parameters = {
+    kept, probes = _sum(spec)
+    parameters = kept | {
         "T": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
         "MAX_COUNT": spec.max_count,
@@ -114,7 +125,7 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
         "TICK_TO_VELOCITY": latency,
         "AGE": int(spec.age),
     }
-    probes = _METHOD_PROBES | within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
+    probes |= _METHOD_PROBES | within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
     probes |= within("aged", {"core_age": "age"}, spec.age)
     probes |= within("carried", _CARRIED_PROBES, bool(carried))
     probes |= within("serial", _SERIAL_PROBES, serial)

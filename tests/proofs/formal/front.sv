@@ -8,6 +8,8 @@ module front #(
     parameter TICK_LATENCY = 2,
     parameter MAX_COUNT = 4,
     parameter COUNT_WIDTH = 4,
+    parameter SUM_WIDTH = 4,      // bits of the sum of a window
+    parameter START = 0,          // what it is raised by
     parameter POSITION_WIDTH = 8,
     parameter UPSET = 0           // the phases of the window and of the filter are those of the core, which may have any
 ) (
@@ -22,7 +24,8 @@ module front #(
       .decode_error(decode_error), .overflow(overflow)
   );
   wire [2:0] core_clocks;
-  wire signed [$clog2(T + 1):0] core_count;
+  wire signed [SUM_WIDTH-1:0] core_sum;
+  wire signed [SUM_WIDTH:0] core_count = core_sum - START;
 
   // The conditioned pins: two flip-flops, then a filter that follows when the last FILTER levels all differ from it, and
   // that begins when the last FILTER levels were the same. The first real level is that of the first clock after reset.

@@ -50,8 +50,8 @@ module m_method #(
 
   wire rests, rested;
   wire [31:0] quiet;
-  wire signed [$clog2(MAX_TICKS):0] core_empty;
-  wire core_rests;
+  wire signed [$clog2(MAX_TICKS - 1):0] core_empty;
+  wire core_rests, core_silent;
   standstill #(MAX_TICKS, COUNT_WIDTH) still (clk, rst, tick, pulse_count, rests, rested, quiet);
 
   // As late as the core shows them.
@@ -66,7 +66,8 @@ module m_method #(
   always @* begin
     lemma_bounded: assert (bounded && ticks <= N);
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
+        && core_silent == (quiet != 0)
+        && (quiet == 0 || core_empty == (rested ? -1 : MAX_TICKS - 1 - $signed({1'b0, quiet}))));
     pm_update: assert (velocity_valid == tick_ && interval == N && !forced);
     pm_velocity: assert (!velocity_valid || (2 * shown <= 2 * scaled + N && 2 * scaled + N < 2 * shown + 2 * N));
     pm_stalled: assert (stalled == rests);

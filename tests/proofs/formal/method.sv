@@ -6,6 +6,8 @@ module method #(
     parameter MAX_TICKS = 8,
     parameter MAX_COUNT = 4,
     parameter COUNT_WIDTH = 4,
+    parameter SUM_WIDTH = 4,      // bits of the sum of a window
+    parameter START = 0,          // what it is raised by
     parameter INTERVAL_WIDTH = 4,
     parameter NUMERATOR_WIDTH = 6,
     parameter FRAC_BITS = 4,
@@ -33,7 +35,8 @@ module method #(
   wire core_longest, core_rests, core_nearly, core_alteration;
   wire signed [COUNT_WIDTH-1:0] core_opening, core_offset;
   wire signed [NUMERATOR_WIDTH-1:0] core_numerator;
-  wire signed [$clog2(T + 1):0] core_count;
+  wire signed [SUM_WIDTH-1:0] core_sum;
+  wire signed [SUM_WIDTH:0] core_count = core_sum - START;
 
   // m_e(i-1) ... m_e(i-max_ticks); zeros before reset. m_s = i - a, by the rules of the alteration.
   reg [COUNT_WIDTH*MAX_TICKS-1:0] past = 0;

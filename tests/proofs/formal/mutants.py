@@ -124,7 +124,7 @@ MUTANTS = [
     Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & total.any())"),
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
-    Mutant("M of 4", "pm_stalled", Standstill, "init=most - 1", "init=most - 2"),
+    Mutant("M of 4", "pm_stalled", Standstill, "init=most)", "init=most - 1)"),
     Mutant("M of 3", "pm_bounds", MMethod, "margin=spec.margin", "margin=0"),
     Mutant(
         "M of 4", "pm_known", MMethod, "known.bounds_valid.eq(seen >= spec.average)", "known.bounds_valid.eq(seen != 0)"
@@ -136,7 +136,7 @@ MUTANTS = [
     Mutant("Rairán", "pr_update", RairanCounters, "(~moved | self.rest)", "~moved", 32),
     Mutant("Rairán", "pr_velocity", RairanMethod, "Mux(high, ~entry[2], entry[0])", "Mux(high, entry[2], entry[0])"),
     Mutant("Rairán", "pr_rest", RairanCounters, "set_(0, update=~self.rest", "set_(1, update=~self.rest", 32),
-    Mutant("Rairán", "pr_stalled", Standstill, "less), most)", "less), most - 1)", 32),
+    Mutant("Rairán", "pr_stalled", Standstill, "left.eq(most)", "left.eq(most - 1)", 32),
     Mutant("Rairán", "pr_range", RairanCounters, "with m.If(full):", "with m.If(0):"),
     Mutant("Rairán", "pr_flag", RairanCounters, "self.beyond.eq(1)", "self.beyond.eq(0)"),
     Mutant("T", "pt_update", QuotientVelocity, "measuring | nearer", "nearer"),
@@ -167,7 +167,7 @@ MUTANTS = [
         "self.period & longest & self.count",
         40,
     ),
-    Mutant("T", "pt_stalled", Standstill, "silent & (shown", "(shown", 32),
+    Mutant("T", "pt_stalled", Standstill, "silent & was_silent", "was_silent", 32),
     Mutant(
         "T",
         "pt_held",

@@ -27,8 +27,8 @@ module rairan #(
   wire [$clog2(MAX_COUNT<3?2:MAX_COUNT)-1:0] core_more;
   wire [$clog2(MAX_TICKS+1)-1:0] core_dt;
   wire [$clog2((MAX_TICKS>MAX_COUNT?MAX_TICKS:MAX_COUNT)+1)-1:0] core_n;
-  wire signed [$clog2(MAX_TICKS):0] core_empty;
-  wire core_rests, core_forced, core_at_rest, core_any, core_high, core_backward, core_moved, core_late, core_in_step, core_rest, core_beyond;
+  wire signed [$clog2(MAX_TICKS - 1):0] core_empty;
+  wire core_rests, core_silent, core_forced, core_at_rest, core_any, core_high, core_backward, core_moved, core_late, core_in_step, core_rest, core_beyond;
 
   wire still, rested;
   wire [31:0] quiet;
@@ -129,7 +129,8 @@ module rairan #(
     lemma_held: assert (n_ep_ != 0 || velocity == 0);
     lemma_rest: assert (core_forced == was_alone && core_at_rest == was_rest && (!was_rest || n_ep == 0));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
+        && core_silent == (quiet != 0)
+        && (quiet == 0 || core_empty == (rested ? -1 : MAX_TICKS - 1 - $signed({1'b0, quiet}))));
     lemma_waits: assert (c_dt == MAX_TICKS ? n_ep == 0 : idle <= c_dt * T + clock);
   end
   always @* begin

@@ -38,8 +38,8 @@ module timed #(
       .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
   );
   wire core_running, core_done, core_measuring, core_forced, core_opened, core_nearer;
-  wire signed [$clog2(MAX_TICKS):0] core_empty;
-  wire core_rests;
+  wire signed [$clog2(MAX_TICKS - 1):0] core_empty;
+  wire core_rests, core_silent;
   wire core_negative, core_longest;
   wire signed [1:0] core_step;
   wire [$clog2(MAX_PERIODS+1)-1:0] core_age;
@@ -252,7 +252,8 @@ module timed #(
     lemma_rest: assert (opened || idle == LONG + B || (measuring && since == idle - LONG + 1 && distance == 0));
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
-        && (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
+        && core_silent == (quiet != 0)
+        && (quiet == 0 || core_empty == (rested ? -1 : MAX_TICKS - 1 - $signed({1'b0, quiet}))));
     lemma_fresh: assert (fresh && fresh_past);
     lemma_began: assert (!fresh_division || fresh || (since != 0 && measuring));
     lemma_settled: assert (SETTLED < 0 || ((!fresh_division || fresh_now)

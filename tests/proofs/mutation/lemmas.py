@@ -6,6 +6,7 @@ In Verilog; `{name}` is a register of the core by name, which may be the end of 
 from proofs.mutation import track_lemmas
 from proofs.mutation.inductive import Known
 
+from tachometry.hdl.arithmetic.saturate import raised_for
 from tachometry.spec import STachometer, TachometerSpec, TrackTachometer
 from tachometry.spec.methods.timed import TimedTachometer
 
@@ -24,8 +25,8 @@ def known(spec: TachometerSpec) -> Known | None:
     return track_lemmas.known(spec) if isinstance(spec, TrackTachometer) else None
 
 
-def _within(name: str, limit: object) -> str:
-    return f"$signed({{{name}}}) <= {limit} && $signed({{{name}}}) >= -{limit}"
+def _within(name: str, limit: object, middle: int = 0) -> str:
+    return f"$signed({{{name}}}) <= {middle} + {limit} && $signed({{{name}}}) >= {middle} - {limit}"
 
 
 def _tick(spec: STachometer) -> list[str]:
@@ -34,11 +35,13 @@ def _tick(spec: STachometer) -> list[str]:
     if cycles >= 16:
         return []  # the sampling clock is no counter
     left = "$signed({sampling_clock.left})"
+    start = raised_for(cycles, spec.max_count)
+    name = f"pulse_counter.{'raised' if start else 'count'}"
     return [
         f"{left} >= -1 && {left} <= {cycles - 2}",
         f"{left} == {cycles - 2} || !{{complete}}",
-        f"{left} == {cycles - 2} ? {_within('pulse_counter.count', cycles)}"
-        f" : {_within('pulse_counter.count', f'($signed({cycles - 2}) - {left})')}",
+        f"{left} == {cycles - 2} ? {_within(name, cycles, start)}"
+        f" : {_within(name, f'($signed({cycles - 2}) - {left})', start)}",
     ]
 
 
