@@ -46,7 +46,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     def measure(*words: Any) -> Measurement:
         verilog, top, between, target, _, seeds, prepare = words
-        asked.append((verilog, top, between, list(seeds), prepare))
+        asked.append((verilog, top, between, list(seeds), prepare, target))
         return Measurement({**dict.fromkeys(target.cells, 7), "Fmax": 99.5}, "a → b", (98.0, 101.0))
 
     monkeypatch.setattr(peers, "measure_verilog", measure)
@@ -58,11 +58,23 @@ def test_verilog_with_a_parameter(counter: str, measured: list[Any], capsys: pyt
     words = [counter, "--top", "counter", "--clock", "clock", "--set", "W=13", "--targets", "HX8K", "--seeds", "2"]
     assert peers.main(words) == 0
     assert "| counter | 7 | 7 | 99.5 (98–101) | a → b |" in capsys.readouterr().out
-    ((verilog, top, between, seeds, prepare),) = measured
+    ((verilog, top, between, seeds, prepare, _),) = measured
     assert (verilog, top, seeds, prepare) == (COUNTER, "counter", [1, 2], "chparam -set W 13 counter; ")
     assert "counter core(" in between
     for port in (".clock(clk)", ".up(feed[0 +: 1])", ".count(result[0 +: 13])"):
         assert port in between
+
+
+def test_the_largest_ecp5_is_measured_if_it_is_asked_for(
+    counter: str, measured: list[Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [counter, "--top", "counter", "--clock", "clock"]
+    assert peers.main([*words, "--targets", "ECP5-85F"]) == 0
+    assert "## ECP5-85F\n" in capsys.readouterr().out
+    assert "--85k" in measured[0][-1].route
+    assert measured[0][-1].cells == peers.TARGETS["ECP5"].cells
+    assert peers.main([*words, "--jobs", "1"]) == 0
+    assert [one[-1] for one in measured[1:]] == list(peers.TARGETS.values())
 
 
 def test_vhdl_has_no_latches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: list[Any]) -> None:
