@@ -6,7 +6,7 @@ from typing import Any
 from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
-from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.arithmetic.saturate import saturate_raised
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler
 from tachometry.hdl.axes.axes_datapath import AxesDatapath
 from tachometry.hdl.axes.axis_counters import AxisCounters
@@ -67,10 +67,10 @@ MUTANTS = [
     Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~level_b", "~change_b & level_b"),
     Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
     Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
-    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(0)"),
-    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "count.eq(step)", "count.eq(step << 1)"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "raised.eq(start + step)", "raised.eq(start)"),
+    Mutant("x4, 2 clocks", "p3_count", PulseCounter, "raised.eq(start + step)", "raised.eq(start + (step << 1))"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
-    Mutant("x2, 7 clocks", "p3_overflow", saturate, "beyond: Value = negative", "beyond: Value = ~negative"),
+    Mutant("x2, 7 clocks", "p3_overflow", saturate_raised, "beyond: Value = negative", "beyond: Value = ~negative"),
     Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & differs", ""),
     Mutant(
         "eq. (21), 1 clock",

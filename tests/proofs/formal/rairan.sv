@@ -130,7 +130,7 @@ module rairan #(
     lemma_rest: assert (core_forced == was_alone && core_at_rest == was_rest && (!was_rest || n_ep == 0));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
         && core_silent == (quiet != 0)
-        && (quiet == 0 || core_empty == (rested ? -1 : MAX_TICKS - 1 - $signed({1'b0, quiet}))));
+        && (quiet == 0 || (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet}))));
     lemma_waits: assert (c_dt == MAX_TICKS ? n_ep == 0 : idle <= c_dt * T + clock);
   end
   always @* begin
