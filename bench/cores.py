@@ -1,10 +1,12 @@
 """The cores that `make size` measures, and the bars that they must reach."""
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+from tachometry.boards.fpga import ecp5_memory
 from tachometry.hdl import export
 from tachometry.hdl.demo.demo import Demo
 from tachometry.hdl.export import verilog_of
@@ -48,6 +50,8 @@ class Configuration:
         With emulator and telemetry.
     without_max_speed : str
         Name of the configuration that differs only in that it has no greatest speed, if there is one.
+    after : str
+        Source of a script that changes the netlist, see `Target`.
     """
 
     name: str
@@ -59,6 +63,12 @@ class Configuration:
     bus: str = "none"
     demo: bool = False
     without_max_speed: str = ""
+    after: str = ""
+
+    @property
+    def has_speed_bar(self) -> bool:
+        """Whether its Fmax has to reach something on any target."""
+        return any("Fmax" in bars for bars in self.bars.values())
 
     @property
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
@@ -85,6 +95,7 @@ TABLE_BARS = {
     "ECP5": {"COMB": 235, "FF": 240, "DP16KD": 1, "MULT": 0, "Fmax": 135, "latency": 4},
     "HX8K": {"LC": 305, "RAM": 4, "Fmax": 130},
 }
+OUTPUT_REGISTER_BARS = {"ECP5": {"COMB": 235, "FF": 215, "DP16KD": 1, "MULT": 0, "Fmax": 200, "latency": 4}}
 # The clock of the reference on the slowest FPGA, and 100 MHz on the others.
 FAST = {"HX8K": {"Fmax": 100}, "UP5K": {"Fmax": 48}}
 DEFAULT_BARS = {"ECP5": {"COMB": 340, "DP16KD": 0, "MULT": 0, "Fmax": 180, "latency": 8}} | FAST
@@ -160,6 +171,15 @@ CONFIGURATIONS = (
         without_max_speed="default",
     ),
     Configuration("table", "reciprocal from a table", replace(REFERENCE, reciprocal_source="table"), TABLE_BARS),
+    Configuration(
+        "table-output-register",
+        "and the block RAM's output register, as `build` uses it",
+        replace(REFERENCE, reciprocal_source="table"),
+        OUTPUT_REGISTER_BARS,
+        is_option=False,
+        targets=("ECP5",),
+        after=inspect.getsource(ecp5_memory),
+    ),
     Configuration("default", "no max_speed", replace(REFERENCE, max_speed=None), DEFAULT_BARS),
     Configuration("no-cancel", "eq. (17) instead of eq. (21)", replace(REFERENCE, cancel=False)),
     Configuration("frac-bits-8", "8 fraction bits", replace(REFERENCE, frac_bits=8)),

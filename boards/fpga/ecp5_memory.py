@@ -2,9 +2,14 @@
 
 Yosys maps a memory to a block RAM whose output comes straight from its cells, 5 to 6 ns after the clock, and a register
 behind it to flip-flops. The block RAM has such a register itself, which is ready in 1 ns; vendors' tools use it.
+
+As a script, `python ecp5_memory.py NETLIST` changes a netlist in its file.
 """
 
+import json
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 _MEMORY, _FLIP_FLOP = "DP16KD", "TRELLIS_FF"
@@ -63,3 +68,10 @@ def _registers(
             return {}
         found[port] = name
     return found
+
+
+if __name__ == "__main__":
+    path = Path(sys.argv[1])
+    netlist = json.loads(path.read_text(encoding="utf-8"))
+    use_output_registers(netlist)
+    path.write_text(json.dumps(netlist), encoding="utf-8")

@@ -47,12 +47,15 @@ class Target:
         nextpnr, device and package.
     cells : dict
         What nextpnr calls the cells that are counted, by the names that the tables give them.
+    after : str
+        Source of a Python script that changes a netlist between synthesis and routing; empty if there is none.
     """
 
     device: str
     synth: str
     route: tuple[str, ...]
     cells: Mapping[str, str]
+    after: str = ""
 
 
 TARGETS = {
@@ -84,7 +87,7 @@ class Measurement:
     Parameters
     ----------
     figures : dict
-        Cells by name, the median `Fmax` in MHz, `latency` in clocks.
+        Cells by name, the median `Fmax` in MHz if it was routed, `latency` in clocks.
     limit : str
         The path that limits Fmax with the seed that has the median.
     spread : tuple of float, or None
@@ -228,31 +231,41 @@ def measure_verilog(
 ) -> Measurement:
     """Synthesise, pack and route a module for a target; what has been measured is not measured again.
 
-    `between` is its wrapper, and `prepare` are passes of Yosys before the synthesis.
+    `between` is its wrapper, and `prepare` are passes of Yosys before the synthesis. Without seeds nothing is routed:
+    there is no Fmax.
 
     Raises
     ------
     RuntimeError
         If a tool fails.
     """
+    files = {"core.v": verilog, "wrapper.v": between, **({"after.py": target.after} if target.after else {})}
+
+    def netlist(sources: str, top: str, name: str) -> list[Sequence[str]]:
+        changed = [["python", "after.py", f"{name}.json"]] if target.after else []
+        return [synthesis(sources, f"{prepare}{target.synth} -top {top}", name), *changed]
+
     commands = [
-        synthesis("core.v", f"{prepare}{target.synth} -top {top}", "core"),
+        *netlist("core.v", top, "core"),
         [*target.route, "-q", "--json", "core.json", "--pack-only", "--report", "area.json", "-l", "area.log"],
-        synthesis("core.v wrapper.v", f"{prepare}{target.synth} -top wrapper", "wrapper"),
     ]
+    if seeds:
+        commands += netlist("core.v wrapper.v", "wrapper", "wrapper")
     for seed in seeds:
         outputs = ["--report", f"route{seed}.json", "-l", f"route{seed}.log"]
         commands.append(
             [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
         )
     reports = ["area.json", *(f"route{seed}.json" for seed in seeds)]
-    packed, *routed = made({"core.v": verilog, "wrapper.v": between}, commands, reports, tools)
+    packed, *routed = made(files, commands, reports, tools)
+    figures: dict[str, float] = dict(area(packed, target.cells))
+    if not routed:
+        return Measurement(figures, "")
     reached = [achieved(report) for report in routed]
     fmax = statistics.median_low(reached)
     median = next(report for report in routed if achieved(report) == fmax)
-    figures: dict[str, float] = {**area(packed, target.cells), "Fmax": fmax}
     path = limit(critical_path(median)) if fmax else "cannot be routed"
-    return Measurement(figures, path, (min(reached), max(reached)))
+    return Measurement(figures | {"Fmax": fmax}, path, (min(reached), max(reached)))
 
 
 def area(report: Mapping[str, Any], cells: Mapping[str, str]) -> dict[str, int]:

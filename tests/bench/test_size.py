@@ -242,6 +242,15 @@ def test_fmax_is_the_median_of_the_seeds(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (three.figures["Fmax"], three.spread) == (120.0, (100.0, 140.0))
 
 
+def test_without_seeds_there_is_no_fmax(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cores that have no bar of Fmax are not routed; their cells are in the tables all the same."""
+    monkeypatch.setattr(synthesis, "made", lambda files, commands, results, tools: [REPORT][: len(results)])
+    found = synthesis.measure_core(SPEC, size.TARGETS["ECP5"], "", {}, seeds=())
+    assert "Fmax" not in found.figures
+    table = size.target_table("ECP5", {("reference", "ECP5"): found})
+    assert table.rows[0][2:] == ["325", "215", "1", "0", "", str(SPEC.tick_to_velocity), ""]
+
+
 def test_what_a_greatest_speed_changes() -> None:
     """Rows in pairs, each of which differs in nothing else."""
     specs = {configuration.name: configuration.spec for configuration in size.CONFIGURATIONS}
