@@ -103,8 +103,9 @@ class PulseCounter(wiring.Component):
             held, overflow = Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond
         elif start:
             held, overflow = saturate_raised(m, raised, self._max_count)
+        fresh: Value = step + start if start else step
         with m.If(complete):
-            m.d.sync += raised.eq(start + step)
+            m.d.sync += raised.eq(fresh)
         coming: Value = complete
         open_sum: Value = count
         if self._staged:

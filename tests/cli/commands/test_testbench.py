@@ -101,7 +101,7 @@ def test_passes_in_pytest(tmp_path: Path) -> None:
 
 MUTANTS: dict[str, tuple[Any, str, str, str]] = {
     "every alteration": (AlterationDetector, " & differs)", ")", "s"),
-    "count lost": (PulseCounter, "m.d.sync += count.eq(step)", "m.d.sync += count.eq(0)", "s"),
+    "count lost": (PulseCounter, "raised.eq(fresh)", "raised.eq(start)", "s"),
     "tick lost": (PulseCounter, "self.tick.eq(self.coming)", "self.tick.eq(self.coming & ~self.step[0])", "m"),
     "glitch believed": (GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2", "s"),
     "index forgotten": (PositionCounter, "self.position.eq(0)", "self.position.eq(1)", "s"),

@@ -69,7 +69,7 @@ def test_full_speed_both_ways(forward: float) -> None:
 
 
 def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
-    with mutant(PulseCounter, "raised.eq(start + step)", "raised.eq(start)"), caught():
+    with mutant(PulseCounter, "raised.eq(fresh)", "raised.eq(start)"), caught():
         check_counts(5, 5, seed=0)
 
 
