@@ -93,13 +93,16 @@ class PulseCounter(wiring.Component):
         held: Value = count
         overflow: Value = Const(0)
         if self._stretched:
-            # Beyond its bound the sum stays where it is.
+            # Beyond its bound the sum stays where it is. A register knows it, so that nothing waits for a comparison.
             left = Signal()
             beyond = Signal()
-            m.d.comb += left.eq((count == most) | (count == -most))
-            m.d.sync += beyond.eq(self.beyond)
+            with m.If(step[0] & (count == Mux(step[-1], 1 - most, most - 1))):
+                m.d.sync += left.eq(1)
             with m.If(left):
                 m.d.sync += count.eq(count)
+            with m.If(complete):
+                m.d.sync += left.eq(0)
+            m.d.sync += beyond.eq(self.beyond)
             held, overflow = Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond
         elif start:
             held, overflow = saturate_raised(m, raised, self._max_count)

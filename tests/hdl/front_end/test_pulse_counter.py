@@ -156,7 +156,13 @@ def test_a_window_may_be_longer_than_nominal(tick_cycles: int, max_count: int) -
 
 @pytest.mark.parametrize(
     ("right", "wrong"),
-    [("count.eq(count)", "count.eq(count + step)"), ("left | beyond", "left"), ("== -most", "== most")],
+    [
+        ("count.eq(count)", "count.eq(count + step)"),
+        ("left | beyond", "left"),
+        ("1 - most, most - 1", "most - 1, 1 - most"),
+        ("step[0] & (count", "(count"),
+        ("left.eq(0)", "left.eq(left)"),
+    ],
 )
 def test_mutants_of_a_longer_window_are_caught(right: str, wrong: str) -> None:
     with mutant(PulseCounter, right, wrong), caught():
