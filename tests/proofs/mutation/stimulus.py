@@ -1,4 +1,7 @@
-"""What is played on the mutants: many short motions with a reset before each, in the middle of the one before."""
+"""What is played on the mutants: many short motions with a reset before each, in the middle of the one before.
+
+The first begins as the core powers up, without a reset.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +40,7 @@ class Stimulus:
     traces : sequence of Part
         One after each reset.
     starts : list of int
-        Clock in which each of them begins, the first one after a reset.
+        Clock in which each of them begins: the first one, or the first one after a reset.
     """
 
     pins: NDArray[np.uint64]
@@ -157,10 +160,12 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         row = np.cumsum(level) - 1
         played = packed([trace.lines[name] for name in _lines(spec)])[row] << np.uint8(1)
         reset = rng.integers(0, 256, resets).astype(np.uint8) | np.uint8(1)
-        starts.append(done + resets)
+        if not traces:
+            reset = reset[:0]
+        starts.append(done + len(reset))
         pins.extend([reset, played])
         traces.append(trace)
-        done += resets + trace.n_clocks
+        done += len(reset) + trace.n_clocks
 
     while done < n_clocks:
         if done > n_clocks // 4 and not shaken:
