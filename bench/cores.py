@@ -239,13 +239,7 @@ CONFIGURATIONS = (
         is_option=False,
     ),
     *variants("m", "M method", MTachometer(**COMMON), M_BARS),
-    Configuration(
-        "m-10",
-        "M method, mean of 10 ticks",
-        MTachometer(**COMMON, average=10),
-        {target: M_BARS[target] for target in ("ECP5", "HX8K")},
-        is_option=False,
-    ),
+    Configuration("m-10", "M method, mean of 10 ticks", MTachometer(**COMMON, average=10), M_BARS, is_option=False),
     *variants("rairan", "Rairán's method, n3", RairanTachometer(**COMMON), RAIRAN_BARS),
     Configuration(
         "rairan-adaptive",

@@ -37,18 +37,20 @@ def check(spec: TachometerSpec, trace: PinTrace) -> None:
     assert number == 0, first
 
 
-# Of the matrix. Without idle counters nothing is skipped.
-CORES = [spec for method in METHODS for spec in map(spec_of, configurations(method)) if Tachometer(spec).idle_counters]
+CORES = [words for method in METHODS for words in configurations(method)]
 
 
-@pytest.mark.parametrize("spec", CORES, ids=lambda spec: f"{spec.method}-{spec.timing.tick_cycles}")
-def test_rows_are_those_of_every_clock(spec: TachometerSpec) -> None:
+@pytest.mark.parametrize("words", CORES, ids=" ".join)
+def test_rows_are_those_of_every_clock(words: tuple[str, ...]) -> None:
     """On random motions; and with edges far apart, so that whole ticks are skipped."""
-    check_core(spec)
+    spec = spec_of(words)
+    if Tachometer(spec).idle_counters:  # else nothing is skipped
+        check_core(spec)
 
 
-def test_every_method_has_cores_that_skip() -> None:
-    assert {spec.method for spec in CORES} == {*METHODS}
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_has_cores_that_skip(method: str) -> None:
+    assert any(Tachometer(spec_of(words)).idle_counters for words in configurations(method))
 
 
 def check_core(spec: TachometerSpec) -> None:
