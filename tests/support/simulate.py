@@ -1,8 +1,10 @@
 """Drive one component clock by clock."""
 
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from operator import attrgetter
-from typing import Any
+from typing import Any, overload
 
 from amaranth import Module, Shape, Signal, Value
 from amaranth.lib import data, wiring
@@ -17,9 +19,49 @@ def member(component: wiring.Component, name: str) -> Any:
     return updates.valid if name == "velocity_valid" else updates.p[name]
 
 
-def clock_by_clock(
-    component: wiring.Component, inputs: Sequence[Mapping[str, int]], outputs: Sequence[str]
-) -> list[dict[str, int]]:
+class Seen(Sequence[dict[str, int]]):
+    """Outputs in each clock, as integers; `bits` are those of a clock in one word.
+
+    A clock is simulated when it is asked for: a test that fails at one simulates none behind it.
+
+    Parameters
+    ----------
+    layout : data.StructLayout
+        Of the word.
+    n_clocks : int
+    bits : iterator of int
+    """
+
+    def __init__(self, layout: data.StructLayout, n_clocks: int, bits: Iterator[int]) -> None:
+        # Amaranth's own view of such a word takes longer than the simulation.
+        self._fields = [
+            (name, field.offset, (1 << field.width) - 1, 1 << field.width - 1 if Shape.cast(field.shape).signed else 0)
+            for name, field in layout
+        ]
+        self._n_clocks = n_clocks
+        self._bits: list[int] = []
+        self._more = bits
+
+    def __len__(self) -> int:
+        return self._n_clocks
+
+    @overload
+    def __getitem__(self, clock: int) -> dict[str, int]: ...
+
+    @overload
+    def __getitem__(self, clock: slice) -> list[dict[str, int]]: ...
+
+    def __getitem__(self, clock: int | slice) -> dict[str, int] | list[dict[str, int]]:
+        if isinstance(clock, slice):
+            return [self[k] for k in range(self._n_clocks)[clock]]
+        clock = range(self._n_clocks)[clock]
+        if clock >= len(self._bits):
+            self._bits.extend(islice(self._more, clock + 1 - len(self._bits)))
+        bits = self._bits[clock]
+        return {name: (bits >> low & mask ^ sign) - sign for name, low, mask, sign in self._fields}
+
+
+def clock_by_clock(component: wiring.Component, inputs: Sequence[Mapping[str, int]], outputs: Sequence[str]) -> Seen:
     """Apply a row of inputs in each clock (what a row leaves out stays) and return the outputs seen in it."""
     top = Module()
     top.submodules.component = component
@@ -29,7 +71,7 @@ def clock_by_clock(
     packed = Signal(layout)
     top.d.comb += [packed[name].eq(value) for name, value in values.items()]
     pins = {name: member(component, name) for row in inputs for name in row}
-    seen: list[int] = []
+    seen: deque[int] = deque()
 
     async def bench(ctx: Any) -> None:
         now: dict[str, int] = {}
@@ -44,13 +86,13 @@ def clock_by_clock(
     simulator = Simulator(top)
     simulator.add_clock(1e-6, if_exists=True)
     simulator.add_testbench(bench)
-    simulator.run()
-    # Amaranth's own view of such a word takes longer than the simulation.
-    fields = [
-        (name, field.offset, (1 << field.width) - 1, 1 << field.width - 1 if Shape.cast(field.shape).signed else 0)
-        for name, field in layout
-    ]
-    return [{name: (bits >> low & mask ^ sign) - sign for name, low, mask, sign in fields} for bits in seen]
+
+    def simulated() -> Iterator[int]:
+        while simulator.advance() or seen:
+            while seen:
+                yield seen.popleft()
+
+    return Seen(layout, len(inputs), simulated())
 
 
 def ticks(box: wiring.Component, m_e: Sequence[int], clocks: int) -> list[dict[str, int]]:

@@ -24,8 +24,8 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
     names = NAMES + [*BOUNDS, "bounds_valid"] * spec.bounds + ["dt_shift"] * (spec.adaptive is not None)
     rows = [{"step_now": 0}] * spec.registers_steps + [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
     lengths = ["tick_shift"] * (spec.adaptive is not None)
-    seen = clock_by_clock(rairan.RairanMethod(spec), rows, ["velocity_valid", "last", "beyond", *lengths, *names])
-    del seen[: spec.registers_steps]
+    shown = ["velocity_valid", "last", "beyond", *lengths, *names]
+    seen = clock_by_clock(rairan.RairanMethod(spec), rows, shown)[spec.registers_steps :]
     got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
     updates = golden_updates(spec, step)
     columns = [updates[name].astype(int).tolist() for name in names]
