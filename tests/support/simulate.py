@@ -1,7 +1,7 @@
 """Drive one component clock by clock."""
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from operator import attrgetter
 from typing import Any, overload
@@ -93,6 +93,9 @@ def clock_by_clock(component: wiring.Component, inputs: Sequence[Mapping[str, in
                 yield seen.popleft()
 
     return Seen(layout, len(inputs), simulated())
+
+
+Player = Callable[[wiring.Component, Sequence[Mapping[str, int]], Sequence[str]], Seen]
 
 
 def ticks(box: wiring.Component, m_e: Sequence[int], clocks: int) -> list[dict[str, int]]:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import compiled
 from support.mutant import caught, mutant
-from support.simulate import clock_by_clock
+from support.simulate import Player, clock_by_clock
 from support.tracking import CLEARING, Executed, Interpreter, Tick, hostile, ticks_of
 
 from tachometry.hdl.methods import track_machine
@@ -143,7 +144,7 @@ def tick(spec: TrackTachometer, rng: np.random.Generator) -> Tick:
     )
 
 
-def check(program: Program, ticks: Sequence[Tick], moved_width: int) -> list[list[Executed]]:
+def check(program: Program, ticks: Sequence[Tick], moved_width: int, play: Player) -> list[list[Executed]]:
     """Run the program once for each tick: in every clock in which an instruction ends, `ac` and `mq` are right."""
     names = ("number", "times", "places", "moved", "length", "beyond", "quiet", "counted")
     spacing = program.clocks + FETCH_CLOCKS
@@ -153,7 +154,7 @@ def check(program: Program, ticks: Sequence[Tick], moved_width: int) -> list[lis
         rows += [begin, *[{"begin": 0}] * (spacing - 1)]
     rows.append({})
     shown = ["velocity", "acceleration", "p", "out", "tracks"]
-    seen = clock_by_clock(track_machine.TrackMachine(program, moved_width=moved_width), rows, shown)
+    seen = play(track_machine.TrackMachine(program, moved_width=moved_width), rows, shown)
     right = Interpreter(program)
     executed = []
     for number, one in enumerate(ticks):
@@ -178,7 +179,7 @@ def check_random(seed: int) -> set[Op]:
     spec = spec_of(external=bool(seed % 2), bandwidth=int(rng.choice([50, 200, 500])))
     held = words(rng, spec.form.width)
     program = script([*random_steps(rng, held, spec, 60), *LEVELS_UP_AND_DOWN], held, spec)
-    executed = check(program, [tick(spec, rng) for _ in range(3)], spec.count_width)
+    executed = check(program, [tick(spec, rng) for _ in range(3)], spec.count_width, clock_by_clock)
     return {each.instruction.op for run in executed for each in run}
 
 
@@ -190,7 +191,9 @@ def test_random_programs() -> None:
     assert met == set(Op)
 
 
-def check_program(external: bool = True, n_ticks: int = 60, seed: int = 1, **options: Any) -> set[Instruction]:
+def check_program(
+    external: bool = True, n_ticks: int = 60, seed: int = 1, *, play: Player = compiled.clock_by_clock, **options: Any
+) -> set[Instruction]:
     """The program itself, on hostile counts that come as soon as they may; its jumps that went only one way."""
     spec = replace(spec_of(external), **options)
     rng = np.random.default_rng(seed)
@@ -199,7 +202,7 @@ def check_program(external: bool = True, n_ticks: int = 60, seed: int = 1, **opt
     for one in ticks_of(spec, windows, core):
         core.run(one)
         ticks.append(one)
-    executed = check(spec.program, ticks, spec.count_width)
+    executed = check(spec.program, ticks, spec.count_width, play)
     ways = {
         (now.instruction, now.clocks - before.clocks)
         for run in executed
@@ -224,7 +227,7 @@ def check_all() -> None:
     """Random programs, and the program itself."""
     for seed in range(6):
         check_random(seed)
-    check_program()
+    check_program(play=clock_by_clock)
 
 
 MUTANTS = {
