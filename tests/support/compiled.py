@@ -36,7 +36,6 @@ def lint(files: list[str], top: str, folder: Path) -> None:
 _PLAYER = """
 #include <cstdio>
 #include <cstdint>
-#include <vector>
 int main(int, char **argv) {{
   cxxrtl_design::p_top top;
   FILE *in = fopen(argv[1], "rb"), *out = fopen(argv[2], "wb");
