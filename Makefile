@@ -9,10 +9,10 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test pytest verify formal mutate upset bench size bitstreams docs api lint clean
+.PHONY: help venv demo figures compare icarus test test-all pytest verify formal formal-quick mutate upset bench size bitstreams docs api lint clean
 
 help: ## this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
 
 # An editable install does not show the folder mapping to mypy and editors; the links do.
 $(VENV)/.run: pyproject.toml
@@ -58,14 +58,20 @@ icarus: ## Icarus Verilog, installed with apt-get if it is missing
 	  $$sudo apt-get install -qq -y iverilog >/dev/null || { $$sudo apt-get update -qq && $$sudo apt-get install -qq -y iverilog >/dev/null; }; \
 	} || { echo "make: Icarus Verilog is needed and could not be installed: see https://github.com/steveicarus/iverilog" >&2; exit 1; }
 
-test: $(VENV)/.test icarus ## lint, types and all tests
+test: $(VENV)/.test icarus ## lint, types and all tests but the long ones
 	@$(MAKE) --no-print-directory -j2 lint pytest
 
 pytest: $(VENV)/.test icarus
+	$(BIN)/pytest -q -n auto --dist worksteal -m "not long"
+
+test-all: lint icarus ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.formal
+
+formal-quick: $(VENV)/.formal ## the same of a small core for every checker, and without mutants
+	PYTHONPATH=tests $(BIN)/python -m proofs.formal quick
 
 upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, see docs/verification.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.upset

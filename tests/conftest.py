@@ -5,9 +5,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from support.long import is_long, long
 
 # Compiled cores stay in the checkout.
 os.environ.setdefault("TACHOMETRY_CACHE", str(Path(__file__).parent.parent / "build" / "cache"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark those that break the source on purpose, see `support.long`."""
+    for item in items:
+        if is_long(item):
+            item.add_marker(long)
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import proofs.mutation.__main__ as command
@@ -13,10 +14,12 @@ from proofs.mutation.cases import CASES, Case
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.inductive import Known
 from proofs.mutation.loops import LOOPS, Commanded
-from proofs.mutation.netlist import exported, mutants
+from proofs.mutation.netlist import GROUP, exported, mutants
+from proofs.mutation.score import hold
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus, stimulus
 from proofs.mutation.track_lemmas import begins
+from support.long import long
 
 from tachometry.sim.golden.control import Command
 from tachometry.sim.signals.recording import PinTrace
@@ -82,6 +85,7 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
     assert sum(line.startswith("  hdl/") for line in survivors) > 10
 
 
+@long
 def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 2)
     monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known([], ["1"]))
@@ -101,6 +105,18 @@ def test_lemmas_must_be_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
     flat, found = mutants(exported(CASE.component), 1, tmp_path)
     with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match=r"lemmas: \[True, False\]"):
         equivalent(CASE, flat, found, stimulus(CASE.spec, 100).pins, tmp_path, pool)
+
+
+def test_registers_power_up_as_in_the_core(tmp_path: Path) -> None:
+    """Those of which an output is mutated too: an initial value of 1 is not lost."""
+    case = next(case for case in CASES if case.name == "s, carried")
+    played = case.play(3000)
+    assert played.starts[0] == 0
+    with patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):
+        flat, found = mutants(exported(case.component), 500, tmp_path, "t:$*dff*")
+        found = [mutant for mutant in found if mutant.option("port") == "Q"][:GROUP]
+        _, rows = run(library(case.pins, flat, found), len(found), len(case.pins.outputs), played.pins, 3000)
+        hold(case, played, rows)
 
 
 def test_every_instruction_has_its_clock() -> None:

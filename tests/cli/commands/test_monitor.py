@@ -17,6 +17,7 @@ import pytest
 from rich.console import Console
 from support.command import run
 from support.demo import BOARD, CLOCK_HZ, WORDS, ToldBoard, demo_map, manifest_of
+from support.long import only
 
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.boards.monitor.columns import columns
@@ -48,7 +49,7 @@ def error(capsys: pytest.CaptureFixture[str], *words: object) -> str:
     return told.removeprefix("tachometry: error: ")
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", only(["s"], METHODS))
 def test_the_selftest_passes(method: str, capsys: pytest.CaptureFixture[str]) -> None:
     long = ("--tick", "100us") if method == "track" else ()  # whose program takes most of a tick
     assert run("monitor", SIM, *WORDS, *long, "--method", method, "--selftest") == 0

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from support.command import run
+from support.long import long
 from support.mutant import mutant
 
 from tachometry.cli.commands import verify as command
@@ -35,7 +36,7 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.mark.parametrize(
     ("methods", "engines", "few"),
-    [(["m"], ["pysim", "cxxrtl", "verilator"], 2), (list(METHODS), ["pysim"], 1)],
+    [(["m"], ["pysim", "cxxrtl", "verilator"], 2), pytest.param(list(METHODS), ["pysim"], 1, marks=long)],
     indirect=["few"],
 )
 def test_engines_and_methods(

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.long import long
 from support.mutant import caught, mutant
 from support.quotient import FlatQuotient, every_quotient
 from support.simulate import clock_by_clock
@@ -28,7 +29,9 @@ def wanted(spec: STachometer, operands: list[NDArray[np.int64]], towards: int = 
     return (base << spec.frac_bits) + round_quotient(n, m << spec.reciprocal.halvings, spec.frac_bits, towards)
 
 
-@pytest.mark.parametrize(("frac_bits", "cancel"), [(16, True), (24, True), (4, True), (16, False)])
+@pytest.mark.parametrize(
+    ("frac_bits", "cancel"), [*(pytest.param(bits, True, marks=long) for bits in (16, 24)), (4, True), (16, False)]
+)
 def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bits: int, cancel: bool) -> None:
     """All N that one count per tick can give, and all m_s to the longest."""
     spec = long_spec(MAX_TICKS, frac_bits, cancel=cancel)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.lockstep import random_case
+from support.long import only
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
@@ -89,7 +90,7 @@ def test_mutants_are_caught(name: str) -> None:
             check(method, seed)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", only([0, 1], SEEDS))
 @pytest.mark.parametrize("method", METHODS)
 def test_registers_are_those_of_the_golden_model(method: str, seed: int) -> None:
     check(method, seed)

@@ -20,6 +20,7 @@ import pytest
 from support import bus_bench
 from support.compiled import lint
 from support.lockstep import random_ticks
+from support.long import long
 from support.mutant import mutant
 
 from tachometry.hdl import export
@@ -226,7 +227,9 @@ def test_verilog_of_every_bus_has_no_warnings(bus: str, tmp_path: Path) -> None:
     lint(["tachometer.v"], "tachometer", tmp_path)
 
 
-@pytest.mark.parametrize(("simulator", "seed", "number"), [("icarus", 3, 4000), ("verilator", 1, 6000)])
+@pytest.mark.parametrize(
+    ("simulator", "seed", "number"), [("icarus", 3, 4000), pytest.param("verilator", 1, 6000, marks=long)]
+)
 def test_buses_read_what_the_golden_model_says(simulator: str, seed: int, number: int, tmp_path: Path) -> None:
     write_design(tmp_path)
     assert play(tmp_path, simulator, seed, number, clocks_each=12) == dict.fromkeys(NAMES, "")

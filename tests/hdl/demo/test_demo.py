@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.demo import DemoPort, uart
+from support.long import only
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.loop import LoopClient
@@ -49,7 +50,7 @@ def random_steps(registers: DemoMap, seed: int) -> list[Step]:
     ]
 
 
-@pytest.mark.parametrize("name", CORES)
+@pytest.mark.parametrize("name", only([*CORES][:1], [*CORES]))
 def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
     spec = CORES[name]
     registers = DemoMap(spec)

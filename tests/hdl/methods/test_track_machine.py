@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import compiled
+from support.long import only
 from support.mutant import caught, mutant
 from support.simulate import Player, clock_by_clock
 from support.tracking import CLEARING, Executed, Interpreter, Tick, hostile, ticks_of
@@ -215,7 +216,7 @@ def check_program(
     }
 
 
-@pytest.mark.parametrize("options", [{}, {"agile": False}, {"growing_memory": False}])
+@pytest.mark.parametrize("options", only([{}], [{}, {"agile": False}, {"growing_memory": False}]))
 def test_program(options: dict[str, Any]) -> None:
     """Every jump goes both ways, but that of an agile correction where there is none."""
     one_way = check_program(True, 150, 1, **options) & check_program(True, 150, 4, **options)

@@ -1,5 +1,6 @@
 """The netlist behind the exported Verilog, and mutants of it, by Yosys' `mutate`."""
 
+import json
 import re
 import subprocess
 import sys
@@ -106,7 +107,27 @@ def selected(group: list[Mutant]) -> list[str]:
 def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
     """One netlist with a group of mutants."""
     (folder / "flat.il").write_text(flat)
+    begin = ["read_rtlil flat.il", "write_json flat.json", *selected(group), "write_json group.json"]
+    yosys("\n".join([*begin, "write_rtlil group.il", ""]), folder)
     # A net of which one bit is mutated would seem to depend on itself.
-    script = ["read_rtlil flat.il", *selected(group), "splitnets -driver", "opt_clean", "write_rtlil group.il", ""]
-    yosys("\n".join(script), folder)
+    end = [*_initial(folder), "splitnets -driver", "opt_clean", "write_rtlil group.il", ""]
+    yosys("\n".join(["read_rtlil group.il", *end]), folder)
     return (folder / "group.il").read_text()
+
+
+def _initial(folder: Path) -> list[str]:
+    """Commands that set what registers power up at if their outputs are mutated: it was left to the nets behind."""
+    (flat,), (group,) = (
+        json.loads((folder / f"{name}.json").read_text())["modules"].values() for name in ("flat", "group")
+    )
+    levels: dict[int, str] = {}
+    for net in flat["netnames"].values():
+        levels.update(zip(net["bits"], reversed(net["attributes"].get("init", "")), strict=False))
+    names = {net["bits"][0]: name for name, net in group["netnames"].items() if len(net["bits"]) == 1}
+    return [
+        f"setattr -set init 1'1 w:{names[bit]}"
+        for cell, had in flat["cells"].items()
+        if "dff" in had["type"]
+        for before, bit in zip(had["connections"]["Q"], group["cells"][cell]["connections"]["Q"], strict=True)
+        if levels.get(before) == "1" and names.get(bit, "").startswith("$")
+    ]

@@ -52,7 +52,7 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
 
     groups = list(pool.map(group, range(0, len(found), GROUP)))
     with patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):
-        _hold(case, played, groups[0][1])
+        hold(case, played, groups[0][1])
     killed = [bool(clock >= 0) for clocks, _ in groups for clock in clocks]
     left = [mutant for mutant, dead in zip(found, killed, strict=True) if not dead]
     alike: list[bool] = []
@@ -64,7 +64,7 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
     return Score(case, len(found), sum(killed), sum(alike), len(unproven) - len(survivors), survivors)
 
 
-def _hold(case: Case, played: Stimulus, rows: NDArray[np.int64]) -> None:
+def hold(case: Case, played: Stimulus, rows: NDArray[np.int64]) -> None:
     """Hold the core without a mutant against the golden model, from reset to reset."""
     for trace, start in zip(played.traces, played.starts, strict=True):
         own = rows[(rows[:, 0] >= start) & (rows[:, 0] < start + trace.n_clocks)]

@@ -14,6 +14,7 @@ from tachometry.sim.engines.cxxrtl import headers, mangled, translate
 
 _OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
+_GROUPING = Path(__file__).with_name("netlist.py").read_text(encoding="utf-8")
 _PORTS = """
 #include <cstring>
 #include <memory>
@@ -54,7 +55,7 @@ def library(pins: Pins, flat: str, group: list[Mutant]) -> Path:
     def make(folder: Path) -> Path:
         return compiled(grouped(flat, group, folder), pins, folder)
 
-    return build.cached(key(flat, commands, pins), ".so", make)
+    return build.cached(key(flat, commands, pins, _GROUPING), ".so", make)
 
 
 def _ports(pins: Pins) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.ideal_motion import SUBCOUNTS, motion, ticks_of
+from support.long import long
 from support.mutant import caught, mutant
 
 from tachometry.sim.golden import model
@@ -65,7 +66,12 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
 
 @pytest.mark.parametrize(
     ("spec", "n_motions"),
-    [(S, 36), (PLAIN, 36), (M, 4), (replace(M, average=8), 4), (replace(M, average=5), 4)],
+    [
+        (S, 36),
+        pytest.param(PLAIN, 36, marks=long),
+        (M, 4),
+        *(pytest.param(replace(M, average=of), 4, marks=long) for of in (8, 5)),
+    ],
     ids=["eq. (21)", "eq. (17)", "M", "M of 8", "M of 5"],
 )
 def test_true_mean_speed_is_always_enclosed(spec: TachometerSpec, n_motions: int) -> None:
@@ -77,7 +83,12 @@ def test_true_mean_speed_is_always_enclosed(spec: TachometerSpec, n_motions: int
 
 @pytest.mark.parametrize(
     ("spec", "n_motions", "least"),
-    [(S, 12, 300_000), (PLAIN, 12, 300_000), (M, 2, 490_000), (replace(M, average=5), 1, 240_000)],
+    [
+        (S, 12, 300_000),
+        pytest.param(PLAIN, 12, 300_000, marks=long),
+        (M, 2, 490_000),
+        (replace(M, average=5), 1, 240_000),
+    ],
     ids=["eq. (21)", "eq. (17)", "M", "M of 5"],
 )
 def test_discs_and_lines_within_the_edge_error(spec: TachometerSpec, n_motions: int, least: int) -> None:

@@ -1,0 +1,128 @@
+"""What is proven of the T and the M/T method."""
+
+from dataclasses import replace
+from typing import Any
+
+from proofs.formal.probes import STANDSTILL_PROBES, within
+from proofs.formal.prove import Proof
+
+from tachometry.spec import Encoder, MTTachometer, Speed, Timing, TTachometer
+
+_TIMED_PROBES = {
+    "core_step": "decoder.step",
+    "core_age": "datapath.gap_timer.age",
+    "core_longest": "datapath.gap_timer.longest",
+    "core_opened": "datapath.gap_timer.opened",
+    "core_negative": "datapath.gap_timer.was_negative",
+    "core_measuring": "datapath.quotient_velocity.measuring",
+    "core_done": "datapath.quotient_velocity.divider.done",
+    "core_forced": "datapath.quotient_velocity.forced",
+    "core_copy": "datapath.quotient_velocity.copy",
+    "core_nearer": "datapath.quotient_velocity.nearer",
+    "core_passes": "datapath.quotient_velocity.farther",
+    "core_running": "datapath.quotient_velocity.divider.running",
+    "core_remainder": "datapath.quotient_velocity.divider.remainder",
+    "core_digits": "datapath.quotient_velocity.divider.digits",
+    "core_steps": "datapath.quotient_velocity.divider.left",
+    "core_by": "datapath.quotient_velocity.divider.by",
+}
+_CLOCKED_PROBES = {
+    "core_came": "datapath.gap_timer.earlier",
+    "core_counted_step": "datapath.count_way.step",
+    "core_moves": "datapath.count_way.moves",
+    "core_forward": "datapath.count_way.forward",
+    "core_backward": "datapath.count_way.backward",
+}
+_WINDOW_OF_MT_PROBES = {
+    "core_length": "datapath.length",
+    "core_late": "datapath.late",
+    "core_travelled": "datapath.travelled",
+}
+_CYCLES_OF_MT_PROBES = {
+    "core_counted": "datapath.counted",
+    "core_cycled": "datapath.cycled",
+    "core_waived": "datapath.waived",
+}
+
+
+def timed(
+    name: str,
+    method: type[TTachometer | MTTachometer],
+    tick_cycles: int,
+    max_count: int,
+    max_ticks: int = 4,
+    **options: Any,
+) -> Proof:
+    """PT: the T and the M/T method, from steps and ticks to updates."""
+    spec = method(
+        encoder=Encoder(1, 4),
+        timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),
+        max_speed=Speed.parse(f"{max_count}rev/s"),
+        frac_bits=4,
+        position_width=8,
+        **options,
+    )
+    assert spec.max_count == max_count, spec.max_count
+    mt = isinstance(spec, MTTachometer)
+    parameters = {
+        "MT": int(mt),
+        "LATTICE": int(spec.on_lattice),
+        "T": tick_cycles,
+        "COUNT_WIDTH": spec.count_width,
+        "MAX_COUNT": max_count,
+        "MAX_VELOCITY": spec.max_velocity,
+        "VELOCITY_WIDTH": spec.velocity_width,
+        "MAX_TICKS": max_ticks,
+        "MAX_PERIODS": spec.max_periods,
+        "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,
+        "CYCLE": spec.cycle_counts if isinstance(spec, MTTachometer) else 1,
+        "MAX_QUOTIENT": spec.max_quotient,
+        "SATURATES": int(spec.saturates),
+        "FLAGS": int(spec.flags_range),
+        "INTEGER_BITS": spec.max_quotient.bit_length() + 1,
+        "INTERVAL_WIDTH": spec.interval_width,
+        "FRAC_BITS": spec.frac_bits,
+        "DIVISION_CLOCKS": spec.division_clocks,
+    }
+    probes = _TIMED_PROBES | STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
+    probes |= within("cycles", _CYCLES_OF_MT_PROBES, parameters["CYCLE"] > 1)
+    probes |= within("clocked", _CLOCKED_PROBES, not spec.on_lattice)
+    probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
+    probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
+    held = {"core_back": "negative", "core_most": "most"}
+    probes |= within("holds", {name: f"datapath.quotient_velocity.{at}" for name, at in held.items()}, spec.saturates)
+    probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
+    return Proof(name, spec, "timed", parameters, probes, depth=4)
+
+
+# What can be said of M/T without what is divided; "travelled" takes as long as all the others.
+_MT_GIVEN = {
+    "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_way lemma_since lemma_free lemma_running lemma_silent "
+    "lemma_many lemma_steps lemma_rest lemma_rests lemma_rested lemma_length lemma_unopened lemma_core_length "
+    "lemma_window_free pt_update pt_held pt_spacing pt_rest",
+    "travelled": "lemma_travelled",
+}
+_CYCLES_GIVEN = {"cycles": "lemma_waived lemma_counted lemma_one_way"}
+
+
+def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
+    """The same in parts, as quotients so far from the upset are beyond the solver.
+
+    From any state that is given which holds some clocks before the end; at the end what is shown is of a division that
+    began since then; and what such a division shows is right, by induction.
+    """
+    spec, clocks = proof.spec, proof.spec.recovery_clocks
+    assert isinstance(spec, MTTachometer)
+    assert clocks is not None
+    settled = clocks - spec.max_periods - spec.max_interval - spec.division_clocks - 1
+    upset = replace(proof, parameters=proof.parameters | {"UPSET": 1, "SETTLED": 0})
+    late = upset.parameters | {"SETTLED": settled}
+    parts = _MT_GIVEN | (_CYCLES_GIVEN if spec.cycle_counts > 1 else {})
+    return [
+        *(
+            replace(upset, name=f"{name}: {part}", depth=1, recovers=settled, only=given)
+            for part, given in parts.items()
+        ),
+        replace(upset, name=f"{name}: since", parameters=late, depth=1, recovers=clocks, only="lemma_fresh"),
+        replace(upset, name=name, given=" ".join(parts.values()), without="lemma_fresh"),
+    ]

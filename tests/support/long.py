@@ -1,0 +1,23 @@
+"""Which tests `make test` leaves to `make test-all`, as CI must end in time.
+
+They are marked `long`: those that show on more cores, or for longer, what another test shows; and all that break the
+source on purpose (`mutants` in their name), as these ask what the tests notice, not whether the product is right.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import pytest
+
+long = pytest.mark.long
+
+
+def is_long(item: pytest.Item) -> bool:
+    """Whether a test breaks the source on purpose."""
+    return "mutant" in item.name.partition("[")[0]
+
+
+def only(short: Iterable[Any], cases: Sequence[Any]) -> list[Any]:
+    """Parameters of a test, of which only some are short."""
+    kept = list(short)
+    return [case if case in kept else pytest.param(case, marks=long) for case in cases]
