@@ -4,7 +4,7 @@ They are marked `long`: those that show on more cores, or for longer, what anoth
 source on purpose (`mutants` in their name), as these ask what the tests notice, not whether the product is right.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import pytest
@@ -17,7 +17,7 @@ def is_long(item: pytest.Item) -> bool:
     return "mutant" in item.name.partition("[")[0]
 
 
-def only(short: Iterable[Any], cases: Sequence[Any]) -> list[Any]:
+def only(short: Iterable[Any], cases: Iterable[Any]) -> list[Any]:
     """Parameters of a test, of which only some are short."""
     kept = list(short)
     return [case if case in kept else pytest.param(case, marks=long) for case in cases]
