@@ -111,7 +111,7 @@ if {[llength [info commands get_registers]]} {
 
 _BENCH = """\
 // Smoke test of NAME: turns the encoder 40 quarter periods forward and 16 back, and checks the position.
-// For every tick and every update against the golden model: tachometry generate --testbench cocotb.
+// For every tick and every update against the golden model: tachometry @COMPARED@.
 @NOTICE_SLASHES@
 module NAME_tb;
   localparam HOLD = @HOLD@;  // clocks of a quarter period
@@ -248,6 +248,7 @@ def _of_one(spec: TachometerSpec) -> tuple[Boxes, dict[str, object]]:
         "A": "quarter[1] ^ quarter[0]",
         "B": "quarter[1]",
         "CHECK": _CHECK,
+        "COMPARED": "generate --testbench cocotb",
         "VELOCITY": "velocity",
         "TICK_CYCLES": cycles,
         "EXPECTED": (40 - 16) * spec.encoder.decoding // 4,
@@ -275,6 +276,7 @@ def _of_axes(spec: AxesSpec) -> tuple[Boxes, dict[str, object]]:
         "LAST": spec.axes - 1,
         "FOUND": taken,
         "AXES": spec.axes,
+        "COMPARED": f"simulate --axes {spec.axes}",
         "TICK_CYCLES": spec.timing.tick_cycles,
         "EXPECTED": (40 - 16) * spec.axis.encoder.decoding // 4,
     }

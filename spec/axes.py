@@ -20,6 +20,7 @@ from tachometry.spec.units import Speed
 MAX_AXES = 64
 # What is counted is back in memory before the same axis is looked at again.
 MIN_SLOTS = 4
+_NEAR = 2000  # clocks; 64 axes need some 800
 WARM_UP = 3  # rounds after reset: two until the levels are those of the pins, one for the level before
 # Clocks from a look at an axis: the count is in its register, is handed over, and the datapath begins.
 COUNT_LATENCY = 3
@@ -45,6 +46,47 @@ _STROBES = {
     "counted.",
     INDEX: "One clock for every rising edge of z of an axis.",
 }
+
+
+def _slots(axes: int, cycles: int) -> int | None:
+    """S for a tick of so many clocks; None if no number divides it."""
+    return next((slots for slots in range(max(axes, MIN_SLOTS), MAX_AXES + 1) if cycles % slots == 0), None)
+
+
+def _axis(spec: STachometer, slots: int) -> STachometer:
+    """The core that each axis is if a round has so many slots."""
+    timing, speed = spec.timing, spec.max_speed
+    return replace(
+        spec,
+        timing=Timing(timing.clock_hz, timing.tick_cycles // slots, int(timing.max_ticks)),
+        max_speed=None if speed is None else Speed(speed.value * slots, speed.unit),
+    )
+
+
+def _turn_cycles(axis: STachometer) -> int:
+    # The next axis begins while the velocity of this one is shown. One clock starts the scaler, one takes its sum.
+    return DECIDE + 1 + axis.looked_up.digits + 1 - READ
+
+
+def _fits(spec: STachometer, axes: int, cycles: int) -> bool:
+    """Whether a tick of so many clocks has whole rounds, and room for the turns of all axes."""
+    slots = _slots(axes, cycles)
+    if slots is None:
+        return False
+    most = spec.timing.max_ticks * spec.timing.tick_cycles // cycles
+    try:
+        axis = _axis(replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2))), slots)
+    except ParameterError:  # there is no core with this tick
+        return False
+    return axes * _turn_cycles(axis) + slots <= cycles
+
+
+def _nearest(spec: STachometer, axes: int) -> list[int]:
+    """The longest tick below that of `spec` that fits, and the shortest above, in clocks, if they are near."""
+    cycles = spec.timing.tick_cycles
+    ways = (range(cycles - 1, max(cycles - _NEAR, 0), -1), range(cycles + 1, cycles + _NEAR))
+    found = (next((one for one in way if _fits(spec, axes, one)), None) for way in ways)
+    return [one for one in found if one is not None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +121,7 @@ class AxesSpec(HasPorts):
         spec = self.tachometer
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
+                name = {"max_tick_cycles": "external-tick"}.get(name, name)
                 raise ParameterError(name, f"must not be given together with axes: {why}")
         if spec.velocity_width != spec.native_width:
             raise ParameterError(
@@ -89,23 +132,18 @@ class AxesSpec(HasPorts):
                 "max_ticks",
                 f"must be at most {MAX_TABLE} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
             )
-        self._check_slots()
-        self._check_room()
+        self._check_tick()
 
-    def _check_slots(self) -> None:
-        cycles, fewest = self.timing.tick_cycles, max(self.axes, MIN_SLOTS)
-        if not any(cycles % slots == 0 for slots in range(fewest, MAX_AXES + 1)):
-            raise ParameterError(
-                "tick_cycles", f"must be a multiple of a number from {fewest} to {MAX_AXES} with axes, not {cycles}"
-            )
-
-    def _check_room(self) -> None:
-        needed = self.axes * self.turn_cycles + self.slots
-        if needed > self.timing.tick_cycles:
+    def _check_tick(self) -> None:
+        cycles = self.timing.tick_cycles
+        if not _fits(self.tachometer, self.axes, cycles):
+            fewest = max(self.axes, MIN_SLOTS)
+            some = f"a number from {fewest} to {MAX_AXES}" if fewest < MAX_AXES else f"{MAX_AXES}"
+            near = " or ".join(map(str, _nearest(self.tachometer, self.axes)))
             raise ParameterError(
                 "tick_cycles",
-                f"must be at least {needed} with {self.axes} axes, {self.turn_cycles} clocks for each and a round of "
-                f"{self.slots}, not {self.timing.tick_cycles}",
+                f"must be a multiple of {some}, and long enough for a turn of every axis with --axes {self.axes}"
+                f"{f': {near}' if near else ''}, not {cycles}",
             )
 
     @property
@@ -121,19 +159,14 @@ class AxesSpec(HasPorts):
     @cached_property
     def slots(self) -> int:
         """S, clocks of a round: the least number that is no less than N and divides a tick."""
-        fewest = max(self.axes, MIN_SLOTS)
-        return next(slots for slots in range(fewest, MAX_AXES + 1) if self.timing.tick_cycles % slots == 0)
+        found = _slots(self.axes, self.timing.tick_cycles)
+        assert found is not None  # see `_check_tick`
+        return found
 
     @cached_property
     def axis(self) -> STachometer:
         """The core that each axis is: one of its clocks is a round of this core, and so speeds are S times as great."""
-        spec, timing = self.tachometer, self.timing
-        speed = spec.max_speed
-        return replace(
-            spec,
-            timing=Timing(timing.clock_hz, timing.tick_cycles // self.slots, int(timing.max_ticks)),
-            max_speed=None if speed is None else Speed(speed.value * self.slots, speed.unit),
-        )
+        return _axis(self.tachometer, self.slots)
 
     @property
     def rounds(self) -> int:
@@ -143,13 +176,21 @@ class AxesSpec(HasPorts):
     @property
     def turn_cycles(self) -> int:
         """Clocks for which an axis has the datapath."""
-        # The next axis begins while the velocity of this one is shown. One clock starts the scaler, one takes its sum.
-        return DECIDE + 1 + self.reciprocal.digits + 1 - READ
+        return _turn_cycles(self.axis)
 
     @property
     def reciprocal(self) -> Reciprocal:
         """The reciprocal of m_s, which is always looked up: there is no time between two axes to divide."""
         return self.axis.looked_up
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is other than might be expected."""
+        if self.tachometer.max_speed is None or self.axis.max_count == self.tachometer.max_count:
+            return ()
+        return (
+            f"greatest speed: an axis is looked at {self.rounds} times in a tick, so it has at most as many counts",
+        )
 
     @property
     def memory(self) -> tuple[str, int, int]:
@@ -244,12 +285,15 @@ class AxesSpec(HasPorts):
                 yield replace(port, name=f"{port.name}_{axis}", help=f"Of axis {axis}, held: {port.help}")
 
     def _of_an_axis(self) -> tuple[Port, ...]:
-        return self.axis.outputs
+        """Those of the core that each axis is; but its clocks are rounds, and times here are in clocks of this core."""
+        units = {port.name: port.unit for port in self.tachometer.outputs}
+        return tuple(replace(port, unit=units[port.name]) for port in self.axis.outputs)
 
     @property
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults included."""
-        return {**self.tachometer.parameters, "axes": self.axes, "parallel": self.parallel}
+        found = {"reciprocal_source": "table", "axes": self.axes, "parallel": self.parallel}
+        return {**self.tachometer.parameters, **found}
 
 
 CoreSpec = TachometerSpec | AxesSpec

@@ -3,12 +3,13 @@
 Yosys maps a memory to a block RAM whose output comes straight from its cells, 5 to 6 ns after the clock, and a register
 behind it to flip-flops. The block RAM has such a register itself, which is ready in 1 ns; vendors' tools use it.
 
-As a script, `python ecp5_memory.py NETLIST` changes a netlist in its file.
+As a script, `python ecp5_memory.py NETLIST` changes a netlist in its file, and says how many bits have moved.
 """
 
+import argparse
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,8 +71,26 @@ def _registers(
     return found
 
 
+def main(words: Sequence[str]) -> int:
+    """Change a netlist in its file; 2 if it cannot be."""
+    parser = argparse.ArgumentParser(
+        prog="ecp5_memory.py", description="Use the output registers of the block RAMs of a netlist for ECP5."
+    )
+    parser.add_argument("netlist", type=Path, metavar="NETLIST", help="JSON that synth_ecp5 has written; it is changed")
+    path = parser.parse_args(words).netlist
+    try:
+        netlist = json.loads(path.read_text(encoding="utf-8"))
+        moved = use_output_registers(netlist)
+        beside = path.with_name(f"{path.name}.new")
+        beside.write_text(json.dumps(netlist), encoding="utf-8")
+        beside.replace(path)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        wrong = error.strerror if isinstance(error, OSError) else "it is no netlist that synth_ecp5 has written as JSON"
+        print(f"ecp5_memory.py: error: {path} cannot be changed: {wrong}", file=sys.stderr)
+        return 2
+    print(f"{moved} flip-flops are output registers of block RAMs now")
+    return 0
+
+
 if __name__ == "__main__":
-    path = Path(sys.argv[1])
-    netlist = json.loads(path.read_text(encoding="utf-8"))
-    use_output_registers(netlist)
-    path.write_text(json.dumps(netlist), encoding="utf-8")
+    sys.exit(main(sys.argv[1:]))

@@ -57,9 +57,8 @@ def run_axes_and_report(
     """The same for many axes, with a recording, and what the shaft truly did, of each."""
     from tachometry.cli.reports.axes import print_axes_summary
     from tachometry.sim.signals.axes import AxesTrace
-    from tachometry.sim.signals.recording import PinTrace
 
-    trace = AxesTrace.of([PinTrace.of(recording, spec.tachometer) for recording in recordings])
+    trace = AxesTrace.placed(recordings, spec)
     found, used = _played(spec, source, trace, None, outputs, engine, window)
     print_axes_summary(spec, found, recordings, truths, used)
     return _status(found, trace.n_clocks)

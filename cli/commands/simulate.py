@@ -64,7 +64,7 @@ def simulate(
     outputs = Outputs(targets, inputs=tables)
     if isinstance(spec, AxesSpec):
         refuse_plot(targets)
-        truths = [record(spec.tachometer, axis) for axis in range(spec.axes)]
+        truths = [record(spec.tachometer, axis, spec.axes) for axis in range(spec.axes)]
         recordings = [truth.recording for truth in truths]
         return run_axes_and_report(spec, "--motion", recordings, truths, outputs, engine, window)
     truth = record(spec)

@@ -178,7 +178,7 @@ def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def build(*, motion: str | None, encoder: Callable[[TachometerSpec], VirtualEncoder], **others: Any) -> Any:
-        def record(spec: TachometerSpec, axis: int | None = None) -> Encoding:
+        def record(spec: TachometerSpec, axis: int | None = None, axes: int = 1) -> Encoding:
             from tachometry.sim.encoder.motion import parse_motion
 
             assert motion is not None
@@ -186,6 +186,10 @@ def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
             if axis is None:
                 return own.record(parse_motion(motion))
             each = motion.split(",")
+            if len(each) > axes:
+                raise ValueError(
+                    f"--motion must have at most one motion for each of the --axes {axes}, not {len(each)}"
+                )
             return replace(own, seed=own.seed + axis).record(parse_motion(each[min(axis, len(each) - 1)]))
 
         if motion is None:

@@ -26,17 +26,19 @@ def print_axes_core(spec: AxesSpec) -> None:
     latencies = manifest(spec)["latency_cycles"]
     own = {
         "greatest speed": f"{speed_text(greatest)} ({axis.max_velocity} counts per tick)",
-        "full scale": f"{axis.full_scale * 2.0**-axis.frac_bits:.9g} {axis.unit}, either way",
+        "full scale": f"{axis.full_scale * 2.0**-axis.frac_bits:.9g} {axis.unit} = "
+        f"{axis.full_scale * alone.rad_per_s_per_lsb:.6g} rad/s, either way",
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.outputs if port.width > 1),
-        "reciprocal": memory_text(*spec.memory),
+        "reciprocal": f"{memory_text(*spec.memory)}; there is no time to divide between two axes",
         **{name: plural(clocks, "clock") for name, clocks in latencies.items()},
+        "tick_to_velocity": "0 clocks: velocity_valid comes together with tick",
     }
     turns = (
         f"{spec.axes}, each looked at every {plural(spec.slots, 'clock')} and computed in "
         f"{plural(spec.turn_cycles, 'clock')} of a tick"
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
-    print_rows([rows[0], ("axes", turns), *rows[1:]])
+    print_rows([rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.notes)])
 
 
 def print_axes_summary(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.signals.arrays import Ints
-from tachometry.sim.signals.recording import PinTrace, merged
+from tachometry.sim.signals.recording import MAX_TICKS, PinTrace, Recording, check_ticks, merged
 from tachometry.sim.signals.run import Run
 from tachometry.spec.axes import AxesSpec
 from tachometry.spec.port import TICK, UPDATE
@@ -37,6 +37,19 @@ class AxesTrace:
         """Traces up to where the last of them ends: where another ends earlier, its levels stay."""
         n_clocks = max(trace.n_clocks for trace in each)
         return cls(tuple(replace(trace, n_clocks=n_clocks) for trace in each))
+
+    @classmethod
+    def placed(cls, recordings: Sequence[Recording], spec: AxesSpec) -> AxesTrace:
+        """What the pins of a core see of a recording for each axis.
+
+        Raises
+        ------
+        ValueError
+            If there are too many clocks to be told apart, or more than `MAX_TICKS` ticks, those of all axes together.
+        """
+        for recording in recordings:
+            check_ticks(recording.duration, spec.tachometer, MAX_TICKS // spec.axes, f" of each of {spec.axes} axes")
+        return cls.of([PinTrace.of(recording, spec.tachometer) for recording in recordings])
 
     @property
     def n_clocks(self) -> int:

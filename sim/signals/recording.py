@@ -222,14 +222,14 @@ class PinTrace(_Lines):
         return self.with_tick_in(nominal_ticks(spec, self.n_clocks))
 
 
-def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS) -> None:
-    """See that so many seconds are not too many ticks to be held; ValueError if they are."""
+def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS, of: str = "") -> None:
+    """See that so many seconds are not too many ticks to be held, `of` each axis; ValueError if they are."""
     ticks = duration / float(spec.timing.tick_seconds)
     if not ticks <= most:
         longest = format_time(most * spec.timing.tick_seconds)
         raise ValueError(
-            f"what is run must have at most {most} ticks, {longest} of this tick, not {ticks:.6g}: shorten it, or take "
-            "longer ticks"
+            f"what is run must have at most {most} ticks{of}, {longest} of this tick, not {ticks:.6g}: shorten it, or "
+            "take longer ticks"
         )
 
 

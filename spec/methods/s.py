@@ -38,7 +38,8 @@ class STachometer(TachometerSpec):
     reciprocal_source: str = option(
         "serial",
         "Where the reciprocal of the measurement time comes from: divided serially between two ticks, or looked up in "
-        "a table of block RAM. Where ticks are too short for the one, or windows too long, the other is taken.",
+        "a table of block RAM. Where ticks are too short for the one, or windows too long, the other is taken; where "
+        "neither is possible, it is carried along from tick to tick.",
         name="reciprocal",
         choices=_SOURCES,
     )
@@ -153,11 +154,16 @@ class STachometer(TachometerSpec):
         divided = isinstance(self.reciprocal, DividedReciprocal)
         if divided == (self.reciprocal_source == "serial") and not self.carried:
             return super().notes
-        found = "carried along" if self.carried else "divided" if divided else "from a table"
-        reason = f"a tick of {plural(self.timing.tick_cycles, 'clock')} is too short to divide between two"
+        short = f"a tick of {plural(self.timing.tick_cycles, 'clock')} is too short to"
+        large = self.timing.max_ticks > MAX_TABLE
+        no_table = f"a table has at most {MAX_TABLE} entries" if large else f"{short} look it up"
         if divided:
-            reason = f"a table has at most {MAX_TABLE} entries"
-        return (*super().notes, f"reciprocal {found}: {reason}")
+            reason = f"divided: {no_table}"
+        elif not self.carried:
+            reason = f"from a table: {short} divide between two"
+        else:
+            reason = f"carried along: {short} divide between two, {f'and {no_table}' if large else 'or to look it up'}"
+        return (*super().notes, f"reciprocal {reason}")
 
     @property
     def numerator_width(self) -> int:

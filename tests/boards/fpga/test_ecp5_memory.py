@@ -1,12 +1,14 @@
 """Registers behind block RAMs, in netlists as Yosys writes them."""
 
+import json
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tachometry.boards.fpga.boards import BOARDS
-from tachometry.boards.fpga.ecp5_memory import use_output_registers
+from tachometry.boards.fpga.ecp5_memory import main, use_output_registers
 
 PLAIN = {"CEMUX": "1 ", "CLKMUX": "CLK", "GSR": "DISABLED", "LSRMUX": "LSR", "REGSET": "RESET"}
 
@@ -86,3 +88,27 @@ def test_what_is_no_output_register_stays(name: str) -> None:
 def test_boards_of_ecp5_use_it() -> None:
     using = {name for name, board in BOARDS.items() if board.flow and board.flow.netlist is use_output_registers}
     assert using == {name for name in BOARDS if name.startswith("ulx3s")}
+
+
+def test_the_script(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "top.json"
+    file.write_text(json.dumps(netlist()))
+    assert main([str(file)]) == 0
+    assert capsys.readouterr().out == "3 flip-flops are output registers of block RAMs now\n"
+    changed = netlist()
+    use_output_registers(changed)
+    assert json.loads(file.read_text()) == changed
+    assert [path.name for path in tmp_path.iterdir()] == ["top.json"]
+
+
+@pytest.mark.parametrize("text", [None, "{", "{}", "[]", '{"modules": {"top": {}}}'])
+def test_the_script_refuses_what_is_no_netlist(
+    text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "top.json"
+    if text is not None:
+        file.write_text(text)
+    assert main([str(file)]) == 2
+    (told,) = capsys.readouterr().err.splitlines()
+    assert told.startswith(f"ecp5_memory.py: error: {file} cannot be changed: ")
+    assert text is None or file.read_text() == text

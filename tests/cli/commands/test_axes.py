@@ -80,7 +80,8 @@ def test_generate(parallel: list[str], tmp_path: Path, capsys: pytest.CaptureFix
         ("--axes 4 --method m", "--method must be s together with --axes, not m"),
         ("--axes 4 --filter 3", "--filter must not be given together with axes: "),
         ("--axes 4 --unit rpm", "--unit must not be given together with axes: "),
-        ("--axes 8 --tick 1us --max-time 1ms", "--tick, in clocks, must be at least "),
+        ("--axes 8 --tick 1us --max-time 1ms", "--tick, in clocks, must be a multiple of a number from 8 to 64, "),
+        ("--axes 4 --external-tick", "--external-tick must not be given together with axes: "),
         ("--axes 4 --bus spi", "--bus must not be given together with axes: "),
         ("--axes 4 --for rio", "--for must not be given together with axes: "),
         ("--axes 4 --testbench cocotb", "--testbench must not be given together with --axes: "),
@@ -90,6 +91,14 @@ def test_what_is_refused(words: str, told: str, tmp_path: Path, capsys: pytest.C
     assert run("generate", "--ppr", "500", "-o", tmp_path / "out", *words.split()) == 2
     assert capsys.readouterr().err.startswith(f"tachometry: error: {told}")
     assert not (tmp_path / "out").exists()
+
+
+def test_what_is_too_much(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All axes together have as many ticks as one may; each has one motion at most."""
+    assert run("simulate", *CORE, "--axes", "4", "--motion", "stop:10000s") == 2
+    assert "must have at most 2500000 ticks of each of 4 axes" in capsys.readouterr().err
+    assert run("simulate", *CORE, "--axes", "2", "--motion", "stop:1ms,stop:1ms,stop:1ms") == 2
+    assert "must have at most one motion for each of the --axes 2, not 3" in capsys.readouterr().err
 
 
 def test_no_figure_of_many(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

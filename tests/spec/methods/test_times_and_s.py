@@ -192,7 +192,12 @@ def test_what_is_told_of_the_reciprocal() -> None:
     ] == [()] * 3
     short = "a tick of {} is too short to divide between two"
     assert s(18).notes == (f"reciprocal from a table: {short.format('18 clocks')}",)
-    assert s(1, reciprocal_source="table").notes == (f"reciprocal carried along: {short.format('1 clock')}",)
+    assert s(1, reciprocal_source="table").notes == (
+        f"reciprocal carried along: {short.format('1 clock')}, or to look it up",
+    )
+    assert s(18, 2049).notes == (
+        f"reciprocal carried along: {short.format('18 clocks')}, and a table has at most 2048 entries",
+    )
     assert s(960, 2049, reciprocal_source="table").notes == ("reciprocal divided: a table has at most 2048 entries",)
     with pytest.raises(ValueError, match=r"^reciprocal must be serial or table, not 'none'$"):
         s(reciprocal_source="none")
