@@ -218,7 +218,7 @@ def ports() -> str:
             "# Ports\n",
             "Made by `make docs` from `spec.ports`. A *strobe* is high for one clock; an output *with* a strobe is new "
             "in its clocks, and held until the next. Widths depend on the options: the manifest NAME.json has those "
-            "of your core.\n",
+            "of your core. Those of a core of many axes are in [axes](axes.md#ports).\n",
             markdown(_HEADER, rows, left=range(4)),
             "\nThe manifest states the latencies: a level sampled at clock c is counted in the window of c + "
             "`pin_to_count`, `tick` is high `tick_latency` clocks after the window's last clock, and `velocity_valid` "

@@ -77,6 +77,10 @@ class Table:
         return f"## {self.title}\n\n{markdown(self.header, self.rows, words)}{below}"
 
 
+BAR_TEXT = """\
+A bar that is missed is not moved. `bus-native` has some flip-flops more than planned. `m-10` has the longest carry
+chain of the reference cores, 41 bits; two shorter ones, as [S](s-method.md) has, need a reciprocal that is divided, and
+that of the mean is a constant."""
 PEERS = Table(
     "Peers",
     (
@@ -163,7 +167,8 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 - Fmax is that of the core in a wrapper, routed. It is the median over seeds 1 to 9; in brackets are the slowest and the
   fastest of them. A bar is met if the median meets it. The inputs come from a shift register. The outputs are
   registered, and then loaded into a shift register that ends in one pin.
-- Latency is from `tick` to `velocity_valid`; of a core with a control loop, from `control_tick` to `current_valid`.
+- Latency is from `tick` to `velocity_valid`, which come together with many axes; of a core with a control loop, from
+  `control_tick` to `current_valid`.
 - The column "what limits Fmax" has the longest path of the median seed, from register to register, as `box.signal`.
 - Only cores whose Fmax has a bar are routed. `python bench/size.py --only NAME` routes any of them.
 
@@ -289,7 +294,7 @@ def bar_table(results: Results) -> Table:
                 found = results.get((configuration.name, target))
                 if found is not None and figure in found.figures:
                     rows.append([configuration.name, target, *bar_texts(figure, bar, found)])
-    return Table("Bars", ["configuration", "target", "figure", "bar", "measured", "verdict"], rows)
+    return Table("Bars", ["configuration", "target", "figure", "bar", "measured", "verdict"], rows, BAR_TEXT)
 
 
 def bar_texts(figure: str, bar: float, found: Measurement) -> tuple[str, str, str, str]:

@@ -53,8 +53,8 @@ def _motion(required: bool) -> Callable[[Any], Any]:
         "--motion",
         required=required,
         metavar="MOTION",
-        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below. With --axes several, with "
-        "commas between: each axis has its own, the last one those that are left, and the next seed.",
+        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below. With --axes of simulate "
+        "several, with commas between: each axis has its own, the last one those that are left, and the next seed.",
     )
 
 
