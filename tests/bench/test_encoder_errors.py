@@ -34,7 +34,8 @@ def test_the_table_of_gains_has_all_rows() -> None:
     ]
 
 
-@pytest.mark.parametrize(("disc", "motion"), [pytest.param("real", "217 rad/s", marks=long), ("phase", "20 rad/s")])
+@long
+@pytest.mark.parametrize(("disc", "motion"), [("real", "217 rad/s"), ("phase", "20 rad/s")])
 def test_gains_are_those_of_the_study(disc: str, motion: str) -> None:
     found = bench.gained(disc, *bench.MOTIONS[motion])
     for method, (none, *others) in found.items():

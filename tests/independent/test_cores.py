@@ -135,6 +135,16 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
     assert any(row.get("velocity_overflow") for row in shown) == case.settings.narrow
 
 
-@pytest.mark.parametrize("case", [pytest.param(case, id=case.name) for case in CASES if case not in SILENT])
+LONG = ("track_rev", "track_rad")
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.name, marks=pytest.mark.long if case.name in LONG else ())
+        for case in CASES
+        if case not in SILENT
+    ],
+)
 def test_core(case: Case, generated: Generated) -> None:
     check_core(case, *made(generated, case))

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
+import pytest
 from independent.bench import in_verilator
 from independent.cases import LONG
 from independent.front import conditioned, ticks_of
@@ -37,6 +38,7 @@ def two_counts(settings: Settings) -> list[Update]:
     ]
 
 
+@pytest.mark.long
 def test_long_ticks_and_long_measurements(generated: Callable[..., Path]) -> None:
     plays, manifests, folder = [], [], Path()
     for case in LONG:

@@ -15,7 +15,13 @@ TICK, MOST = 50, 10
 Generated = Callable[..., Path]
 
 
-@pytest.mark.parametrize("case", [pytest.param(case, id=case.name) for case in SILENT])
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.name, marks=pytest.mark.long if case.name == "track_native" else ())
+        for case in SILENT
+    ],
+)
 def test_core_and_its_silences(case: Case, generated: Generated) -> None:
     folder, manifest = made(generated, case)
     check_core(case, folder, manifest)

@@ -16,7 +16,6 @@ from independent.front import conditioned, wrapped
 from independent.settings import Settings, arguments
 from independent.show import check_velocity
 from independent.stimulus import Lines, steady
-from support.long import only
 
 TRACKING = [case for case in CASES if case.settings.method == "track"]
 FIRST = 5  # ticks before the motion
@@ -147,7 +146,10 @@ def check_rest(motion: Motion) -> None:
         assert motion.settings.lowpass is not None or row["velocity"] == 0
 
 
-@pytest.mark.parametrize("case", only(TRACKING[:1], TRACKING), ids=[case.name for case in TRACKING])
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, id=case.name, marks=() if case.name == "track_rpm" else pytest.mark.long) for case in TRACKING],
+)
 def test_a_known_motion(case: Case, generated: Callable[..., Path]) -> None:
     settings = case.settings
     folder = generated(case.name, "--method", "track", *arguments(settings.words))

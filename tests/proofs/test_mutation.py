@@ -99,6 +99,7 @@ def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch
         assert not any(equivalent(CASE, flat, latest, played.pins, tmp_path, pool))
 
 
+@long
 def test_lemmas_must_be_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One that holds at first only, behind one that always holds."""
     monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known(["wire one = 1;"], ["one", "!{tick}"]))

@@ -1,9 +1,11 @@
 """Which tests `make test` leaves to `make test-all`, as CI must end in time.
 
-They are marked `long`: those that show on more cores, or for longer, what another test shows; and all that break the
-source on purpose (`mutants` in their name), as these ask what the tests notice, not whether the product is right.
+They are marked `long`: those that show on more cores, or for longer, what another test shows; and all that break
+something on purpose (`mutant`, `caught` or `noticed` in their name), as these ask what the tests notice, not whether
+the product is right.
 """
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,8 +15,8 @@ long = pytest.mark.long
 
 
 def is_long(item: pytest.Item) -> bool:
-    """Whether a test breaks the source on purpose."""
-    return "mutant" in item.name.partition("[")[0]
+    """Whether a test breaks something on purpose, by its name."""
+    return re.search("mutant|_caught$|_noticed$", item.name.partition("[")[0]) is not None
 
 
 def only(short: Iterable[Any], cases: Iterable[Any]) -> list[Any]:
