@@ -57,9 +57,10 @@ def main(words: list[str]) -> bool:
             begin = f"any state, {proof.recovers} clocks" if proof.recovers else f"{result.depth} clocks"
             begin = f"given, {begin}" if proof.given else begin
             row(proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict)
-        print()
-        row("core", "property", "mutant", "refuted in", "seconds", "verdict")
-        row(*["---"] * 6)
+        if mutants:
+            print()
+            row("core", "property", "mutant", "refuted in", "seconds", "verdict")
+            row(*["---"] * 6)
         for wrong, future in zip(mutants, refuted, strict=True):
             result = future.result()
             fine &= result.verdict == "refuted"
