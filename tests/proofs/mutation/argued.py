@@ -42,9 +42,22 @@ _HELD = (
     "it is inverted in every clock from a control tick to the next, and is read an even number of clocks after the tick"
 )
 _NO_TICKS = "of no control tick there is no coefficient but 0, and of this method one update comes before the first"
+_SLACK = (
+    "it changes the lowest two bits of a product, by less than what 1/m_s may be off: with every N and every m_s of "
+    "this core the quotient is the same, see test_argued.py"
+)
+_TWICE = "twice = (high ^ low) & ~(low ^ below)"
+_ODD = "product = Cat(Mux(twice, 0, 1), Mux(twice, 1, self.q[1]) ^ (high & ~twice), product[2:])"
 _WHOLE = "without a filter y is the velocity: there is nothing below an LSB of it"
 
 ARGUED = {
+    ("s, divided", _ODD, "$56.Y[0] const1"): _SLACK,
+    ("s, divided", _TWICE, "$49.A[0] const1"): _SLACK,
+    ("s, divided", _TWICE, "$50.A[0] const0"): _SLACK,
+    ("s, divided, wide", _TWICE, "$65.A[0] const1"): _SLACK,
+    ("s, divided, wide", "upper = Signal(signed(n_upper + 2), reset_less=True)", "upper[12] const1"): (
+        "of five digits, each of which moves the sum down by two bits, it never comes down to the two that are shown"
+    ),
     ("loop, unfiltered", '"y": Out(signed(signed_width(form.most_y))),', "y[11] cnot1"): _WHOLE,
     ("loop, unfiltered", "less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)", "Y[6] const0"): _WHOLE,
     **{

@@ -77,7 +77,7 @@ write_rtlil left_{number}.il
 abc -dff -script +strash;dprove,-j,-V,0,-T,{seconds};write_status,verdict_{number}
 """
 _PROVEN = "snl_UNSAT"
-_SECONDS = 60  # for a mutant
+_SECONDS = 20  # for a mutant
 _WATCHED = 20_000  # clocks in which mutants are watched
 _SHARED = 1000  # bits of registers above which nothing is proven unless they are shared
 _TOGETHER = 8  # mutants for one run of Yosys

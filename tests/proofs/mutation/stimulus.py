@@ -18,6 +18,7 @@ from tachometry.spec import TachometerSpec
 _EDGES = 60  # of a motion, at each of its speeds
 _LONG = 100  # clocks of a tick with which motions have fewer edges, and lines change a few times in a tick
 _RATTLE = 40_000  # clocks
+_STEPS = 1000  # of the counts in a tick
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
 
@@ -107,6 +108,27 @@ def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     return _trace(spec, np.array([level & 1, level >> 1, tick, tick], dtype=np.uint8))
 
 
+def steps(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
+    """Ticks with as many counts as the one before, for a while, and then with any others: every N with every m_s."""
+    cycles, longest = spec.timing.tick_cycles, spec.timing.max_ticks
+    most = min(cycles, (spec.max_count + 1) * 4 // spec.encoder.decoding)
+    lasts = rng.integers(1, longest + 2, _STEPS)
+    counts = np.where(rng.random(_STEPS) < 0.3, rng.integers(-2, 3, _STEPS), rng.integers(-most, most + 1, _STEPS))
+    counts = np.clip(counts, -most, most)
+    edges = [
+        tick * cycles + (2 * np.arange(abs(number)) + 1) * cycles // (2 * abs(number))
+        for tick, number in enumerate(np.repeat(counts, lasts).tolist())
+        if number
+    ]
+    clock = np.concatenate([*edges, np.zeros(0, dtype=np.int64)])
+    ways = np.repeat(np.sign(np.repeat(counts, lasts)), np.abs(np.repeat(counts, lasts)))
+    n_clocks = int(lasts.sum()) * cycles
+    quarter = np.append(0, np.cumsum(ways))[np.searchsorted(clock, np.arange(n_clocks), side="right")]
+    level = quadrature(quarter)
+    tick = np.arange(n_clocks) % max(cycles, 2) == 0
+    return _trace(spec, np.array([level & 1, level >> 1, tick, tick], dtype=np.uint8))
+
+
 def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     """Lines that change in nearly every clock, until the filter's count of them is at its end, and a tick that does."""
     changes = rng.random((4, _RATTLE if spec.filter_clocks else _RATTLE // 20)) < np.array([[0.9], [0.9], [0.9], [1]])
@@ -176,6 +198,9 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
             trace = noise(spec, rng, n_silences * longest)
         elif len(traces) % period == 2:
             trace = bursts(spec, rng)
+        elif len(traces) % period == 6 and not long:
+            trace = steps(spec, rng)
+            n_clocks += trace.n_clocks  # the others are as many as without them
         elif len(traces) % period in (5, 13, 21, 29, 37) and long:
             trace = steady(spec, rng)
         elif long and len(traces) % 2:  # within a tick
