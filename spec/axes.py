@@ -74,18 +74,22 @@ def _fits(spec: STachometer, axes: int, cycles: int) -> bool:
     if slots is None:
         return False
     most = spec.timing.max_ticks * spec.timing.tick_cycles // cycles
-    try:
-        axis = _axis(replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2))), slots)
-    except ParameterError:  # there is no core with this tick
-        return False
+    axis = _axis(replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2))), slots)
     return axes * _turn_cycles(axis) + slots <= cycles
 
 
 def _nearest(spec: STachometer, axes: int) -> list[int]:
     """The longest tick below that of `spec` that fits, and the shortest above, in clocks, if they are near."""
+
+    def possible(cycles: int) -> bool:
+        try:
+            return _fits(spec, axes, cycles)
+        except ParameterError:  # no axis can have this tick
+            return False
+
     cycles = spec.timing.tick_cycles
     ways = (range(cycles - 1, max(cycles - _NEAR, 0), -1), range(cycles + 1, cycles + _NEAR))
-    found = (next((one for one in way if _fits(spec, axes, one)), None) for way in ways)
+    found = (next(filter(possible, way), None) for way in ways)
     return [one for one in found if one is not None]
 
 
@@ -121,6 +125,7 @@ class AxesSpec(HasPorts):
         spec = self.tachometer
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
+                # What is wrong is the option, not the length that it may have.
                 name = {"max_tick_cycles": "external-tick"}.get(name, name)
                 raise ParameterError(name, f"must not be given together with axes: {why}")
         if spec.velocity_width != spec.native_width:

@@ -72,7 +72,7 @@ def _registers(
 
 
 def main(words: Sequence[str]) -> int:
-    """Change a netlist in its file; 2 if it cannot be."""
+    """Change a netlist in its file; 2 if it cannot be. It needs nothing else of tachometry: `make size` runs a copy."""
     parser = argparse.ArgumentParser(
         prog="ecp5_memory.py", description="Use the output registers of the block RAMs of a netlist for ECP5."
     )
@@ -82,8 +82,11 @@ def main(words: Sequence[str]) -> int:
         netlist = json.loads(path.read_text(encoding="utf-8"))
         moved = use_output_registers(netlist)
         beside = path.with_name(f"{path.name}.new")
-        beside.write_text(json.dumps(netlist), encoding="utf-8")
-        beside.replace(path)
+        try:
+            beside.write_text(json.dumps(netlist), encoding="utf-8")
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         wrong = error.strerror if isinstance(error, OSError) else "it is no netlist that synth_ecp5 has written as JSON"
         print(f"ecp5_memory.py: error: {path} cannot be changed: {wrong}", file=sys.stderr)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from rich.text import Text
 
-from tachometry.cli.reports.core import configuration, memory_text, speed_text
+from tachometry.cli.reports.core import configuration, full_scale_text, memory_text, speed_text
 from tachometry.cli.reports.run import print_warnings, verdict
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.encoder.virtual import Encoding
@@ -26,8 +26,7 @@ def print_axes_core(spec: AxesSpec) -> None:
     latencies = manifest(spec)["latency_cycles"]
     own = {
         "greatest speed": f"{speed_text(greatest)} ({axis.max_velocity} counts per tick)",
-        "full scale": f"{axis.full_scale * 2.0**-axis.frac_bits:.9g} {axis.unit} = "
-        f"{axis.full_scale * alone.rad_per_s_per_lsb:.6g} rad/s, either way",
+        "full scale": full_scale_text(alone, axis.full_scale),
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.outputs if port.width > 1),
         "reciprocal": f"{memory_text(*spec.memory)}; there is no time to divide between two axes",
         **{name: plural(clocks, "clock") for name, clocks in latencies.items()},

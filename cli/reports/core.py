@@ -49,11 +49,16 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     ]
 
 
-def _full_scale(spec: TachometerSpec) -> str:
-    value = f"{spec.full_scale * 2.0**-spec.frac_bits:.9g} {spec.unit}"
+def full_scale_text(spec: TachometerSpec, full_scale: int) -> str:
+    """A greatest velocity in LSB, in the unit of a core and in rad/s."""
+    value = f"{full_scale * 2.0**-spec.frac_bits:.9g} {spec.unit}"
     if spec.unit == NATIVE:
-        value += f" = {spec.full_scale * spec.rad_per_s_per_lsb:.6g} rad/s"
-    value += ", either way"
+        value += f" = {full_scale * spec.rad_per_s_per_lsb:.6g} rad/s"
+    return f"{value}, either way"
+
+
+def _full_scale(spec: TachometerSpec) -> str:
+    value = full_scale_text(spec, spec.full_scale)
     if not spec.narrow:
         return value
     counted = spec.shown_unit.of(spec.max_velocity * spec.unit_velocity)

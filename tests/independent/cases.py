@@ -1,7 +1,10 @@
 """The cores that are tried: every option of every method, every unit, and the ends of every range."""
 
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
+from typing import Any
 
+import pytest
 from independent.settings import Settings
 
 _PLAIN = {"ppr": "500", "clock": "1000000Hz"}
@@ -29,6 +32,11 @@ class Case:
     turns: bool = True
     within: int = 0
     seed: str = ""
+
+
+def parameters(cases: Iterable[Case], long: Container[str] = ()) -> list[Any]:
+    """Cases as parameters of a test; those of the names in `long` are only in `make test-all`."""
+    return [pytest.param(case, id=case.name, marks=pytest.mark.long if case.name in long else ()) for case in cases]
 
 
 def _case(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from independent.bench import Manifest, Row, in_icarus
-from independent.cases import CASES, SILENT, Case
+from independent.cases import CASES, SILENT, Case, parameters
 from independent.front import Front, Tick, conditioned, external_ends, index_positions, ticks_of
 from independent.manifest import check_manifest
 from independent.methods import Update, m_updates, s_updates
@@ -135,16 +135,8 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
     assert any(row.get("velocity_overflow") for row in shown) == case.settings.narrow
 
 
-LONG = ("track_rev", "track_rad")
-
-
 @pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, id=case.name, marks=pytest.mark.long if case.name in LONG else ())
-        for case in CASES
-        if case not in SILENT
-    ],
+    "case", parameters((case for case in CASES if case not in SILENT), long=("track_rev", "track_rad"))
 )
 def test_core(case: Case, generated: Generated) -> None:
     check_core(case, *made(generated, case))

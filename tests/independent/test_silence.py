@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from independent.bench import Row, in_icarus
-from independent.cases import SILENT, Case
+from independent.cases import SILENT, Case, parameters
 from independent.settings import Settings
 from independent.stimulus import Lines, steady
 from independent.test_cores import check_core, made
@@ -15,13 +15,7 @@ TICK, MOST = 50, 10
 Generated = Callable[..., Path]
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, id=case.name, marks=pytest.mark.long if case.name == "track_native" else ())
-        for case in SILENT
-    ],
-)
+@pytest.mark.parametrize("case", parameters(SILENT, long=("track_native",)))
 def test_core_and_its_silences(case: Case, generated: Generated) -> None:
     folder, manifest = made(generated, case)
     check_core(case, folder, manifest)

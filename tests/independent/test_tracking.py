@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from independent.bench import Manifest, Row, in_verilator
-from independent.cases import CASES, Case
+from independent.cases import CASES, Case, parameters
 from independent.front import conditioned, wrapped
 from independent.settings import Settings, arguments
 from independent.show import check_velocity
@@ -146,10 +146,7 @@ def check_rest(motion: Motion) -> None:
         assert motion.settings.lowpass is not None or row["velocity"] == 0
 
 
-@pytest.mark.parametrize(
-    "case",
-    [pytest.param(case, id=case.name, marks=() if case.name == "track_rpm" else pytest.mark.long) for case in TRACKING],
-)
+@pytest.mark.parametrize("case", parameters(TRACKING, long=("track_native", "track_rad", "track_rev")))
 def test_a_known_motion(case: Case, generated: Callable[..., Path]) -> None:
     settings = case.settings
     folder = generated(case.name, "--method", "track", *arguments(settings.words))

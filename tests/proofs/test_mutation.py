@@ -17,10 +17,11 @@ from proofs.mutation.loops import LOOPS, Commanded
 from proofs.mutation.netlist import GROUP, exported, mutants
 from proofs.mutation.score import hold
 from proofs.mutation.simulate import library, run
-from proofs.mutation.stimulus import Stimulus, stimulus
+from proofs.mutation.stimulus import Stimulus, steps, stimulus
 from proofs.mutation.track_lemmas import begins
 from support.long import long
 
+from tachometry.sim import golden
 from tachometry.sim.golden.control import Command
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
@@ -118,6 +119,13 @@ def test_registers_power_up_as_in_the_core(tmp_path: Path) -> None:
         found = [mutant for mutant in found if mutant.option("port") == "Q"][:GROUP]
         _, rows = run(library(case.pins, flat, found), len(found), len(case.pins.outputs), played.pins, 3000)
         hold(case, played, rows)
+
+
+def test_steps_have_windows_of_all_lengths_and_all_counts() -> None:
+    spec = next(case for case in CASES if case.name == "s, divided, wide").spec
+    run_of = golden.run(spec, steps(spec, np.random.default_rng(1)))
+    assert {*run_of.updates.interval.tolist()} == {*range(1, spec.timing.max_ticks + 1)}
+    assert {*run_of.ticks.pulse_count.tolist()} == {*range(-spec.max_count, spec.max_count + 1)}
 
 
 def test_every_instruction_has_its_clock() -> None:

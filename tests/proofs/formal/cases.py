@@ -7,7 +7,7 @@ from unittest.mock import patch
 from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
 from proofs.formal.buses import ON_BUSES
 from proofs.formal.control import CONTROL
-from proofs.formal.probes import STANDSTILL_PROBES, within
+from proofs.formal.probes import STANDSTILL_PROBES, counting, within
 from proofs.formal.prove import Proof
 from proofs.formal.timed import mt_after_upset, timed
 from proofs.formal.tracking import COUNTS_OF_A_TICK
@@ -201,13 +201,7 @@ _RAIRAN_PROBES = {
 
 def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof:
     """PR: the method of Rairán, from steps to updates."""
-    spec = RairanTachometer(
-        encoder=Encoder(1, 4),
-        timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),
-        max_speed=Speed.parse(f"{max_count}rev/s"),
-        frac_bits=4,
-        position_width=8,
-    )
+    spec = RairanTachometer(**counting(tick_cycles, max_ticks, max_count))
     assert spec.max_count == max_count, spec.max_count
     parameters = {
         "T": tick_cycles,
@@ -250,6 +244,7 @@ QUICK = [
     "positions of two axes",
     "wishbone",
     "axi-lite",
+    "control loop",
     "control loop, any gains",
 ]
 

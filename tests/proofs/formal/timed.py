@@ -3,10 +3,10 @@
 from dataclasses import replace
 from typing import Any
 
-from proofs.formal.probes import STANDSTILL_PROBES, within
+from proofs.formal.probes import STANDSTILL_PROBES, counting, within
 from proofs.formal.prove import Proof
 
-from tachometry.spec import Encoder, MTTachometer, Speed, Timing, TTachometer
+from tachometry.spec import MTTachometer, TTachometer
 
 _TIMED_PROBES = {
     "core_step": "decoder.step",
@@ -54,14 +54,7 @@ def timed(
     **options: Any,
 ) -> Proof:
     """PT: the T and the M/T method, from steps and ticks to updates."""
-    spec = method(
-        encoder=Encoder(1, 4),
-        timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),
-        max_speed=Speed.parse(f"{max_count}rev/s"),
-        frac_bits=4,
-        position_width=8,
-        **options,
-    )
+    spec = method(**counting(tick_cycles, max_ticks, max_count), **options)
     assert spec.max_count == max_count, spec.max_count
     mt = isinstance(spec, MTTachometer)
     parameters = {

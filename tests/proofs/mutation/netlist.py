@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from amaranth.back import rtlil
 from amaranth.lib import wiring
@@ -115,14 +116,21 @@ def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
     return (folder / "group.il").read_text()
 
 
+def power_up(module: dict[str, Any]) -> dict[Any, str]:
+    """Initial values of bits, of a module in Yosys' JSON."""
+    levels: dict[Any, str] = {}
+    for net in module["netnames"].values():
+        if "init" in net["attributes"]:
+            levels.update(zip(net["bits"], reversed(net["attributes"]["init"]), strict=True))
+    return levels
+
+
 def _initial(folder: Path) -> list[str]:
     """Commands that set what registers power up at if their outputs are mutated: it was left to the nets behind."""
     (flat,), (group,) = (
         json.loads((folder / f"{name}.json").read_text())["modules"].values() for name in ("flat", "group")
     )
-    levels: dict[int, str] = {}
-    for net in flat["netnames"].values():
-        levels.update(zip(net["bits"], reversed(net["attributes"].get("init", "")), strict=False))
+    levels = power_up(flat)
     names = {net["bits"][0]: name for name, net in group["netnames"].items() if len(net["bits"]) == 1}
     return [
         f"setattr -set init 1'1 w:{names[bit]}"

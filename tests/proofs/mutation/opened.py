@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from proofs.mutation.netlist import Mutant, selected, yosys
+from proofs.mutation.netlist import Mutant, power_up, selected, yosys
 
 _MAP = """\
 read_rtlil flat.il
@@ -62,12 +62,10 @@ class Opened:
 def _known(mapped: dict[str, Any]) -> dict[str, tuple[str, frozenset[str]]]:
     """Initial value and names of each register, by its cell."""
     (module,) = mapped["modules"].values()
-    bits: dict[Any, str] = {}
+    bits = power_up(module)
     names: dict[tuple[Any, ...], set[str]] = defaultdict(set)
     for name, net in module["netnames"].items():
         names[tuple(net["bits"])].add(re.sub(r"\$\d+", "", name))
-        if "init" in net["attributes"]:
-            bits.update(zip(net["bits"], reversed(net["attributes"]["init"]), strict=True))
     known = {}
     for name, cell in module["cells"].items():
         if cell["type"] == "$dff":

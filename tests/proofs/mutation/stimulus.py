@@ -86,7 +86,7 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     clock = np.cumsum(np.repeat(apart, edges)) + int(rng.choice([0, 2 * longest]))
     quarter = np.cumsum(np.repeat(rng.choice([1, 1, -1], parts), edges))
     n_clocks = int(clock[-1]) + 1
-    level = quadrature(np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")])
+    level = _levels(clock, quarter, n_clocks)
     (z,) = noise_lines(rng, n_clocks, 1)
     tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.longest_tick + 2) == 0
     return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
@@ -109,22 +109,20 @@ def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
 
 
 def steps(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """Ticks with as many counts as the one before, for a while, and then with any others: every N with every m_s."""
+    """Ticks with as many counts as the one before, for a while, and then with any others: windows of all lengths."""
     cycles, longest = spec.timing.tick_cycles, spec.timing.max_ticks
     most = min(cycles, (spec.max_count + 1) * 4 // spec.encoder.decoding)
     lasts = rng.integers(1, longest + 2, _STEPS)
     counts = np.where(rng.random(_STEPS) < 0.3, rng.integers(-2, 3, _STEPS), rng.integers(-most, most + 1, _STEPS))
-    counts = np.clip(counts, -most, most)
+    counts = np.repeat(np.clip(counts, -most, most), lasts)  # of each tick
     edges = [
         tick * cycles + (2 * np.arange(abs(number)) + 1) * cycles // (2 * abs(number))
-        for tick, number in enumerate(np.repeat(counts, lasts).tolist())
+        for tick, number in enumerate(counts.tolist())
         if number
     ]
-    clock = np.concatenate([*edges, np.zeros(0, dtype=np.int64)])
-    ways = np.repeat(np.sign(np.repeat(counts, lasts)), np.abs(np.repeat(counts, lasts)))
-    n_clocks = int(lasts.sum()) * cycles
-    quarter = np.append(0, np.cumsum(ways))[np.searchsorted(clock, np.arange(n_clocks), side="right")]
-    level = quadrature(quarter)
+    n_clocks = len(counts) * cycles
+    quarter = np.cumsum(np.repeat(np.sign(counts), np.abs(counts)))
+    level = _levels(np.concatenate(edges), quarter, n_clocks)
     tick = np.arange(n_clocks) % max(cycles, 2) == 0
     return _trace(spec, np.array([level & 1, level >> 1, tick, tick], dtype=np.uint8))
 
@@ -145,6 +143,11 @@ def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
             clocks = run.ticks.clock - spec.tick_latency if of_tick else run.updates.clock
             found.append(trace.until(int(rng.choice(clocks[:2])) - before))
     return [*found, noise(spec, rng, 4 * spec.longest_tick, 2)]
+
+
+def _levels(clock: NDArray[np.int64], quarter: NDArray[np.int64], n_clocks: int) -> NDArray[np.uint8]:
+    """A + 2 B in every clock, from the quarters of a period that begin in some; both lines are low before."""
+    return quadrature(np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")])
 
 
 def _trace(spec: TachometerSpec, level: NDArray[np.uint8]) -> PinTrace:
