@@ -133,9 +133,6 @@ ARGUED = {
     ("track, age", '"age": Out(range(max_age + 1)),', "age$49[1] cnot1"): _EACH_TICK,
     ("t, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
     ("t, in clocks", '"was_negative": Out(1),', "B[0] inv"): _NO_COUNT,
-    ("t, in ticks", "above.eq(value > Const(limit, value.shape())),", "B[2] inv"): (
-        "the limit of the output is 123 instead of 127; velocities are 2^5·2π/m, and the nearest ones are 100 and 201"
-    ),
     ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
     ("mt, in clocks", "earlier = Signal()  # a count in an earlier period of this tick", "S[0] const0"): (
         "it outlasts a reset until the next tick, and only withholds a comparison there: the velocity is 0 and would "
