@@ -80,7 +80,15 @@ class Divider(wiring.Component):
     def next_digit_of(self, number: int) -> Value:
         """What `digit` would be in the clock after this one if the quotient were this number."""
         place = self._left[: (self._steps - 1).bit_length()]
-        return Array(number >> k & 1 for k in range(1 << len(place)))[place]
+        return Array(number >> self._reached(k) & 1 for k in range(1 << len(place)))[place]
+
+    def _reached(self, place: int) -> int:
+        """The place of a digit that stands for one beyond them: most bits are the same, so few have to be looked at."""
+        for bit in reversed(range(place.bit_length() - 1)):
+            if place < self._steps:
+                break
+            place &= ~(1 << bit)
+        return place
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -71,7 +71,7 @@ class QuotientVelocity(wiring.Component):
             {
                 "measure": In(1),
                 "decay": In(1),
-                "dividend": In(signed(len(self.divider.dividend) - 1)),
+                "dividend": In(signed(spec.distance_width)),
                 "divisor": In(spec.interval_width),
                 "forced_in": In(1),
                 "beyond_in": In(1),
@@ -99,8 +99,9 @@ class QuotientVelocity(wiring.Component):
             self.free.eq(~(measuring & divider.running)),
             divider.start.eq(self.measure | decays),
             divider.divisor.eq(self.divisor),
-            divider.dividend.eq(Mux(self.measure, halves, greatest) if spec.decays else halves),
         ]
+        divided, too_far = self._taken(m, halves, Mux(self.measure, halves, greatest) if spec.decays else halves)
+        m.d.comb += divider.dividend.eq(divided)
         forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
         with m.If(divider.start):
             m.d.sync += [
@@ -109,7 +110,7 @@ class QuotientVelocity(wiring.Component):
                 beyond.eq(self.beyond_in),
             ]
 
-        nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity)
+        nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity, measuring & too_far)
         update = Signal()
         m.d.comb += update.eq(divider.done & (measuring | nearer if spec.decays else 1))
         m.d.sync += self.updates.valid.eq(update)
@@ -131,12 +132,27 @@ class QuotientVelocity(wiring.Component):
             self._bounds(m, new, decays, update)
         return m
 
-    def _bounded(self, m: Module, measuring: Signal, velocity: Value) -> tuple[Value, Value, Value]:
+    def _taken(self, m: Module, way: Value, divided: Value) -> tuple[Value, Value]:
+        """What the divider takes of a number, and later whether the way, if that is divided, is more than it takes.
+
+        With a greatest speed the divider is so narrow that a long way may be more. Over any time that is too fast.
+        """
+        kept = len(self.divider.dividend) - 2
+        if len(way) <= kept + 2:
+            return divided, Const(0)
+        # A remainder that is a bit shorter than its register can be doubled. So the second digit of a quotient that is
+        # too great for all digits is always another one than that of the greatest speed.
+        upper = Signal(len(way) - kept, reset_less=True)
+        with m.If(self.divider.start):
+            m.d.sync += upper.eq(way[kept:])
+        return Cat(divided[:kept], divided[-1].replicate(2)), upper != upper[-1].replicate(len(upper))
+
+    def _bounded(self, m: Module, measuring: Signal, velocity: Value, too_far: Value) -> tuple[Value, Value, Value]:
         """The quotient held within a bound: whether it was nearer to 0, or beyond, and what it is then.
 
         The bound of a measurement is the greatest speed, that of a decay the velocity. The digits of highest weight
         come first: so the first that differs from the bound's decides, and if the quotient is beyond, all that follow
-        are the bound's.
+        are the bound's. A quotient that needs more digits than are made differs from any bound in the second of them.
         A copy of the velocity goes around in step with the digits of a decay, and takes up those of the result.
         """
         spec, divider = self._spec, self.divider
@@ -161,7 +177,7 @@ class QuotientVelocity(wiring.Component):
             bounded = Const(1)
         m.d.comb += [
             comes_nearer.eq(nearer | (~farther & (bound != negative) & (divider.digit == negative))),
-            passes.eq(bounded & (farther | (~nearer & (bound == negative) & (divider.digit != negative)))),
+            passes.eq(bounded & (farther | too_far | (~nearer & (bound == negative) & (divider.digit != negative)))),
         ]
         with m.If(divider.running):
             m.d.sync += [

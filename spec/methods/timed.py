@@ -146,15 +146,30 @@ class TimedTachometer(TachometerSpec):
         return self.saturates
 
     @property
+    def _all_quotient_bits(self) -> int:
+        """Bits after the sign of any quotient, and of any bound if there are bounds."""
+        return (self.max_bound if self.bounds else self.max_quotient).bit_length() + self.native_frac_bits
+
+    @property
+    def distance_width(self) -> int:
+        """Bits of a distance in counts, times the timer periods in a tick."""
+        return self.interval_width + self._all_quotient_bits - (self.native_frac_bits - 1)
+
+    @property
     def quotient_bits(self) -> int:
-        """Bits that the divider makes of a quotient after its sign; with bounds, as many of all quotients."""
-        bits = (self.max_bound if self.bounds else self.max_quotient).bit_length() + self.native_frac_bits
+        """Bits that the divider makes of a quotient after its sign; with bounds, as many of all quotients.
+
+        The greatest speed is 0 in the first of them, so what is beyond all of them is seen there.
+        """
+        most = bits = self._all_quotient_bits
+        if self.saturates and not self.bounds:
+            bits = min(most, self.max_count.bit_length() + 1 + self.native_frac_bits)
         output = self.output
         if output is None or len(output.digits) < 3:
             return bits
-        # Up to two more are worth it if updates are then so far apart that the unit takes one adder.
-        more = output.serial_latency - (bits + 2)
-        return bits + more if more in (1, 2) else bits
+        # More are worth it, up to two more than all, if updates are then so far apart that the unit takes one adder.
+        enough = output.serial_latency - 2
+        return enough if bits < enough <= most + 2 else bits
 
     @property
     def interval_width(self) -> int:

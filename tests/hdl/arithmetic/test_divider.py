@@ -81,6 +81,27 @@ def test_wide_quotients() -> None:
     check(10, 25, 20, [(4 * int(rng.integers(1 - (n << 7), n << 7)), n) for n in by], 2)
 
 
+@pytest.mark.parametrize("nearest", [False, True])
+@pytest.mark.parametrize(("integer_bits", "scale_bits", "divisor_width"), [(3, 2, 3), (3, 1, 4), (4, 2, 3)])
+def test_the_second_digit_tells_a_quotient_of_too_many(
+    integer_bits: int, scale_bits: int, divisor_width: int, nearest: bool
+) -> None:
+    dut = divider.Divider(
+        divisor_width=divisor_width, integer_bits=integer_bits, scale_bits=scale_bits, nearest=nearest
+    )
+    most = 1 << (divisor_width + integer_bits - 1)
+    cases = [
+        (dividend, by)
+        for by in range(1, 1 << divisor_width)
+        for dividend in range(-most, most)
+        if not -(by << integer_bits) <= dividend < by << integer_bits
+    ]
+    rows = [row for dividend, by in cases for row in ({"start": 1, "dividend": dividend, "divisor": by}, {"start": 0})]
+    seen = [row["digit"] for row in clock_by_clock(dut, [*rows, {"start": 0}, {"start": 0}], ["digit"])]
+    positive = [int(dividend >= 0) for dividend, _ in cases]
+    assert (len(cases) > 90, seen[1:-2:2], seen[2:-1:2]) == (True, positive, positive)
+
+
 MUTANTS = {
     "restoring nothing": ("(~negative).replicate", "Const(1).replicate"),
     "no digit of the dividend": ("Cat(1, digits[-1], remainder)", "Cat(1, 0, remainder)"),

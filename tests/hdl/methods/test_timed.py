@@ -6,8 +6,9 @@ import pytest
 from support.mutant import caught, mutant
 from support.timed import FRAC_BITS, SILENCE, TICK, decay, run, silence, spec_of, speed
 
-from tachometry.hdl.methods import count_way, gap_timer, quotient_velocity
-from tachometry.spec import Speed, Timing
+from tachometry.hdl.methods import count_way, gap_timer
+from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
+from tachometry.spec import Speed, Timing, TTachometer
 from tachometry.spec.methods.timed import TimedTachometer
 
 METHODS = ["t", "mt"]
@@ -64,7 +65,8 @@ def check_greatest_speed(method: str, sign: int = 1) -> None:
     """What is too fast is held there, whichever way; what is slower is not."""
     spec = timed(method, bound_decay=False, max_speed=Speed.parse("2rev/s"))
     assert spec.saturates
-    fast = {5, 9} if method == "t" else range(5, 21)  # two counts; a tick full of them
+    # Two counts; as many as a window takes.
+    fast = {5, 9} if isinstance(spec, TTachometer) else range(5, 5 + spec.min_periods + 2)
     got = run(spec, dict.fromkeys([*fast, 139], sign), 180)
     last, first = max(fast), min(fast)
     velocities = [(last, 2 << FRAC_BITS, last - first), (139, speed(1, 139 - last), 139 - last)]
@@ -75,6 +77,21 @@ def check_greatest_speed(method: str, sign: int = 1) -> None:
 @pytest.mark.parametrize("sign", [1, -1])
 def test_greatest_speed(method: str, sign: int) -> None:
     check_greatest_speed(method, sign)
+
+
+def check_too_far() -> None:
+    """A window so long and so fast that the divider does not take its distance is held there, too."""
+    time = 205
+    spec = spec_of("mt", min_time=time - 1, bound_decay=False, max_speed=Speed.parse("2rev/s"))
+    # In half counts, times the clocks in a tick. Less what the divider does not take, it would be next to nothing.
+    assert 0 < 2 * TICK * time - (1 << (len(QuotientVelocity(spec).divider.dividend) - 2)) < TICK
+    for sign in (1, -1):
+        got = run(spec, dict.fromkeys(range(5, 6 + time), sign), 6 + time)
+        assert [row[1:3] for row in got] == [(sign * 2 << FRAC_BITS, time)]
+
+
+def test_too_far() -> None:
+    check_too_far()
 
 
 def check_one_count(method: str) -> None:
@@ -204,35 +221,36 @@ MUTANTS = {
         "self.was_negative",
         check_counts_in_a_row,
     ),
-    "never nearer": (quotient_velocity.QuotientVelocity, "measuring | nearer", "measuring", check_standstill),
-    "always nearer": (quotient_velocity.QuotientVelocity, "measuring | nearer", "1", check_standstill),
+    "never nearer": (QuotientVelocity, "measuring | nearer", "measuring", check_standstill),
+    "always nearer": (QuotientVelocity, "measuring | nearer", "1", check_standstill),
     "compared with what was shown before": (
-        quotient_velocity.QuotientVelocity,
+        QuotientVelocity,
         "Cat(Mux(passes, bound, divider.digit), copy)",
         "Cat(copy[-1], copy)",
         check_standstill,
     ),
     "down and not to the nearest": (
-        quotient_velocity.QuotientVelocity,
+        QuotientVelocity,
         "nearest=True",
         "nearest=False",
         check_standstill,
     ),
     "forced as it was before": (
-        quotient_velocity.QuotientVelocity,
+        QuotientVelocity,
         "forced.eq(self.forced_in)",
         "forced.eq(forced)",
         check_standstill,
     ),
     "beyond the greatest speed": (
-        quotient_velocity.QuotientVelocity,
+        QuotientVelocity,
         "bounded & (farther",
         "~measuring & (farther",
         check_greatest_speed,
     ),
+    "too far for the divider": (QuotientVelocity, "farther | too_far", "farther", lambda _: check_too_far()),
     "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
     "decaying too early": (
-        quotient_velocity.QuotientVelocity,
+        QuotientVelocity,
         " & ~divider.done",
         "",
         check_turning_tail,

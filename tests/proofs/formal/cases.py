@@ -278,6 +278,8 @@ PROOFS = [
     rairan("Rairán", 3, 4, 2),
     timed("T", TTachometer, 2, 1),
     timed("M/T", MTTachometer, 2, 1),
+    timed("T of few digits", TTachometer, 4, 1),
+    timed("M/T of few digits", MTTachometer, 4, 1, min_time=15),
     timed("M/T of whole cycles", MTTachometer, 2, 1, whole_cycles=True),
     timed("T in ticks", TTachometer, 2, 2, 12, timer="tick"),
     timed("M/T in ticks", MTTachometer, 2, 2, timer="tick"),

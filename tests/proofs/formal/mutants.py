@@ -157,6 +157,8 @@ MUTANTS = [
     Mutant("T", "pt_flag", QuotientVelocity, "beyond | beyond_most", "beyond"),
     Mutant("T in ticks", "pt_flag", QuotientVelocity, "beyond | beyond_most", "beyond_most"),
     Mutant("T", "pt_saturated", QuotientVelocity, "Mux(passes, bound, divider.digit)", "divider.digit"),
+    Mutant("T of few digits", "pt_saturated", QuotientVelocity, "Mux(passes, bound, divider.digit)", "divider.digit"),
+    Mutant("M/T of few digits", "pt_flag", QuotientVelocity, "farther | too_far", "farther", 40),
     Mutant("T in ticks", "pt_decays", QuotientVelocity, "measuring | nearer", "1"),
     Mutant("T in ticks", "pt_bound", QuotientVelocity, "measuring | nearer", "measuring", 32),
     Mutant(

@@ -73,6 +73,7 @@ def timed(
         "SATURATES": int(spec.saturates),
         "FLAGS": int(spec.flags_range),
         "INTEGER_BITS": spec.max_quotient.bit_length() + 1,
+        "QUOTIENT_BITS": spec.quotient_bits,
         "INTERVAL_WIDTH": spec.interval_width,
         "FRAC_BITS": spec.frac_bits,
         "DIVISION_CLOCKS": spec.division_clocks,

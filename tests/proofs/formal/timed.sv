@@ -17,7 +17,8 @@ module timed #(
     parameter MAX_QUOTIENT = 4,
     parameter SATURATES = 1,
     parameter FLAGS = 1,          // there is an out_of_range
-    parameter INTEGER_BITS = 3,
+    parameter INTEGER_BITS = 3,   // of any quotient of half counts
+    parameter QUOTIENT_BITS = 6,  // that the divider makes after the sign
     parameter INTERVAL_WIDTH = 5,
     parameter FRAC_BITS = 4,
     parameter DIVISION_CLOCKS = 11,
@@ -26,7 +27,7 @@ module timed #(
 ) (
     input clk, input rst, input a, input b
 );
-  localparam V = VELOCITY_WIDTH, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = Q + FRAC_BITS - 1, W = 8;
+  localparam V = VELOCITY_WIDTH, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = QUOTIENT_BITS, W = 8;
   localparam P = LATTICE ? 1 : T, B = DIVISION_CLOCKS, LONG = MAX_PERIODS * (LATTICE ? T : 1), PHASES = LATTICE ? T : 1;
   localparam PATIENCE = MIN_PERIODS * (CYCLE > 1 ? 2 : 1);  // timer periods after which any count closes a window
   wire tick, velocity_valid, forced, stalled;
@@ -200,8 +201,14 @@ module timed #(
   // Lemmas: what the induction needs to know of the state. Of a division: what is divided, shifted, is the remainder and
   // the divisor times the digits so far, 1 or -1 each; behind the digits is what is left of it.
   wire [4:0] j = since - 1;
-  wire signed [N+I+1:0] all = (distance <<< FRAC_BITS - 1) + $signed({1'b0, times[I-1:1]});
-  wire signed [N+I+1:0] taken = all >>> (N - j);
+  localparam A = Q + FRAC_BITS - 1;  // bits of any quotient
+  wire signed [A+I+1:0] all = (distance <<< FRAC_BITS - 1) + $signed({1'b0, times[I-1:1]});
+  wire signed [A+I+1:0] taken = all >>> (N - j);
+  // The divider has fewer digits than the quotient, which the second one tells, or cannot take the distance.
+  localparam signed [A+I+1:0] FARTHEST = 1 << (I + N - FRAC_BITS);
+  wire signed [A+I+1:0] end_of_digits = $signed({1'b0, times}) <<< N;
+  wire far = N < A && measuring && (distance >= FARTHEST || distance < -FARTHEST);
+  wire over = far || (N < A && (all >= end_of_digits || all < -end_of_digits));
   wire [N:0] found_digits = core_digits & ((1 << j) - 1);
   wire signed [N+1:0] digits = $signed({1'b0, found_digits, 1'b0}) - (1 <<< j) + 1;
   wire signed [N+I+1:0] passed = $signed({1'b0, times}) * digits;
@@ -233,14 +240,16 @@ module timed #(
     lemma_times: assert (!fresh_division || since == 0 || times <= MAX_PERIODS + (MT ? PATIENCE : 0));
     lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
     lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
-    lemma_left: assert (!fresh_division || !core_running || more_digits == (all & ((1 << (N - j)) - 1)));
+    lemma_left: assert (!fresh_division || !core_running || far || more_digits == (all & ((1 << (N - j)) - 1)));
     lemma_steps: assert (!core_running || core_steps == N - 1 - $signed({1'b0, j}));
-    lemma_remainder: assert (!fresh_division || !core_running || (core_remainder < $signed({1'b0, times})
+    lemma_remainder: assert (!fresh_division || !core_running || over || (core_remainder < $signed({1'b0, times})
         && core_remainder >= -$signed({1'b0, times})));
-    lemma_quotient: assert (!fresh_division || !core_running || taken == core_remainder + passed);
-    lemma_found: assert (!fresh_division || since < B || (found <= asked && asked < found + twice));
+    lemma_over: assert (!fresh_division || !core_running || !over || far || j != 1 || (core_remainder < 0) == minus);
+    lemma_quotient: assert (!fresh_division || !core_running || far || (over && j != 0) || taken == core_remainder + passed);
+    lemma_found: assert (!fresh_division || since < B || over || (found <= asked && asked < found + twice));
     lemma_compared: assert (!fresh_division || since == 0 || !(measuring ? SATURATES : fresh)
-        || (core_nearer == (minus ? found_digits > bound_digits : found_digits < bound_digits)
+        || (over ? (far || !core_nearer) && core_passes == (since > 2 || (far && since > 1))
+            : core_nearer == (minus ? found_digits > bound_digits : found_digits < bound_digits)
             && core_passes == (minus ? found_digits < bound_digits : found_digits > bound_digits)));
     lemma_taken: assert (!fresh_division || since == 0 || taken_digits == (core_passes ? bound_digits : found_digits) || (!fresh && !measuring && core_passes));
     lemma_copy: assert (!fresh || (since != 0 && measuring)

@@ -157,7 +157,7 @@ CASES = [
     _case("t", "in clocks", 7, 5, 3, bounds=True, age=True),
     _case("t", "in ticks", 5, 44, None, timer="tick", unit="rad/s", frac_bits=8, velocity_width=8, **_FRONT),
     _case("mt", "in clocks", 7, 5, 3, bounds=True, age=True),
-    _case("mt", "whole cycles", 7, 5, 3, 340, whole_cycles=True),
+    _case("mt", "whole cycles", 7, 5, 1, 340, whole_cycles=True),
     _case("mt", "in ticks", 9, 12, 1, timer="tick", max_tick_cycles=11, decoding=1),
     _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),
     _case("rairan", "n2", 5, 6, 2, 340, estimate="n2", **_FRONT),

@@ -33,9 +33,13 @@ def test_a_division_takes_a_clock_a_digit_its_sign_included_and_one_for_the_divi
     assert [t().division_clocks, mt().division_clocks] == [5 + 4 + 2] * 2
     assert [t(timer="tick").division_clocks, mt(timer="tick").division_clocks] == [1 + 4 + 2, 5 + 4 + 2]
     assert t().datapath_latency == 11 + 1
-    # A bound may be 41 counts. A greatest speed changes nothing.
+    # A bound may be 41 counts.
     assert t(bounds=True).division_clocks == 6 + 4 + 2
-    assert t(max_speed=Speed(Fraction(1000), "rev/s")).division_clocks == 11
+    # Of a greatest speed of one count, and one of four, there is one digit more; 16 counts have as many as 20.
+    fast = {n: Speed(Fraction(n * 1_000_000, 20 * 32), "rev/s") for n in (1, 4, 16)}  # counts in a tick
+    assert [t(max_speed=speed).max_count for speed in fast.values()] == [1, 4, 16]
+    assert [t(max_speed=speed).division_clocks for speed in fast.values()] == [1 + 1 + 4 + 2, 3 + 1 + 4 + 2, 11]
+    assert t(max_speed=fast[1], bounds=True).division_clocks == 6 + 4 + 2
 
 
 def test_updates_are_a_division_apart() -> None:
