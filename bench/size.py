@@ -177,8 +177,8 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 """
 
 
-SPEED_TEXT = """With an external tick M, T and M/T have up to 4 LUTs more on ECP5, and 12 to 19 flip-flops less, as m_e may be
-a number of 1,920 counts that has to be held within 13. All others are smaller. A division takes 6 clocks
+SPEED_TEXT = """With an external tick M, T and M/T have up to 4 LUTs more on ECP5, and 12 to 19 flip-flops less: m_e
+may be a number of 1,920 counts that has to be held within 13. All others are smaller. A division takes 6 clocks
 less, with an external tick 5. Differences of Fmax of a few percent are less than those between seeds."""
 
 

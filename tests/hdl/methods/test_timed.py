@@ -8,7 +8,7 @@ from support.timed import FRAC_BITS, SILENCE, TICK, decay, run, silence, spec_of
 
 from tachometry.hdl.methods import count_way, gap_timer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
-from tachometry.spec import Speed, Timing, TTachometer
+from tachometry.spec import MTTachometer, Speed, Timing
 from tachometry.spec.methods.timed import TimedTachometer
 
 METHODS = ["t", "mt"]
@@ -65,8 +65,8 @@ def check_greatest_speed(method: str, sign: int = 1) -> None:
     """What is too fast is held there, whichever way; what is slower is not."""
     spec = timed(method, bound_decay=False, max_speed=Speed.parse("2rev/s"))
     assert spec.saturates
-    # Two counts; as many as a window takes.
-    fast = {5, 9} if isinstance(spec, TTachometer) else range(5, 5 + spec.min_periods + 2)
+    # As many as a window takes; two counts.
+    fast = range(5, 5 + spec.min_periods + 2) if isinstance(spec, MTTachometer) else {5, 9}
     got = run(spec, dict.fromkeys([*fast, 139], sign), 180)
     last, first = max(fast), min(fast)
     velocities = [(last, 2 << FRAC_BITS, last - first), (139, speed(1, 139 - last), 139 - last)]
