@@ -155,7 +155,7 @@ CASES = [
         lowpass=Fraction(1, 2),
     ),
     _case("t", "in clocks", 7, 5, 3, bounds=True, age=True),
-    _case("t", "in ticks", 5, 44, None, timer="tick", unit="rad/s", frac_bits=8, velocity_width=8, **_FRONT),
+    _case("t", "in ticks", 5, 44, None, timer="tick", unit="rpm", frac_bits=5, velocity_width=8, **_FRONT),
     _case("mt", "in clocks", 7, 5, 3, bounds=True, age=True),
     _case("mt", "whole cycles", 7, 5, 1, 340, whole_cycles=True),
     _case("mt", "in ticks", 9, 12, 1, timer="tick", max_tick_cycles=11, decoding=1),

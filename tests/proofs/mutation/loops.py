@@ -183,7 +183,8 @@ def _case(
 
 
 LOOPS = [
-    _case("serial", 82, 10, 164, 300),
+    # What is held from a control tick to the next is read an odd number of clocks after it: an inverter would be seen.
+    _case("serial", 82, 10, 164, 300, filter=None, current_width=13),
     _case("parallel", 26, 12, 52, 160, kind=_Short, method="t", multiplier="parallel"),
     _case("conventional", 52, 2, 52, 120, **_CONVENTIONAL),
     _case("unfiltered", 26, 4, 52, 80, method="t", multiplier="parallel", filter=None),
