@@ -38,9 +38,6 @@ _GOES_ON = (
     "end"
 )
 _LEFT = 'self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)'
-_HELD = (
-    "it is inverted in every clock from a control tick to the next, and is read an even number of clocks after the tick"
-)
 _NO_TICKS = "of no control tick there is no coefficient but 0, and of this method one update comes before the first"
 _SLACK = (
     "it changes the lowest two bits of a product, by less than what 1/m_s may be off: with every N and every m_s of "
@@ -60,11 +57,6 @@ ARGUED = {
     ),
     ("loop, unfiltered", '"y": Out(signed(signed_width(form.most_y))),', "y[11] cnot1"): _WHOLE,
     ("loop, unfiltered", "less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)", "Y[6] const0"): _WHOLE,
-    **{
-        ("loop, serial", "velocity = Signal.like(self.command_velocity, reset_less=True)", f"velocity[{what}"): _HELD
-        for what in ("7] cnot0", "2] cnot1", "1] inv", "11] inv", "3] cnot0")
-    },
-    ("loop, serial", "enabled = Signal()", "A[0] inv"): _HELD,
     ("loop, serial", "due = Signal()", "B[0] const1"): "a control tick sets it before a product is stored",
     ("loop, serial", "ticked = Signal()  # before the first control tick there is no current", "ticked[0] const1"): (
         _NO_TICKS
