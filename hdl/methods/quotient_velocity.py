@@ -133,15 +133,17 @@ class QuotientVelocity(wiring.Component):
         return m
 
     def _taken(self, m: Module, way: Value, divided: Value) -> tuple[Value, Value]:
-        """What the divider takes of a number, and later whether the way, if that is divided, is more than it takes.
+        """What the divider takes of a number, and whether the way is more than it takes.
 
-        With a greatest speed the divider is so narrow that a long way may be more. Over any time that is too fast.
+        The latter is known while the way is divided. Only with a greatest speed is the divider so narrow; a way that it
+        does not take is too fast in any time.
         """
-        kept = len(self.divider.dividend) - 2
-        if len(way) <= kept + 2:
+        taken = len(self.divider.dividend)
+        if len(way) <= taken:
             return divided, Const(0)
-        # A remainder that is a bit shorter than its register can be doubled. So the second digit of a quotient that is
-        # too great for all digits is always another one than that of the greatest speed.
+        # One bit less than its register has, so that the first remainder can be doubled: then the second digit of a
+        # quotient that is too great for all digits is always another one than that of the greatest speed.
+        kept = taken - 2  # and twice the sign
         upper = Signal(len(way) - kept, reset_less=True)
         with m.If(self.divider.start):
             m.d.sync += upper.eq(way[kept:])
