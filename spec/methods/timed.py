@@ -161,15 +161,15 @@ class TimedTachometer(TachometerSpec):
 
         The greatest speed is 0 in the first of them, so what is beyond all of them is seen there.
         """
-        most = bits = self._all_quotient_bits
+        bits = self._all_quotient_bits
         if self.saturates and not self.bounds:
-            bits = min(most, self.max_count.bit_length() + 1 + self.native_frac_bits)
+            bits = min(bits, self.max_count.bit_length() + 1 + self.native_frac_bits)
         output = self.output
         if output is None or len(output.digits) < 3:
             return bits
-        # More are worth it, up to two more than all, if updates are then so far apart that the unit takes one adder.
-        enough = output.serial_latency - 2
-        return enough if bits < enough <= most + 2 else bits
+        # Up to two more are worth it if updates are then so far apart that the unit takes one adder.
+        more = output.serial_latency - (bits + 2)
+        return bits + more if more in (1, 2) else bits
 
     @property
     def interval_width(self) -> int:

@@ -81,13 +81,15 @@ def test_greatest_speed(method: str, sign: int) -> None:
 
 def check_too_far() -> None:
     """A window so long and so fast that the divider does not take its distance is held there, too."""
-    time = 205
-    spec = spec_of("mt", min_time=time - 1, bound_decay=False, max_speed=Speed.parse("2rev/s"))
-    # In half counts, times the clocks in a tick. Less what the divider does not take, it would be next to nothing.
-    assert 0 < 2 * TICK * time - (1 << (len(QuotientVelocity(spec).divider.dividend) - 2)) < TICK
-    for sign in (1, -1):
-        got = run(spec, dict.fromkeys(range(5, 6 + time), sign), 6 + time)
-        assert [row[1:3] for row in got] == [(sign * 2 << FRAC_BITS, time)]
+    for time in (205, 400):
+        spec = spec_of("mt", min_time=time - 1, bound_decay=False, max_speed=Speed.parse("2rev/s"))
+        # In half counts, times the clocks in a tick. The first, less what the divider does not take, would be next to
+        # nothing; the second still fits its register, but not when it is doubled.
+        most, distance = 1 << (len(QuotientVelocity(spec).divider.dividend) - 2), 2 * TICK * time
+        assert 0 < distance - most < TICK if time == 205 else 2 * most - distance < 2 * TICK * TICK
+        for sign in (1, -1):
+            got = run(spec, dict.fromkeys(range(5, 6 + time), sign), 6 + time)
+            assert [row[1:3] for row in got] == [(sign * 2 << FRAC_BITS, time)]
 
 
 def test_too_far() -> None:
@@ -248,6 +250,7 @@ MUTANTS = {
         check_greatest_speed,
     ),
     "too far for the divider": (QuotientVelocity, "farther | too_far", "farther", lambda _: check_too_far()),
+    "too far to be doubled": (QuotientVelocity, "taken - 2", "taken - 1", lambda _: check_too_far()),
     "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
     "decaying too early": (
         QuotientVelocity,

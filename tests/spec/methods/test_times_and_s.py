@@ -246,3 +246,13 @@ def test_a_unit_takes_one_adder_where_it_is_a_sum_of_more_than_two(made: Any) ->
         "rad/s": specs["rad/s"].output.serial_latency <= specs["rad/s"].update_spacing,
     }
     assert specs["rad/s"].output_serial
+
+
+@pytest.mark.parametrize("made", [TTachometer, MTTachometer])
+def test_a_digit_more_for_one_adder(made: Any) -> None:
+    """With a greatest speed of a count a tick, too: its digit, one that shows that it is exceeded, and that one."""
+    fast = Speed.parse("1024rev/s")
+    spec = made(encoder=Encoder(8), timing=Timing(1 << 20, 32, 10), unit="rad/s", frac_bits=2, max_speed=fast)
+    assert spec.max_count == 1
+    assert spec.quotient_bits == 1 + 1 + spec.native_frac_bits + 1
+    assert spec.output_serial
