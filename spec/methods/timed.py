@@ -116,8 +116,9 @@ class TimedTachometer(TachometerSpec):
 
     @property
     def remembered_clocks(self) -> int:
-        # An unrelated division may have to end first.
-        return self.remembered_periods * (self.longest_tick if self.on_lattice else 1) + self.division_clocks
+        # An unrelated division may have to end first, the counter of which may be at its end.
+        division = (1 << (self.quotient_bits - 1).bit_length()) + 2
+        return self.remembered_periods * (self.longest_tick if self.on_lattice else 1) + division
 
     @property
     def max_interval(self) -> int:

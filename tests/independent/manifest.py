@@ -234,14 +234,12 @@ class Expected:
         if timed:
             shown = int(self.manifest["recovery_cycles"])
             least = lines + tick + clocks + self.to_tick + self.to_velocity
+            # What counts the digits may have to wrap; a clock for the dividend, and one for the result.
+            division = (1 << (self.division - 3).bit_length()) + 2
             # In other units a division is shorter than the way to the velocity, by how much is not told.
-            if (
-                not settings.native
-                and clocks + self.to_velocity > silence
-                and least + 10 < shown < least + self.division
-            ):
+            if not settings.native and clocks + self.to_velocity > silence and least + 10 < shown < least + division:
                 return shown
-            clocks += self.division
+            clocks += division
         return lines + tick + max(clocks + self.to_velocity, silence) + self.to_tick
 
     def entries(self) -> dict[str, Callable[[], object]]:

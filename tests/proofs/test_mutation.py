@@ -109,6 +109,22 @@ def test_lemmas_must_be_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
         equivalent(CASE, flat, found, stimulus(CASE.spec, 100).pins, tmp_path, pool)
 
 
+@pytest.mark.parametrize("prove", [pytest.param(True, marks=long), False])
+def test_lemmas_of_track_are_of_its_registers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, prove: bool) -> None:
+    """All that they name are there, and the lemmas are proven."""
+    monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 1)
+    if not prove:
+        monkeypatch.setattr(proofs.mutation.equivalent, "proven", lambda *arguments: [True])
+    case = next(case for case in CASES if case.name == "track, age")
+    flat, found = mutants(exported(case.component), 1, tmp_path)
+    with ThreadPoolExecutor(1) as pool:
+        assert len(equivalent(case, flat, found, stimulus(case.spec, 100).pins, tmp_path, pool)) == 1
+        if not prove:
+            monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known([], ["{no.register}"]))
+            with pytest.raises(AssertionError, match="a register of a lemma is not there"):
+                equivalent(case, flat, found, stimulus(case.spec, 100).pins, tmp_path, pool)
+
+
 def test_registers_power_up_as_in_the_core(tmp_path: Path) -> None:
     """Those of which an output is mutated too: an initial value of 1 is not lost."""
     case = next(case for case in CASES if case.name == "s, carried")

@@ -1,7 +1,8 @@
 """Survivors that are equivalent to the core by an argument made by hand, where the proof does not reach.
 
 The keys are the core, the line of the HDL, and what the mutant changes in the cell that Yosys made of that line, with
-the cell where the line has several of a kind. B is the value that a reset gives, and S is whether there is a reset.
+the cell where the line has several of a kind; some multiplexers that Yosys makes have no line. B is the value that a
+reset gives, and S is whether there is a reset.
 """
 
 from pathlib import Path
@@ -19,6 +20,12 @@ _EVEN = (
     "it is inverted in every clock from a tick to the next; the program reads it an even number of clocks after "
     "the tick, but where it asks for more than one, and then 2 and 3 are exchanged, and 0 and 1"
 )
+_EVEN_PLACES = (
+    "it is inverted like that if the number of counts is even, and the program reads the places of two counts an even "
+    "number of clocks after the tick"
+)
+_NO_REST = "whether the phase is one count is asked only where it is not rest"
+_UNUSED_READ = "what is read then is not used: no operation that is executed reads two behind one that writes"
 _EACH_TICK = "every tick has an update, so the age is at most 1"
 _OPEN_PLACES = "the first count after a reset is alone in its tick and replaces it, and without one it is not read"
 _SIGN = (
@@ -45,6 +52,15 @@ _SLACK = (
 )
 _TWICE = "twice = (high ^ low) & ~(low ^ below)"
 _ODD = "product = Cat(Mux(twice, 0, 1), Mux(twice, 1, self.q[1]) ^ (high & ~twice), product[2:])"
+_BEFORE = (
+    "before the first control tick there is one update at most, whose velocity is replaced by another before it is "
+    "used; and of no control tick there is no coefficient but 0"
+)
+_TWO_A_TICK = (
+    "it is inverted like that in every clock, and is read and set again an even number of clocks after a control tick "
+    "has set it"
+)
+_DEMANDED = "a tick sets it before a product is done"
 _WHOLE = "without a filter y is the velocity: there is nothing below an LSB of it"
 
 ARGUED = {
@@ -65,6 +81,34 @@ ARGUED = {
     ("loop, serial", "m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)", "A[0] const1"): (
         "what is cleared has been loaded, with its coefficient, in the clock in which the term begins"
     ),
+    ("loop, serial", "waits = Signal()", "B[0] inv"): _BEFORE,
+    ("loop, serial", "m.d.comb += self.due.eq(waits | (self.n == self._longest))", "$14.A[0] inv"): (
+        "it stands for 6 control ticks instead of 7: S has an update in every 5 of them, so that one waits there"
+    ),
+    ("loop, serial", "step = Mux(skipped, word, product.product)", "$318.A[8] inv"): (
+        "that is what y takes, and without a filter y never takes a product"
+    ),
+    ("loop, serial", '"y": Out(signed(signed_width(form.most_y))),', "y[4] const0"): _WHOLE,
+    ("loop, serial", '"current_sum": Out(signed(form.most_sum.bit_length() + 1)),', "current_sum[11] cnot1"): (
+        _TWO_A_TICK
+    ),
+    ("loop, parallel", '"current_sum": Out(signed(form.most_sum.bit_length() + 1)),', "current_sum[12] cnot1"): (
+        _TWO_A_TICK
+    ),
+    ("loop, parallel", '"n": Out(range(form.longest + 1)),', "n[0] cnot1"): _TWO_A_TICK,
+    ("loop, parallel", "ticked = Signal()  # before the first control tick there is no current", "ticked[0] const1"): (
+        _NO_TICKS
+    ),
+    ("loop, unfiltered", "waits = Signal()", "S[0] const0"): _BEFORE,
+    ("loop, unfiltered", "product = Signal.like(self.product, reset_less=True)", "D[19] inv"): (
+        "that is the highest bit of the sum, to which four products are added; and no bit of w"
+    ),
+    ("loop, command generator", "swinging = Signal()", "B[0] inv"): _DEMANDED,
+    ("loop, command generator", "ramp = Signal()", "B[0] const1"): _DEMANDED,
+    ("loop, command generator", "with m.If(done & (stage == number)):", "$971.A[0] inv"): (
+        "the velocity is taken a clock earlier: word and factor are there a clock before the product begins, so it is "
+        "right by then"
+    ),
     (
         "loop, conventional",
         "m.d.sync += [self.n.eq(self.n + 1), self.current_sum.eq(self.current_sum + self.current)]",
@@ -77,15 +121,37 @@ ARGUED = {
     **{("t, in clocks", "left.eq(left - 1),", f"$40.Y[{bit}] const1"): _GOES_ON for bit in (1, 2)},
     **{("mt, in clocks", _LEFT, f"left[{bit}] const1"): _GOES_ON for bit in (1, 2)},
     ("mt, in clocks", "left.eq(left - 1),", "$40.A[0] const1"): _GOES_ON,
-    ("track, age", '"number": Out(form.number_bits),', "S[0] const0"): _OUTPUT_OF_COUNTS,
+    ("track, age", '"number": Out(form.number_bits),', "B[0] inv"): _OUTPUT_OF_COUNTS,
+    ("track, index", '"number": Out(form.number_bits),', "S[0] const0"): _OUTPUT_OF_COUNTS,
     ("track, age", '"places": Out(signed(form.places_bits)),', "B[3] const1"): _OUTPUT_OF_COUNTS,
-    ("track, age", '"number": Out(form.number_bits),', "number[0] inv"): _EVEN,
+    ("track, index", '"number": Out(form.number_bits),', "number[0] inv"): _EVEN,
+    ("track, external tick", '"number": Out(form.number_bits),', "number[0] cnot0"): _EVEN,
     ("track, external tick", '"places": Out(signed(form.places_bits)),', "B[2] const1"): _OUTPUT_OF_COUNTS,
     ("track, age", '"number": Out(form.number_bits),', "D[0] inv"): _EVEN,
-    ("track, age", '"places": Out(signed(form.places_bits)),', "places[1] cnot0"): (
-        "it is inverted like that if the number of counts is even, and the program reads the places of two counts an "
-        "even number of clocks after the tick"
+    ("track, age", '"places": Out(signed(form.places_bits)),', "places[3] cnot0"): _EVEN_PLACES,
+    ("track, external tick", '"places": Out(signed(form.places_bits)),', "A[2] cnot0"): _EVEN_PLACES,
+    ("track, index", "", "datapath.$procmux$195.A[5] inv"): (
+        "the position is inverted in every clock from a tick to the next, and taken an even number of clocks after it"
     ),
+    ("track, index", "", "machine.$procmux$33.B[0] cnot0"): (
+        "rest and one count are exchanged by a `TEST_OR`, which the program has only where there is a speed"
+    ),
+    ("track, age", "Condition.BEGUN: phase == Phase.BEGUN,", "A[0] const1"): _NO_REST,
+    ("track, age", "flag = Signal()", "S[0] const0"): "after a reset nothing reads the flag before a `TEST` sets it",
+    ("track, age", "past_b = Signal()", "S[0] const0"): "steps are counted only when it has been set after a reset",
+    ("track, external tick", "level = Signal(range(LEVELS))", "B[1] const1"): (
+        "the program sets the level before there is a speed, and reads tables only where there is one"
+    ),
+    ("track, age", "with m.If(self.tick & ~was_silent):", "A[0] const1"): (
+        "it comes to its full number in the clock behind a tick with counts, not with the next tick; and it is used "
+        "only with a tick behind one without counts"
+    ),
+    ("track, index", _MET, "A[2] cnot0"): "the flag is asked for only in ticks with counts",
+    (
+        "track, index",
+        "m.d.sync += mq.eq(Mux(now.multiply, mq >> 1, Mux(now.divide, Cat(~total[-1], mq), ac)))",
+        "B[24] const0",
+    ): "that is the highest bit of a multiplier, and no product takes as many steps",
     ("track, external tick", '"number": Out(form.number_bits),', "A[0] inv"): _EVEN,
     ("track, external tick", '"number": Out(form.number_bits),', "Y[0] cnot0"): _EVEN,
     ("track, external tick", '"number": Out(form.number_bits),', "number[0] cnot1"): _EVEN,
@@ -94,7 +160,7 @@ ARGUED = {
     ("track, age", "pc = Signal(address_width)", "B[2] inv"): (
         "a clock after a reset it is 0, as always at rest, and no tick comes as early"
     ),
-    ("track, age", _AT_REST, "$247.A[0] const0"): (
+    ("track, index", _AT_REST, "$247.A[0] const0"): (
         "it is 0 a clock later, as always at rest, and no tick comes as early"
     ),
     ("track, age", "following = Signal(layout, reset_less=True)", "following[23] cnot1"): (
@@ -106,13 +172,12 @@ ARGUED = {
     ("track, external tick", "special = Mux(work, now.special, Special.NONE)", "$350.S[0] const1"): (
         "that is for `TEST_OR`, which is never behind a jump; and after a reset nothing reads the flag before a `TEST`"
     ),
-    ("track, index", _READS, "$185.Y[0] const1"): (
-        "what is read then is not used: no operation that is executed reads two behind one that writes"
-    ),
+    ("track, age", _READS, "$185.Y[0] const1"): _UNUSED_READ,
+    ("track, external tick", _READS, "$194.A[0] const0"): _UNUSED_READ,
     ("track, index", "with m.If(self.tick & ~less[-1]):", "$20.B[0] const1"): (
         "if `less` is below 0 the standstill is shown, whatever is left, until a tick with counts sets that anew"
     ),
-    ("track, age", _CLEAR, "$209.A[0] inv"): _POSITIVE,
+    ("track, index", _CLEAR, "$210.A[0] const0"): _POSITIVE,
     ("track, external tick", _CLEAR, "$218.A[0] inv"): _POSITIVE,
     ("track, index", _MET, "A[2] cnot1"): "the flag is asked for only behind an error, when the phase is not one count",
     ("track, external tick", "with m.If(work & now.keep):", "A[0] const1"): _SIGN,
@@ -148,10 +213,9 @@ ARGUED = {
 def argued(core: str, mutant: Mutant) -> bool:
     """Whether an argument covers a mutant of a core."""
     place = f".{mutant.place}"
-    for source in mutant.lines:
-        file, _, number = source.partition(":")
-        if file.startswith("hdl/"):
-            line = (ROOT / file).read_text(encoding="utf-8").splitlines()[int(number.split(".")[0]) - 1]
-            if any((core, line.strip()) == key[:2] and place.endswith(f".{key[2]}") for key in ARGUED):
-                return True
-    return False
+    lines = [_line(*source.split(":")) for source in mutant.lines if source.startswith("hdl/")] or [""]
+    return any(key[0] == core and key[1] in lines and place.endswith(f".{key[2]}") for key in ARGUED)
+
+
+def _line(file: str, number: str) -> str:
+    return (ROOT / file).read_text(encoding="utf-8").splitlines()[int(number.split(".")[0]) - 1].strip()

@@ -15,8 +15,9 @@ from support.control import GENERATED, random_demands
 
 from tachometry.hdl.control.command_generator import CommandGenerator
 from tachometry.spec import Port
-from tachometry.spec.control.generator import generator_clocks
+from tachometry.spec.control.generator import CONSTANT, RAMP, generator_clocks
 
+_NEAR = 0.3  # of the ticks begin a ramp whose bound is near the change that is left
 _COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 
 
@@ -80,6 +81,7 @@ class GeneratorCase(Case):
         tick = tick[tick < n_clocks]
         demands = random_demands(GENERATED, rng, len(tick))
         taken = {name.removeprefix("generator_"): values for name, values in demands.items()}
+        _near_bounds(rng, taken)
         taken["enable"] = (rng.random(len(tick)) < 0.95).astype(np.int64)
         width = GENERATED.tachometer.position_width
         taken["position"] = rng.integers(0, 1 << width, len(tick))
@@ -90,6 +92,19 @@ class GeneratorCase(Case):
         levels["rst"] = rng.random(n_clocks) < 1e-3
         levels["rst"][0] = True
         return Stimulus(self.pins.words(n_clocks, levels), [], [])
+
+
+def _near_bounds(rng: np.random.Generator, taken: dict[str, NDArray[Any]]) -> None:
+    """Some ticks set a velocity, and the next one begins a ramp to another: its bound is the change but for a bit."""
+    first = np.flatnonzero(rng.random(len(taken["mode"])) < _NEAR)[:-1]
+    first = first[np.diff(first, append=first[-1] + 2) > 1]
+    shift = GENERATED.generator.velocity_shift
+    change = np.exp2(rng.uniform(0, 32 - shift, len(first))).astype(np.int64)
+    velocity = rng.integers(-1 << 30, 1 << 30, len(first))
+    taken["mode"][first], taken["mode"][first + 1] = CONSTANT, RAMP
+    taken["velocity"][first] = velocity
+    taken["velocity"][first + 1] = velocity + np.where(rng.random(len(first)) < 0.5, change, -change)
+    taken["acceleration"][first + 1] = (change << shift) ^ (1 << rng.integers(0, 32, len(first)))
 
 
 COMMANDS: list[Case] = [GeneratorCase("loop, command generator", GENERATED.tachometer, 200)]

@@ -241,6 +241,7 @@ def equivalent(
     found = known(case.spec)
     if found:
         named = Known(_named(found.definitions, cut), _named(found.lemmas, cut))
+        assert list(map(len, named)) == list(map(len, found)), "a register of a lemma is not there"
         alike.update(np.flatnonzero(proven(case.pins, cut, differ, named, folder, pool)) + 1)
     for together in (_TOGETHER,) if many else (_TOGETHER, 1):
         left = [number for number in range(1, len(group) + 1) if number not in alike]

@@ -34,6 +34,7 @@ delete -input w:mutsel w:differs_*
 write_rtlil step.il
 """
 _SECONDS = 60  # for a mutant
+_LEMMAS_SECONDS = 1800  # without them there is nothing
 _TOGETHER = 8  # mutants for one run of Yosys
 _EQUAL = "-set now 1'1 -prove equal 1'1"
 _VERDICT = re.compile(r"SAT proof finished - (no )?model found|(Interrupted SAT solver)")
@@ -127,13 +128,13 @@ def proven(
     (folder / "step.v").write_text(_lemmas(cut, known) + _step(ports, cut))
     yosys(_MAKE, folder)
 
-    def asked(part: list[tuple[str, str]]) -> list[bool]:
+    def asked(part: list[tuple[str, str]], seconds: int = _SECONDS) -> list[bool]:
         """Whether each of some proofs succeeds."""
         own = Path(tempfile.mkdtemp(dir=folder))
         (own / "step.il").write_text((folder / "step.il").read_text())
         script = ["read_rtlil step.il", "design -save all"]
         for fixed, question in part:
-            script += ["design -load all", "cd step", fixed, "opt -full", f"sat -timeout {_SECONDS} {question}"]
+            script += ["design -load all", "cd step", fixed, "opt -full", f"sat -timeout {seconds} {question}"]
         said = yosys("\n".join(script), own)
         verdicts = [found[1] is not None for found in _VERDICT.finditer(said)]
         assert len(verdicts) == len(part), said
@@ -154,6 +155,6 @@ def proven(
     place = np.cumsum([0, *(register.width for register in cut.registers)])
     nothing = np.zeros(place[-1], dtype=bool)
     core = fixed(0, nothing)
-    right = answered([(core, "-prove first 1'1"), (core, "-set now 1'1 -prove then 1'1")])
+    right = asked([(core, "-prove first 1'1"), (core, "-set now 1'1 -prove then 1'1")], _LEMMAS_SECONDS)
     assert all(right), f"lemmas: {right}"
     return answered([(fixed(number, row), _EQUAL) for number, row in enumerate(differ, 1)])

@@ -1,3 +1,4 @@
+# amaranth: UnusedElaboratable=no
 """Lemmas about the tracking method: where its program is, in every clock of a tick.
 
 Every path through the program takes the same number of clocks. So each instruction has its clock of the tick, and the
@@ -7,6 +8,7 @@ words that the machine holds are those of the program before `pc`. The ends of t
 from amaranth import Shape
 from proofs.mutation.inductive import Known
 
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.track_machine import _layout, _word
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking_code import NOT_TAKEN, TAKEN, Condition, Instruction, Op
@@ -60,8 +62,25 @@ def _definitions(spec: TrackTachometer) -> list[str]:
     lines += [f"wire [{more - 1}:0] done_steps = now_word{left} - {{datapath.machine.now}}{left};"]
     lines += ["wire signed [15:0] now_since = $signed({1'b0, now_begins}) + $signed({1'b0, done_steps}) + 2;"]
     start = spec.longest_tick - 2
-    lines += [f"wire signed [15:0] since = {start - 2} - $signed({{sampling_clock.left}});"]
-    return lines
+    return [*lines, *_left(spec, start), f"wire signed [15:0] since = {start - 2} - left;"]
+
+
+def _left(spec: TrackTachometer, start: int) -> list[str]:
+    """The clocks that are left of a tick: that is what an external tick counts; else each state has its number."""
+    if spec.max_tick_cycles:
+        return ["wire signed [15:0] left = $signed({sampling_clock.left});"]
+    states = SamplingClock(spec.timing.tick_cycles).states
+    bits = max(states).bit_length()
+    of_state = dict.fromkeys(range(1 << bits), start + 1)  # no state of a tick
+    in_tick = states[-spec.timing.tick_cycles :]
+    of_state |= dict(zip(in_tick, range(start, -2, -1), strict=True))
+    return [
+        f"reg signed [15:0] lefts [0:{(1 << bits) - 1}];",
+        "initial begin",
+        *(f"lefts[{state}] = {left};" for state, left in of_state.items()),
+        "end",
+        "wire signed [15:0] left = lefts[({sampling_clock.state})];",
+    ]
 
 
 def _lemmas(spec: TrackTachometer) -> list[str]:
@@ -72,7 +91,6 @@ def _lemmas(spec: TrackTachometer) -> list[str]:
     now = "{datapath.machine.now}"
     rest = f"[{width - more - 1}:0]"
     start = spec.longest_tick - 2
-    left = "$signed({sampling_clock.left})"
     length = len(spec.program.instructions)
     length_clocks = begins(spec.program.instructions)[-1]
     elapsed = "{tick_counts.elapsed}"
@@ -90,21 +108,21 @@ def _lemmas(spec: TrackTachometer) -> list[str]:
         f"!{fetched} || {held} || since == $signed({{1'b0, fetching_begins}})",
         f"!{held} || {active} || since == $signed({{1'b0, following_begins}}) + 1",
         f"!{active} || since == now_since || {{pulse_counter.complete}} && now_since == {length_clocks + 2}",
-        f"{left} >= -1 && {left} <= {start}",
-        f"!{{pulse_counter.complete}} || {left} == {start}",
-        f"!{{pulse_counter.tick}} || {left} == {start - 1}",
+        f"left >= -1 && left <= {start}",
+        f"!{{pulse_counter.complete}} || left == {start}",
+        f"!{{pulse_counter.tick}} || left == {start - 1}",
         "{datapath.machine.phase} != 3",
         f"{{tick_counts.number}} <= {spec.max_count} && {{tick_counts.open_number}} <= {spec.max_count}",
         f"{elapsed} <= {spec.timing.max_ticks}",
         "{tick_counts.counted} == |{tick_counts.number}",
     ]
+    if spec.age:
+        found += ["{age.before} <= 1", f"{{age.before}} == 0 || {fetched} || {{updates__valid}}"]
     found += [
-        "{age.before} <= 1",
-        f"{{age.before}} == 0 || {fetched} || {{updates__valid}}",
         f"!{{updates__valid}} || since == {length_clocks + 3} || {{pulse_counter.complete}} || {{pulse_counter.tick}}",
     ]
     if spec.min_tick_cycles and spec.max_tick_cycles:
-        found.append(f"!{{enough}} || {left} < {start - (spec.min_tick_cycles - 2)}")
+        found.append(f"!{{enough}} || left < {start - (spec.min_tick_cycles - 2)}")
     return found
 
 

@@ -94,11 +94,15 @@ def test_the_longest_measurement() -> None:
 
 
 def test_what_is_remembered() -> None:
-    """T: the time since the last count, which may wrap, and that to the next; then a division."""
-    assert t().remembered_clocks == (256 + 200 + 1) + 11
-    assert t(timer="tick").remembered_clocks == (16 + 10 + 1) * 20 + 7
-    assert t(timer="tick", max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30 + 7
-    assert mt().remembered_clocks == (256 + 200 + 220 + 2) + 11
+    """T: the time since the last count, which may wrap, and that to the next; then a division.
+
+    It begins with the dividend, and ends a clock behind a counter of 16 or 8 clocks, for the 9 or 5 digits.
+    """
+    assert [t().quotient_bits, t(timer="tick").quotient_bits] == [9, 5]
+    assert t().remembered_clocks == (256 + 200 + 1) + 1 + 16 + 1
+    assert t(timer="tick").remembered_clocks == (16 + 10 + 1) * 20 + 1 + 8 + 1
+    assert t(timer="tick", max_tick_cycles=30).remembered_clocks == (16 + 10 + 1) * 30 + 1 + 8 + 1
+    assert mt().remembered_clocks == (256 + 200 + 220 + 2) + 1 + 16 + 1
 
 
 def test_speeds_beyond_the_range() -> None:
