@@ -26,12 +26,6 @@ _EVEN_PLACES = (
 )
 _NO_REST = "whether the phase is one count is asked only where it is not rest"
 _UNUSED_READ = "what is read then is not used: no operation that is executed reads two behind one that writes"
-_EACH_TICK = "every tick has an update, so the age is at most 1"
-_OPEN_PLACES = "the first count after a reset is alone in its tick and replaces it, and without one it is not read"
-_SIGN = (
-    "an instruction behind a jump keeps a sign that is not its own, which no way that the jump leads to reads before "
-    "it has kept another one"
-)
 _POSITIVE = (
     "the time between the first two counts is not held at `least_gap` any more, and only there is `POSITIVE` used: a "
     "count in less time is faster than the greatest speed, at which it is held, and the quotient fits the word"
@@ -52,6 +46,10 @@ _SLACK = (
 )
 _TWICE = "twice = (high ^ low) & ~(low ^ below)"
 _ODD = "product = Cat(Mux(twice, 0, 1), Mux(twice, 1, self.q[1]) ^ (high & ~twice), product[2:])"
+_REGULAR = "regular = self.tick & ~self.alteration  # b is the number of this tick"
+_LATER = (
+    "b is taken in the clocks behind the tick, in which the pulse number stays, and is not read before the next one"
+)
 _BEFORE = (
     "before the first control tick there is one update at most, whose velocity is replaced by another before it is "
     "used; and of no control tick there is no coefficient but 0"
@@ -71,16 +69,8 @@ ARGUED = {
     ("s, divided, wide", "upper = Signal(signed(n_upper + 2), reset_less=True)", "upper[12] const1"): (
         "of five digits, each of which moves the sum down by two bits, it never comes down to the two that are shown"
     ),
-    ("loop, unfiltered", '"y": Out(signed(signed_width(form.most_y))),', "y[11] cnot1"): _WHOLE,
-    ("loop, unfiltered", "less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)", "Y[6] const0"): _WHOLE,
-    ("loop, serial", "due = Signal()", "B[0] const1"): "a control tick sets it before a product is stored",
-    ("loop, serial", "ticked = Signal()  # before the first control tick there is no current", "ticked[0] const1"): (
-        _NO_TICKS
-    ),
-    ("loop, serial", "with m.If(self.update & (ticked | self.tick)):", "Y[0] const1"): _NO_TICKS,
-    ("loop, serial", "m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)", "A[0] const1"): (
-        "what is cleared has been loaded, with its coefficient, in the clock in which the term begins"
-    ),
+    ("s, divided", _REGULAR, "$9.A[0] inv"): _LATER,
+    ("s, divided, wide", _REGULAR, "$9.A[0] inv"): _LATER,
     ("loop, serial", "waits = Signal()", "B[0] inv"): _BEFORE,
     ("loop, serial", "m.d.comb += self.due.eq(waits | (self.n == self._longest))", "$14.A[0] inv"): (
         "it stands for 6 control ticks instead of 7: S has an update in every 5 of them, so that one waits there"
@@ -109,25 +99,17 @@ ARGUED = {
         "the velocity is taken a clock earlier: word and factor are there a clock before the product begins, so it is "
         "right by then"
     ),
-    (
-        "loop, conventional",
-        "m.d.sync += [self.n.eq(self.n + 1), self.current_sum.eq(self.current_sum + self.current)]",
-        "A[1] cnot1",
-    ): "that is if the sum is not 0: each control tick has cleared it when its current is added",
-    ("t, in clocks", '"running": Out(1),', "running[0] const1"): _GOES_ON,
+    ("t, in clocks", '"running": Out(1),', "divider_velocity_lower.running[0] const1"): _GOES_ON,
+    ("t, in clocks", '"running": Out(1),', "divider_velocity_upper.running[0] const1"): _GOES_ON,
     ("t, in clocks", '"running": Out(1),', "$procmux$57.A[0] const1"): _GOES_ON,
-    **{("t, in clocks", _LEFT, f"left[{bit}] const1"): _GOES_ON for bit in range(3)},
-    ("t, in clocks", _LEFT, "left[3] const0"): _GOES_ON,
-    **{("t, in clocks", "left.eq(left - 1),", f"$40.Y[{bit}] const1"): _GOES_ON for bit in (1, 2)},
-    **{("mt, in clocks", _LEFT, f"left[{bit}] const1"): _GOES_ON for bit in (1, 2)},
-    ("mt, in clocks", "left.eq(left - 1),", "$40.A[0] const1"): _GOES_ON,
+    ("t, in clocks", _LEFT, "left[2] const1"): _GOES_ON,
+    ("t, in clocks", _LEFT, "divider_velocity_upper.left[3] const0"): _GOES_ON,
+    ("t, in clocks", "left.eq(left - 1),", "$40.Y[2] const1"): _GOES_ON,
+    ("mt, in clocks", _LEFT, "left[1] const1"): _GOES_ON,
     ("track, age", '"number": Out(form.number_bits),', "B[0] inv"): _OUTPUT_OF_COUNTS,
     ("track, index", '"number": Out(form.number_bits),', "S[0] const0"): _OUTPUT_OF_COUNTS,
-    ("track, age", '"places": Out(signed(form.places_bits)),', "B[3] const1"): _OUTPUT_OF_COUNTS,
     ("track, index", '"number": Out(form.number_bits),', "number[0] inv"): _EVEN,
     ("track, external tick", '"number": Out(form.number_bits),', "number[0] cnot0"): _EVEN,
-    ("track, external tick", '"places": Out(signed(form.places_bits)),', "B[2] const1"): _OUTPUT_OF_COUNTS,
-    ("track, age", '"number": Out(form.number_bits),', "D[0] inv"): _EVEN,
     ("track, age", '"places": Out(signed(form.places_bits)),', "places[3] cnot0"): _EVEN_PLACES,
     ("track, external tick", '"places": Out(signed(form.places_bits)),', "A[2] cnot0"): _EVEN_PLACES,
     ("track, index", "", "datapath.$procmux$195.A[5] inv"): (
@@ -152,61 +134,13 @@ ARGUED = {
         "m.d.sync += mq.eq(Mux(now.multiply, mq >> 1, Mux(now.divide, Cat(~total[-1], mq), ac)))",
         "B[24] const0",
     ): "that is the highest bit of a multiplier, and no product takes as many steps",
-    ("track, external tick", '"number": Out(form.number_bits),', "A[0] inv"): _EVEN,
-    ("track, external tick", '"number": Out(form.number_bits),', "Y[0] cnot0"): _EVEN,
-    ("track, external tick", '"number": Out(form.number_bits),', "number[0] cnot1"): _EVEN,
-    ("track, external tick", 'places = Signal.like(self.places, name="open_places")', "B[4] const1"): _OPEN_PLACES,
-    ("track, external tick", 'places = Signal.like(self.places, name="open_places")', "B[2] const1"): _OPEN_PLACES,
-    ("track, age", "pc = Signal(address_width)", "B[2] inv"): (
-        "a clock after a reset it is 0, as always at rest, and no tick comes as early"
-    ),
     ("track, index", _AT_REST, "$247.A[0] const0"): (
         "it is 0 a clock later, as always at rest, and no tick comes as early"
     ),
-    ("track, age", "following = Signal(layout, reset_less=True)", "following[23] cnot1"): (
-        "that is the address of a `TO_MQ`, which has none"
-    ),
-    ("track, external tick", "following = Signal(layout, reset_less=True)", "following[26] cnot1"): (
-        "that is the address of a `MUL`, and its word has been read before"
-    ),
-    ("track, external tick", "special = Mux(work, now.special, Special.NONE)", "$350.S[0] const1"): (
-        "that is for `TEST_OR`, which is never behind a jump; and after a reset nothing reads the flag before a `TEST`"
-    ),
     ("track, age", _READS, "$185.Y[0] const1"): _UNUSED_READ,
     ("track, external tick", _READS, "$194.A[0] const0"): _UNUSED_READ,
-    ("track, index", "with m.If(self.tick & ~less[-1]):", "$20.B[0] const1"): (
-        "if `less` is below 0 the standstill is shown, whatever is left, until a tick with counts sets that anew"
-    ),
     ("track, index", _CLEAR, "$210.A[0] const0"): _POSITIVE,
-    ("track, external tick", _CLEAR, "$218.A[0] inv"): _POSITIVE,
-    ("track, index", _MET, "A[2] cnot1"): "the flag is asked for only behind an error, when the phase is not one count",
-    ("track, external tick", "with m.If(work & now.keep):", "A[0] const1"): _SIGN,
-    ("track, external tick", "*(fetch.addr.eq(place), fetch.en.eq(done | self.begin)),", "B[0] const0"): (
-        "the program has ended when it begins, and then no instruction takes longer"
-    ),
-    ("track, external tick", _MET, "A[5] cnot1"): (
-        "whether the phase is rest is asked only of ticks that are not beyond the greatest speed"
-    ),
-    ("track, age", "with m.If(work & now.keep):", "A[0] const1"): _SIGN,
-    ("track, age", '"after": Out(range(max_age + 1)),', "after[1] const0"): _EACH_TICK,
-    ("track, age", '"age": Out(range(max_age + 1)),', "age$49[1] cnot1"): _EACH_TICK,
-    ("t, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
-    ("t, in clocks", '"was_negative": Out(1),', "B[0] inv"): _NO_COUNT,
     ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
-    ("mt, in clocks", "earlier = Signal()  # a count in an earlier period of this tick", "S[0] const0"): (
-        "it outlasts a reset until the next tick, and only withholds a comparison there: the velocity is 0 and would "
-        "not decay, and the first measurement takes the divider whether it is idle or not"
-    ),
-    ("mt, in clocks", "change = Signal(signed(max(len(shown), spec.native_width) + 1))", "change[6] const0"): (
-        "it is read to decide whether the velocity decays: the change is at most 48, from −48 to 0, and less than 64"
-    ),
-    ("uart", "with m.If(beat & (place == 0) & in_header):", "A[0] inv"): (
-        "the check is set in all clocks of the start bit but the last, instead of in the last: it is not read before"
-    ),
-    ("uart", "place = Signal(range(QUIET_BITS))", "Y[2] inv"): (
-        "the place that a reset gives: it counts bits of quiet, after which the parts of a frame are what they are "
-        "after a reset, and a start bit sets it to 0"
-    ),
 }
 
 

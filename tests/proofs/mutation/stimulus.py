@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
-from tachometry.spec import TachometerSpec
+from tachometry.spec import STachometer, TachometerSpec
+from tachometry.spec.formats.reciprocal import Reciprocal
 
 _EDGES = 60  # of a motion, at each of its speeds
 _LONG = 100  # clocks of a tick with which motions have fewer edges, and lines change a few times in a tick
 _RATTLE = 40_000  # clocks
 _STEPS = 1000  # of the counts in a tick
+_HARD = 16  # quotients of each m_s
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
 
@@ -110,13 +112,40 @@ def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
 
 def steps(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     """Ticks with as many counts as the one before, for a while, and then with any others: windows of all lengths."""
-    cycles, longest = spec.timing.tick_cycles, spec.timing.max_ticks
-    most = min(cycles, (spec.max_count + 1) * 4 // spec.encoder.decoding)
+    longest = spec.timing.max_ticks
+    most = min(spec.timing.tick_cycles, (spec.max_count + 1) * 4 // spec.encoder.decoding)
     lasts = rng.integers(1, longest + 2, _STEPS)
     counts = np.where(rng.random(_STEPS) < 0.3, rng.integers(-2, 3, _STEPS), rng.integers(-most, most + 1, _STEPS))
-    counts = np.repeat(np.clip(counts, -most, most), lasts)  # of each tick
+    return _of_counts(spec, np.repeat(np.clip(counts, -most, most), lasts))
+
+
+def hard(spec: STachometer, form: Reciprocal) -> PinTrace:
+    """Windows of all lengths with the quotients nearest to a tie: only they show the last bits of a product.
+
+    Before each window, and inside, all ticks have b counts: (d0 + d1)/(2·m_s) is of the first and the last, eq. (21).
+    """
+    counts = [0]
+    one = 1 << form.scale_bits
+    for m in range(1, form.max_m + 1):
+
+        def near(d: int, m: int = m) -> int:
+            past = ((d << spec.finer) * form.value(m) + form.rounding()) % one
+            return min(past, one - past)
+
+        for d in sorted(range(-4 * spec.max_count, 4 * spec.max_count + 1), key=near)[:_HARD]:
+            b = int(np.sign(d)) * -max(0, (abs(d) - 2 * spec.max_count + 1) // 2)
+            first = (d + 2 * b) // 2
+            counts += [b, b, first, *[b] * (m - 1), d + 2 * b - first]
+    # The longest one between two empty ticks is no standstill.
+    counts += [1, 1, 0, *[1] * (form.max_m - 1), 0, 1, 1]
+    return _of_counts(spec, np.array(counts), spec.pin_to_count)
+
+
+def _of_counts(spec: TachometerSpec, counts: NDArray[np.int64], earlier: int = 0) -> PinTrace:
+    """Ticks with so many edges each, spread evenly, and some clocks earlier."""
+    cycles = spec.timing.tick_cycles
     edges = [
-        tick * cycles + (2 * np.arange(abs(number)) + 1) * cycles // (2 * abs(number))
+        tick * cycles - earlier + (2 * np.arange(abs(number)) + 1) * cycles // (2 * abs(number))
         for tick, number in enumerate(counts.tolist())
         if number
     ]
@@ -139,7 +168,8 @@ def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
     for before in range(-3, 10):
         for of_tick in (True, False):
             trace = noise(spec, rng, 4 * spec.longest_tick, 2)
-            run = golden.run(spec, trace)
+            while not len((run := golden.run(spec, trace)).updates.clock):
+                trace = noise(spec, rng, 4 * spec.longest_tick, 2)
             clocks = run.ticks.clock - spec.tick_latency if of_tick else run.updates.clock
             found.append(trace.until(int(rng.choice(clocks[:2])) - before))
     return [*found, noise(spec, rng, 4 * spec.longest_tick, 2)]
@@ -219,6 +249,10 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
         add(trace, int(rng.choice([1, 1, 2, 5])))
-    for trace in ending(spec, rng) if long else ():
+    reciprocal = spec.reciprocal if isinstance(spec, STachometer) else None
+    last = ending(spec, rng) if long or isinstance(reciprocal, Reciprocal) else []
+    if isinstance(spec, STachometer) and isinstance(reciprocal, Reciprocal):
+        last.append(hard(spec, reciprocal))
+    for trace in last:
         add(trace, 1)
     return Stimulus(np.concatenate(pins).astype(np.uint64)[:, np.newaxis], traces, starts)
