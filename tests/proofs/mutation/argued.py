@@ -47,9 +47,7 @@ _SLACK = (
 _TWICE = "twice = (high ^ low) & ~(low ^ below)"
 _ODD = "product = Cat(Mux(twice, 0, 1), Mux(twice, 1, self.q[1]) ^ (high & ~twice), product[2:])"
 _REGULAR = "regular = self.tick & ~self.alteration  # b is the number of this tick"
-_LATER = (
-    "b is taken in the clocks behind the tick, in which the pulse number stays, and is not read before the next one"
-)
+_LATER = "b is taken in the clocks behind the tick, in which the pulse number stays, and is read in the next one"
 _BEFORE = (
     "before the first control tick there is one update at most, whose velocity is replaced by another before it is "
     "used; and of no control tick there is no coefficient but 0"
