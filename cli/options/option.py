@@ -92,6 +92,13 @@ def later(name: str, make: Callable[[], Sequence[click.Option]]) -> Callable[[Co
 class GroupedCommand(click.Command):
     """A command whose help lists its options under the headings of their groups."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            error.ctx = error.ctx or ctx  # the parser does not say of which command an option has no argument
+            raise
+
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         found: list[click.Parameter] = []
         for parameter in super().get_params(ctx):

@@ -251,6 +251,7 @@ def test_impossible_options(options: str, message: str, tmp_path: Path, capsys: 
     ("args", "message"),
     [
         (["generate", "--ppr", "9"], "Missing option '--output' / '-o'. (see tachometry generate --help)"),
+        (["generate", "--ppr"], "Option '--ppr' requires an argument. (see tachometry generate --help)"),
         ([], "Missing command. (see tachometry --help)"),
         (["make"], "No such command 'make'. (see tachometry --help)"),
     ],
