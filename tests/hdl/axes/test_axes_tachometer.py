@@ -33,6 +33,23 @@ def test_small_cores(spec: AxesSpec) -> None:
     check(spec)
 
 
+def test_an_edge_is_in_the_tick_that_ends_pin_to_count_after_it() -> None:
+    """Of every axis; one that is sampled a clock later is too late for axis 0, which is looked at first."""
+    spec = small()
+
+    def counted(clock: int) -> list[int]:
+        """Pulse numbers of all axes in the second tick, of edges in a clock."""
+        low = np.zeros(2, dtype=np.uint8)
+        pins = PinTrace(np.array([0, clock]), a=np.array([0, 1], dtype=np.uint8), b=low, n_clocks=4 * TICK_CYCLES)
+        run = golden.run(spec, AxesTrace((pins,) * spec.axes))
+        found: list[int] = run.ticks.pulse_count[spec.axes : 2 * spec.axes].tolist()
+        return found
+
+    last = 2 * TICK_CYCLES - 1 - spec.pin_to_count
+    assert counted(last) == [1] * spec.axes
+    assert counted(last + 1)[0] == 0
+
+
 MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
     "begins with the wrong axis": (AxesDatapath, "(self.slot == 0)", "(self.slot == 1)", {}),
     "handed over to another": (

@@ -17,6 +17,51 @@ _argue(
     "position + half → position - half",
 )
 _argue(
+    f"{_FRONT_END}: filter_line",
+    "The first change of all that are looked at has held, so none looks for what was before it.",
+    "0 → -1",
+)
+_argue(
+    "sim/golden/command_generator.py: Generator.command",
+    "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.",
+    "self.place + (1 << wide - 1) → self.place - (1 << wide - 1)",
+)
+_argue(
+    "sim/golden/command_generator.py: generated",
+    "There are as many demands as positions.",
+    "True → False",
+)
+_argue(
+    "sim/golden/loop_registers.py: GoldenLoopBank.answers",
+    "Nothing is frozen before the first control tick, so what is held is set before it is used.",
+    "0 → -1",
+)
+_argue(
+    "sim/golden/methods/mt.py: Model._whole",
+    "A window of just a cycle ends with its last count either way: none that it could be cut to comes earlier.",
+    "through < cycle → through <= cycle",
+)
+_argue(
+    "sim/golden/methods/track.py: Model.updates",
+    "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.",
+    "fine + half → fine - half",
+)
+_argue(
+    "sim/golden/methods/track.py: Recursion._second",
+    "From the same place to the same place the speed is 0.",
+    "e >= 0 → e > 0",
+)
+_argue(
+    "sim/golden/methods/track.py: Recursion._late",
+    "A p of 0 is near the position, so its sign is not used.",
+    "0 → 1",
+)
+_argue(
+    "sim/golden/ordered.py: not_before",
+    "What the passes do not find is searched for.",
+    "1 → 0 #5",
+)
+_argue(
     "sim/golden/sampling.py: windows",
     "A level is 0 or 1, so its difference from 2 is no rise either.",
     "1 → 2 #2",
@@ -71,12 +116,22 @@ _argue(
 _argue(
     f"{_REGISTERS}._capture",
     "No strobe is high before clock 2, so it is the same when, before it, counting begins.",
-    *("1 → 2 #3", "1 → 0 #3", "1 → 2 #6", "1 → 0 #6"),
+    *("-1 → 1 #3", "1 → 2 #3", "1 → 0 #3", "1 → 2 #6", "1 → 0 #6"),
 )
 _argue(
     f"{_REGISTERS}._lost",
     "No update is in clock 0; what stands for one before the first is negative, and never later than a capture.",
     *("before >= 0 → before > 0", "0 → -1", "1 → 2"),
+)
+_argue(
+    f"{_REGISTERS}.answers",
+    "No event that is counted is in clock 0.",
+    "1 → 0",
+)
+_argue(
+    f"{_REGISTERS}._read",
+    "A word has 32 bits, as its fields lie within it.",
+    "1 → 2 #5",
 )
 _argue(
     f"{_REGISTERS}.answers",
@@ -185,6 +240,11 @@ _argue(
     f"{_TIMED}: _asking",
     "No count is seen before clock 2, and the tick in whose clock something is measured is not empty.",
     *("-1 → 1 #2", "1 → 2 #5", "1 → 0 #5", "'right' → 'left'"),
+)
+_argue(
+    f"{_TIMED}: _decaying",
+    "Of n ranks the greatest is n − 1: then those of a later measurement are less than all before, or as the least.",
+    "len(rank) + 1 → len(rank) - 1",
 )
 _argue(
     f"{_TIMED}: Counts.silences",

@@ -9,7 +9,7 @@ import pytest
 from support.mutant import caught, mutant
 
 from tachometry.sim.golden import command_generator
-from tachometry.sim.golden.command_generator import Demand
+from tachometry.sim.golden.command_generator import Command, Demand
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.generator import CONSTANT, RAMP, RATE_FRAC_BITS, SINE, GeneratorForm
@@ -19,6 +19,7 @@ CORE = STachometer(
 )
 SPEC = LoopSpec(tachometer=CORE, velocity_gain=Fraction(80), command="generator")
 FORM = SPEC.generator
+OFTEN = replace(SPEC, multiplier="parallel", period=96)  # a control tick in 2 µs
 
 
 def states(form: GeneratorForm, demands: list[Demand], position: int = 0) -> np.ndarray:
@@ -69,18 +70,47 @@ def test_a_ramp() -> None:
     check_ramp()
 
 
-def test_the_commands_are_in_the_units_of_the_ports() -> None:
-    """To half an LSB, and a sixteenth."""
+@pytest.mark.parametrize("spec", [SPEC, OFTEN])
+def test_the_commands_are_in_the_units_of_the_ports(spec: LoopSpec) -> None:
+    """To half an LSB, and a sixteenth; where control ticks are close, an LSB of the acceleration is less than one."""
+    form = spec.generator
+    assert (form.acceleration.shift < 0) == (spec is OFTEN)
     count = 2 * math.pi / CORE.encoder.counts_per_rev
-    tick, velocity = float(SPEC.seconds), float(SPEC.rad_per_s / (1 << SPEC.command_bits))
-    generator = command_generator.Generator(FORM)
-    for raw in (123_456_789, -1_000_000_007, 3):
-        generator.tick(0, Demand(RAMP, raw, 1 << 30))
+    tick, velocity = float(spec.seconds), float(spec.rad_per_s / (1 << spec.command_bits))
+    most = (1 << 19) - 1
+    generator = command_generator.Generator(form)
+    for raw, bound in ((123_456_789, 1 << 30), (-1_000_000_007, 87_000), (3, 1000), (-2_000_000, 7), (5, 1 << 31)):
+        generator.tick(0, Demand(RAMP, raw, bound))
         command = generator.command()
-        speed = generator.speed / 2**FORM.fraction * count / tick / velocity
+        speed = generator.speed / 2**form.fraction * count / tick / velocity
         assert command.velocity == pytest.approx(speed, abs=0.57)
-        change = generator.change / 2**FORM.fraction * count / tick**2 * 2.0**SPEC.acceleration_frac_bits
-        assert command.acceleration == pytest.approx(np.clip(change, -(1 << 19), 1 << 19), abs=1.1)
+        change = generator.change / 2**form.fraction * count / tick**2 * 2.0**spec.acceleration_frac_bits
+        assert command.acceleration == pytest.approx(np.clip(change, -most, most), abs=0.57)
+        assert abs(command.acceleration) < most or bound > 1 << 20
+
+
+def test_nothing_is_demanded_but_what_is_told() -> None:
+    """A demand is for rest, and a command is to be followed, at rest and at 0, where nothing else is told."""
+    assert Command() == Command(position=0, velocity=0, acceleration=0, enable=True)
+    assert Demand() == Demand(mode=CONSTANT, velocity=0, acceleration=0, amplitude=0, rate=0, enable=True)
+
+
+def test_a_sine_begins_at_rest_from_the_start_and_where_it_was_disabled() -> None:
+    """At one end: the first step is none. A disabled generator is where the shaft is, at rest."""
+    generator = command_generator.Generator(FORM)
+    sine = Demand(SINE, amplitude=1000, rate=1 << 31)
+    generator.tick(0, sine)
+    assert (generator.place, generator.speed, generator.change) == (0, 0, 0)
+    generator.tick(0, sine)
+    assert generator.speed > 0
+    generator.tick(5, Demand(CONSTANT, 77, enable=False))
+    assert (generator.place, generator.speed, generator.change) == (5 << FORM.fraction, 0, 0)
+    generator.tick(5, sine)
+    assert generator.speed == 0
+    generator.tick(5, Demand(CONSTANT, 1 << 20))
+    assert generator.speed == 1 << 20 + FORM.velocity_shift
+    generator.tick(5, sine)
+    assert generator.speed == 0
 
 
 def test_nothing_overflows() -> None:

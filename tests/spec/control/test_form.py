@@ -142,6 +142,10 @@ def test_gains_of_the_options(seed: int) -> None:
         lsb, wanted = gain_per_lsb(spec, term), nominal.get(term, Fraction(1))
         assert abs(raw * lsb - wanted) <= lsb / 2
         assert spec.form.most_gain * lsb > 15.9 * wanted
+    # Where k_p is 0 the range is that for two equal poles.
+    none = replace(spec, position_gain=Fraction(0))
+    most = none.form.most_gain * gain_per_lsb(none, Term.POSITION)
+    assert 15.9 < most / (spec.velocity_gain / 2) ** 2 < 33
 
 
 @pytest.mark.parametrize(
