@@ -45,6 +45,7 @@ def test_the_fastest_tests_of_a_line_are_taken() -> None:
     assert chosen_for(found, "x.py", 2, 20) == ["fast", "slow"]
     assert chosen_for(found, "x.py", 2, 5) == ["fast"]
     assert chosen_for(found, "x.py", 3, 5) == ["slow"]
+    assert chosen_for(found, "x.py", 3, 20) == ["slow", "fast"]
     assert chosen_for(found, "x.py", 1, 20) == ["fast", "slow"]
     assert chosen_for(found, "z.py", 1, 20) == []
 

@@ -74,21 +74,23 @@ def covered(root: Path, files: Sequence[str], tests: Sequence[str], folder: Path
 
 
 def chosen_for(found: Covered, file: str, line: int, budget: float) -> list[str]:
-    """Tests that run a line, as many as take `budget` seconds; if it only runs at import, those that run its file.
+    """Tests that run a line, as many as take `budget` seconds, then those that run its file.
 
-    The fastest of every test function comes first, then the next of each, so that all that is asked is asked soon.
+    What is computed once, by an import or by another test, is not run again where it matters. Of every test function
+    the fastest test comes first, then the next of each, so that all that is asked is asked soon.
     """
-    of_line = [test for test, entry in found.items() if test and line in entry["lines"].get(file, ())]
-    running = of_line or [test for test, entry in found.items() if test and file in entry["lines"]]
-    rounds: list[tuple[int, float, str]] = []
-    met = Counter[str]()
-    for test in sorted(running, key=lambda test: found[test]["seconds"]):
-        function = test.split("[")[0]
-        rounds.append((met[function], found[test]["seconds"], test))
-        met[function] += 1
+    of_file = [test for test, entry in found.items() if test and file in entry["lines"]]
+    of_line = [test for test in of_file if line in found[test]["lines"][file]]
     spent, taken = 0.0, list[str]()
-    for _, seconds, test in sorted(rounds):
-        if spent + seconds <= budget or not taken:
-            spent += seconds
-            taken.append(test)
+    for running in (of_line, [test for test in of_file if test not in of_line]):
+        met = Counter[str]()
+        rounds: list[tuple[int, float, str]] = []
+        for test in sorted(running, key=lambda test: found[test]["seconds"]):
+            function = test.split("[")[0]
+            rounds.append((met[function], found[test]["seconds"], test))
+            met[function] += 1
+        for _, seconds, test in sorted(rounds):
+            if spent + seconds <= budget or not taken:
+                spent += seconds
+                taken.append(test)
     return taken
