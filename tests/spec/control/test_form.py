@@ -191,6 +191,31 @@ def test_coefficients_are_those_of_the_equations(number: int) -> None:
     assert 4 <= least * 2**form.extra_bits < 8 or form.extra_bits == 2
 
 
+@pytest.mark.parametrize("number", range(len(SPECS)))
+def test_what_the_formats_hold(number: int) -> None:
+    """The greatest words of all terms; and an error of the position that is the least of all bits that is enough."""
+    form = SPECS[number].form
+    most = {
+        Term.FILTER: 2 * form.most_y,
+        Term.OBSERVER: form.most_w,
+        Term.CURRENT: form.longest * form.current_limit,
+        Term.POSITION: form.most_error + 1,
+        Term.VELOCITY: form.most_y + (1 << form.velocity_width - 1 + form.extra_bits),
+        Term.ACCELERATION: 1 << 19,
+        Term.DISTURBANCE: form.most_w,
+    }
+    assert form.word_width == max((most[term] << one.shift).bit_length() + 1 for term, one in form.terms.items())
+    others = sum(form.product(term, most[term]) + 1 for term in (Term.VELOCITY, Term.ACCELERATION, Term.DISTURBANCE))
+    enough = others + 16 * form.current_limit + 1
+    everything = (1 << form.position_width + POSITION_FRAC_BITS - 1) - 1
+    bits = 1
+    while form.product(Term.POSITION, 2**bits - 1) < enough and 2**bits - 1 < everything and form.most_error > 1:
+        bits += 1
+    assert form.most_error == 2**bits - 1
+    total = others + form.product(Term.POSITION, form.most_error + 1) + 1
+    assert form.total_width == max(total.bit_length() + 1, form.position_width + POSITION_FRAC_BITS)
+
+
 def test_a_tracking_core_has_no_filter() -> None:
     core = TrackTachometer(encoder=Encoder(500), max_speed=Speed.parse("1000rad/s"), velocity_width=16)
     assert LoopSpec(tachometer=core).filter is None
