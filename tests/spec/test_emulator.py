@@ -1,0 +1,44 @@
+"""Units of the encoder emulator, from what a shaft does."""
+
+import math
+
+import pytest
+
+from tachometry.spec import Encoder, ParameterError, STachometer, Timing
+from tachometry.spec.emulator import (
+    FINE_WIDTH,
+    PHASE_WIDTH,
+    START,
+    EmulatorSettings,
+    fastest,
+    rad_per_s,
+    rate_of,
+    speed_of,
+)
+
+SPEC = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"))
+
+
+def test_a_speed_a_rate_and_the_fastest() -> None:
+    """A rate changes the speed every second clock, in 2^-16 of its LSB; lines are at least eight clocks long."""
+    periods = 100 / (2 * math.pi) * 500  # a second, at 100 rad/s
+    assert speed_of(SPEC, 100) == round(periods / 48e6 * 2**32)
+    assert rad_per_s(SPEC, speed_of(SPEC, 100)) == pytest.approx(100, rel=1e-5)
+    clocks = 4_800_000  # a tenth of a second
+    assert rate_of(SPEC, 1000) * (clocks // 2) / 2**16 == pytest.approx(speed_of(SPEC, 100), rel=1e-3)
+    assert fastest(SPEC) * 500 / (2 * math.pi) == pytest.approx(48e6 / 8)
+    assert (2**PHASE_WIDTH, 8 * START, 2**FINE_WIDTH) == (2**32, 2**32, 1024)
+
+
+def test_nothing_is_wrong_with_the_lines_unless_it_is_told() -> None:
+    nothing = dict.fromkeys(("speed", "rate", "phase_error", "duty_a", "duty_b", "jitter", "bounce", "drop"), 0)
+    assert EmulatorSettings() == EmulatorSettings(**nothing)
+
+
+@pytest.mark.parametrize("decoding", [1, 2, 4])
+def test_the_most_pulses_of_an_encoder(decoding: int) -> None:
+    most = 2**24 // decoding
+    assert Encoder(most, decoding).counts_per_rev == 2**24
+    assert Encoder(1, decoding).counts_per_rev == decoding
+    with pytest.raises(ParameterError, match=rf"from 1 to {most} with x{decoding} decoding, not {most + 1}$"):
+        Encoder(most + 1, decoding)
