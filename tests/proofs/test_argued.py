@@ -110,7 +110,10 @@ def answers(way: Way) -> dict[Condition, bool]:
 
 @pytest.mark.parametrize("core", ["age", "external tick", "index"])
 def test_the_program_of_track(core: str) -> None:
-    """An input that is inverted in every clock is right where an instruction reads it that begins in an odd clock."""
+    """When it reads its inputs, and what has been asked and set before it asks, on all ways.
+
+    An input that is inverted in every clock is right where an instruction reads it that begins in an odd clock.
+    """
     spec = next(case for case in CASES if case.name == f"track, {core}").spec
     assert isinstance(spec, TrackTachometer)
     program = spec.program

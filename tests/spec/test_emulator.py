@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from tachometry.spec import Encoder, ParameterError, STachometer, Timing
+from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.emulator import (
     FINE_WIDTH,
     PHASE_WIDTH,
@@ -33,12 +33,3 @@ def test_a_speed_a_rate_and_the_fastest() -> None:
 def test_nothing_is_wrong_with_the_lines_unless_it_is_told() -> None:
     nothing = dict.fromkeys(("speed", "rate", "phase_error", "duty_a", "duty_b", "jitter", "bounce", "drop"), 0)
     assert EmulatorSettings() == EmulatorSettings(**nothing)
-
-
-@pytest.mark.parametrize("decoding", [1, 2, 4])
-def test_the_most_pulses_of_an_encoder(decoding: int) -> None:
-    most = 2**24 // decoding
-    assert Encoder(most, decoding).counts_per_rev == 2**24
-    assert Encoder(1, decoding).counts_per_rev == decoding
-    with pytest.raises(ParameterError, match=rf"from 1 to {most} with x{decoding} decoding, not {most + 1}$"):
-        Encoder(most + 1, decoding)

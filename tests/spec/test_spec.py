@@ -27,6 +27,12 @@ def test_timing_in_times_or_clocks(clock: str | int, tick: str | int, max_time: 
     assert Timing.parse(clock, tick, max_time) == TIMING
 
 
+@pytest.mark.parametrize("decoding", [1, 2, 4])
+def test_the_fewest_and_the_most_counts_of_a_revolution(decoding: int) -> None:
+    assert Encoder(1, decoding).counts_per_rev == decoding
+    assert Encoder(2**24 // decoding, decoding).counts_per_rev == 2**24
+
+
 ERRORS = [
     (lambda: Encoder(0), "pulses_per_rev must be from 1 to 4194304 with x4 decoding, not 0"),
     (lambda: Encoder(1 << 24, 2), "pulses_per_rev must be from 1 to 8388608 with x2 decoding, not 16777216"),

@@ -39,6 +39,14 @@ UNFILTERED = replace(SMALL, filter=None)
 SERIAL = replace(SMALL, multiplier="serial", period=320)
 WITH_INPUTS = replace(SMALL, gains="inputs")
 GENERATED = replace(SMALL, command="generator")
+USUAL = LoopSpec(
+    tachometer=STachometer(
+        encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
+    ),
+    velocity_gain=Fraction(80),
+    command="generator",
+)
+OFTEN = replace(USUAL, multiplier="parallel", period=96)  # a control tick in 2 µs
 COLUMNS = ("current", "saturated", "y", "w")
 
 

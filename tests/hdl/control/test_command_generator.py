@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.control import GENERATED, random_demands
+from support.control import GENERATED, OFTEN, random_demands
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.control import command_generator
 from tachometry.hdl.control.command_generator import CommandGenerator
 from tachometry.sim.golden.command_generator import Demand, generated
-from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.generator import AMPLITUDE_WIDTH, SINE, WORD, generator_clocks
 
@@ -60,12 +59,8 @@ def test_with_a_serial_multiplier() -> None:
 
 def test_with_control_ticks_in_2_microseconds() -> None:
     """An LSB of the acceleration is less than one of the port there."""
-    tachometer = STachometer(
-        encoder=Encoder(500), timing=Timing(48_000_000, 960, 500), max_speed=Speed.parse("1000rad/s")
-    )
-    often = replace(GENERATED, tachometer=tachometer, period=96)
-    assert often.generator.acceleration.shift < 0
-    check(often, 300)
+    assert OFTEN.generator.acceleration.shift < 0
+    check(OFTEN, 300)
 
 
 MUTANTS: dict[str, tuple[Any, str, str]] = {

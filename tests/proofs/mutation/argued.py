@@ -24,7 +24,6 @@ _EVEN_PLACES = (
     "it is inverted like that if the number of counts is even, and the program reads the places of two counts an even "
     "number of clocks after the tick"
 )
-_NO_REST = "whether the phase is one count is asked only where it is not rest"
 _UNUSED_READ = "what is read then is not used: no operation that is executed reads two behind one that writes"
 _POSITIVE = (
     "the time between the first two counts is not held at `least_gap` any more, and only there is `POSITIVE` used: a "
@@ -39,7 +38,6 @@ _GOES_ON = (
     "end"
 )
 _LEFT = 'self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)'
-_NO_TICKS = "of no control tick there is no coefficient but 0, and of this method one update comes before the first"
 _SLACK = (
     "it changes the lowest two bits of a product, by less than what 1/m_s may be off: with every N and every m_s of "
     "this core the quotient is the same, see test_argued.py"
@@ -85,7 +83,7 @@ ARGUED = {
     ),
     ("loop, parallel", '"n": Out(range(form.longest + 1)),', "n[0] cnot1"): _TWO_A_TICK,
     ("loop, parallel", "ticked = Signal()  # before the first control tick there is no current", "ticked[0] const1"): (
-        _NO_TICKS
+        _BEFORE
     ),
     ("loop, unfiltered", "waits = Signal()", "S[0] const0"): _BEFORE,
     ("loop, unfiltered", "product = Signal.like(self.product, reset_less=True)", "D[19] inv"): (
@@ -116,7 +114,9 @@ ARGUED = {
     ("track, index", "", "machine.$procmux$33.B[0] cnot0"): (
         "rest and one count are exchanged by a `TEST_OR`, which the program has only where there is a speed"
     ),
-    ("track, age", "Condition.BEGUN: phase == Phase.BEGUN,", "A[0] const1"): _NO_REST,
+    ("track, age", "Condition.BEGUN: phase == Phase.BEGUN,", "A[0] const1"): (
+        "whether the phase is one count is asked only where it is not rest"
+    ),
     ("track, age", "flag = Signal()", "S[0] const0"): "after a reset nothing reads the flag before a `TEST` sets it",
     ("track, age", "past_b = Signal()", "S[0] const0"): "steps are counted only when it has been set after a reset",
     ("track, external tick", "level = Signal(range(LEVELS))", "B[1] const1"): (

@@ -249,10 +249,9 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
         add(trace, int(rng.choice([1, 1, 2, 5])))
-    reciprocal = spec.reciprocal if isinstance(spec, STachometer) else None
-    last = ending(spec, rng) if long or isinstance(reciprocal, Reciprocal) else []
-    if isinstance(spec, STachometer) and isinstance(reciprocal, Reciprocal):
-        last.append(hard(spec, reciprocal))
+    last = ending(spec, rng) if long else []
+    if isinstance(spec, STachometer) and isinstance(spec.reciprocal, Reciprocal):
+        last = [*ending(spec, rng), hard(spec, spec.reciprocal)]
     for trace in last:
         add(trace, 1)
     return Stimulus(np.concatenate(pins).astype(np.uint64)[:, np.newaxis], traces, starts)

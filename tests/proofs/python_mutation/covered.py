@@ -79,18 +79,17 @@ def chosen_for(found: Covered, file: str, line: int, budget: float) -> list[str]
     What is computed once, by an import or by another test, is not run again where it matters. Of every test function
     the fastest test comes first, then the next of each, so that all that is asked is asked soon.
     """
-    of_file = [test for test, entry in found.items() if test and file in entry["lines"]]
-    of_line = [test for test in of_file if line in found[test]["lines"][file]]
+    running = [test for test, entry in found.items() if test and file in entry["lines"]]
+    rounds: list[tuple[bool, int, float, str]] = []
+    met = Counter[tuple[bool, str]]()
+    for test in sorted(running, key=lambda test: found[test]["seconds"]):
+        elsewhere = line not in found[test]["lines"][file]
+        function = elsewhere, test.split("[")[0]
+        rounds.append((elsewhere, met[function], found[test]["seconds"], test))
+        met[function] += 1
     spent, taken = 0.0, list[str]()
-    for running in (of_line, [test for test in of_file if test not in of_line]):
-        met = Counter[str]()
-        rounds: list[tuple[int, float, str]] = []
-        for test in sorted(running, key=lambda test: found[test]["seconds"]):
-            function = test.split("[")[0]
-            rounds.append((met[function], found[test]["seconds"], test))
-            met[function] += 1
-        for _, seconds, test in sorted(rounds):
-            if spent + seconds <= budget or not taken:
-                spent += seconds
-                taken.append(test)
+    for *_, seconds, test in sorted(rounds):
+        if spent + seconds <= budget or not taken:
+            spent += seconds
+            taken.append(test)
     return taken

@@ -11,20 +11,16 @@ def _argue(where: str, argument: str, *changes: str) -> None:
 _FRONT_END, _REGISTERS = "sim/golden/front_end.py", "sim/golden/registers.py: GoldenBank"
 _RAIRAN, _TIMED = "sim/golden/methods/rairan.py", "sim/golden/methods/timed.py"
 
-_argue(
-    f"{_FRONT_END}: count.wrapped",
-    "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.",
-    "position + half → position - half",
-)
+for _where, _change in {
+    f"{_FRONT_END}: count.wrapped": "position + half → position - half",
+    "sim/golden/command_generator.py: Generator.command": "self.place + (1 << wide - 1) → self.place - (1 << wide - 1)",
+    "sim/golden/methods/track.py: Model.updates": "fine + half → fine - half",
+}.items():
+    _argue(_where, "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.", _change)
 _argue(
     f"{_FRONT_END}: filter_line",
     "The first change of all that are looked at has held, so none looks for what was before it.",
     "0 → -1",
-)
-_argue(
-    "sim/golden/command_generator.py: Generator.command",
-    "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.",
-    "self.place + (1 << wide - 1) → self.place - (1 << wide - 1)",
 )
 _argue(
     "sim/golden/command_generator.py: generated",
@@ -40,11 +36,6 @@ _argue(
     "sim/golden/methods/mt.py: Model._whole",
     "A window of just a cycle ends with its last count either way: none that it could be cut to comes earlier.",
     "through < cycle → through <= cycle",
-)
-_argue(
-    "sim/golden/methods/track.py: Model.updates",
-    "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.",
-    "fine + half → fine - half",
 )
 _argue(
     "sim/golden/methods/track.py: Recursion._second",
@@ -129,11 +120,6 @@ _argue(
     "1 → 0",
 )
 _argue(
-    f"{_REGISTERS}._read",
-    "A word has 32 bits, as its fields lie within it.",
-    "1 → 2 #5",
-)
-_argue(
     f"{_REGISTERS}.answers",
     "It is only read if something has been captured, and then it has been set.",
     "False → True",
@@ -141,7 +127,7 @@ _argue(
 _argue(
     f"{_REGISTERS}._read",
     "The fields of a register lie within its bits, so there is nothing above them to be cut off.",
-    "1 << WORD → 1 >> WORD",
+    *("1 << WORD → 1 >> WORD", "1 → 2 #5"),
 )
 
 _argue(

@@ -18,7 +18,7 @@ from proofs.python_mutation.mutants import Mutant, mutated
 
 _STARTED = 30.0  # seconds that a fork may take before its first test
 _MEMORY = 8 << 30  # bytes that a mutant may ask for
-_SLOWER = 5.0  # times as long as the tests took without a mutant; many a wrong width is searched for without end
+_SLOWER = 20.0  # times as long as the tests took without a mutant
 
 
 def module_of(file: str) -> str:

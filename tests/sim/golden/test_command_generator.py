@@ -2,24 +2,18 @@
 
 import math
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
+from support.control import OFTEN, USUAL
 from support.mutant import caught, mutant
 
 from tachometry.sim.golden import command_generator
 from tachometry.sim.golden.command_generator import Command, Demand
-from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.generator import CONSTANT, RAMP, RATE_FRAC_BITS, SINE, GeneratorForm
 
-CORE = STachometer(
-    encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
-)
-SPEC = LoopSpec(tachometer=CORE, velocity_gain=Fraction(80), command="generator")
-FORM = SPEC.generator
-OFTEN = replace(SPEC, multiplier="parallel", period=96)  # a control tick in 2 µs
+FORM = USUAL.generator
 
 
 def states(form: GeneratorForm, demands: list[Demand], position: int = 0) -> np.ndarray:
@@ -34,7 +28,7 @@ def states(form: GeneratorForm, demands: list[Demand], position: int = 0) -> np.
 
 def check_sine(hertz: float, amplitude: float, n: int) -> None:
     """A sine is one for ever, and place and speed are sums, in every bit."""
-    turn = math.pi * hertz * float(SPEC.seconds)
+    turn = math.pi * hertz * float(USUAL.seconds)
     rate = round(4 * math.sin(turn) ** 2 * 2**RATE_FRAC_BITS)
     angle = 2 * math.asin(math.sqrt(rate / 2**RATE_FRAC_BITS) / 2)
     found = states(FORM, [Demand(SINE, amplitude=round(amplitude * 256), rate=rate)] * n, 7)
@@ -70,12 +64,12 @@ def test_a_ramp() -> None:
     check_ramp()
 
 
-@pytest.mark.parametrize("spec", [SPEC, OFTEN])
+@pytest.mark.parametrize("spec", [USUAL, OFTEN])
 def test_the_commands_are_in_the_units_of_the_ports(spec: LoopSpec) -> None:
     """To half an LSB, and a sixteenth; where control ticks are close, an LSB of the acceleration is less than one."""
     form = spec.generator
     assert (form.acceleration.shift < 0) == (spec is OFTEN)
-    count = 2 * math.pi / CORE.encoder.counts_per_rev
+    count = 2 * math.pi / spec.tachometer.encoder.counts_per_rev
     tick, velocity = float(spec.seconds), float(spec.rad_per_s / (1 << spec.command_bits))
     most = (1 << 19) - 1
     generator = command_generator.Generator(form)

@@ -5,19 +5,16 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from support.control import OFTEN, USUAL
 
-from tachometry.spec import Encoder, Speed, STachometer, Timing
-from tachometry.spec.control import LoopSpec
+from tachometry.spec import Encoder, Speed, Timing
 from tachometry.spec.control.generator import generator_clocks
 
-CORE = STachometer(
-    encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
-)
-USUAL = LoopSpec(tachometer=CORE, velocity_gain=Fraction(80), command="generator")
+CORE = USUAL.tachometer
 SLOW = replace(CORE, encoder=Encoder(20_000), timing=Timing.parse("48MHz", "1ms", "100ms"))
 SPECS = [
     USUAL,
-    replace(USUAL, multiplier="parallel", period=96),
+    OFTEN,
     replace(USUAL, tachometer=replace(CORE, max_speed=None)),
     replace(USUAL, tachometer=replace(SLOW, max_speed=Speed.parse("3rad/s")), inertia=Fraction(1)),
     replace(USUAL, tachometer=replace(SLOW, max_speed=Speed.parse("3000rad/s")), inertia=Fraction(1, 10**7)),

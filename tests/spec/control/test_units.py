@@ -7,31 +7,28 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from support.control import USUAL
 
 from tachometry.sim.golden.command_generator import Command, Demand, Generator
 from tachometry.sim.golden.control import Control
-from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.generator import CONSTANT, RAMP, SINE
 from tachometry.spec.manifest import manifest
 
 COUNTS = 2000  # a revolution
-CORE = STachometer(
-    encoder=Encoder(COUNTS // 4), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
-)
 INERTIA, CONSTANT_OF_TORQUE, K_P, K_V, OBSERVER = 2e-4, 0.05, 900.0, 70.0, 250.0
-SPEC = LoopSpec(
-    tachometer=CORE,
-    inertia=Fraction(2, 10_000),
-    torque_constant=Fraction(5, 100),
+SPEC = replace(
+    USUAL,
+    inertia=Fraction("2e-4"),
+    torque_constant=Fraction("0.05"),
     position_gain=Fraction(900),
     velocity_gain=Fraction(70),
     observer=Fraction(250),
     filter=None,
     current_limit=Fraction(12),
-    command="generator",
 )
-SPECS = [SPEC, replace(SPEC, tachometer=replace(CORE, unit="rad/s", frac_bits=6), multiplier="parallel", period=480)]
+IN_RAD_PER_S = replace(USUAL.tachometer, unit="rad/s", frac_bits=6)
+SPECS = [SPEC, replace(SPEC, tachometer=IN_RAD_PER_S, multiplier="parallel", period=480)]
 
 
 def described(spec: LoopSpec) -> dict[str, Any]:
