@@ -61,7 +61,10 @@ once. What is gained depends on the motion: with an edge in every hundredth cloc
 program of the tracking method is at work in most clocks of a tick of 20 us.
 
 A golden model's time depends on the numbers of edges, ticks and updates, not on clocks. That of the tracking method
-follows its recursion tick by tick.
+follows its recursion tick by tick. A process that has freed large arrays before, as the one of the table above, keeps
+memory for the next ones, so golden models are faster there than at the top of this page: two thirds of the time of T
+are page faults of new memory. Glibc returns no memory to the system, and they are gone, with
+`MALLOC_TRIM_THRESHOLD_=4000000000` and `MALLOC_MMAP_THRESHOLD_=1000000000` in the environment.
 
 The next table shows what makes a clock fast, on the S method. Each row includes the changes of the rows above it:
 
