@@ -53,13 +53,18 @@ def test_the_fastest_tests_of_a_line_are_taken() -> None:
 SCRIPT = """
 import sys
 from pathlib import Path
+from proofs.python_mutation import judge
 from proofs.python_mutation.judge import judge_all
 from proofs.python_mutation.mutants import mutants_of
+judge._STARTED = 5
 root, folder = Path(sys.argv[1]), Path(sys.argv[2])
 tests = ["tests/spec/test_spec.py::test_widths_hold_what_they_must"]
 jobs = [(m, tests, 1.0) for m in mutants_of(root, "spec/units.py") if m.where == "signed_width"][:1]
 jobs += [(m, tests, 1.0) for m in mutants_of(root, "sim/golden/low_pass.py")][:1]  # which they never run
 jobs += [(jobs[0][0], [], 0.0)]
+digits = ["tests/spec/test_formats.py::test_the_product_is_a_sum_of_few_shifted_terms"]
+endless = [m for m in mutants_of(root, "spec/formats/velocity_output.py") if m.where == "_canonical"]
+jobs += [(m, digits, 0.0) for m in endless if m.change == "1 → 0 #2"]  # a number that never becomes 0
 for verdict in sorted(judge_all(root, jobs, 2, folder, lambda verdict: None), key=lambda v: v.mutant.file + v.what):
     print(verdict.what)
 """
@@ -69,7 +74,7 @@ def test_a_wrong_line_is_noticed_by_its_tests_alone(tmp_path: Path) -> None:
     command = [sys.executable, "-c", SCRIPT, str(ROOT), str(tmp_path)]
     env = {**os.environ, "PYTHONPATH": str(ROOT / "tests")}
     done = subprocess.run(command, cwd=ROOT, env=env, check=True, capture_output=True, text=True)
-    assert done.stdout.split() == ["survived", "killed", "untested"]
+    assert done.stdout.split() == ["survived", "timeout", "killed", "untested"]
 
 
 @pytest.mark.parametrize(("killed", "fine"), [(96, True), (94, False)])

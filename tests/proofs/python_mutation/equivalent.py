@@ -23,6 +23,11 @@ _argue(
     "0 → -1",
 )
 _argue(
+    "sim/golden/axes.py: seen",
+    "It may be longer than is needed: what is shown after the end of the trace is cut off.",
+    "2 → 3",
+)
+_argue(
     "sim/golden/command_generator.py: generated",
     "There are as many demands as positions.",
     "True → False",

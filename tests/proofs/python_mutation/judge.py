@@ -2,6 +2,7 @@
 
 import ast
 import importlib.machinery
+import math
 import os
 import resource
 import signal
@@ -16,9 +17,10 @@ from pathlib import Path
 import pytest
 from proofs.python_mutation.mutants import Mutant, mutated
 
-_STARTED = 30.0  # seconds that a fork may take before its first test
+_STARTED = 30.0  # seconds of its processor that a fork may take before its first test
+_SLOWER = 5.0  # times as long as the tests took without a mutant, of its processor too
+_WAITED = 3600.0  # seconds after which a fork waits for what never comes
 _MEMORY = 8 << 30  # bytes that a mutant may ask for
-_SLOWER = 20.0  # times as long as the tests took without a mutant
 
 
 def module_of(file: str) -> str:
@@ -95,7 +97,7 @@ def judge_all(
 
     while waiting or running:
         while waiting and len(running) < processes:
-            nth, (mutant, tests, _) = waiting.pop()
+            nth, (mutant, tests, took) = waiting.pop()
             begun = time.monotonic()
             if not tests:
                 done(nth, "untested", begun)
@@ -105,6 +107,8 @@ def judge_all(
                 status = 1
                 try:
                     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+                    seconds = math.ceil(_STARTED + _SLOWER * took)
+                    resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
                     status = _child(root, mutant, tests, folder / f"tmp-{nth}")
                 finally:
                     os._exit(status)
@@ -112,12 +116,12 @@ def judge_all(
         time.sleep(0.02)
         for child, (nth, begun) in list(running.items()):
             ended, status = os.waitpid(child, os.WNOHANG)
-            late = time.monotonic() - begun > _STARTED + _SLOWER * jobs[nth][2]
-            if not ended and not late:
+            if not ended and time.monotonic() - begun <= _WAITED:
                 continue
             if not ended:
                 os.killpg(child, signal.SIGKILL)
                 os.waitpid(child, 0)
+            late = not ended or (os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU)
             del running[child]
-            done(nth, "survived" if ended and status == 0 else "killed" if ended else "timeout", begun)
+            done(nth, "timeout" if late else "killed" if status else "survived", begun)
     return verdicts

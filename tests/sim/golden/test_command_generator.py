@@ -87,6 +87,9 @@ def test_nothing_is_demanded_but_what_is_told() -> None:
     """A demand is for rest, and a command is to be followed, at rest and at 0, where nothing else is told."""
     assert Command() == Command(position=0, velocity=0, acceleration=0, enable=True)
     assert Demand() == Demand(mode=CONSTANT, velocity=0, acceleration=0, amplitude=0, rate=0, enable=True)
+    generator = command_generator.Generator(FORM)
+    generator.tick(0, Demand())
+    assert generator.command() == Command()
 
 
 def test_a_sine_begins_at_rest_from_the_start_and_where_it_was_disabled() -> None:

@@ -11,6 +11,7 @@ from support.mutant import caught, mutant
 from support.shaft import Double, Fixed, run
 
 from tachometry.sim.golden import control
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
 
@@ -89,6 +90,14 @@ def test_the_same_as_in_double_precision(name: str) -> None:
 def test_mutants_are_caught(right: str, wrong: str) -> None:
     with mutant(control.Control, right, wrong), caught():
         check_side_by_side(SPECS["synchronised"])
+
+
+def test_an_update_takes_part_after_its_clock() -> None:
+    """The one in the clock of a control tick has not come for that tick."""
+    clock, nowhere = np.array([1000, 2000, 3000]), np.zeros(3, np.int64)
+    updates = Table(np.array([2000]), {"velocity": np.array([500])})
+    rows = control.control(SPECS["conventional"], clock, nowhere, updates, [control.Command()] * 3)
+    assert (rows.filtered_velocity != 0).tolist() == [False, False, True]
 
 
 def test_a_shaft_follows() -> None:
