@@ -164,7 +164,7 @@ def variants(
 CONFIGURATIONS = (
     Configuration(
         "reference",
-        "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 bits",
+        "48 MHz, 20 us, 10 ms, 500 PPR x4, 1000 rad/s, 16 fraction bits",
         REFERENCE,
         BARS,
         False,
@@ -261,11 +261,17 @@ CONFIGURATIONS = (
     ),
     Configuration(
         "track",
-        "tracking, 1000 rad/s, 16 bits",
+        "tracking, 1000 rad/s, velocity of 16 bits",
         TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16),
         TRACK_BARS,
         is_option=False,
         without_max_speed="track-wide",
+    ),
+    Configuration(
+        "track-20-bits",
+        "tracking, 1000 rad/s, velocity of 20 bits, as that of the reference",
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED),
+        is_option=False,
     ),
     Configuration(
         "track-external-tick",

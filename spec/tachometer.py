@@ -11,7 +11,7 @@ from tachometry.spec.numbers import Numbers
 from tachometry.spec.option import ParameterError, is_derived, options_of, settle
 from tachometry.spec.port import UPDATE, HasPorts, Port, held, ports_of
 from tachometry.spec.timing import MAX_TICK_CYCLES
-from tachometry.spec.units import PI, SpeedUnit, plural, signed_width
+from tachometry.spec.units import PI, SpeedUnit, plural, rounded, signed_width
 
 TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
 # The ends of what encloses the true speed, and which way each is rounded: outward.
@@ -75,12 +75,13 @@ class TachometerSpec(Numbers, HasPorts):
         object.__setattr__(self, "edge_error", Fraction(math.ceil(8 * self.edge_error), 8))
 
     def _check_lowpass(self, bandwidth: Fraction) -> None:
-        least = float(4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS)))
+        least = 4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS))
         greatest = 2 * PI * self.timing.clock_hz  # nothing is faster than the clock
         if bandwidth <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS or bandwidth > greatest:
             raise ParameterError(
                 "lowpass",
-                f"must be from {least:.4g} to {float(greatest):.4g} rad/s here, not {float(bandwidth):.9g} rad/s",
+                f"must be from {rounded(least, up=True)} to {rounded(greatest, up=False)} rad/s here, "
+                f"not {float(bandwidth):.9g} rad/s",
             )
 
     def _check_ticks(self) -> None:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tachometry.spec.option import Derived, Option, ParameterError, option, read_options, settle
-from tachometry.spec.units import format_time, parse_frequency, parse_time
+from tachometry.spec.units import TIME, format_time, parse_frequency, plural, read_exactly
 
 MAX_CLOCK_HZ = 10**11
 MAX_TICK_CYCLES = 1 << 20
-MAX_TICKS = 1 << 20
+MIN_TICKS, MAX_TICKS = 2, 1 << 20
 
 _GROUP = "Timing"
 
@@ -19,7 +19,9 @@ def _clocks(what: str, text: str) -> Derived:
 
 
 def _ticks(what: str, text: str) -> Derived:
-    return Derived(lambda timing: _whole(what, text, timing.tick_seconds, "tick", Fraction(1, timing.clock_hz)))
+    return Derived(
+        lambda timing: _whole(what, text, timing.tick_seconds, "tick", Fraction(1, timing.clock_hz), MIN_TICKS)
+    )
 
 
 @dataclass(frozen=True)
@@ -93,8 +95,8 @@ class Timing:
         if not 1 <= self.tick_cycles <= MAX_TICK_CYCLES:
             raise ParameterError("tick_cycles", f"must be from 1 to {MAX_TICK_CYCLES}, not {self.tick_cycles}")
         settle(self)
-        if not 2 <= self.max_ticks <= MAX_TICKS:
-            raise ParameterError("max_ticks", f"must be from 2 to {MAX_TICKS}, not {self.max_ticks}")
+        if not MIN_TICKS <= self.max_ticks <= MAX_TICKS:
+            raise ParameterError("max_ticks", f"must be from {MIN_TICKS} to {MAX_TICKS}, not {self.max_ticks}")
 
     @classmethod
     def parse(
@@ -122,18 +124,19 @@ def whole_clocks(what: str, given: str, clock_hz: int) -> int:
     return _whole(what, given, Fraction(1, clock_hz), "clock", Fraction(1, clock_hz))
 
 
-def _whole(what: str, given: str, period: Fraction, name: str, given_in: Fraction) -> int:
-    """`given`, a time or a number of clocks, as a whole number of periods."""
+def _whole(what: str, given: str, period: Fraction, name: str, given_in: Fraction, least: int = 1) -> int:
+    """`given`, a time or a number of clocks, as a whole number of periods, of which `least` are needed."""
     number = given.strip()
     plain = re.fullmatch(r"\d{1,30}", number, re.ASCII)
-    seconds = int(number) * given_in if plain else parse_time(what, number)
+    or_plain = "or a whole number of clocks"
+    seconds = int(number) * given_in if plain else read_exactly(what, number, TIME, also=or_plain)
     if seconds <= 0:
         raise ParameterError(what, f"must be longer than 0, not {given}")
     periods = seconds / period
     if periods.denominator == 1:
         return int(periods)
-    below, above = (f"{n} {name}{'s' * (n != 1)} ({format_time(n * period)})" for n in (int(periods), int(periods) + 1))
-    nearest = above if periods < 1 else f"{below} and {above}"
+    possible = sorted({max(int(periods) + more, least) for more in (0, 1)})
+    nearest = " and ".join(f"{plural(n, name)} ({format_time(n * period)})" for n in possible)
     raise ParameterError(
         what, f"must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"
     )

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -66,7 +67,7 @@ TORQUE_CONSTANT = {"Nm/A": Unit(), "mNm/A": Unit(Fraction(1, 1000))}
 TORQUE = _decimal(Nm=0, mNm=-3)
 
 
-def read_quantity(what: str, text: str, units: Units, default: str = "") -> tuple[Fraction, str]:
+def read_quantity(what: str, text: str, units: Units, default: str = "", also: str = "") -> tuple[Fraction, str]:
     """The decimal number in a text, exactly, and its unit.
 
     Parameters
@@ -78,6 +79,8 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
         Those that it may have.
     default : str
         Unit of a number without one.
+    also : str
+        What else may stand there, which the caller reads, for the message.
 
     Raises
     ------
@@ -92,7 +95,7 @@ def read_quantity(what: str, text: str, units: Units, default: str = "") -> tupl
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
         if "" in units:
             allowed = names and f"or one in {names}"
-        raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed)))}, not {text!r}")
+        raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed, also)))}, not {text!r}")
     value = Fraction(match[1])
     if value and not _LEAST <= abs(value) <= _GREATEST:
         raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")
@@ -104,10 +107,17 @@ def plain_unit(unit: str) -> str:
     return re.sub("^[µμ]", "u", unit)
 
 
-def read_exactly(what: str, text: str, units: Units, default: str = "") -> Fraction:
+def read_exactly(what: str, text: str, units: Units, default: str = "", also: str = "") -> Fraction:
     """The quantity in the first of the units, exactly; arguments and errors as of `read_quantity`."""
-    value, unit = read_quantity(what, text, units, default)
+    value, unit = read_quantity(what, text, units, default, also)
     return value * units[unit].exact
+
+
+def rounded(value: Fraction | float, *, up: bool, digits: int = 4) -> str:
+    """A limit to some digits, from above or from below, so that what is told is allowed."""
+    exact = Fraction(value)
+    with localcontext(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR):
+        return f"{float(Decimal(exact.numerator) / exact.denominator):.{digits}g}"
 
 
 def read_nearest(what: str, text: str, units: Units, default: str = "") -> float:

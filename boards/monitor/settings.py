@@ -16,7 +16,7 @@ from tachometry.spec.emulator import (
     speed_of,
 )
 from tachometry.spec.registers.map import WORD
-from tachometry.spec.units import FRACTION, SPEED, TIME, Unit, read_exactly, read_nearest
+from tachometry.spec.units import FRACTION, SPEED, TIME, Unit, read_exactly, read_nearest, rounded
 
 _ACCELERATION = {name: SPEED[speed] for name, speed in {"rad/s/s": "rad/s", "rev/s/s": "rev/s", "rpm/s": "rpm"}.items()}
 _OF_PERIOD = {"": Unit(), "%": Unit(Fraction(1, 100)), "deg": Unit(Fraction(1, 360))}
@@ -50,7 +50,8 @@ def emulator_settings(spec: TachometerSpec, words: Iterable[str]) -> Fields:
 def _speed(spec: TachometerSpec, text: str) -> Fields:
     speed, most = read_nearest("speed", text, SPEED, "rad/s"), fastest(spec)
     if abs(speed) > most:
-        raise ParameterError("speed", f"must be from -{most:.6g} to {most:.6g} rad/s with this clock, not {text}")
+        limit = rounded(most, up=False, digits=6)
+        raise ParameterError("speed", f"must be from -{limit} to {limit} rad/s with this clock, not {text}")
     return {"speed": min(speed_of(spec, speed), (1 << WORD - 1) - 1)}
 
 

@@ -15,7 +15,7 @@ from tachometry.spec.units import QUANTITY, ratio
 
 Text = str | None  # None: without the option
 
-_RANGE = re.compile(rf"{QUANTITY}\s*\.\.\s*{QUANTITY}\s*:\s*(\d{{1,6}})\s*(log)?")
+_RANGE = re.compile(rf"{QUANTITY}\s*\.\.\s*{QUANTITY}\s*:\s*(\d{{1,30}})\s*(log)?")
 _MOST = 100_000  # values of an axis
 _DIGITS = 4  # of values between the ends of a logarithmic range
 _LISTS = ("methods", "axes")

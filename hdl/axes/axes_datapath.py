@@ -90,24 +90,23 @@ class AxesDatapath(wiring.Component):
         m.submodules.quotient = quotient = self.quotient
         m.submodules.handed_over = handed = Memory(shape=self.count.shape(), depth=spec.slots, init=[])
         kept = data.StructLayout({"position": self.position.shape(), "window": window.state.shape()})
-        m.submodules.state = state = Memory(shape=kept, depth=spec.axes, init=[])
         read_count = handed.read_port()
         write_count = handed.write_port()
-        read = state.read_port()
-        write = state.write_port()
         m.d.comb += [
             turns.begin.eq(self.complete & (self.slot == 0)),
             write_count.addr.eq(self.slot),
             write_count.data.eq(self.count),
             write_count.en.eq(self.complete),
             read_count.addr.eq(turns.axis),
-            read.addr.eq(turns.axis),
         ]
+        decides = turns.step[DECIDE]
+        after = Signal(kept)
         # Block RAM is slow.
         count = Signal.like(self.count)
         before = Signal(kept)
+        stored = self._stored(m, after, decides)
         with m.If(turns.step[READ - 1]):
-            m.d.sync += [count.eq(read_count.data), before.eq(read.data)]
+            m.d.sync += [count.eq(read_count.data), before.eq(stored)]
 
         overflow = Signal()
         m_e = count
@@ -123,7 +122,6 @@ class AxesDatapath(wiring.Component):
             with m.If(turns.clears):
                 m.d.sync += [self.pulse_count.eq(0), self.overflow.eq(0), self.position.eq(0)]
 
-        decides = turns.step[DECIDE]
         updates = Signal()
         forced = Signal()
         m.d.sync += updates.eq(decides & window.update)
@@ -133,10 +131,8 @@ class AxesDatapath(wiring.Component):
             window.clears.eq(turns.clears),
             window.state.eq(before.window),
             window.m_e.eq(self.pulse_count),
-            write.addr.eq(turns.axis),
-            write.data.position.eq(self.position),
-            write.data.window.eq(window.next),
-            write.en.eq(decides),
+            after.position.eq(self.position),
+            after.window.eq(window.next),
             quotient.m.eq(window.state.m_s),
             quotient.load.eq(decides),
             quotient.start.eq(updates),
@@ -156,3 +152,21 @@ class AxesDatapath(wiring.Component):
             self.forced.eq(found.p.forced),
         ]
         return m
+
+    def _stored(self, m: Module, after: data.View, decides: Value) -> Value | data.View:
+        """The state of the axis that has its turn, as it was; it becomes `after` where it decides."""
+        if self._spec.axes == 1:
+            only = Signal.like(after, reset_less=True)  # Verilog has no addresses of no bits
+            with m.If(decides):
+                m.d.sync += only.eq(after)
+            return only
+        m.submodules.state = state = Memory(shape=after.shape(), depth=self._spec.axes, init=[])
+        read = state.read_port()
+        write = state.write_port()
+        m.d.comb += [
+            read.addr.eq(self.turns.axis),
+            write.addr.eq(self.turns.axis),
+            write.data.eq(after),
+            write.en.eq(decides),
+        ]
+        return read.data

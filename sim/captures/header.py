@@ -100,6 +100,8 @@ def read_header(path: Path, file: BinaryIO, time: Channel | None, samplerate_hz:
         If there is no such line, or if rows cannot be dated.
     """
     text, comments, lines = _first_line(file)
+    if "\r" in text:
+        raise CaptureError(f"lines of {path} must end in LF or CR LF, not CR")
     separator = max(",;\t", key=text.count)
     names = [name.strip() for name in next(csv.reader([text], delimiter=separator), [])]
     column = _time_column(path, names, time)

@@ -53,7 +53,7 @@ class Bounce:
     @staticmethod
     def parse(text: str) -> "Bounce":
         """Read COUNT:TIME, such as 3:500us (s, ms, us or ns)."""
-        match = re.fullmatch(r"\s*(\d{1,9}):([^:]+)", text, re.ASCII)
+        match = re.fullmatch(r"\s*(\d{1,30}):([^:]+)", text, re.ASCII)
         if match is None:
             raise ParameterError("bounce", f"must be COUNT:TIME, such as 3:500us, not {text!r}")
         return Bounce(int(match[1]), read_nearest("bounce time", match[2], TIME, "s"))

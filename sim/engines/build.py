@@ -150,7 +150,7 @@ def cache_folder() -> Path:
         If TACHOMETRY_CACHE names one that cannot be written; if another user owns the folder, or can write to it.
     """
     given = os.environ.get("TACHOMETRY_CACHE")
-    folder = Path(given) if given else platformdirs.user_cache_path("tachometry")
+    folder = Path(given).absolute() if given else platformdirs.user_cache_path("tachometry")
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         writable = os.access(folder, os.W_OK | os.X_OK)

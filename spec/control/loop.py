@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,17 @@ from tachometry.spec.option import Derived, ParameterError, option, options_of, 
 from tachometry.spec.port import HasPorts, Port
 from tachometry.spec.tachometer import TachometerSpec
 from tachometry.spec.timing import Timing, whole_clocks
-from tachometry.spec.units import CURRENT, PI, PLAIN, TORQUE_CONSTANT, Units, parse_bandwidth, plural, read_exactly
+from tachometry.spec.units import (
+    CURRENT,
+    PI,
+    PLAIN,
+    TORQUE_CONSTANT,
+    Units,
+    parse_bandwidth,
+    plural,
+    read_exactly,
+    rounded,
+)
 
 MAX_PERIOD = 1 << 24
 MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
@@ -204,11 +214,24 @@ class LoopSpec(HasPorts):
             raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
         self._check_formats()
         if self.period < self.least_period:
+            # Words are of other widths in a longer period, so this is not what this one would take.
+            periods = [self.period]
+            while (needed := self._least_in(periods[-1])) not in periods:
+                periods.append(needed)
+            least = min(period for period in periods if self._least_in(period) <= period)
             raise ParameterError(
                 "control_period",
-                f"must be at least {plural(self.least_period, 'clock')}, as long as the controller computes with a "
+                f"must be at least {plural(least, 'clock')}, as long as the controller computes with a "
                 f"{self.multiplier} multiplier, not {self.period}",
             )
+
+    def _least_in(self, period: int) -> int:
+        """`least_period` with another period."""
+        other = object.__new__(LoopSpec)
+        for field in fields(self):
+            object.__setattr__(other, field.name, getattr(self, field.name))
+        object.__setattr__(other, "period", period)
+        return other.least_period
 
     def _check_formats(self) -> None:
         for rate, name in ((self.observer, "observer"), (self.filter, "velocity_filter")):
@@ -216,7 +239,9 @@ class LoopSpec(HasPorts):
             most = 2 * PI * self.timing.clock_hz
             if rate is not None and not least <= rate <= most:
                 raise ParameterError(
-                    name, f"must be from {float(least):.4g} to {float(most):.4g} rad/s here, not {float(rate):.9g}"
+                    name,
+                    f"must be from {rounded(least, up=True)} to {rounded(most, up=False)} rad/s here, "
+                    f"not {float(rate):.9g}",
                 )
         bits = factor_bits(list(self.ratios.values()))
         if bits > MAX_FACTOR_BITS:

@@ -9,6 +9,7 @@ from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target
 from tachometry.spec.option import ParameterError, option
 from tachometry.spec.port import UPDATE, Port, held
 from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.units import rounded
 
 # The estimates are looked up by Ndt1, or by Nep1 − 1, in a table with as many entries at most.
 MAX_TABLE = 2048
@@ -99,7 +100,7 @@ class RairanTachometer(TachometerSpec):
                 "max_speed", f"must be at most {most} counts per tick with adaptive, not {self.max_count}"
             )
         if self.adaptive_dt.fewest > self.max_pulse_count:
-            least = f"{1 / (2 * self.max_pulse_count - 1):.4g}"
+            least = rounded(Fraction(1, 2 * self.max_pulse_count - 1), up=True)
             raise ParameterError(
                 "adaptive", f"must be at least {least} with this speed and time, not {float(target):.9g}"
             )

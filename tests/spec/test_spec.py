@@ -39,6 +39,14 @@ ERRORS = [
     (lambda: Encoder((1 << 24) + 1, 1), "pulses_per_rev must be from 1 to 16777216 with x1 decoding, not 16777217"),
     (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, not 3"),
     (lambda: Timing(0, 2, 2), "clock must be from 1 Hz to 100 GHz, not 0 Hz"),
+    (
+        lambda: Timing.parse("1MHz", "20us", "1us"),
+        "max_time must be a whole number of ticks, not 1us (0.05); nearest: 2 ticks (40us)",
+    ),
+    (
+        lambda: Timing.parse("1MHz", "20us", "45us"),
+        "max_time must be a whole number of ticks, not 45us (2.25); nearest: 2 ticks (40us) and 3 ticks (60us)",
+    ),
     (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, not 0"),
     (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 1048576, not 1"),
     (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, not 1048577"),
@@ -49,7 +57,7 @@ ERRORS = [
     (lambda: Timing.parse("0.5Hz", "20us", "10ms"), "clock must be a positive whole number of Hz, not '0.5Hz'"),
     (
         lambda: Timing.parse("48MHz", "20", "10 m"),
-        "max_time must be a number with one of the units s, ms, us, ns, not '10 m'",
+        "max_time must be a number with one of the units s, ms, us, ns or a whole number of clocks, not '10 m'",
     ),
     (
         lambda: Timing.parse("48MHz", "20.01us", "10ms"),

@@ -25,6 +25,7 @@ from tachometry.spec.units import (
     parse_time,
     ratio,
     read_exactly,
+    rounded,
 )
 
 
@@ -130,6 +131,23 @@ def test_the_least_and_the_greatest_number() -> None:
     for text in ("1.01e30Hz", "0.99e-30Hz", "-1.01e30Hz", "1e31Hz", "1e-31Hz"):
         with pytest.raises(ParameterError, match=f"^x must be of a size from 1e-30 to 1e30, not '{text}'$"):
             read_exactly("x", text, FREQUENCY)
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "below", "above"),
+    [
+        (Fraction(1, 3), 4, "0.3333", "0.3334"),
+        (Fraction(2, 3), 4, "0.6666", "0.6667"),
+        (-Fraction(2, 3), 2, "-0.67", "-0.66"),
+        (18_849.556, 6, "18849.5", "18849.6"),
+        (Fraction(301_592_895), 4, "3.015e+08", "3.016e+08"),
+        (Fraction(99_999), 4, "9.999e+04", "1e+05"),
+        (Fraction(5, 2), 2, "2.5", "2.5"),
+    ],
+)
+def test_limits_are_rounded_so_that_they_are_allowed(value: Fraction, digits: int, below: str, above: str) -> None:
+    assert rounded(value, up=False, digits=digits) == below
+    assert rounded(value, up=True, digits=digits) == above
 
 
 def test_sizes_of_units() -> None:

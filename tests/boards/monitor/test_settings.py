@@ -56,7 +56,7 @@ def test_the_fastest_speed_is_taken() -> None:
         ("", "--set must be NAME=VALUE with a NAME of "),
         ("speed=fast", "--set speed must be a number in rad/s, rev/s, rpm (default rad/s), not 'fast'"),
         ("speed=nan", "--set speed must be a number in "),
-        ("speed=1e6", "--set speed must be from -18849.6 to 18849.6 rad/s with this clock, not 1e6"),
+        ("speed=1e6", "--set speed must be from -18849.5 to 18849.5 rad/s with this clock, not 1e6"),
         ("speed=1e999", "--set speed must be of a size from 1e-30 to 1e30"),
         ("acceleration=0", "--set acceleration must be from 0.003214 to 1.381e+07 rad/s/s here"),
         ("acceleration=-1", "--set acceleration must be from 0.003214 to 1.381e+07 rad/s/s here"),

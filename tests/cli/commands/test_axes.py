@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 from support.command import run
+from support.compiled import lint
 
 from tachometry.cli.commands import verify as command
-from tachometry.sim.studies.axes import AXES
+from tachometry.hdl import export
+from tachometry.sim.studies.axes import AXES, core_of
 
 CORE = "--ppr 25 --clock 20kHz --tick 2ms --max-time 8ms --max-speed 100rad/s --engine pysim".split()
 MOTIONS = "ramp:0:60:100ms,constant:-40:100ms"
@@ -70,6 +72,12 @@ def test_generate(parallel: list[str], tmp_path: Path, capsys: pytest.CaptureFix
     subprocess.run(["iverilog", "-g2012", "-Wall", "-o", "bench", "axes.v", "axes_tb.sv"], cwd=tmp_path, check=True)
     done = subprocess.run(["./bench"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.startswith("PASS: position 24 of axis 0")
+
+
+@pytest.mark.parametrize("words", AXES, ids=lambda words: f"{words[words.index('--axes') + 1]} axes")
+def test_verilog_without_warnings(words: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "axes.v").write_text(export(core_of(words), "axes")["axes.v"])
+    lint(["axes.v"], "axes", tmp_path)
 
 
 @pytest.mark.parametrize(

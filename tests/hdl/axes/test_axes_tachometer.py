@@ -59,9 +59,10 @@ MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
         {},
     ),
     "counts of another": (AxesDatapath, "read_count.addr.eq(turns.axis)", "read_count.addr.eq(0)", {}),
-    "state of another": (AxesDatapath, "read.addr.eq(turns.axis)", "read.addr.eq(0)", {}),
-    "state kept for another": (AxesDatapath, "write.addr.eq(turns.axis)", "write.addr.eq(0)", {}),
+    "state of another": (AxesDatapath, "read.addr.eq(self.turns.axis)", "read.addr.eq(0)", {}),
+    "state kept for another": (AxesDatapath, "write.addr.eq(self.turns.axis)", "write.addr.eq(0)", {}),
     "state never kept": (AxesDatapath, "write.en.eq(decides)", "write.en.eq(0)", {}),
+    "state of the only axis never kept": (AxesDatapath, "m.d.sync += only.eq(after)", "pass", {"axes": 1}),
     "named as another": (AxesDatapath, "self.axis.eq(turns.axis)", "self.axis.eq(turns.axis + 1)", {}),
     "position of saturated counts": (AxesDatapath, "before.position + count", "before.position + m_e", {}),
     "tick after reset": (AxesDatapath, "turns.step[-1] & ~turns.clears", "turns.step[-1]", {}),
@@ -83,7 +84,7 @@ MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
 def test_mutants_are_caught(name: str) -> None:
     box, right, wrong, options = MUTANTS[name]
     with mutant(box, right, wrong), caught():
-        check(small(2, **options))
+        check(small(**{"axes": 2, **options}))
 
 
 class Restarted(AxesTachometer):

@@ -1,5 +1,6 @@
 """The whole core with a control loop against the golden models: clock by clock, and as exported."""
 
+import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -132,3 +133,19 @@ def test_a_stream_of_the_wrong_sign_is_caught() -> None:
 def test_what_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"^control_period must be at least 45 clocks, as long as the controller"):
         replace(CORE, period=44)
+
+
+@pytest.mark.parametrize("multiplier", ["serial", "parallel"])
+@pytest.mark.parametrize("command", ["ports", "generator"])
+def test_the_least_control_period_is_told_whatever_was_asked_for(multiplier: str, command: str) -> None:
+    """The shorter the period, the wider the words, and the longer they take."""
+    spec = replace(CORE, multiplier=multiplier, command=command, period=4800)
+    told = set()
+    for period in (1, 20, 40):
+        with pytest.raises(ParameterError, match=r"^control_period must be at least (\d+) clocks, ") as refused:
+            replace(spec, period=period)
+        told.add(int(re.findall(r"\d+", str(refused.value))[0]))
+    (least,) = told
+    assert replace(spec, period=least).period == least
+    with pytest.raises(ParameterError, match=f"^control_period must be at least {least} clocks, "):
+        replace(spec, period=least - 1)

@@ -265,6 +265,12 @@ def test_csv_row(tmp_path: Path, row: str, message: str, block: int) -> None:
         read_csv(path, _block=block)
 
 
+@pytest.mark.parametrize("text", ["time,a,b\r0,0,1\r1,1,1\r", "ti\rme,a,b\n0,0,1\n"])
+def test_csv_with_cr_in_the_header(tmp_path: Path, text: str) -> None:
+    make_csv(tmp_path / "x.csv", text)
+    assert_error(tmp_path / "x.csv", "lines of PATH must end in LF or CR LF, not CR")
+
+
 def test_csv_cut_in_its_last_line(tmp_path: Path) -> None:
     make_csv(tmp_path / "x.csv", "time,a,b\n0,0,1\n0.25,1")
     assert_error(tmp_path / "x.csv", "PATH line 3: a row must have 3 fields (time,a,b), not 2")

@@ -86,6 +86,13 @@ def test_a_full_disk_names_the_cache(folder: Path) -> None:
         cached("one", ".bin", full)
 
 
+def test_a_cache_named_from_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compilers run in folders of their own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TACHOMETRY_CACHE", "here")
+    assert cached("one", ".bin", Maker()).parent == tmp_path / "here"
+
+
 def test_without_a_cache_that_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a container with a read-only home."""
     monkeypatch.setenv("TACHOMETRY_CACHE", "/proc/cache")

@@ -230,7 +230,7 @@ def test_a_long_measurement_is_cut_into_parts() -> None:
 
 
 def test_limits() -> None:
-    with pytest.raises(ParameterError, match=r"^observer must be from 0\.01192 to 3\.016e\+08 rad/s here, not 1e\+09$"):
+    with pytest.raises(ParameterError, match=r"^observer must be from 0\.01193 to 3\.015e\+08 rad/s here, not 1e\+09$"):
         LoopSpec(tachometer=CORE, observer=Fraction(10**9))
     with pytest.raises(ParameterError, match=r"^current_width must be from 8 to 24, not 25$"):
         LoopSpec(tachometer=CORE, current_width=25)
