@@ -192,7 +192,7 @@ def test_equal_options_give_equal_files(tmp_path: Path) -> None:
         ("--ppr 9 --tick 20 --max-time 1s", "--max-time, in ticks, must be from 2 to 1048576, not 2400000"),
         ("--ppr 9 --tick 1s --max-time 2s", "--tick, in clocks, must be from 1 to 1048576, not 48000000"),
         ("--ppr 9 --tick -1us", "--tick must be longer than 0, not -1us"),
-        ("--ppr 9 --max-time 11us", "--max-time must be a whole number of ticks, not 11us (0.55); nearest: 1 tick"),
+        ("--ppr 9 --max-time 11us", "--max-time must be a whole number of ticks, not 11us (0.55); nearest: 2 ticks"),
         ("--ppr 9 --clock 1e999GHz", "error: "),
         ("--ppr 9 --frac-bits 30", "--frac-bits must be from 4 to 24, not 30"),
         ("--ppr 9 --max-speed 5", "--max-speed must be a number with one of the units rad/s, rev/s, rpm, not '5'"),
