@@ -87,7 +87,7 @@ class Coefficients:
     """
 
     values: tuple[int, ...]
-    shift: int = 0
+    shift: int
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from proofs.python_mutation.__main__ import report
-from proofs.python_mutation.covered import chosen_for
+from proofs.python_mutation.covered import chosen_for, with_imports
 from proofs.python_mutation.equivalent import ARGUED
 from proofs.python_mutation.judge import Verdict
 from proofs.python_mutation.mutants import ROOMS, Mutant, files, mutants_of, mutated, sample
@@ -48,6 +48,15 @@ def test_the_fastest_tests_of_a_line_are_taken() -> None:
     assert chosen_for(found, "x.py", 3, 20) == ["slow", "fast"]
     assert chosen_for(found, "x.py", 1, 20) == ["fast", "slow"]
     assert chosen_for(found, "z.py", 1, 20) == []
+
+
+def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:
+    (tmp_path / "test_x.py").write_text("from tachometry.spec.units import PI\nfrom tachometry.spec import numbers\n")
+    entry = {"seconds": 1.0, "lines": {"spec/units.py": [3]}}
+    found = with_imports(tmp_path, {"": {"seconds": 0.0, "lines": {}}, "test_x.py::test_pi": entry})
+    lines = found["test_x.py::test_pi"]["lines"]
+    assert (lines["spec/units.py"], lines["spec/numbers.py"]) == ([3], [])
+    assert chosen_for(found, "spec/numbers.py", 5, 20) == ["test_x.py::test_pi"]
 
 
 SCRIPT = """

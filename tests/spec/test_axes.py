@@ -57,6 +57,7 @@ def test_ports() -> None:
         **dict.fromkeys(("a", "b", "z"), 5),
         **dict.fromkeys(("axis", "decode_error_axis", "index_axis"), 3),
     }
+    assert next(port.width for port in spec_of(1).ports if port.name == "axis") == 1  # no port has no bits
     held = spec_of(5, index=True, parallel=True)
     values = {name for strobe in held.axis.strobes.values() for name in strobe}
     assert {port.name for port in held.ports} == {

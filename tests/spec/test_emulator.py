@@ -6,7 +6,11 @@ import pytest
 
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.emulator import (
+    BOUNCE_WIDTH,
+    DROP_WIDTH,
+    ERROR_WIDTH,
     FINE_WIDTH,
+    JITTER_WIDTH,
     PHASE_WIDTH,
     START,
     EmulatorSettings,
@@ -28,6 +32,13 @@ def test_a_speed_a_rate_and_the_fastest() -> None:
     assert rate_of(SPEC, 1000) * (clocks // 2) / 2**16 == pytest.approx(speed_of(SPEC, 100), rel=1e-3)
     assert fastest(SPEC) * 500 / (2 * math.pi) == pytest.approx(48e6 / 8)
     assert (2**PHASE_WIDTH, 8 * START, 2**FINE_WIDTH) == (2**32, 2**32, 1024)
+
+
+def test_how_wrong_the_lines_can_be() -> None:
+    """Edges come an eighth of a period late or early, and move by a sixteenth. Bounces are shorter than 256 clocks."""
+    eighth, sixteenth = (2**FINE_WIDTH // n for n in (8, 16))
+    widths = [2 ** (ERROR_WIDTH - 1), 2**JITTER_WIDTH, 2**BOUNCE_WIDTH, 2**DROP_WIDTH]  # errors are signed
+    assert widths == [eighth, sixteenth, 256, 256]
 
 
 def test_nothing_is_wrong_with_the_lines_unless_it_is_told() -> None:

@@ -50,6 +50,18 @@ def test_an_edge_is_in_the_tick_that_ends_pin_to_count_after_it() -> None:
     assert counted(last + 1)[0] == 0
 
 
+@pytest.mark.parametrize("clock", range(5, 11))
+def test_the_first_edge_that_counts_is_between_the_looks_of_the_second_and_third_round(clock: int) -> None:
+    """A level is looked at two clocks after it was sampled, with four slots a round."""
+    spec = small()
+    low = np.zeros(2, dtype=np.uint8)
+    pins = PinTrace(np.array([0, clock]), a=np.array([0, 1], dtype=np.uint8), b=low, n_clocks=4 * TICK_CYCLES)
+    trace = AxesTrace((pins,) * spec.axes)
+    check(spec, trace)
+    counted = golden.run(spec, trace).ticks.pulse_count[: spec.axes].tolist()
+    assert counted == [int(clock + 2 > spec.slots * 2 + axis) for axis in range(spec.axes)]
+
+
 MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
     "begins with the wrong axis": (AxesDatapath, "(self.slot == 0)", "(self.slot == 1)", {}),
     "handed over to another": (

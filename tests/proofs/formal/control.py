@@ -18,9 +18,9 @@ _FORM = ControlForm(
     extra_bits=1,
     factor_bits=2,
     terms={
-        Term.FILTER: Coefficients((1, 2, 3)),
-        Term.OBSERVER: Coefficients((1, 2, 3)),
-        Term.CURRENT: Coefficients((2, 1, 1)),
+        Term.FILTER: Coefficients((1, 2, 3), 0),
+        Term.OBSERVER: Coefficients((1, 2, 3), 0),
+        Term.CURRENT: Coefficients((2, 1, 1), 0),
         Term.POSITION: Coefficients((3,), 4),
         Term.VELOCITY: Coefficients((3,), 2),
         Term.ACCELERATION: Coefficients((2,), 3),

@@ -7,7 +7,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from proofs.python_mutation.covered import chosen_for, covered
+from proofs.python_mutation.covered import chosen_for, covered, with_imports
 from proofs.python_mutation.equivalent import ARGUED
 from proofs.python_mutation.judge import Verdict, judge_all
 from proofs.python_mutation.mutants import ROOMS, files, sample
@@ -41,7 +41,7 @@ def main(words: list[str]) -> bool:
     for module in _WARM:
         import_module(module)
     tests = [f"tests/{path}" for path in given.tests or TESTS]
-    found = covered(ROOT, files(ROOT), tests, folder)
+    found = with_imports(ROOT, covered(ROOT, files(ROOT), tests, folder))
     jobs = []
     for mutant in sample(ROOT, given.mutants, given.seed):
         if not mutant.file.startswith(given.only):

@@ -1,5 +1,6 @@
 """Which tests run which lines, and how long each takes: one run of the tests, of which every test is a context."""
 
+import ast
 import hashlib
 import json
 import os
@@ -70,6 +71,22 @@ def covered(root: Path, files: Sequence[str], tests: Sequence[str], folder: Path
             kept.unlink(missing_ok=True)
             raise SystemExit("the tests must pass before there are mutants")
     found: Covered = json.loads(kept.read_text())
+    return found
+
+
+def with_imports(root: Path, found: Covered) -> Covered:
+    """Also the files that the file of a test imports: it may use what was computed when they were imported."""
+    imported: dict[str, set[str]] = {}
+    for test, entry in found.items():
+        file = test.split("::")[0]
+        if file and file not in imported:
+            nodes = ast.walk(ast.parse((root / file).read_text(encoding="utf-8")))
+            froms = [node for node in nodes if isinstance(node, ast.ImportFrom)]
+            names = {f"{node.module}.{name}" for node in froms for name in ("", *(alias.name for alias in node.names))}
+            ours = {name.removeprefix("tachometry.").strip(".") for name in names if name.startswith("tachometry.")}
+            imported[file] = {f"{name.replace('.', '/')}.py" for name in ours}
+        for name in imported.get(file, ()):
+            entry["lines"].setdefault(name, [])
     return found
 
 

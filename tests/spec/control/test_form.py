@@ -227,6 +227,8 @@ def test_a_long_measurement_is_cut_into_parts() -> None:
     spec = LoopSpec(tachometer=replace(CORE, timing=Timing.parse("48MHz", "20us", "100ms")))
     assert spec.longest == 1023
     assert LoopSpec(tachometer=CORE).longest == 511
+    # Two ticks, as the update may come late in one, and as control ticks need not come with them: all bits of 4.
+    assert LoopSpec(tachometer=replace(CORE, timing=Timing(48_000_000, 960, 2)), period=960).longest == 7
 
 
 def test_limits() -> None:
@@ -234,3 +236,6 @@ def test_limits() -> None:
         LoopSpec(tachometer=CORE, observer=Fraction(10**9))
     with pytest.raises(ParameterError, match=r"^current_width must be from 8 to 24, not 25$"):
         LoopSpec(tachometer=CORE, current_width=25)
+    for period in (0, (1 << 24) + 1):
+        with pytest.raises(ParameterError, match=rf"^control_period must be from 1 to {1 << 24} clocks, not {period}$"):
+            LoopSpec(tachometer=CORE, period=period)
