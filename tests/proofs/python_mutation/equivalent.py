@@ -14,6 +14,7 @@ _RAIRAN, _TIMED = "sim/golden/methods/rairan.py", "sim/golden/methods/timed.py"
 for _where, _change in {
     f"{_FRONT_END}: count.wrapped": "position + half → position - half",
     "sim/golden/command_generator.py: Generator.command": "self.place + (1 << wide - 1) → self.place - (1 << wide - 1)",
+    "sim/golden/emulator.py: GoldenEmulator._play": ("fine - moved[:n] - _TURN // 2 → fine - moved[:n] + _TURN // 2"),
     "sim/golden/methods/track.py: Model.updates": "fine + half → fine - half",
 }.items():
     _argue(_where, "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.", _change)
@@ -41,6 +42,16 @@ _argue(
     "sim/golden/methods/mt.py: Model._whole",
     "A window of just a cycle ends with its last count either way: none that it could be cut to comes earlier.",
     "through < cycle → through <= cycle",
+)
+_argue(
+    "sim/golden/emulator.py: GoldenEmulator._speeds",
+    "Where the speed has turned to the target itself, it is the same which of the two is taken.",
+    "self._turned >= target → self._turned > target",
+)
+_argue(
+    "sim/golden/emulator.py: GoldenEmulator._play",
+    "There are as many lines as levels.",
+    "True → False",
 )
 _argue(
     "sim/golden/methods/track.py: Recursion._second",
