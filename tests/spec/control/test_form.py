@@ -191,10 +191,8 @@ def test_coefficients_are_those_of_the_equations(number: int) -> None:
     assert 4 <= least * 2**form.extra_bits < 8 or form.extra_bits == 2
 
 
-@pytest.mark.parametrize("number", range(len(SPECS)))
-def test_what_the_formats_hold(number: int) -> None:
+def check_formats(form: ControlForm) -> None:
     """The greatest words of all terms; and an error of the position that is the least of all bits that is enough."""
-    form = SPECS[number].form
     most = {
         Term.FILTER: 2 * form.most_y,
         Term.OBSERVER: form.most_w,
@@ -214,6 +212,18 @@ def test_what_the_formats_hold(number: int) -> None:
     assert form.most_error == 2**bits - 1
     total = others + form.product(Term.POSITION, form.most_error + 1) + 1
     assert form.total_width == max(total.bit_length() + 1, form.position_width + POSITION_FRAC_BITS)
+
+
+@pytest.mark.parametrize("number", range(len(SPECS)))
+def test_what_the_formats_hold(number: int) -> None:
+    """Whichever term has the widest word, however few bits the position has, however great the current may be."""
+    form = SPECS[number].form
+    check_formats(form)
+    for term, one in form.terms.items():
+        check_formats(replace(form, terms={**form.terms, term: replace(one, shift=one.shift + 60)}))
+    check_formats(replace(form, position_width=1))
+    for bits in range(1, 30):
+        check_formats(replace(form, current_limit=form.current_limit << bits))
 
 
 def test_a_tracking_core_has_no_filter() -> None:
