@@ -67,3 +67,40 @@ def test_the_unit_of_time(seed: int) -> None:
     half = form.longest_tick / 2
     assert unit > half
     assert unit <= most < 2 * unit or (unit > most and unit <= 2 * half)
+
+
+def gains(form: Tracking) -> list[tuple[int, float]]:
+    """Ticks from count to count, and d = 1 − θ, with the least bandwidth: in each, the fewest of the most x, none."""
+    slowest = 10 if form.growing else 1
+    per_tick = float(form.bandwidth) * form.tick_cycles / form.clock_hz / slowest
+    forgets = (1 - float(form.least_memory)) * (0.2 if form.growing else 1)
+    reached = round(-math.log(1 - forgets) / per_tick)
+    return [
+        (m, min(1 - math.exp(-per_tick * m), forgets))
+        for m in (1, min(max(reached, 1), form.max_ticks), form.max_ticks)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_errors_are_held_with_the_fewest_bits(seed: int) -> None:
+    """As in the error analysis: half an LSB of the velocity, and of the position."""
+    form = drawn(seed)
+    found, u = gains(form), 2**form.unit_bits / form.tick_cycles
+    more = next(bits for bits in range(10) if bits == 9 or all(m / (d * u) <= 2**bits for m, d in found))
+    assert form.extra_bits == more
+
+    def enough(bits: int) -> bool:
+        each = [(m, d, m / (2 * d**2 * u) * (1 + m / (d * u * 2**more))) for m, d in found]
+        velocity = max(3 * d / m * e + 1.5 / (d * u) + 1 for m, d, e in each) / 2**bits
+        position = max(e + 1 for _, _, e in each) / 2**bits
+        return velocity <= 0.5 / 2**form.velocity_bits and position <= 0.5 / 2**form.fine_bits
+
+    assert form.frac_bits == next(bits for bits in range(100) if enough(bits))
+    assert form.acceleration_error == pytest.approx(max(4.5 * u / m * 2**more + 1.5 / d for m, d in found))
+    # A gain is off by 2^−B, of d or of d·U/m: for one count per tick by an eighth of an LSB of the velocity.
+    least = min(found[0][1], found[0][1] * u)
+    fewest = next(bits for bits in range(20, 100) if 2.0**-bits <= least / 8 / 2**form.velocity_bits)
+    assert form.gain_bits - form.ratio_range == fewest
+    # Each count of a tick is up to as many places from its end, less a half.
+    counts = form.max_count
+    assert form.places_bits == sum(2 * counts - 1 for _ in range(counts)).bit_length() + 1
