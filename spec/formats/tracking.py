@@ -223,11 +223,11 @@ class Tracking:
             counts * (counts + moved),  # the sum over the counts of a tick
             # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
             self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
-            # What is multiplied: on its way to a product the adder holds nearly twice as much.
-            2 * self.max_error * d * 2**self.ratio_range,  # e·d
+            # What is multiplied: on its way to a product the adder holds nearly twice as much. The rest of it is less
+            # than another term: v·Στ is less than the sum over the counts; and e·d than h, or, where R < 2, than 4·e.
             2 * self.max_error * of_v * 2 ** (self.extra_bits + self.ratio_range),  # h
             2 * self.max_acceleration / 2**self.frac_bits,
-            2 * self.max_velocity / 2**self.frac_bits * max(1.125, 2 ** (self.times_bits - 1 - self.unit_bits)),
+            2.25 * self.max_velocity / 2**self.frac_bits,
             4 * self.max_error,  # e less its mean
             self.max_acceleration / 2**self.frac_bits + self.max_error * of_a * 2**self.extra_bits,
             2 * self.max_error + 2 * moved + 2,  # p

@@ -59,9 +59,7 @@ class Program:
     @cached_property
     def acceleration_scale(self) -> tuple[int, int]:
         """What a is multiplied by for the output, and the right shift after it."""
-        shift = self.form.width - 2
-        while round(self.acceleration_factor * (1 << shift)) >> shift:
-            shift -= 1
+        shift = self.form.width - 2  # the factor is less than 1/12, as a is off by more than 1.5 of its LSB
         return round(self.acceleration_factor * (1 << shift)), shift
 
     @property

@@ -1,12 +1,15 @@
 """Formats of the tracking recursion, computed another way, for cores of all sizes."""
 
 import math
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from tachometry.spec.formats.tracking import Tracking
+from tachometry.spec import ParameterError, TrackTachometer, of_texts
+from tachometry.spec.formats.tracking import RATIOS, STEP_BACK, Tracking
+from tachometry.spec.formats.tracking_program import Program
 
 
 def drawn(seed: int) -> Tracking:
@@ -31,10 +34,33 @@ def drawn(seed: int) -> Tracking:
     )
 
 
-@pytest.mark.parametrize("seed", range(200))
-def test_a_word_holds_what_the_program_computes(seed: int) -> None:
+def few(seed: int) -> Tracking:
+    """Few counts in short ticks with great bandwidths, so that small terms are the greatest."""
+    rng = np.random.default_rng(seed)
+    external = bool(rng.random() < 0.5)
+    tick = int(rng.integers(257, 400))
+    return Tracking(
+        clock_hz=1 << 20,
+        tick_cycles=tick,
+        longest_tick=int(tick * 2 ** rng.uniform(0, 4)) if external else tick,
+        max_ticks=int(2 ** rng.uniform(1, 4)),
+        max_count=int(2 ** rng.uniform(0, 3)),
+        external=external,
+        bandwidth=Fraction((1 << 20) / tick * 10 ** rng.uniform(-2, 0.5)).limit_denominator(1000),
+        least_memory=Fraction(rng.uniform(0.5, 0.95)).limit_denominator(100),
+        edge_error=Fraction(1, 2),
+        agile=bool(rng.random() < 0.5),
+        growing=bool(rng.random() < 0.5),
+        velocity_bits=int(rng.integers(4, 10)),
+        fine_bits=int(rng.integers(12, 17)),
+    )
+
+
+@pytest.mark.parametrize("seed", range(600))
+@pytest.mark.parametrize("made", [drawn, few])
+def test_a_word_holds_what_the_program_computes(made: Callable[[int], Tracking], seed: int) -> None:
     """All in counts and the unit of time U."""
-    form = drawn(seed)
+    form = made(seed)
     unit, counts, error = 2.0**form.unit_bits, form.max_count, 2 * form.max_count + 2
     assert form.max_error == error
     speed, change = (most / 2.0**form.frac_bits for most in (form.max_velocity, form.max_acceleration))
@@ -57,6 +83,12 @@ def test_a_word_holds_what_the_program_computes(seed: int) -> None:
     )
     dividend = max(form.number_bits + form.mean_bits, form.gap_bits + form.gain_bits - 8)
     assert form.width == 1 + max(math.ceil(math.log2(greatest)) + form.frac_bits, dividend)
+
+
+def test_levels() -> None:
+    """Sixteen over a decade; λ that goes back by four of them is nearly doubled."""
+    assert (RATIOS[0], RATIOS[15]) == (1, pytest.approx(0.1))
+    assert RATIOS[6 - STEP_BACK] / RATIOS[6] == pytest.approx(10 ** (4 / 15)) == pytest.approx(1.848, abs=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(200))
@@ -104,3 +136,69 @@ def test_errors_are_held_with_the_fewest_bits(seed: int) -> None:
     # Each count of a tick is up to as many places from its end, less a half.
     counts = form.max_count
     assert form.places_bits == sum(2 * counts - 1 for _ in range(counts)).bit_length() + 1
+
+
+def spec_of(**texts: str) -> TrackTachometer:
+    spec = of_texts("track", {"ppr": "500"} | {name.replace("_", "-"): text for name, text in texts.items()})
+    assert isinstance(spec, TrackTachometer)
+    return spec
+
+
+def test_ends_of_ranges() -> None:
+    assert spec_of().fine_bits == 6
+    assert [spec_of(fine_bits=bits).fine_bits for bits in ("1", "16")] == [1, 16]
+    assert [spec_of(edge_error=error).edge_error for error in ("0.05", "2")] == [Fraction(1, 20), 2]
+    beyond: tuple[dict[str, str], ...] = ({"fine_bits": "0"}, {"fine_bits": "17"}, {"edge_error": "2.01"})
+    for wrong in (*beyond, {"edge_error": "0.049"}):
+        with pytest.raises(ParameterError):
+            spec_of(**wrong)
+
+
+def test_the_shortest_tick_is_that_of_the_program() -> None:
+
+    def with_tick(cycles: int) -> TrackTachometer:
+        return spec_of(tick=str(cycles), max_time=str(500 * cycles))
+
+    shortest = with_tick(900).min_tick_cycles
+    assert with_tick(shortest).min_tick_cycles == shortest
+    with pytest.raises(ParameterError, match=f"^tick_cycles must be at least {shortest} "):
+        with_tick(shortest - 1)
+
+
+@pytest.mark.parametrize("unit", ["count/tick", "rev/s", "rpm"])
+@pytest.mark.parametrize(
+    "options", [{}, {"velocity_width": "12"}, {"bandwidth": "200rad/s"}, {"max_speed": "3000rad/s"}]
+)
+def test_the_acceleration_has_the_most_fraction_bits(unit: str, options: dict[str, str]) -> None:
+    """Its error is a quarter of an LSB at most; the greatest one fits, and so does what is rounded up."""
+    spec = spec_of(unit=unit, **options)
+    form = spec.form
+    count = Fraction({"count/tick": 1, "rev/s": 50_000**2, "rpm": 60 * 50_000**2}[unit])  # per tick²
+    count /= {"count/tick": 1}.get(unit, 2000)
+    lsb = count * Fraction(960, 2**form.unit_bits) ** 2 / 2 ** (form.frac_bits + form.extra_bits)
+
+    def fits(bits: int) -> bool:
+        one = lsb * Fraction(2) ** bits  # in LSB of the output
+        room = 2 ** (spec.acceleration_width - 1) - 2
+        return form.max_acceleration * one <= room and form.acceleration_error * one <= 1 / 8
+
+    assert spec.acceleration_frac_bits == max(bits for bits in range(-60, 60) if fits(bits))
+    assert spec.program.acceleration_factor == lsb * Fraction(2) ** spec.acceleration_frac_bits
+
+
+def test_the_velocity_is_shown_up_to_two_units_of_time_ahead() -> None:
+    form = spec_of().form
+    assert Program(form, Fraction(1, 100), 10**6).lead == 2 * 2**form.unit_bits - 1
+
+
+def test_words_lie_side_by_side() -> None:
+    """Those that change, the constants, and from 64 on 16 words for each table."""
+    program = spec_of().program
+    states = "p v a h gap gap_shifted mean before age e d r e1 e2 t x".split()
+    assert [program.address(word) for word in states] == [*range(16)]
+    assert [program.address(word) for word in program.constants] == [*range(16, 16 + len(program.constants))]
+    assert [program.address(word) for word in program.tables] == [64, 80, 96]
+    assert len(program.memory) == 64 + 3 * 16
+    for word, value in program.constants.items():
+        assert program.memory[program.address(word)] == value
+    assert not any(program.memory[16 + len(program.constants) : 64])
