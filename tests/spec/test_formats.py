@@ -10,7 +10,13 @@ import pytest
 from tachometry.spec import Encoder, ParameterError, STachometer, Timing
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 from tachometry.spec.formats.low_pass import LowPass
-from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal, _odd_neighbours
+from tachometry.spec.formats.reciprocal import (
+    DividedReciprocal,
+    NarrowReciprocal,
+    Reciprocal,
+    _odd_neighbours,
+    odd_quotient,
+)
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
 
@@ -60,6 +66,56 @@ def test_reciprocals(
     assert form.has_ties == any(
         Fraction(2 * n << frac_bits, m << halvings) % 2 == 1 for m in range(1, max_m + 1) for n in range(1, 400)
     )
+
+
+@pytest.mark.parametrize("kind", [Reciprocal, DividedReciprocal])
+@pytest.mark.parametrize("bounds", [False, True])
+@pytest.mark.parametrize("halvings", [0, 1, 3, 7])
+@pytest.mark.parametrize("max_numerator", [1, 2, 3, 28, 331])
+@pytest.mark.parametrize(("max_m", "frac_bits"), [(1, 4), (3, 4), (100, 5), (2047, 10), (2049, 16), (5000, 8)])
+def test_a_reciprocal_has_the_fewest_bits_by_its_derivation(
+    kind: type[Reciprocal], max_m: int, frac_bits: int, max_numerator: int, halvings: int, bounds: bool
+) -> None:
+    """An error of N·δ, and what is added against it, are less than half a unit of N/(2^s·m), or than the whole."""
+    form = kind(max_m, max_numerator, frac_bits, halvings, bounds)
+    error = Fraction(max_numerator, 2 if kind is Reciprocal else 1)  # |δ| is at most ½, or 1
+    digits = next(digits for digits in count(1) if max_numerator <= 4**digits // 2 - 1)
+    powers = [2**k for k in range(13)]
+    ties = any(Fraction(2 * n << frac_bits, m << halvings) % 2 == 1 for m in powers if m <= max_m for n in powers)
+    slack = int("10" * digits, 2) if bounds or ties else 0
+    assert (form.digits, form.has_ties, form.slack) == (digits, ties, slack)
+    # What is shifted in with the digits is the same for the ceiling.
+    up = next(up for up in count(int(error) + 1) if (up + slack) % 4**digits == 0)
+    assert not bounds or form.slack_up == up
+
+    def enough(scale: int) -> bool:
+        ceiling = not bounds or up + error < Fraction(2**scale, 2**halvings * max_m)
+        return slack + error < Fraction(2**scale, 2 ** max(halvings, 1) * max_m) and ceiling and scale > 2 * digits
+
+    if not (kind is DividedReciprocal and form.tried):
+        assert form.scale_bits == next(scale for scale in count() if enough(scale))
+
+
+def test_few_divisors_are_tried() -> None:
+    """Those of a table, of 2048 entries at most."""
+    assert [DividedReciprocal(max_m, 5, 16, 1).tried for max_m in (2048, 2049)] == [True, False]
+
+
+@pytest.mark.parametrize("halvings", [0, 1, 2])
+@pytest.mark.parametrize("max_numerator", [1, 7, 28, 80])
+def test_a_division_that_is_tried_has_the_fewest_bits(max_numerator: int, halvings: int) -> None:
+    """With a bit less, some quotient is wrong."""
+    form = DividedReciprocal(60, max_numerator, 8, halvings)
+    assert form.tried
+    less = form.guard_bits - 1
+    scale = less + halvings
+
+    def right(m: int) -> bool:
+        q, by = odd_quotient(8 + less, m), m << halvings
+        numbers = range(-max_numerator, max_numerator + 1)
+        return all((n * q + (1 << scale - 1)) >> scale == ((n << 9) + by) // (2 * by) for n in numbers)
+
+    assert scale <= 2 * form.digits or not all(map(right, range(1, 61)))
 
 
 @pytest.mark.parametrize("kind", [Reciprocal, DividedReciprocal, NarrowReciprocal])

@@ -94,6 +94,10 @@ def test_what_fits_the_bits_of_the_velocity(unit: str, width: int) -> None:
     assert narrow.shown_absent_bound == 2 ** (width - 1) - 1
 
 
+def test_counts_that_are_just_the_greatest_number() -> None:
+    assert [spec_of(velocity_width=8, frac_bits=4).fitting_frac_bits(counts) for counts in (127, 128)] == [0, -1]
+
+
 def test_saturated_counts_per_tick_have_an_output() -> None:
     assert not spec_of(velocity_width=27).narrow
     assert spec_of(velocity_width=27).output is None

@@ -1,5 +1,6 @@
 """Options are declared once, and every way to a core reads them alike."""
 
+import inspect
 import json
 import pickle
 import re
@@ -21,10 +22,16 @@ from tachometry.spec import (
     of_texts,
     own_options,
 )
+from tachometry.spec.axes import AxesSpec
 from tachometry.spec.manifest import manifest
 from tachometry.spec.units import Speed
 
 PPR = {"ppr": "500"}
+
+
+@pytest.mark.parametrize("made", [*METHODS.values(), AxesSpec])
+def test_parameters_are_given_by_name(made: type) -> None:
+    assert {one.kind for one in inspect.signature(made).parameters.values()} == {inspect.Parameter.KEYWORD_ONLY}
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -20,6 +20,8 @@ from tachometry.spec.units import (
     PI,
     SPEED,
     TIME,
+    TORQUE,
+    SpeedUnit,
     ceil_log2,
     parse_bandwidth,
     parse_time,
@@ -157,6 +159,18 @@ def test_sizes_of_units() -> None:
     assert [unit.exact for unit in SPEED.values()] == [1, 2 * PI, PI / 30]
     assert [unit.exact for unit in ANGLE.values()] == [1, Fraction(1, 1000), PI / 180]
     assert [unit.exact for unit in BANDWIDTH.values()] == [1, *(2 * PI * 10**power for power in (0, 3, 6, 9))]
+    assert [unit.exact for unit in TORQUE.values()] == [1, Fraction(1, 1000)]
     assert [unit.exact for unit in FRACTION.values()] == [1, Fraction(1, 100)]
     assert [unit.nearest(Fraction(7)) for unit in TIME.values()] == [7.0, 7e-3, 7e-6, 7e-9]
     assert SPEED["rpm"].nearest(Fraction(30)) == math.pi
+
+
+def test_speeds_are_shown_in_their_unit() -> None:
+    shown = [SpeedUnit(name).of(2 * math.pi) for name in ("rad/s", "rev/s", "rpm")]
+    assert shown == pytest.approx([2 * math.pi, 1, 60])
+
+
+def test_numbers_of_up_to_400_characters_are_read() -> None:
+    assert read_exactly("x", "1." + "0" * 396 + "Hz", FREQUENCY) == 1
+    with pytest.raises(ParameterError):
+        read_exactly("x", "1." + "0" * 397 + "Hz", FREQUENCY)

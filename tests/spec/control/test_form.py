@@ -241,6 +241,17 @@ def test_a_long_measurement_is_cut_into_parts() -> None:
     assert LoopSpec(tachometer=replace(CORE, timing=Timing(48_000_000, 960, 2)), period=960).longest == 7
 
 
+def test_words_of_80_bits() -> None:
+    """Each doubling of a great gain takes one more."""
+    gain = next(
+        Fraction(2**n)
+        for n in range(80, 90)
+        if LoopSpec(tachometer=CORE, position_gain=Fraction(2**n)).form.word_width == 80
+    )
+    with pytest.raises(ParameterError, match="words would have 81 bits, and 80 are the most"):
+        LoopSpec(tachometer=CORE, position_gain=2 * gain)
+
+
 def test_limits() -> None:
     with pytest.raises(ParameterError, match=r"^observer must be from 0\.01193 to 3\.015e\+08 rad/s here, not 1e\+09$"):
         LoopSpec(tachometer=CORE, observer=Fraction(10**9))

@@ -40,6 +40,13 @@ def test_estimates(frac_bits: int) -> None:
     assert entries("n2", **ADAPTIVE) == [2 * 2**frac_bits // (i + 1) for i in range(1, 32)]
 
 
+def test_n3_is_looked_up_by_the_pulses_of_a_tick_too() -> None:
+    """By Nep1 − 1, which is at most 7 and 8 here."""
+    specs = [make_spec(dt, 3, estimate=estimate) for estimate in ("n1", "n3") for dt in (8, 9)]
+    assert [spec.max_pulse_count for spec in specs] == [8, 9] * 2
+    assert [spec.depth for spec in specs] == [4, 4, 8, 16]
+
+
 def bounds_of(spec: RairanTachometer, n: int, k: int, high: bool) -> tuple[int, int, int]:
     """Lower, upper and loose bound of Ndt1 = n, or of Nep1 = n + 1, with dt·2^k; in counts per tick."""
     f, off, none = spec.frac_bits, spec.edge_error, spec.absent_bound

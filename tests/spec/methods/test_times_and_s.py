@@ -42,6 +42,12 @@ def test_a_division_takes_a_clock_a_digit_its_sign_included_and_one_for_the_divi
     assert t(max_speed=fast[1], bounds=True).division_clocks == 6 + 4 + 2
 
 
+def test_a_distance_has_as_many_bits_as_a_time_and_a_quotient_together_and_a_sign() -> None:
+    """200 clocks have 8 bits, and 20 counts have 5; ten ticks of the lattice have 4."""
+    assert [one.distance_width for one in (t(), mt(), t(timer="tick"))] == [8 + 5 + 1, 8 + 5 + 1, 4 + 1 + 1]
+    assert t(bounds=True).distance_width == 8 + 6 + 1
+
+
 def test_updates_are_a_division_apart() -> None:
     """On the lattice they come with ticks: a division of 11 clocks takes two ticks of 10, one of 11."""
     assert [t().update_spacing, mt().update_spacing] == [11, 11]
@@ -260,3 +266,7 @@ def test_a_digit_more_for_one_adder(made: Any) -> None:
     assert spec.max_count == 1
     assert spec.quotient_bits == 1 + 1 + spec.native_frac_bits + 1
     assert spec.output_serial
+    # A sum of three, too: 20 counts have five bits, and six follow.
+    three = made(encoder=Encoder(13), timing=Timing(1 << 20, 20, 10), unit="rev/s", frac_bits=-6)
+    assert (len(three.output.digits), three.native_frac_bits, three.quotient_bits) == (3, 6, 5 + 6 + 2)
+    assert three.output_serial

@@ -24,7 +24,7 @@ from tachometry.spec.registers.files import REGISTER_FILES, register_files
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import Register, RegisterMap
 from tachometry.spec.registers.page import page
-from tachometry.spec.registers.rdl import rdl
+from tachometry.spec.registers.rdl import _text, rdl
 
 SEEDS = range(8)
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
@@ -224,6 +224,14 @@ def test_a_text_without_a_register_is_noticed(text: str, tmp_path: Path, monkeyp
         fewer = Fewer(registers.spec)
         with caught():
             check(fewer if text == "client" else registers, make(fewer, "spindle"), tmp_path)
+
+
+def test_words_with_hyphens_are_not_parted() -> None:
+    """Where a text of RDL goes on in the next line, there is a space."""
+    text = " ".join(["of-many-parts"] * 40)
+    lines = _text("desc = ", text)
+    assert max(map(len, lines)) <= 110
+    assert " ".join(line.strip() for line in lines) == f'desc = "{text}";'
 
 
 @pytest.mark.parametrize("name", ["field", "mem", "property", "NAME", "PREFIX", "real", "abstract", "ref"])

@@ -1,7 +1,11 @@
 """The map of the registers: bits of their fields, and numbers of the frames, as the pages have them."""
 
+import pytest
+
 from tachometry.spec import of_texts
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers import frames
+from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import Field, RegisterMap
 from tachometry.spec.registers.values import captured_values, in_unit
 
@@ -80,6 +84,29 @@ def test_values_of_more_than_a_word_have_two() -> None:
         assert [low.captures, high.captures] == [name == "VELOCITY", False]
     assert not registers["INTERVAL"].help.startswith(("Upper", "Lower"))
     assert map_of(position_width="32")["POSITION"].fields[0].width == 32
+
+
+@pytest.mark.parametrize("command", ["ports", "generator"])
+def test_what_is_written_is_held_within_the_bits_of_its_port(command: str) -> None:
+    """But a position, which is taken modulo its period, and words that are used whole."""
+    times = {"tick": "80us", "max-time": "800us"}
+    core = of_texts("s", BASE | times | {"max-speed": "500rad/s", "position-width": "40"})
+    loop = LoopSpec(tachometer=core, gains="inputs", command=command, multiplier="parallel")
+    registers, ports = registers_of(loop), {port.name: port for port in loop.held_inputs}
+    held: set[str] = set()
+    for one, entry in zip(registers, registers.described()["map"], strict=True):
+        for field, told in zip(one.fields, entry["fields"], strict=True):
+            assert ("least" in told, "most" in told) == (field.most is not None, field.most is not None)
+            if field.most is None or field.port == "current_limit":
+                continue
+            port = ports[field.port]
+            bits = port.width - field.shift
+            least, most = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if port.signed else (0, 2**bits - 1)
+            assert (told["least"], told["most"]) == (field.least, field.most) == (least, most)
+            held.add(port.name)
+    gains = {"gain_position", "gain_velocity", "gain_acceleration", "gain_disturbance"}
+    commands = {"ports": {"command_velocity", "command_acceleration"}, "generator": {"generator_amplitude"}}
+    assert held == gains | commands[command]
 
 
 def test_numbers_of_the_serial_lines() -> None:

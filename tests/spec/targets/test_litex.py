@@ -193,6 +193,9 @@ def test_offsets_and_ports_are_those_of_the_core(method: str) -> None:
     assert names["PINS"] == [pin.name for pin in core.pins]
     assert names["OUTPUTS"] == {port.name: (port.width, port.signed) for port in core.outputs}
     assert names["CLOCK_HZ"] == core.timing.clock_hz
+    # An address is one of bytes, two bits of which are left out.
+    (high,) = re.findall(r"self\.bus\.adr\[:(\d+)\]", text)
+    assert names["SIZE"] == 4 << int(high)
 
 
 def test_another_bus_is_refused() -> None:
