@@ -29,6 +29,19 @@ def test_the_same_thousand_is_drawn_from_every_room() -> None:
     assert len(chosen) == len(set(chosen)) == 1000
     assert chosen == sample(ROOT, 1000, seed=1)
     assert {mutant.room for mutant in chosen} == set(ROOMS)
+    assert set(sample(ROOT, 100, seed=1)) < set(chosen)
+    assert set(sample(ROOT, 1000, seed=2)) != set(chosen)
+
+
+def test_a_change_elsewhere_does_not_change_what_is_drawn(tmp_path: Path) -> None:
+    """A line above, and a file that has lost all of its mutants."""
+    for file in files(ROOT):
+        text = (ROOT / file).read_text(encoding="utf-8")
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).write_text(f"\n{text}" if file != FILE else "", encoding="utf-8")
+    before = {mutant.name for mutant in sample(ROOT, 1000, seed=1) if mutant.file != FILE}
+    after = {mutant.name for mutant in sample(tmp_path, 1000, seed=1)}
+    assert before <= after
 
 
 def test_every_argument_is_of_a_mutant() -> None:
@@ -48,6 +61,13 @@ def test_the_fastest_tests_of_a_line_are_taken() -> None:
     assert chosen_for(found, "x.py", 3, 20) == ["slow", "fast"]
     assert chosen_for(found, "x.py", 1, 20) == ["fast", "slow"]
     assert chosen_for(found, "z.py", 1, 20) == []
+
+
+def test_tests_that_take_next_to_no_time_come_first() -> None:
+    """Then one of each function, and the next of each."""
+    seconds = {"f[1]": 0.01, "f[2]": 0.02, "f[3]": 1.0, "f[4]": 2.0, "g": 3.0}
+    found = {test: {"seconds": took, "lines": {"x.py": [2]}} for test, took in seconds.items()}
+    assert chosen_for(found, "x.py", 2, 20) == ["f[1]", "f[2]", "f[3]", "g", "f[4]"]
 
 
 def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:

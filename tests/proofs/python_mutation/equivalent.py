@@ -364,3 +364,28 @@ _argue(
     "It is only asked whether it is 1.",
     "0 → -1",
 )
+
+_argue(
+    "spec/formats/tracking.py: Tracking._gains",
+    "Where x reaches its most within a tick, errors of two ticks are at most those of the longest silence.",
+    "1 → 2 #3",
+)
+_argue("spec/formats/tracking_code.py: Op", "No other operation has this number.", "26 → 27")
+_argue("spec/formats/tracking_code.py: Do", "What has no word does not use what is read.", "0 → 1")
+_argue("spec/formats/reciprocal.py: _fewest", "There are as many fractions as divisors.", "True → False")
+_argue(
+    "spec/formats/velocity_output.py: VelocityOutput._constant",
+    "Without its sign, m | −m is the lowest bit that is set, as m & −m is; and the length of −2^k is that of 2^k.",
+    "multiplier & -multiplier → multiplier | -multiplier",
+)
+_argue(
+    "spec/control/form.py: ControlForm._most_error_of_gains",
+    "Coefficients that are inputs have more than 5 bits.",
+    "0 → 1",
+)
+_argue("spec/emulator.py: ", "Any of the random bits does.", "3 → 4 #2")
+_argue(
+    "spec/registers/c_header.py: comment",
+    "Compilers do not read where the lines of a comment end.",
+    *("110 → 111", "110 → 109"),
+)

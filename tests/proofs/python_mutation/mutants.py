@@ -2,7 +2,7 @@
 
 import ast
 import copy
-import random
+import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -174,9 +174,9 @@ def files(root: Path) -> list[str]:
 
 
 def sample(root: Path, n: int, seed: int) -> list[Mutant]:
-    """So many mutants of all files, at random but always the same ones; all, if there are no more."""
+    """So many mutants of all files, at random; whether one is among them hardly depends on what else there is."""
     everything = [mutant for file in files(root) for mutant in mutants_of(root, file)]
-    chosen = random.Random(seed).sample(everything, min(n, len(everything)))
+    chosen = sorted(everything, key=lambda mutant: hashlib.sha256(f"{seed} {mutant.name}".encode()).digest())[:n]
     return sorted(chosen, key=lambda mutant: (mutant.file, mutant.place, mutant.variant))
 
 
