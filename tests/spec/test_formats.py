@@ -92,7 +92,7 @@ def test_a_reciprocal_has_the_fewest_bits_by_its_derivation(
         ceiling = not bounds or up + error < Fraction(2**scale, 2**halvings * max_m)
         return slack + error < Fraction(2**scale, 2 ** max(halvings, 1) * max_m) and ceiling and scale > 2 * digits
 
-    if not (kind is DividedReciprocal and form.tried):
+    if not (isinstance(form, DividedReciprocal) and form.tried):
         assert form.scale_bits == next(scale for scale in count() if enough(scale))
 
 

@@ -87,7 +87,7 @@ def test_a_word_holds_what_the_program_computes(made: Callable[[int], Tracking],
 
 def test_levels() -> None:
     """Sixteen over a decade; λ that goes back by four of them is nearly doubled."""
-    assert (RATIOS[0], RATIOS[15]) == (1, pytest.approx(0.1))
+    assert [RATIOS[0], RATIOS[15]] == pytest.approx([1, 0.1])
     assert RATIOS[6 - STEP_BACK] / RATIOS[6] == pytest.approx(10 ** (4 / 15)) == pytest.approx(1.848, abs=1e-3)
 
 
