@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -43,20 +44,20 @@ def few(seed: int) -> Tracking:
         clock_hz=1 << 20,
         tick_cycles=tick,
         longest_tick=int(tick * 2 ** rng.uniform(0, 4)) if external else tick,
-        max_ticks=int(2 ** rng.uniform(1, 4)),
-        max_count=int(2 ** rng.uniform(0, 3)),
+        max_ticks=int(2 ** rng.uniform(1, 3)),
+        max_count=int(2 ** rng.uniform(0, 2)),
         external=external,
-        bandwidth=Fraction((1 << 20) / tick * 10 ** rng.uniform(-2, 0.5)).limit_denominator(1000),
+        bandwidth=Fraction((1 << 20) / tick * 10 ** rng.uniform(-1.5, 0)).limit_denominator(1000),
         least_memory=Fraction(rng.uniform(0.5, 0.95)).limit_denominator(100),
         edge_error=Fraction(1, 2),
         agile=bool(rng.random() < 0.5),
         growing=bool(rng.random() < 0.5),
-        velocity_bits=int(rng.integers(4, 10)),
-        fine_bits=int(rng.integers(12, 17)),
+        velocity_bits=int(rng.integers(4, 8)),
+        fine_bits=int(rng.integers(14, 17)),
     )
 
 
-@pytest.mark.parametrize("seed", range(600))
+@pytest.mark.parametrize("seed", range(1000))
 @pytest.mark.parametrize("made", [drawn, few])
 def test_a_word_holds_what_the_program_computes(made: Callable[[int], Tracking], seed: int) -> None:
     """All in counts and the unit of time U."""
@@ -89,6 +90,51 @@ def test_levels() -> None:
     """Sixteen over a decade; λ that goes back by four of them is nearly doubled."""
     assert [RATIOS[0], RATIOS[15]] == pytest.approx([1, 0.1])
     assert RATIOS[6 - STEP_BACK] / RATIOS[6] == pytest.approx(10 ** (4 / 15)) == pytest.approx(1.848, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("made", [drawn, few])
+def test_constants(made: Callable[[int], Tracking], seed: int) -> None:
+    form = made(seed)
+    one, wide, error = 2**form.frac_bits, float(form.bandwidth) / form.clock_hz, float(form.edge_error)
+    assert form.max_gap == form.longest_tick * form.max_ticks + form.longest_tick
+    assert form.max_acceleration == form.max_velocity * 2**form.extra_bits // 8
+    assert form.fixed(Fraction(3, 2)) == 1.5 * one
+    assert form.late_limit == pytest.approx((0.5 + 1.5 * error) * one, abs=0.51)
+    # The square of a quarter of E, with 17 bits.
+    assert form.mean_threshold.bit_length() == 17
+    assert form.mean_threshold / 2**form.mean_threshold_bits == pytest.approx((error / 4) ** 2, rel=2**-17)
+    per_gap = one * 2 ** (form.gap_bits - 1)
+    levels = [wide / 10 ** (level / 15) for level in range(16)]
+    assert form.rates == pytest.approx([rate * per_gap for rate in levels], rel=1e-12, abs=0.51)
+    assert form.agile_rate == pytest.approx(4 * wide * per_gap, rel=1e-12, abs=0.51)
+    # 1/λ grows by a tenth of the time. A level ends where λ is in the middle to the next, as ratios are.
+    ends = [10 * (1 / math.sqrt(rate * lower) - 1 / wide) for rate, lower in pairwise(levels)]
+    spans = [end - begin for begin, end in pairwise([0.0, *ends])]
+    longest = 2 ** (form.width - 1) - 1 - form.max_gap  # so that a gap can be added
+    assert form.spans == pytest.approx([*(min(span, longest) for span in spans), longest], rel=1e-9, abs=0.51)
+    # The first speed: all counts of a tick, and two, in the shortest time between two; with a sign.
+    fastest = (form.max_count + 2) * 2**form.unit_bits / max(form.tick_cycles // form.max_count, 1) * one
+    bits = next(bits for bits in range(200) if fastest <= 2**bits) + 1
+    assert form.start_bits == min(max(bits - form.width, 0), form.unit_bits)
+
+
+def test_constants_of_the_program() -> None:
+    form = spec_of(max_speed="1000rad/s").form
+    program, one = Program(form, Fraction(1, 100), 10), 2.0**form.frac_bits
+    expected = {
+        **{"length": 960, "length_shifted": 960 * 2 ** (form.gain_bits - 8), "several": 2 * 2**form.mean_bits},
+        **{"one": one, "three": 3 * one, "three_quarters": 0.75 * one, "lsb": 1, "lost": form.max_error * one},
+        **{"most_v": form.max_velocity, "most_a": form.max_acceleration},
+        **{"coarse_v": form.max_velocity // 2**form.start_bits, "least_gap": form.least_gap},
+        **{"error": 0.4 * one, "errors": 0.8 * one, "some_error": 0.1 * one, "late": 1.1 * one},
+        **{"mean_limit": form.mean_threshold, "rate0": form.rates[0], "agile_rate": form.agile_rate},
+        **{"most_x0": -math.log(0.7) * one, "lead": 10 + program.clocks},
+    }
+    factor, shift = program.acceleration_scale
+    assert shift == form.width - 2
+    assert factor / 2**shift == pytest.approx(0.01, rel=2 ** -(shift - 8))
+    assert program.constants == pytest.approx({**expected, "acceleration": factor}, abs=0.51)
 
 
 @pytest.mark.parametrize("seed", range(200))
@@ -201,4 +247,4 @@ def test_words_lie_side_by_side() -> None:
     assert len(program.memory) == 64 + 3 * 16
     for word, value in program.constants.items():
         assert program.memory[program.address(word)] == value
-    assert not any(program.memory[16 + len(program.constants) : 64])
+    assert not any(program.memory[:16] + program.memory[16 + len(program.constants) : 64])
