@@ -85,6 +85,23 @@ def test_manifest() -> None:
         manifest(spec_of(5, parallel=True), "position_4")
 
 
+@pytest.mark.parametrize("parallel", [False, True])
+def test_latencies(parallel: bool) -> None:
+    """An axis is looked at last 8 clocks before the tick ends. Its count is handed over four clocks later.
+
+    A turn takes two clocks more than there are from turn to turn, and holding the values one more.
+    """
+    spec = spec_of(8, parallel=parallel)
+    assert [spec.look(axis, number) for axis, number in ((0, 0), (7, 0), (3, 5))] == [0, 7, 43]
+    first, turn = 960 - 8 + 4, spec.turn_cycles
+    for axis in range(8):
+        for tick in (0, 3):
+            clock = 960 * tick + first + axis * turn + turn + 2 + parallel
+            assert spec.tick_clock(axis, tick) == clock
+    told = manifest(spec)["latency_cycles"]
+    assert told == {"pin_to_count": 2 + 8 - 1, "tick_latency": spec.tick_clock(7, 0) - 959, "tick_to_velocity": 0}
+
+
 def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
     """In rounds; and two ticks and a round for what all axes share."""
     for spec in (spec_of(), spec_of(3, tick=1000)):
@@ -112,6 +129,7 @@ def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
         (8, {"lowpass": Fraction(100)}, "lowpass must not be given together with axes: "),
         (8, {"velocity_width": 22}, "velocity_width must not be given together with axes: "),
         (8, {"max_ticks": 4096}, "max_ticks must be at most 2048 with axes, not 4096: 1/m_s is looked up"),
+        (8, {"max_ticks": 2048}, ""),
         (8, {"tick": 67 * 16}, ""),
         (
             8,

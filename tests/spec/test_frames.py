@@ -29,12 +29,21 @@ def test_requests() -> None:
 
 
 def test_answers() -> None:
-    answer = Answer((0x01020304, 5), error=True)
+    answer = Answer((0x01020304, 0x05060708), error=True)
     frame = frames.encode_answer(frames.decode_request(READ), answer)
-    assert frame[:-2] == bytes([0x89, 4, 3, 2, 1, 5, 0, 0, 0, 1])
+    assert frame[:-2] == bytes([0x89, 4, 3, 2, 1, 8, 7, 6, 5, 1])
     assert frames.decode_answer(READ, frame) == answer
     written = frames.encode_answer(frames.decode_request(WRITE), Answer((), error=False))
     assert frames.decode_answer(WRITE, written) == Answer((), error=False)
+
+
+def test_telemetry() -> None:
+    body = bytes([0xA7, 4, 3, 2, 1, 8, 7, 6, 5, 0])
+    assert frames.decode_telemetry(frames.with_check(body)) == (7, (0x01020304, 0x05060708))
+    assert frames.telemetry_length(2) == len(body) + 2
+    for wrong in (body[:-1], body[:-1] + b"\1", b"\x97" + body[1:]):
+        with pytest.raises(FrameError, match="^telemetry must "):
+            frames.decode_telemetry(frames.with_check(wrong))
 
 
 def test_the_examples_of_the_page() -> None:
