@@ -42,7 +42,7 @@ def test_telemetry() -> None:
     assert frames.decode_telemetry(frames.with_check(body)) == (7, (0x01020304, 0x05060708))
     assert frames.telemetry_length(2) == len(body) + 2
     for wrong in (body[:-1], body[:-1] + b"\1", b"\x97" + body[1:]):
-        with pytest.raises(FrameError, match="^telemetry must "):
+        with pytest.raises(FrameError, match=r"^telemetry must "):
             frames.decode_telemetry(frames.with_check(wrong))
 
 

@@ -1,14 +1,18 @@
 """Options are declared once, and every way to a core reads them alike."""
 
+import dataclasses
+import importlib
 import inspect
 import json
 import pickle
+import pkgutil
 import re
 from fractions import Fraction
 
 import pytest
 from support.options import had_by
 
+import tachometry.spec
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import (
     METHODS,
@@ -32,6 +36,14 @@ PPR = {"ppr": "500"}
 @pytest.mark.parametrize("made", [*METHODS.values(), AxesSpec])
 def test_parameters_are_given_by_name(made: type) -> None:
     assert {one.kind for one in inspect.signature(made).parameters.values()} == {inspect.Parameter.KEYWORD_ONLY}
+
+
+def test_what_is_described_does_not_change() -> None:
+    """Every dataclass of spec/ is frozen, so it can be kept in a cache and shared by processes."""
+    for module in pkgutil.walk_packages(tachometry.spec.__path__, "tachometry.spec."):
+        for name, made in vars(importlib.import_module(module.name)).items():
+            if dataclasses.is_dataclass(made):
+                assert made.__dataclass_params__.frozen, name
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -383,6 +383,13 @@ _argue(
     "Coefficients that are inputs have more than 5 bits.",
     "0 → 1",
 )
+_argue(
+    "spec/control/form.py: ControlForm.word_width",
+    "The error is held within ±(2^k − 1), and 2^k + 1 has as many bits as 2^k.",
+    "1 → 2",
+)
+_argue("spec/control/coefficients.py: control_form", "A gain has one coefficient.", "0 → -1 #2")
+_argue("spec/control/form.py: Term", "No other product has this number.", "0 → -1")
 _argue("spec/emulator.py: ", "Any of the random bits does.", "3 → 4 #2")
 _argue(
     "spec/registers/c_header.py: comment",

@@ -13,7 +13,15 @@ import pytest
 from tachometry.spec import Encoder, ParameterError, Speed, STachometer, Timing, TrackTachometer
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.coefficients import gain_per_lsb
-from tachometry.spec.control.form import GAINS, GUARD_BITS, POSITION_FRAC_BITS, ControlForm, Term
+from tachometry.spec.control.form import (
+    GAINS,
+    GUARD_BITS,
+    POSITION_FRAC_BITS,
+    Coefficients,
+    ControlForm,
+    Term,
+    coefficients,
+)
 
 CORE = STachometer(
     encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
@@ -142,10 +150,18 @@ def test_gains_of_the_options(seed: int) -> None:
         lsb, wanted = gain_per_lsb(spec, term), nominal.get(term, Fraction(1))
         assert abs(raw * lsb - wanted) <= lsb / 2
         assert spec.form.most_gain * lsb > 15.9 * wanted
+    assert spec.form.most_gain == 2**spec.form.gain_bits - 1
     # Where k_p is 0 the range is that for two equal poles.
     none = replace(spec, position_gain=Fraction(0))
     most = none.form.most_gain * gain_per_lsb(none, Term.POSITION)
     assert 15.9 < most / (spec.velocity_gain / 2) ** 2 < 33
+    # An error is held within 16 times what the gain of the option needs, or a usual one, a 32nd of the greatest.
+    for form in (spec.form, none.form):
+        position, usual = form.terms[Term.POSITION], 2**form.factor_bits // 32
+        gain = min(position.values[0] or usual, usual)
+        fixed = replace(form, terms=form.terms | {Term.POSITION: replace(position, values=(gain,))}, gain_bits=0)
+        greatest = 2 ** (form.position_width + POSITION_FRAC_BITS - 1)
+        assert form.most_error == min(16 * (fixed.most_error + 1), greatest) - 1
 
 
 @pytest.mark.parametrize(
@@ -210,8 +226,15 @@ def check_formats(form: ControlForm) -> None:
     while form.product(Term.POSITION, 2**bits - 1) < enough and 2**bits - 1 < everything and form.most_error > 1:
         bits += 1
     assert form.most_error == 2**bits - 1
+    assert form._most_others == others
     total = others + form.product(Term.POSITION, form.most_error + 1) + 1
+    assert form.most_total == total
     assert form.total_width == max(total.bit_length() + 1, form.position_width + POSITION_FRAC_BITS)
+    # z leads by less than what the sum of n + 1 currents adds, and what rounding adds, over what is forgotten in n.
+    forgets, gains = form.terms[Term.OBSERVER].values, form.terms[Term.CURRENT]
+    adds = [(n + 1) * form.current_limit * 2**gains.shift * gain for n, gain in enumerate(gains.values, 0)]
+    leads = [Fraction(add + 2**form.factor_bits, forget) for add, forget in zip(adds, forgets, strict=True)]
+    assert form.most_lead == math.ceil(max(leads))
 
 
 @pytest.mark.parametrize("number", range(len(SPECS)))
@@ -239,6 +262,11 @@ def test_a_long_measurement_is_cut_into_parts() -> None:
     assert LoopSpec(tachometer=CORE).longest == 511
     # Two ticks, as the update may come late in one, and as control ticks need not come with them: all bits of 4.
     assert LoopSpec(tachometer=replace(CORE, timing=Timing(48_000_000, 960, 2)), period=960).longest == 7
+
+
+def test_a_coefficient_just_below_a_power_of_two_has_all_bits() -> None:
+    assert coefficients([Fraction(1, 2), 1 - Fraction(1, 10**6)], 12) == Coefficients((2048, 4095), 0)
+    assert coefficients([Fraction(1), Fraction(3)], 12) == Coefficients((1024, 3072), 2)
 
 
 def test_words_of_80_bits() -> None:
