@@ -6,12 +6,16 @@ import pytest
 
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.emulator import (
+    BOUNCE_BITS,
     BOUNCE_WIDTH,
+    DROP_BITS,
     DROP_WIDTH,
     ERROR_WIDTH,
     FINE_WIDTH,
     JITTER_WIDTH,
     PHASE_WIDTH,
+    RANDOM_TAP,
+    RANDOM_WIDTH,
     START,
     EmulatorSettings,
     fastest,
@@ -44,3 +48,20 @@ def test_how_wrong_the_lines_can_be() -> None:
 def test_nothing_is_wrong_with_the_lines_unless_it_is_told() -> None:
     nothing = dict.fromkeys(("speed", "rate", "phase_error", "duty_a", "duty_b", "jitter", "bounce", "drop"), 0)
     assert EmulatorSettings() == EmulatorSettings(**nothing)
+
+
+def test_the_random_bits_come_again_after_the_longest_time() -> None:
+    """The polynomial x^31 + x^28 + 1 has no factor, as x^(2^31) is x modulo it, and 2^31 − 1 and 31 are primes."""
+    polynomial = 1 << RANDOM_WIDTH | 1 << RANDOM_TAP | 1
+
+    def remainder(number: int) -> int:
+        while (more := number.bit_length() - polynomial.bit_length()) >= 0:
+            number ^= polynomial << more
+        return number
+
+    power = 0b10  # x
+    for _ in range(RANDOM_WIDTH):
+        power = remainder(int(f"{power:b}", 4))  # the square has a 0 between two bits
+    assert (RANDOM_WIDTH, power) == (31, 0b10)
+    bits = [*BOUNCE_BITS, *(first + more for first in DROP_BITS for more in range(DROP_WIDTH))]
+    assert max(bits) < RANDOM_WIDTH

@@ -1,6 +1,5 @@
 """Options are declared once, and every way to a core reads them alike."""
 
-import dataclasses
 import importlib
 import inspect
 import json
@@ -8,7 +7,6 @@ import pickle
 import pkgutil
 import re
 from fractions import Fraction
-from typing import Any
 
 import pytest
 from support.options import had_by
@@ -42,9 +40,9 @@ def test_parameters_are_given_by_name(made: type) -> None:
 def test_what_is_described_does_not_change() -> None:
     """Every dataclass of spec/ is frozen, so it can be kept in a cache and shared by processes."""
     for module in pkgutil.walk_packages(tachometry.spec.__path__, "tachometry.spec."):
-        found: dict[str, Any] = vars(importlib.import_module(module.name))
-        for name, made in found.items():
-            assert not dataclasses.is_dataclass(made) or made.__dataclass_params__.frozen, name
+        for name, made in vars(importlib.import_module(module.name)).items():
+            params = getattr(made, "__dataclass_params__", None)
+            assert params is None or params.frozen, name
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -390,7 +390,12 @@ _argue(
 )
 _argue("spec/control/coefficients.py: control_form", "A gain has one coefficient.", "0 → -1 #2")
 _argue("spec/control/form.py: Term", "No other product has this number.", "0 → -1")
-_argue("spec/emulator.py: ", "Any of the random bits does.", "3 → 4 #2")
+_argue("spec/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))
+_argue(
+    "spec/docstrings.py: with_inherited",
+    "The heading is then taken for a name, which no parameter has.",
+    "1 → 0",
+)
 _argue(
     "spec/registers/c_header.py: comment",
     "Compilers do not read where the lines of a comment end.",
