@@ -236,7 +236,10 @@ def _between(form: Reciprocal) -> Sequence[tuple[tuple[int, int], tuple[int, int
 
 
 def _odd_neighbours(numerator: int, denominator: int, most: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The nearest fractions below and above one, with odd numerators and denominators of at most `most`."""
+    """The nearest fractions below and above one, with odd numerators and denominators of at most `most`.
+
+    The one between has an even numerator in its lowest terms, or a greater denominator.
+    """
     a, b = numerator // denominator, 1  # at most the fraction
     c, d = a + 1, 1  # above it
     while b + d <= most:
@@ -249,7 +252,7 @@ def _odd_neighbours(numerator: int, denominator: int, most: int) -> tuple[tuple[
             steps = min((above - 1) // below, (most - d) // b) if below else (most - d) // b
             c, d = c + steps * a, d + steps * b
     lower, upper = (a, b), (c, d)
-    if a % 2 == 0 or a * denominator == b * numerator:
+    if a % 2 == 0:
         times = (most + d) // b
         lower = times * a - c, times * b - d
     if c % 2 == 0:

@@ -72,11 +72,18 @@ def test_tests_that_take_next_to_no_time_come_first() -> None:
 
 def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:
     (tmp_path / "test_x.py").write_text("from tachometry.spec.units import PI\nfrom tachometry.spec import numbers\n")
-    entry = {"seconds": 1.0, "lines": {"spec/units.py": [3]}}
-    found = with_imports(tmp_path, {"": {"seconds": 0.0, "lines": {}}, "test_x.py::test_pi": entry})
+    (tmp_path / "test_y.py").write_text("import tachometry.spec\n")
+    entry, all_files = {"seconds": 1.0, "lines": {"spec/units.py": [3]}}, ("spec/units.py", "spec/numbers.py", "x.py")
+    before = {
+        "": {"seconds": 0.0, "lines": {file: [1] for file in all_files}},
+        "test_x.py::test_pi": entry,
+        "test_y.py::test_all": {"seconds": 2.0, "lines": {}},
+    }
+    found = with_imports(tmp_path, before)
     lines = found["test_x.py::test_pi"]["lines"]
     assert (lines["spec/units.py"], lines["spec/numbers.py"]) == ([3], [])
-    assert chosen_for(found, "spec/numbers.py", 5, 20) == ["test_x.py::test_pi"]
+    assert found["test_y.py::test_all"]["lines"].keys() == {"spec/units.py", "spec/numbers.py"}
+    assert chosen_for(found, "spec/numbers.py", 5, 20) == ["test_x.py::test_pi", "test_y.py::test_all"]
 
 
 SCRIPT = """

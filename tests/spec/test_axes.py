@@ -57,7 +57,8 @@ def test_ports() -> None:
         **dict.fromkeys(("a", "b", "z"), 5),
         **dict.fromkeys(("axis", "decode_error_axis", "index_axis"), 3),
     }
-    assert next(port.width for port in spec_of(1).ports if port.name == "axis") == 1  # no port has no bits
+    widths = [next(port.width for port in spec_of(axes).ports if port.name == "axis") for axes in (1, 2, 8, 9)]
+    assert widths == [1, 1, 3, 4]  # no port has no bits
     held = spec_of(5, index=True, parallel=True)
     values = {name for strobe in held.axis.strobes.values() for name in strobe}
     assert {port.name for port in held.ports} == {
@@ -104,10 +105,10 @@ def test_latencies(parallel: bool) -> None:
 
 def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
     """In rounds; and two ticks and a round for what all axes share."""
-    for spec in (spec_of(), spec_of(3, tick=1000)):
+    for spec in (spec_of(), spec_of(3, tick=1000), spec_of(5, tick=1000)):
         own = spec.axis.recovery_clocks
         assert own is not None
-        shared = 2 * spec.timing.tick_cycles + {8: 8, 4: 4}[spec.slots]
+        shared = 2 * spec.timing.tick_cycles + {8: 8, 4: 4, 5: 8}[spec.slots]
         assert spec.recovery_clocks == manifest(spec, "t")["recovery_cycles"] == spec.slots * own + shared
 
 

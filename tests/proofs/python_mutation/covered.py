@@ -76,16 +76,22 @@ def covered(root: Path, files: Sequence[str], tests: Sequence[str], folder: Path
 
 
 def with_imports(root: Path, found: Covered) -> Covered:
-    """Also the files that the file of a test imports: it may use what was computed when they were imported."""
+    """Also the files that the file of a test imports: it may use what was computed when they were imported.
+
+    Who imports a package as a whole looks at all of its files.
+    """
     imported: dict[str, set[str]] = {}
+    ours = {name for entry in found.values() for name in entry["lines"]}
     for test, entry in found.items():
         file = test.split("::")[0]
         if file and file not in imported:
-            nodes = ast.walk(ast.parse((root / file).read_text(encoding="utf-8")))
+            nodes = [*ast.walk(ast.parse((root / file).read_text(encoding="utf-8")))]
             froms = [node for node in nodes if isinstance(node, ast.ImportFrom)]
             names = {f"{node.module}.{name}" for node in froms for name in ("", *(alias.name for alias in node.names))}
-            ours = {name.removeprefix("tachometry.").strip(".") for name in names if name.startswith("tachometry.")}
-            imported[file] = {f"{name.replace('.', '/')}.py" for name in ours}
+            paths = {name.removeprefix("tachometry.").strip(".").replace(".", "/") for name in names}
+            whole = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+            rooms = tuple(f"{name.removeprefix('tachometry.')}/" for name in whole if name.startswith("tachometry."))
+            imported[file] = {name for name in ours if name.removesuffix(".py") in paths or name.startswith(rooms)}
         for name in imported.get(file, ()):
             entry["lines"].setdefault(name, [])
     return found

@@ -280,7 +280,31 @@ def test_words_of_80_bits() -> None:
         LoopSpec(tachometer=CORE, position_gain=2 * gain)
 
 
+def test_times() -> None:
+    """Seven products, one for each term, and two clocks to hold their sum; without the filter three for the first."""
+    for multiplier, filter, clocks in (
+        *(("serial", Fraction(40), lambda p: 7 * (p + 4) + 2), ("parallel", Fraction(40), lambda p: 7 * 6 + 2)),
+        *(("serial", None, lambda p: 6 * (p + 4) + 3 + 2), ("parallel", None, lambda p: 6 * 6 + 3 + 2)),
+    ):
+        spec = LoopSpec(tachometer=CORE, multiplier=multiplier, filter=filter)
+        assert spec.latency == clocks(spec.form.factor_bits)
+        assert spec.least_period == spec.latency + 1
+        # A control tick comes a clock behind the first update, which is late from the last clock of the tick on.
+        assert spec.first_tick == 959 + CORE.tick_latency + CORE.tick_to_velocity + 1
+
+
+def test_coefficients_of_40_bits() -> None:
+    """Each halving of a small gain takes one more."""
+    found = (LoopSpec(tachometer=CORE, position_gain=Fraction(1, 2**n)) for n in range(100))
+    gain = next(spec.position_gain for spec in found if spec.form.factor_bits == 40)
+    with pytest.raises(ParameterError, match=r"^kp must fit the other gains: coefficients would have 41 bits"):
+        LoopSpec(tachometer=CORE, position_gain=gain / 2)
+
+
 def test_limits() -> None:
+    assert LoopSpec(tachometer=CORE).current_width == 16
+    with pytest.raises(ParameterError, match=r"^velocity_filter must be greater than 0, not 0$"):
+        LoopSpec(tachometer=CORE, filter=Fraction(0))
     with pytest.raises(ParameterError, match=r"^observer must be from 0\.01193 to 3\.015e\+08 rad/s here, not 1e\+09$"):
         LoopSpec(tachometer=CORE, observer=Fraction(10**9))
     with pytest.raises(ParameterError, match=r"^current_width must be from 8 to 24, not 25$"):
