@@ -328,5 +328,6 @@ def test_a_unit_of_its_own_is_only_held_within_its_bits() -> None:
     assert VelocityOutput(Fraction(1), 1000, 12).limit == 1000
     halves = [VelocityOutput(Fraction(1, 8), 1001, 30, bounds) for bounds in (False, True)]
     assert [form.greatest for form in halves] == [125, 126]
+    assert halves[1].rounding() == halves[1].rounding(0) == 2 ** (halves[1].shift - 1)
     nothing = VelocityOutput(Fraction(1, 10**9), 5, 30)
     assert (nothing.multiplier, nothing.shift, nothing.digits, nothing.scaled(5)) == (0, 0, (), 0)

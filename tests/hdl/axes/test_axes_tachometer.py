@@ -62,6 +62,21 @@ def test_the_first_edge_that_counts_is_between_the_looks_of_the_second_and_third
     assert counted == [int(clock + 2 > spec.slots * 2 + axis) for axis in range(spec.axes)]
 
 
+def test_a_run_that_ends_earlier_has_the_same_rows_until_then() -> None:
+    """Wherever it ends."""
+    spec = small(2, index=True)
+    trace = motions(spec, 400)
+    whole = golden.run(spec, trace)
+    for n_clocks in range(300, 400):
+        short = golden.run(spec, trace.until(n_clocks))
+        for strobe, table in whole.tables.items():
+            before = table.rows(table.clock < n_clocks)
+            found = short.tables[strobe]
+            assert found.clock.tolist() == before.clock.tolist()
+            for name in table.columns:
+                assert found[name].tolist() == before[name].tolist(), (strobe, name)
+
+
 MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
     "begins with the wrong axis": (AxesDatapath, "(self.slot == 0)", "(self.slot == 1)", {}),
     "handed over to another": (

@@ -23,6 +23,23 @@ _argue(
     "The first change of all that are looked at has held, so none looks for what was before it.",
     "0 → -1",
 )
+_argue("sim/golden/emulator.py: ", "It is worked out in parts, and their length does not change what comes.", "18 → 17")
+_argue("sim/golden/emulator.py: GoldenEmulator.trace", "Nothing is shown of what comes after the end.", "False → True")
+_argue(
+    "sim/golden/emulator.py: GoldenEmulator._speeds",
+    "What lies behind the clock after the last one is not used.",
+    "1 → 2 #2",
+)
+_argue(
+    "sim/golden/emulator.py: GoldenEmulator._play",
+    "Without a draw all that has been moved has been moved alike.",
+    "1 → 0 #4",
+)
+_argue(
+    "sim/golden/methods/adaptive.py: adaptive_windows",
+    "The window from reset begins anew, whatever it is told.",
+    "False → True",
+)
 _argue(
     "sim/golden/axes.py: seen",
     "It may be longer than is needed: what is shown after the end of the trace is cut off.",
@@ -46,7 +63,7 @@ _argue(
 _argue(
     "sim/golden/emulator.py: GoldenEmulator._speeds",
     "Where the speed has turned to the target itself, it is the same which of the two is taken.",
-    "self._turned >= target → self._turned > target",
+    *("self._turned >= target → self._turned > target", "self._turned <= target → self._turned < target"),
 )
 _argue(
     "sim/golden/emulator.py: GoldenEmulator._play",
@@ -372,6 +389,10 @@ _argue(
 )
 _argue("spec/formats/tracking_code.py: Op", "No other operation has this number.", "26 → 27")
 _argue("spec/formats/tracking_code.py: Do", "What has no word does not use what is read.", "0 → 1")
+_argue("spec/formats/tracking_code.py: assembled", "It is replaced when the address is known.", "0 → -1 #2")
+_argue("spec/formats/tracking_code.py: assembled.wait", "A wait does not use the word that is read.", "0 → 1")
+_argue("spec/formats/reciprocal.py: _narrowest", "There are as many fractions as divisors.", "True → False")
+_argue("spec/methods/mt.py: MTTachometer.max_interval", "A window takes a period at least anyway.", "0 → -1")
 _argue("spec/formats/reciprocal.py: _fewest", "There are as many fractions as divisors.", "True → False")
 _argue(
     "spec/formats/velocity_output.py: VelocityOutput._constant",

@@ -41,6 +41,11 @@ def test_without_an_index_its_line_is_not_looked_at() -> None:
     assert decoded(spec_of(index="yes"), trace).index.tolist() == [7 + 2, 30 + 2]
 
 
+def test_the_position_of_an_index_before_and_after_counts() -> None:
+    _, index = count(spec_of(index="yes"), steps_of([30, 40, 50], [1, 1, -1], [20, 35, 40, 60]), np.arange(9, 76, 10))
+    assert index["index_position"].tolist() == [0, 1, 2, 1]
+
+
 def test_a_glitch_is_counted_when_the_line_has_gone_back() -> None:
     """Two clocks later the synchroniser shows the level to which it went back, and one more clock counts."""
     spec = spec_of(filter="3")

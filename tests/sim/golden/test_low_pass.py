@@ -158,21 +158,22 @@ def test_a_method_without_updates_at_rest_ends_at_0() -> None:
     assert ends[-1] > 0  # others go on, and so does the filter
 
 
-def test_the_first_update_is_filtered_from_0_and_so_is_the_first_after_rest() -> None:
+@pytest.mark.parametrize(("lowpass", "bits"), [(10_000, 3), (1000, 6)])
+def test_the_first_update_is_filtered_from_0_and_so_is_the_first_after_rest(lowpass: int, bits: int) -> None:
     """By fractions: y = u + E·(0 − u), rounded to 2^−k and then to an LSB; at rest the state is just 0."""
     rairan = RairanTachometer(
         encoder=Encoder(100),
         timing=Timing(1_000_000, 100, 50),
-        lowpass=Fraction(10_000),
+        lowpass=Fraction(lowpass),
         max_speed=Speed(Fraction(200)),
     )
     form, half = rairan.low_pass, Fraction(1, 2)
-    assert form.extra_bits == 3  # E = 1/e
+    assert form.extra_bits == bits
     factor = Fraction(form.tables[0][1], 2**form.factor_bits)
-    assert factor == pytest.approx(math.exp(-1))
+    assert factor == pytest.approx(math.exp(-lowpass * 1e-4))
 
     def wanted(u: int) -> int:
-        y = u + math.floor(factor * -u * 8 + half) / Fraction(8)
+        y = u + math.floor(factor * -u * 2**bits + half) / Fraction(2**bits)
         return math.floor(y + half)
 
     values = [*range(-100, 100), 77_777]

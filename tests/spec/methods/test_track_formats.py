@@ -117,6 +117,7 @@ def test_constants(made: Callable[[int], Tracking], seed: int) -> None:
     fastest = (form.max_count + 2) * 2**form.unit_bits / max(form.tick_cycles // form.max_count, 1) * one
     bits = next(bits for bits in range(200) if fastest <= 2**bits) + 1
     assert form.start_bits == min(max(bits - form.width, 0), form.unit_bits)
+    assert Program(form, Fraction(1, 100), 10).constants["coarse_v"] == form.max_velocity // 2**form.start_bits
 
 
 def test_constants_of_the_program() -> None:
