@@ -247,6 +247,8 @@ _argue(
     f"{_TIMED}: _asking",
     "More measurements are looked at, or none fewer whose velocity decays: each tick is held against it later.",
     *("1 → 2 #3", "1 → 0 #3", "'left' → 'right'", "'left' → 'right' #2", "1 → 2 #4"),
+    "places(ticks.clock, latest, 'left') - places(ticks.clock, taken.clock, 'left') → "
+    "places(ticks.clock, latest, 'left') + places(ticks.clock, taken.clock, 'left')",
     "np.abs(_greatest(spec, held, np.maximum(longest, 1))) < np.abs(held) → "
     "np.abs(_greatest(spec, held, np.maximum(longest, 1))) <= np.abs(held)",
 )

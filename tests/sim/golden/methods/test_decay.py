@@ -94,6 +94,18 @@ def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> It
                 yield Row(clock, velocity, age, True, least, most)
 
 
+@pytest.mark.parametrize("timer", ["clock", "tick"])
+def test_a_velocity_decays_by_an_lsb_at_least(timer: str) -> None:
+    """After every measurement, and though an LSB is so coarse that it lasts for many ticks."""
+    timing = Timing(100 * TICK, TICK, 60)
+    spec = TTachometer(encoder=Encoder(25), timing=timing, frac_bits=4, timer=timer)
+    counts = {first + gap: 1 for first in range(2 * TICK, 200 * TICK, 50 * TICK) for gap in (0, 2 * TICK)}
+    updates = updates_of(spec, counts, 200 * TICK)
+    velocity, forced = updates.velocity, updates["forced"].astype(bool)
+    assert np.count_nonzero(forced) > 20
+    assert (velocity[1:][forced[1:]] < velocity[:-1][forced[1:]]).all()
+
+
 def rounded(value: Fraction, frac_bits: int) -> Fraction:
     """To the nearest multiple of 2^−f, ties upward."""
     return Fraction(math.floor(value * 2**frac_bits + Fraction(1, 2)), 2**frac_bits)
