@@ -201,6 +201,20 @@ def test_ends_of_ranges() -> None:
             spec_of(**wrong)
 
 
+def test_widths_and_delays() -> None:
+    assert [spec_of(velocity_width=width).acceleration_width for width in ("30", "39", "40", "60")] == [38, 47, 48, 48]
+    for unit in ("count/tick", "rpm"):
+        spec = spec_of(unit=unit, lowpass="100Hz")
+        assert spec.low_pass_latency > 0
+        assert (spec.output_latency > 0) == (unit == "rpm")
+        program, around = spec.low_pass_latency + spec.output_latency, spec.pin_to_count + spec.tick_latency
+        assert spec.program.delay == around + 3 + program
+    wide = {"tick": "40us", "max_time": "20s", "frac_bits": "24"}
+    assert spec_of(bandwidth="20rad/s", **wide).form.width == 64
+    with pytest.raises(ParameterError, match="its words would have 65 bits, and 64 are the most"):
+        spec_of(bandwidth="10rad/s", **wide)
+
+
 def test_the_shortest_tick_is_that_of_the_program() -> None:
 
     def with_tick(cycles: int) -> TrackTachometer:

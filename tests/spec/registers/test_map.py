@@ -5,6 +5,7 @@ import pytest
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers import frames
+from tachometry.spec.registers.demo import DemoMap
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import Field, RegisterMap
 from tachometry.spec.registers.values import captured_values, in_unit
@@ -107,6 +108,33 @@ def test_what_is_written_is_held_within_the_bits_of_its_port(command: str) -> No
     gains = {"gain_position", "gain_velocity", "gain_acceleration", "gain_disturbance"}
     commands = {"ports": {"command_velocity", "command_acceleration"}, "generator": {"generator_amplitude"}}
     assert held == gains | commands[command]
+
+
+def test_bits_of_a_loop() -> None:
+    core = of_texts("s", BASE | {"tick": "80us", "max-time": "800us", "max-speed": "500rad/s", "position-width": "40"})
+    ports = registers_of(LoopSpec(tachometer=core, gains="inputs", multiplier="parallel"))
+    made = registers_of(LoopSpec(tachometer=core, gains="inputs", command="generator", multiplier="parallel"))
+    assert bits(ports, "LOOP") == [("enable", 0, 1), ("freeze", 1, 1)]
+    assert bits(made, "LOOP") == [("enable", 0, 1), ("freeze", 1, 1), ("mode", 4, 2)]
+    assert all(field.writable for field in made["LOOP"].fields)
+    words = [ports[f"COMMAND_POSITION_{end}"].fields[0] for end in ("LOW", "HIGH")]
+    # 40 bits before the point, and eight behind it.
+    assert [(word.shift, word.kept, word.signed) for word in words] == [(0, 32, False), (32, 16, True)]
+    limit = ports["CURRENT_LIMIT"].fields[0]
+    assert (limit.least, limit.most, limit.reset) == (0, limit.reset, limit.most)
+    told = {text.removeprefix("One LSB of generator_") for *_, text in made.quantities}
+    units = {"velocity": "counts/tick", "acceleration": "counts/tick²", "amplitude": "counts", "rate": "1"}
+    assert told >= {f"{name} in {unit}; a tick is a control tick." for name, unit in units.items()}
+
+
+def test_bits_of_a_demo() -> None:
+    """As docs/boards.md has them."""
+    demo = DemoMap(of_texts("s", BASE | {"max-speed": "500rad/s"}))
+    assert bits(demo, "DEMO") == [("emulated", 0, 1), ("restart", 1, 1), ("jump", 2, 1)]
+    assert [field.single for field in demo["DEMO"].fields] == [False, True, True]
+    assert bits(demo, "ERRORS") == [("phase_error", 0, 8), ("duty_a", 8, 8), ("duty_b", 16, 8)]
+    assert bits(demo, "NOISE") == [("jitter", 0, 6), ("bounce", 8, 8), ("drop", 16, 8)]
+    assert bits(demo, "TELEMETRY") == [("telemetry_period", 0, 16)]
 
 
 def test_numbers_of_the_serial_lines() -> None:
