@@ -88,6 +88,8 @@ def test_recovery() -> None:
         assert spec.recovery_clocks == 2 + 1 + begun + silence(10, tick) + 2
     for clocks, held in ((1, 2), (2, 2), (3, 4), (5, 8), (255, 256)):
         assert spec_of(20, filter_clocks=clocks).recovery_clocks == 2 + held + clocks + 1 + 33 + silence(10, 20) + 2
+    # From 16 clocks on the tick is counted otherwise.
+    assert [spec_of(tick).front_recovery_clocks for tick in (15, 16, 17)] == [2 + 1 + 1 + bits for bits in (16, 32, 32)]
     long = spec_of(20, average=200)
     assert long.recovery_clocks == 2 + 1 + 33 + 201 * 20 + long.tick_to_velocity + 2
     assert spec_of(20, max_tick_cycles=50).recovery_clocks == 2 + 1 + 65 + silence(10, 50) + 2

@@ -145,7 +145,7 @@ _argue(
 _argue(
     f"{_REGISTERS}._lost",
     "No update is in clock 0; what stands for one before the first is negative, and never later than a capture.",
-    *("before >= 0 → before > 0", "0 → -1", "1 → 2"),
+    *("before >= 0 → before > 0", "0 → -1", "1 → 2", "1 → 2 #3", "1 → 0 #3"),
 )
 _argue(
     f"{_REGISTERS}.answers",
@@ -419,6 +419,7 @@ _argue(
     "The heading is then taken for a name, which no parameter has.",
     "1 → 0",
 )
+_argue("spec/registers/rdl.py: _text", "The end of a line is a space to who reads it.", *("110 → 111", "110 → 109"))
 _argue(
     "spec/registers/c_header.py: comment",
     "Compilers do not read where the lines of a comment end.",

@@ -7,10 +7,10 @@ tick is in clock 10·k + 11, and its update a clock later.
 import numpy as np
 import pytest
 
-from tachometry.sim.golden.registers import Access, GoldenBank
+from tachometry.sim.golden.registers import Access, GoldenBank, written
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import of_texts
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.registers.map import Field, RegisterMap
 
 CORE = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "40", "frac-bits": "4", "max-speed": "1e6rad/s"}
 COUNTS = 400
@@ -212,3 +212,15 @@ def test_constants() -> None:
         int.from_bytes(b"TACH", "big"),
         bank.map.configuration,
     ]
+
+
+def test_two_that_capture_in_one_clock_are_one_capture() -> None:
+    bank = Bank(pins())
+    status = bank.ask((0, "CONTROL", 2), (81, "STATUS", None), captures=(61, 80, 80))[1]
+    assert bank.flag(status, "updated") == 1
+
+
+@pytest.mark.parametrize(("data", "taken"), [(0x4000_0000, 127), (0x7FFF_FFFF, 127), (0x8000_0000, -128), (5, 5)])
+def test_what_is_written_is_held_within_the_range_of_its_field(data: int, taken: int) -> None:
+    field = Field("value", 32, bits=8, signed=True, least=-128, most=127, writable=True, port="x")
+    assert written(field, data, 0) == taken
