@@ -1,7 +1,10 @@
 """Parameters of a base class in the docstring of a class."""
 
+from dataclasses import fields
+
 import pytest
 
+from tachometry.spec import METHODS
 from tachometry.spec.docstrings import with_inherited
 
 BASE = """A base.
@@ -49,3 +52,9 @@ def test_without_parameters_of_a_base_the_docstring_stays(own: str | None, base:
 @pytest.mark.parametrize("own", [None, "", "   "])
 def test_a_class_without_a_docstring_gets_none(own: str | None) -> None:
     assert with_inherited(own, BASE) == own
+
+
+def test_parameters_of_all_cores_are_in_the_docstring_of_each() -> None:
+    for made in METHODS.values():
+        for one in fields(made):
+            assert f"\n{one.name}" in (made.__doc__ or "") or f", {one.name}" in (made.__doc__ or ""), (made, one.name)

@@ -391,6 +391,8 @@ _argue(
 )
 _argue("spec/formats/tracking_code.py: Op", "No other operation has this number.", "26 → 27")
 _argue("spec/formats/tracking_code.py: Do", "What has no word does not use what is read.", "0 → 1")
+_argue("spec/axes.py: _nearest", "No tick of one clock has a turn of an axis.", "0 → 1")
+_argue("spec/registers/values.py: CapturedValue.field", "A register of a value has one field.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled", "It is replaced when the address is known.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled.wait", "A wait does not use the word that is read.", "0 → 1")
 _argue("spec/formats/reciprocal.py: _narrowest", "There are as many fractions as divisors.", "True → False")

@@ -22,6 +22,7 @@ from tachometry.spec.control.form import (
     Term,
     coefficients,
 )
+from tachometry.spec.option import options_of
 
 CORE = STachometer(
     encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
@@ -253,6 +254,9 @@ def test_a_tracking_core_has_no_filter() -> None:
     core = TrackTachometer(encoder=Encoder(500), max_speed=Speed.parse("1000rad/s"), velocity_width=16)
     assert LoopSpec(tachometer=core).filter is None
     assert LoopSpec(tachometer=CORE).filter == 40
+    (told,) = (about for about in options_of(LoopSpec) if about.field == "filter")
+    assert told.parse is not None
+    assert [told.parse("x", text) for text in ("none", " NONE ", "40rad/s")] == [None, None, 40]
     assert replace(LoopSpec(tachometer=CORE), observer=Fraction(80)).period == 960
 
 

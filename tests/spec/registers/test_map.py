@@ -69,6 +69,8 @@ def test_bits_of_control_counters_and_status() -> None:
     assert bits(registers, "STATUS") == [
         (name, low, 1) for low, name in enumerate(("updated", "indexed", "forced", "overflow", "stalled"))
     ]
+    ports = [field.port for field in registers["STATUS"].fields]
+    assert ports == ["", "", "forced", "overflow", "stalled"]  # what is not of the core comes first
     assert registers["IDENTIFICATION"].reset == 0x54414348  # TACH
     assert [one.reset for one in registers if not one.constant] == [0] * 8
 
