@@ -57,11 +57,30 @@ def few(seed: int) -> Tracking:
     )
 
 
-@pytest.mark.parametrize("seed", range(1000))
-@pytest.mark.parametrize("made", [drawn, few])
-def test_a_word_holds_what_the_program_computes(made: Callable[[int], Tracking], seed: int) -> None:
+Made = Callable[[int], Tracking]
+
+
+def for_each(n: int, *kinds: Made) -> Callable[[Callable[[Tracking], None]], Callable[[Made], None]]:
+    """A test of n cores of each kind, which tells the one that fails."""
+
+    def decorated(check: Callable[[Tracking], None]) -> Callable[[Made], None]:
+        @pytest.mark.parametrize("made", kinds)
+        def test(made: Made) -> None:
+            for seed in range(n):
+                try:
+                    check(made(seed))
+                except AssertionError as error:
+                    error.add_note(f"{made.__name__}({seed})")
+                    raise
+
+        return test
+
+    return decorated
+
+
+@for_each(1000, drawn, few)
+def test_a_word_holds_what_the_program_computes(form: Tracking) -> None:
     """All in counts and the unit of time U."""
-    form = made(seed)
     unit, counts, error = 2.0**form.unit_bits, form.max_count, 2 * form.max_count + 2
     assert form.max_error == error
     speed, change = (most / 2.0**form.frac_bits for most in (form.max_velocity, form.max_acceleration))
@@ -92,10 +111,8 @@ def test_levels() -> None:
     assert RATIOS[6 - STEP_BACK] / RATIOS[6] == pytest.approx(10 ** (4 / 15)) == pytest.approx(1.848, abs=1e-3)
 
 
-@pytest.mark.parametrize("seed", range(100))
-@pytest.mark.parametrize("made", [drawn, few])
-def test_constants(made: Callable[[int], Tracking], seed: int) -> None:
-    form = made(seed)
+@for_each(100, drawn, few)
+def test_constants(form: Tracking) -> None:
     one, wide, error = 2**form.frac_bits, float(form.bandwidth) / form.clock_hz, float(form.edge_error)
     assert form.max_gap == form.longest_tick * form.max_ticks + form.longest_tick
     assert form.max_acceleration == form.max_velocity * 2**form.extra_bits // 8
@@ -138,10 +155,9 @@ def test_constants_of_the_program() -> None:
     assert program.constants == pytest.approx({**expected, "acceleration": factor}, abs=0.51)
 
 
-@pytest.mark.parametrize("seed", range(200))
-def test_the_unit_of_time(seed: int) -> None:
+@for_each(200, drawn)
+def test_the_unit_of_time(form: Tracking) -> None:
     """As long as possible up to 1/(4·λ_0), but half the longest tick at least."""
-    form = drawn(seed)
     unit, most = 2**form.unit_bits, form.clock_hz / (4 * form.bandwidth)
     half = form.longest_tick / 2
     assert unit > half
@@ -160,10 +176,9 @@ def gains(form: Tracking) -> list[tuple[int, float]]:
     ]
 
 
-@pytest.mark.parametrize("seed", range(200))
-def test_errors_are_held_with_the_fewest_bits(seed: int) -> None:
+@for_each(200, drawn)
+def test_errors_are_held_with_the_fewest_bits(form: Tracking) -> None:
     """As in the error analysis: half an LSB of the velocity, and of the position."""
-    form = drawn(seed)
     found, u = gains(form), 2**form.unit_bits / form.tick_cycles
     more = next(bits for bits in range(10) if bits == 9 or all(m / (d * u) <= 2**bits for m, d in found))
     assert form.extra_bits == more
