@@ -214,28 +214,27 @@ class Tracking:
     @cached_property
     def width(self) -> int:
         """W: bits of a word."""
-        counts, moved = self.max_count, self._moved
         # The greatest d²·U/gap and d³·(U/gap)², which are those of the greatest x.
         rate = (AGILE if self.agile else 1) * self.rate(0) * (1 << self.unit_bits)
         d = 1 - math.exp(-self.most(0))
         of_v, of_a = rate * d**2 / self.most(0), rate**2 * d**3 / self.most(0) ** 2
         greatest = max(
-            counts * (counts + moved),  # the sum over the counts of a tick
             # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
             self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
             # What is multiplied: on its way to a product the adder holds nearly twice as much. The rest of it is less
-            # than another term: v·Στ is less than the sum over the counts; and e·d than h, or, where R < 2, than 4·e.
+            # than another term: v·Στ, as the sum over the counts of a tick, is less than the dividend of their mean;
+            # and e·d is less than h, or, where R < 2, than 4·e.
             2 * self.max_error * of_v * 2 ** (self.extra_bits + self.ratio_range),  # h
             2 * self.max_acceleration / 2**self.frac_bits,
             2.25 * self.max_velocity / 2**self.frac_bits,
             4 * self.max_error,  # e less its mean
             self.max_acceleration / 2**self.frac_bits + self.max_error * of_a * 2**self.extra_bits,
-            2 * self.max_error + 2 * moved + 2,  # p
+            2 * self.max_error + 2 * self._moved + 2,  # p
             AGILE * self.rate(0) * (1 << self.gap_bits),  # x
         )
         whole = math.ceil(math.log2(greatest))
-        divisor = max(self.number_bits + self.mean_bits, self.gap_bits + self.gap_shift)
-        return max(whole + self.frac_bits, divisor) + 1
+        dividend = max(self.number_bits + self.mean_bits, self.gap_bits + self.gap_shift)
+        return max(whole + self.frac_bits, dividend) + 1
 
     def fixed(self, value: float | Fraction) -> int:
         """A number with F fraction bits."""
