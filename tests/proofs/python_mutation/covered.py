@@ -98,20 +98,20 @@ def with_imports(root: Path, found: Covered) -> Covered:
 
 
 def chosen_for(found: Covered, file: str, line: int, budget: float) -> list[str]:
-    """Tests that run a line, as many as take `budget` seconds, then those that run its file.
+    """Tests that run a line or its file, as many as take `budget` seconds.
 
-    What is computed once, by an import or by another test, is not run again where it matters. Tests that take next to
-    no time come first. Of every other test function the fastest test is taken, then the next of each, so that all that
-    is asked is asked soon.
+    What is computed once, by an import or by another test, is not run again where it matters. So the tests of the file
+    that take next to no time come first, then the others of the line, then those of the file. Of every test function the
+    fastest test is taken, then the next of each, so that all that is asked is asked soon.
     """
     running = [test for test, entry in found.items() if test and file in entry["lines"]]
-    rounds: list[tuple[bool, int, float, str]] = []
-    met = Counter[tuple[bool, str]]()
+    rounds: list[tuple[bool, bool, int, float, str]] = []
+    met = Counter[tuple[bool, bool, str]]()
     for test in sorted(running, key=lambda test: found[test]["seconds"]):
-        elsewhere = line not in found[test]["lines"][file]
-        function = elsewhere, test.split("[")[0]
-        met[function] += found[test]["seconds"] > _NEXT_TO_NO_TIME
-        rounds.append((elsewhere, met[function], found[test]["seconds"], test))
+        seconds = found[test]["seconds"]
+        function = seconds > _NEXT_TO_NO_TIME, line not in found[test]["lines"][file], test.split("[")[0]
+        rounds.append((*function[:2], met[function], seconds, test))
+        met[function] += 1
     spent, taken = 0.0, list[str]()
     for *_, seconds, test in sorted(rounds):
         if spent + seconds <= budget or not taken:
