@@ -52,6 +52,7 @@ def test_it_is_the_same_in_another_process() -> None:
 
 
 def test_ports() -> None:
+    assert not AxesSpec(tachometer=ALONE, axes=2).parallel
     strobed = {port.name: port.width for port in spec_of(5, index=True).ports}
     assert {name: strobed[name] for name in ("a", "b", "z", "axis", "decode_error_axis", "index_axis")} == {
         **dict.fromkeys(("a", "b", "z"), 5),

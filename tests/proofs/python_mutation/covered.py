@@ -101,8 +101,8 @@ def chosen_for(found: Covered, file: str, line: int, budget: float) -> list[str]
     """Tests that run a line or its file, as many as take `budget` seconds.
 
     What is computed once, by an import or by another test, is not run again where it matters. So the tests of the file
-    that take next to no time come first, then the others of the line, then those of the file. Of every test function the
-    fastest test is taken, then the next of each, so that all that is asked is asked soon.
+    that take next to no time come first, then the others of the line, then those of the file. Of every test function
+    the fastest test is taken, then the next of each, so that all that is asked is asked soon.
     """
     running = [test for test, entry in found.items() if test and file in entry["lines"]]
     rounds: list[tuple[bool, bool, int, float, str]] = []

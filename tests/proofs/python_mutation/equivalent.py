@@ -413,6 +413,18 @@ _argue(
     "The error is held within ±(2^k − 1), and 2^k + 1 has as many bits as 2^k.",
     "1 → 2",
 )
+_argue(
+    "spec/control/form.py: decay",
+    "Coefficients have 40 bits at most, and one digit of e^−x more or less in 60 does not change them.",
+    *("70 → 71", "70 → 69"),
+)
+_argue("spec/control/form.py: extra_bits", "No c(1) is more than 1, so 4/c(1) is 4 at least.", "2 → 1")
+_argue(
+    "spec/control/form.py: ControlForm.most_error",
+    "Whatever is more than half of the range is held within it.",
+    "limit < half → limit <= half",
+)
+_argue("spec/control/form.py: ControlForm._most_error_of_gains", "A gain has one coefficient.", "0 → -1 #2")
 _argue("spec/control/coefficients.py: control_form", "A gain has one coefficient.", "0 → -1 #2")
 _argue("spec/control/form.py: Term", "No other product has this number.", "0 → -1")
 _argue("spec/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))

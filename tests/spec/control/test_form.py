@@ -208,6 +208,16 @@ def test_coefficients_are_those_of_the_equations(number: int) -> None:
     assert 4 <= least * 2**form.extra_bits < 8 or form.extra_bits == 2
 
 
+@pytest.mark.parametrize("number", range(len(SPECS)))
+def test_products_are_rounded_and_the_least_coefficient_has_twelve_bits(number: int) -> None:
+    form = SPECS[number].form
+    assert 2**11 <= min(min(one.values) for one in form.terms.values() if one.values[0]) <= 2**12
+    for term, one in form.terms.items():
+        for word in (-1001, -3, -1, 0, 1, 2, 777, 123_456):
+            exact = Fraction(word * 2**one.shift * one.values[-1], 2**form.factor_bits)
+            assert form.product(term, word, len(one.values)) == math.floor(exact + Fraction(1, 2))
+
+
 def check_formats(form: ControlForm) -> None:
     """The greatest words of all terms; and an error of the position that is the least of all bits that is enough."""
     most = {
@@ -297,6 +307,15 @@ def test_times() -> None:
         assert spec.first_tick == 959 + CORE.tick_latency + CORE.tick_to_velocity + 1
 
 
+def test_gains_that_are_inputs_have_24_bits_at_most() -> None:
+    bits = [
+        (spec.form.factor_bits, spec.form.gain_bits)
+        for spec in (LoopSpec(tachometer=CORE, gains="inputs", inertia=Fraction(1, 10**n)) for n in range(1, 9))
+    ]
+    assert {gain for _, gain in bits} >= {24}
+    assert all(gain == min(factor, 24) for factor, gain in bits)
+
+
 def test_coefficients_of_40_bits() -> None:
     """Each halving of a small gain takes one more."""
     found = (LoopSpec(tachometer=CORE, position_gain=Fraction(1, 2**n)) for n in range(100))
@@ -307,12 +326,19 @@ def test_coefficients_of_40_bits() -> None:
 
 def test_limits() -> None:
     assert LoopSpec(tachometer=CORE).current_width == 16
+    # 16 bits hold 2^15 − 1 LSB, and not one more.
+    just = Fraction(2**15 - 1, 2**10)
+    assert [
+        LoopSpec(tachometer=CORE, current_limit=just + more).current_frac_bits for more in (0, Fraction(1, 2**10))
+    ] == [10, 9]
     with pytest.raises(ParameterError, match=r"^velocity_filter must be greater than 0, not 0$"):
         LoopSpec(tachometer=CORE, filter=Fraction(0))
     with pytest.raises(ParameterError, match=r"^observer must be from 0\.01193 to 3\.015e\+08 rad/s here, not 1e\+09$"):
         LoopSpec(tachometer=CORE, observer=Fraction(10**9))
     with pytest.raises(ParameterError, match=r"^current_width must be from 8 to 24, not 25$"):
         LoopSpec(tachometer=CORE, current_width=25)
+    with pytest.raises(ParameterError, match=r"^kp must be at least 0, not -0\.5$"):
+        LoopSpec(tachometer=CORE, position_gain=Fraction(-1, 2))
     for period in (0, (1 << 24) + 1):
         with pytest.raises(ParameterError, match=rf"^control_period must be from 1 to {1 << 24} clocks, not {period}$"):
             LoopSpec(tachometer=CORE, period=period)
