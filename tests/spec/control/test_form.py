@@ -326,6 +326,7 @@ def test_coefficients_of_40_bits() -> None:
 
 def test_limits() -> None:
     assert LoopSpec(tachometer=CORE).current_width == 16
+    assert LoopSpec(tachometer=CORE, filter=Fraction(1, 2)).filter == Fraction(1, 2)
     # 16 bits hold 2^15 − 1 LSB, and not one more.
     just = Fraction(2**15 - 1, 2**10)
     assert [
