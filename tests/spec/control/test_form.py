@@ -241,9 +241,9 @@ def check_formats(form: ControlForm) -> None:
     total = others + form.product(Term.POSITION, form.most_error + 1) + 1
     assert form.most_total == total
     assert form.total_width == max(total.bit_length() + 1, form.position_width + POSITION_FRAC_BITS)
-    # z leads by less than what the sum of n + 1 currents adds, and what rounding adds, over what is forgotten in n.
+    # z leads by less than what n currents add, and what rounding adds, over what is forgotten in n ticks.
     forgets, gains = form.terms[Term.OBSERVER].values, form.terms[Term.CURRENT]
-    adds = [(n + 1) * form.current_limit * 2**gains.shift * gain for n, gain in enumerate(gains.values, 0)]
+    adds = [n * form.current_limit * 2**gains.shift * gain for n, gain in enumerate(gains.values, 1)]
     leads = [Fraction(add + 2**form.factor_bits, forget) for add, forget in zip(adds, forgets, strict=True)]
     assert form.most_lead == math.ceil(max(leads))
 
