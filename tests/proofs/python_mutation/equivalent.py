@@ -45,11 +45,7 @@ _argue(
     "It may be longer than is needed: what is shown after the end of the trace is cut off.",
     "2 → 3",
 )
-_argue(
-    "sim/golden/command_generator.py: generated",
-    "There are as many demands as positions.",
-    "True → False",
-)
+_argue("sim/golden/command_generator.py: generated", "There are as many demands as positions.", "True → False")
 _argue(
     "sim/golden/loop_registers.py: GoldenLoopBank.answers",
     "Nothing is frozen before the first control tick, so what is held is set before it is used.",
@@ -65,11 +61,7 @@ _argue(
     "Where the speed has turned to the target itself, it is the same which of the two is taken.",
     *("self._turned >= target → self._turned > target", "self._turned <= target → self._turned < target"),
 )
-_argue(
-    "sim/golden/emulator.py: GoldenEmulator._play",
-    "There are as many lines as levels.",
-    "True → False",
-)
+_argue("sim/golden/emulator.py: GoldenEmulator._play", "There are as many lines as levels.", "True → False")
 _argue(
     "sim/golden/methods/track.py: Recursion._second",
     "From the same place to the same place the speed is 0.",
@@ -80,16 +72,8 @@ _argue(
     "A p of 0 is near the position, so its sign is not used.",
     "0 → 1",
 )
-_argue(
-    "sim/golden/ordered.py: not_before",
-    "What the passes do not find is searched for.",
-    "1 → 0 #5",
-)
-_argue(
-    "sim/golden/sampling.py: windows",
-    "A level is 0 or 1, so its difference from 2 is no rise either.",
-    "1 → 2 #2",
-)
+_argue("sim/golden/ordered.py: not_before", "What the passes do not find is searched for.", "1 → 0 #5")
+_argue("sim/golden/sampling.py: windows", "A level is 0 or 1, so its difference from 2 is no rise either.", "1 → 2 #2")
 _argue(
     "sim/golden/output.py: with_age",
     "What stands for the cause before the first update has to be before the first tick, which is in clock 2 or later.",
@@ -147,11 +131,7 @@ _argue(
     "No update is in clock 0; what stands for one before the first is negative, and never later than a capture.",
     *("before >= 0 → before > 0", "0 → -1", "1 → 2", "1 → 2 #3", "1 → 0 #3"),
 )
-_argue(
-    f"{_REGISTERS}.answers",
-    "No event that is counted is in clock 0.",
-    "1 → 0",
-)
+_argue(f"{_REGISTERS}.answers", "No event that is counted is in clock 0.", "1 → 0")
 _argue(
     f"{_REGISTERS}.answers",
     "It is only read if something has been captured, and then it has been set.",
@@ -227,11 +207,7 @@ _argue(
     "velocity < 0 → velocity <= 0",
     "0 → 1",
 )
-_argue(
-    f"{_TIMED}: _decaying",
-    "The sign is 1 or −1, and 3 // 1 = 3, 3 // −1 = −3.",
-    "3 * sign → 3 // sign",
-)
+_argue(f"{_TIMED}: _decaying", "The sign is 1 or −1, and 3 // 1 = 3, 3 // −1 = −3.", "3 * sign → 3 // sign")
 _argue(
     f"{_TIMED}: _decaying",
     "A tick that asks comes after a measurement, so there is a count before it.",
@@ -252,11 +228,7 @@ _argue(
     "np.abs(_greatest(spec, held, np.maximum(longest, 1))) < np.abs(held) → "
     "np.abs(_greatest(spec, held, np.maximum(longest, 1))) <= np.abs(held)",
 )
-_argue(
-    f"{_TIMED}: _asking",
-    "Without ticks none asks.",
-    *("0 → 1", "0 → -1"),
-)
+_argue(f"{_TIMED}: _asking", "Without ticks none asks.", *("0 → 1", "0 → -1"))
 _argue(
     f"{_TIMED}: _asking",
     "No count is seen before clock 2, and the tick in whose clock something is measured is not empty.",
@@ -282,16 +254,8 @@ _argue(
     "The first count only opens, so the time before it is not read.",
     *("-1 → 1", "1 → 2", "1 → 0"),
 )
-_argue(
-    f"{_TIMED}: with_silences",
-    "The array holds zeros, which are not more than 1 either.",
-    "0 → 1 #2",
-)
-_argue(
-    f"{_TIMED}: Measurements.with_more",
-    "No silence ends in the period of a count.",
-    "'right' → 'left'",
-)
+_argue(f"{_TIMED}: with_silences", "The array holds zeros, which are not more than 1 either.", "0 → 1 #2")
+_argue(f"{_TIMED}: Measurements.with_more", "No silence ends in the period of a count.", "'right' → 'left'")
 _argue(f"{_TIMED}: _bounds", "There are two bounds, and two ends of the enclosure.", "True → False")
 
 _argue(
@@ -363,11 +327,7 @@ _argue(
     "there is no count in it; its Ndt1 of 0 is taken as 1 anyhow; and its count is no measurement.",
     *("node > 0 → node >= 0", "0 → -1 #5", "0 → -1 #9"),
 )
-_argue(
-    f"{_RAIRAN}: windows",
-    "A window ends after it begins, so the number is never negative.",
-    "0 → -1 #8",
-)
+_argue(f"{_RAIRAN}: windows", "A window ends after it begins, so the number is never negative.", "0 → -1 #8")
 _argue(
     f"{_RAIRAN}: windows",
     "The direction of no count at all belongs to the velocity 0 at rest, which is said to be forward.",
@@ -378,11 +338,7 @@ _argue(
     "An Ndt1 beyond the maximum time is no measurement, and more than 1 either way.",
     "spec.timing.max_ticks >> found.shift → spec.timing.max_ticks << found.shift",
 )
-_argue(
-    f"{_RAIRAN}: Model._regime",
-    "It is only asked whether it is 1.",
-    "0 → -1",
-)
+_argue(f"{_RAIRAN}: Model._regime", "It is only asked whether it is 1.", "0 → -1")
 
 _argue(
     "spec/formats/tracking.py: Tracking._gains",
@@ -395,9 +351,9 @@ _argue("spec/axes.py: _nearest", "No tick of one clock has a turn of an axis.", 
 _argue("spec/registers/values.py: CapturedValue.field", "A register of a value has one field.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled", "It is replaced when the address is known.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled.wait", "A wait does not use the word that is read.", "0 → 1")
-_argue("spec/formats/reciprocal.py: _narrowest", "There are as many fractions as divisors.", "True → False")
 _argue("spec/methods/mt.py: MTTachometer.max_interval", "A window takes a period at least anyway.", "0 → -1")
-_argue("spec/formats/reciprocal.py: _fewest", "There are as many fractions as divisors.", "True → False")
+for _where in ("_narrowest", "_fewest"):
+    _argue(f"spec/formats/reciprocal.py: {_where}", "There are as many fractions as divisors.", "True → False")
 _argue(
     "spec/formats/velocity_output.py: VelocityOutput._constant",
     "Without its sign, m | −m is the lowest bit that is set, as m & −m is; and the length of −2^k is that of 2^k.",
@@ -424,15 +380,11 @@ _argue(
     "Whatever is more than half of the range is held within it.",
     "limit < half → limit <= half",
 )
-_argue("spec/control/form.py: ControlForm._most_error_of_gains", "A gain has one coefficient.", "0 → -1 #2")
-_argue("spec/control/coefficients.py: control_form", "A gain has one coefficient.", "0 → -1 #2")
+for _where in ("form.py: ControlForm._most_error_of_gains", "coefficients.py: control_form"):
+    _argue(f"spec/control/{_where}", "A gain has one coefficient.", "0 → -1 #2")
 _argue("spec/control/form.py: Term", "No other product has this number.", "0 → -1")
 _argue("spec/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))
-_argue(
-    "spec/docstrings.py: with_inherited",
-    "The heading is then taken for a name, which no parameter has.",
-    "1 → 0",
-)
+_argue("spec/docstrings.py: with_inherited", "The heading is then taken for a name, which no parameter has.", "1 → 0")
 _argue("spec/registers/rdl.py: _text", "The end of a line is a space to who reads it.", *("110 → 111", "110 → 109"))
 _argue(
     "spec/registers/c_header.py: comment",

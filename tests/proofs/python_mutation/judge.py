@@ -18,7 +18,7 @@ import pytest
 from proofs.python_mutation.mutants import Mutant, mutated
 
 _STARTED = 30.0  # seconds of its processor that a fork may take before its first test
-_SLOWER = 2.0  # times as long as the tests took without a mutant, of its processor too, whatever else runs
+_SLOWER = 5.0  # times as long as the tests took without a mutant, of its processor too
 _WAITED = 3600.0  # seconds after which a fork waits for what never comes
 _MEMORY = 8 << 30  # bytes that a mutant may ask for
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -37,21 +38,16 @@ def drawn(seed: int) -> Tracking:
 
 def few(seed: int) -> Tracking:
     """Few counts in short ticks with great bandwidths, so that small terms are the greatest."""
-    rng = np.random.default_rng(seed)
-    external = bool(rng.random() < 0.5)
+    rng, form = np.random.default_rng(seed), drawn(seed)
     tick = int(rng.integers(257, 400))
-    return Tracking(
+    return replace(
+        form,
         clock_hz=1 << 20,
         tick_cycles=tick,
-        longest_tick=int(tick * 2 ** rng.uniform(0, 4)) if external else tick,
+        longest_tick=int(tick * 2 ** rng.uniform(0, 4)) if form.external else tick,
         max_ticks=int(2 ** rng.uniform(1, 3)),
         max_count=int(2 ** rng.uniform(0, 2)),
-        external=external,
         bandwidth=Fraction((1 << 20) / tick * 10 ** rng.uniform(-1.5, 0)).limit_denominator(1000),
-        least_memory=Fraction(rng.uniform(0.5, 0.95)).limit_denominator(100),
-        edge_error=Fraction(1, 2),
-        agile=bool(rng.random() < 0.5),
-        growing=bool(rng.random() < 0.5),
         velocity_bits=int(rng.integers(4, 8)),
         fine_bits=int(rng.integers(14, 17)),
     )

@@ -89,12 +89,15 @@ def test_values_of_more_than_a_word_have_two() -> None:
     assert map_of(position_width="32")["POSITION"].fields[0].width == 32
 
 
+def loop_of(command: str) -> LoopSpec:
+    core = of_texts("s", BASE | {"tick": "80us", "max-time": "800us", "max-speed": "500rad/s", "position-width": "40"})
+    return LoopSpec(tachometer=core, gains="inputs", command=command, multiplier="parallel")
+
+
 @pytest.mark.parametrize("command", ["ports", "generator"])
 def test_what_is_written_is_held_within_the_bits_of_its_port(command: str) -> None:
     """But a position, which is taken modulo its period, and words that are used whole."""
-    times = {"tick": "80us", "max-time": "800us"}
-    core = of_texts("s", BASE | times | {"max-speed": "500rad/s", "position-width": "40"})
-    loop = LoopSpec(tachometer=core, gains="inputs", command=command, multiplier="parallel")
+    loop = loop_of(command)
     registers, ports = registers_of(loop), {port.name: port for port in loop.held_inputs}
     held: set[str] = set()
     for one, entry in zip(registers, registers.described()["map"], strict=True):
@@ -113,9 +116,7 @@ def test_what_is_written_is_held_within_the_bits_of_its_port(command: str) -> No
 
 
 def test_bits_of_a_loop() -> None:
-    core = of_texts("s", BASE | {"tick": "80us", "max-time": "800us", "max-speed": "500rad/s", "position-width": "40"})
-    ports = registers_of(LoopSpec(tachometer=core, gains="inputs", multiplier="parallel"))
-    made = registers_of(LoopSpec(tachometer=core, gains="inputs", command="generator", multiplier="parallel"))
+    ports, made = (registers_of(loop_of(command)) for command in ("ports", "generator"))
     assert bits(ports, "LOOP") == [("enable", 0, 1), ("freeze", 1, 1)]
     assert bits(made, "LOOP") == [("enable", 0, 1), ("freeze", 1, 1), ("mode", 4, 2)]
     assert all(field.writable for field in made["LOOP"].fields)
