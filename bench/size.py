@@ -177,9 +177,9 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 """
 
 
-SPEED_TEXT = """With an external tick M, T and M/T have up to 4 LUTs more on ECP5, and 12 to 19 flip-flops less: m_e
-may be a number of 1,920 counts that has to be held within 13. All others are smaller. A division takes 6 clocks
-less, with an external tick 5. Differences of Fmax of a few percent are less than those between seeds."""
+SPEED_TEXT = """With an external tick M and M/T have one LUT more on ECP5, and 13 and 12 flip-flops less: m_e may be a
+number of 1,920 counts that has to be held within 13. No other core is larger. A division takes 6 clocks less, with an
+external tick 5. Differences of Fmax of a few percent are less than those between seeds."""
 
 
 Results = Mapping[tuple[str, str], Measurement]
@@ -280,10 +280,10 @@ def speed_table(results: Results) -> Table:
                 cells = next(iter(device.cells))
                 row = [
                     f"{figures[figure] - base[figure]:+.{digits}f}" if {figure} <= figures.keys() & base.keys() else ""
-                    for figure, digits in ((cells, 0), ("Fmax", 1))
+                    for figure, digits in ((cells, 0), ("FF", 0), ("Fmax", 1))
                 ]
                 rows.append([configuration.name, without, target, *row])
-    header = ["configuration", "without", "target", "COMB or LC (cells)", heading("Fmax")]
+    header = ["configuration", "without", "target", "COMB or LC (cells)", heading("FF"), heading("Fmax")]
     return Table("What --max-speed 1000rad/s changes: difference from the core without", header, rows, SPEED_TEXT)
 
 

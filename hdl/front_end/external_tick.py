@@ -70,7 +70,10 @@ class ExternalTick(wiring.Component):
             error.eq(rises ^ self.last),
         ]
         m.d.comb += self.tick_error.eq(*delay(m, error, clocks=self._latency - 1))
-        with m.If(left == start - (self._min_cycles - 2)):
+        # Lower bits tell the first clock that may end a window from all before it; later, `enough` is high anyway.
+        first = self._min_cycles - 2
+        bits = first.bit_length()
+        with m.If(left[:bits] == (start - first) % (1 << bits)):
             m.d.sync += enough.eq(1)
         with m.If(self.last):
             m.d.sync += [left.eq(start), enough.eq(0)]

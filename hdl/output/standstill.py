@@ -14,7 +14,7 @@ class Standstill(wiring.Component):
     ----------
     max_ticks : int
     count_width : int
-        Bits of m_e.
+        Bits of m_e, whose least number, without an opposite, never comes.
     max_shift : int
         A tick may be as long as 2^max_shift nominal ones.
 
@@ -44,7 +44,7 @@ class Standstill(wiring.Component):
         m = Module()
         differs = "shift" in self.signature.members
         shown = Signal()
-        silent = ~self.m_e.any()
+        silent = ~self.m_e[:-1].any()  # only the least number has nothing but its sign
         # Nominal ticks that may still be empty; negative, if none may. So a sign is the flag, and nothing has to be
         # compared.
         if differs:

@@ -66,6 +66,7 @@ def test_a_line_that_rests_high_has_not_risen() -> None:
 
 MUTANTS = {
     "one clock too early is taken": ("self._min_cycles - 2", "self._min_cycles - 3"),
+    "a bit of the first clock is not looked at": ("first.bit_length()", "first.bit_length() - 1"),
     "watchdog a clock late": ("start = self._max_cycles - 2", "start = self._max_cycles - 1"),
     "an early tick is not told": ("error.eq(rises ^ self.last)", "error.eq(self.last & ~rises)"),
     "a missing tick is not told": ("error.eq(rises ^ self.last)", "error.eq(rises & ~self.last)"),

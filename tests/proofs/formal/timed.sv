@@ -263,6 +263,7 @@ module timed #(
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
         && core_silent == (quiet != 0)
         && (quiet == 0 || (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet}))));
+    lemma_size: assert (pulse_count <= MAX_COUNT && -pulse_count <= MAX_COUNT);
     lemma_fresh: assert (fresh && fresh_past);
     lemma_began: assert (!fresh_division || fresh || (since != 0 && measuring));
     lemma_settled: assert (SETTLED < 0 || ((!fresh_division || fresh_now)
@@ -306,7 +307,6 @@ module timed #(
         lemma_window: assert (clock < T && core_window == T - 2 - $signed({1'b0, clock}));
         lemma_phase: assert (phase >= 1 && phase <= T && (!tick || phase == T) && (ticked || !opened)
             && (!ticked || (phase == (clock + T - 2) % T + 1 && tick == (phase == T))));
-        lemma_size: assert (pulse_count <= MAX_COUNT && -pulse_count <= MAX_COUNT);
       end
     end
     if (MT) begin : mt
