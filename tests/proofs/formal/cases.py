@@ -182,6 +182,8 @@ def small_m(average: int) -> MTachometer:
 
 _RAIRAN_PROBES = {
     "core_step": "step_late",
+    "core_sum": "pulse_counter.count",
+    "core_outside": "pulse_counter.left",
     "core_left": "datapath.counters.left",
     "core_more": "datapath.counters.c_more",
     "core_any": "datapath.counters.any",

@@ -24,6 +24,8 @@ module rairan #(
   );
   wire signed [1:0] core_step;
   wire signed [$clog2(T):0] core_left;
+  wire signed [$clog2(MAX_COUNT+2):0] core_sum;
+  wire core_outside;
   wire [$clog2(MAX_COUNT<3?2:MAX_COUNT)-1:0] core_more;
   wire [$clog2(MAX_TICKS+1)-1:0] core_dt;
   wire [$clog2((MAX_TICKS>MAX_COUNT?MAX_TICKS:MAX_COUNT)+1)-1:0] core_n;
@@ -131,6 +133,9 @@ module rairan #(
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
         && core_silent == (quiet != 0)
         && (quiet == 0 || (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet}))));
+    lemma_size: assert (pulse_count <= MAX_COUNT && -pulse_count <= MAX_COUNT);
+    lemma_sum: assert (core_sum <= MAX_COUNT + 1 && -core_sum <= MAX_COUNT + 1
+        && core_outside == (core_sum > MAX_COUNT || -core_sum > MAX_COUNT));
     lemma_waits: assert (c_dt == MAX_TICKS ? n_ep == 0 : idle <= c_dt * T + clock);
   end
   always @* begin
