@@ -27,7 +27,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
 from tachometry.spec.formats.tracking_code import NOT_TAKEN, TAKEN, Condition, Instruction, Op
 
-CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=80)
+CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=40)
 CLOCKS = 200_000
 
 
@@ -48,10 +48,10 @@ def small(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 
 
 def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    small.setattr(command, "LEAST", 0.95)  # two of these few survive, and are not proven equivalent
     assert command.main(["mt"])
-    total = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("| mt | 80 |"))
-    assert float(total.split("|")[-2].rstrip(" %")) >= 95, total
+    total = capsys.readouterr().out.splitlines()[-1]
+    assert total.startswith("| mt | 40 |"), total
+    assert total.endswith("| 100.0 % |"), total
 
 
 def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -> None:

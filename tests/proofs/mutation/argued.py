@@ -139,6 +139,15 @@ ARGUED = {
     ("track, external tick", _READS, "$194.A[0] const0"): _UNUSED_READ,
     ("track, index", _CLEAR, "$210.A[0] const0"): _POSITIVE,
     ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
+    ("mt, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
+    (
+        "mt, in clocks",
+        "copy = Signal(len(divider.quotient), init=1 << (len(divider.quotient) - 1))",
+        "B[8] const0",
+    ): (
+        "it is the sign of the copy after a reset: until a measurement replaces the copy, what decays is 0, and a "
+        "quotient passes this bound with its first digit as it passes 0, so nothing is shown, and the copy stays"
+    ),
 }
 
 
