@@ -1,6 +1,6 @@
 """A number held within bounds."""
 
-from amaranth import Cat, Module, Mux, Signal, Value, signed
+from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
 
 
 def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
@@ -29,28 +29,52 @@ def raised_for(most: int, limit: int) -> int:
 def saturate_raised(m: Module, raised: Signal, limit: int) -> tuple[Signal, Signal]:
     """As `saturate`, of `raised` − `raised_for(…)`, with half of the cells.
 
-    All numbers within the bounds have the same upper bits, 0, so none of these is compared with a sign.
+    All numbers within the bounds have the same upper bits, 0, so none of these is compared with a sign. A number that
+    is held within its bounds keeps its sign.
     """
     place = limit.bit_length()
-    within = Signal(signed(place + 1))
-    far = Signal()
+    lower, negative = raised[:place], ~raised[place]
+    far, above, below, changed, sign = Signal(), Signal(), Signal(), Signal(), Signal()
     held = Signal(signed(place + 1))
-    changed = Signal()
+    is_above, is_below = _exceeds(lower, limit, Const(0)), _exceeds(~lower, limit, Const(1))
     m.d.comb += [
-        within.eq(Cat(raised[:place], ~raised[place])),
         far.eq(raised[place + 1 :].any()),
-        changed.eq(far | _beyond(within, limit)),
-        held.eq(Mux(changed, Mux(raised[-1] | ~(far | raised[place]), -limit, limit), within)),
+        # For waveforms. Where `changed` takes these signals instead, or without them, Yosys finds a LUT more.
+        above.eq(is_above),
+        below.eq(is_below),
+        changed.eq(Mux(negative, is_below | far, is_above | far)),
+        sign.eq((far & raised[-1]) | (~far & negative)),
+        held.eq(Cat(*(_bit_held(bit, changed, sign, limit, at) for at, bit in enumerate(lower)), sign)),
     ]
     return held, changed
 
 
+def _bit_held(bit: Value, changed: Signal, sign: Signal, limit: int, place: int) -> Value:
+    """A bit of the number, or that of +`limit` or −`limit` if `changed`: most are the same in both, or need no Mux."""
+    kept = ~changed & bit
+    match limit >> place & 1, -limit >> place & 1:
+        case 1, 1:
+            return changed | bit
+        case 1, 0:
+            return (changed & ~sign) | kept
+        case 0, 1:
+            return (changed & sign) | kept
+    return kept
+
+
 def _beyond(value: Signal, limit: int) -> Value:
-    """Whether |value| is greater than `limit`, by gates of few bits: a carry chain is slower up to a dozen bits."""
+    """Whether |value| is greater than `limit`."""
     negative = value[-1]
     # value ^ negative is |value|, or one less if it is negative; then equal is beyond, too.
-    beyond: Value = negative
-    for place, bit in enumerate(value[:-1]):
-        differs = bit ^ negative
-        beyond = differs & beyond if limit >> place & 1 else differs | beyond
-    return beyond
+    return _exceeds(value[:-1] ^ negative.replicate(len(value) - 1), limit, negative)
+
+
+def _exceeds(size: Value, limit: int, equal: Value) -> Value:
+    """Whether size > limit, or `equal` if it is the same, by gates of few bits.
+
+    A carry chain is slower up to a dozen bits.
+    """
+    exceeds = equal
+    for place, bit in enumerate(size):
+        exceeds = bit & exceeds if limit >> place & 1 else bit | exceeds
+    return exceeds

@@ -76,11 +76,10 @@ def test_mutant_that_drops_a_step_at_the_tick_is_caught() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("beyond: Value = negative", "beyond: Value = negative & 0"),
-        ("beyond: Value = negative", "beyond: Value = negative | 1"),
-        ("differs & beyond", "differs"),
-        ("differs | beyond", "beyond"),
-        ("bit ^ negative", "bit"),
+        ("exceeds = equal", "exceeds = Const(0)"),
+        ("exceeds = equal", "exceeds = Const(1)"),
+        ("bit & exceeds", "bit"),
+        ("bit | exceeds", "exceeds"),
     ],
 )
 def test_mutants_of_the_bounds_are_caught(right: str, wrong: str) -> None:
@@ -90,19 +89,33 @@ def test_mutants_of_the_bounds_are_caught(right: str, wrong: str) -> None:
         check_bounds(5, 5, raised=True)
 
 
+def test_mutant_of_the_size_of_a_negative_number_is_caught() -> None:
+    with mutant(saturate, " ^ negative.replicate(len(value) - 1)", ""), caught():
+        check_bounds(5, 5)
+
+
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
         ("place + 1 :]", "place + 2 :]"),
-        ("far | _beyond(", "_beyond("),
-        ("~(far | raised[place])", "~raised[place]"),
-        ("raised[-1] | ~", "~"),
-        ("~raised[place]))", "raised[place]))"),
+        ("is_below | far", "is_below"),
+        ("is_above | far", "is_above"),
+        ("is_below | far", "is_above | far"),
+        ("_exceeds(~lower", "_exceeds(lower"),
+        ("(far & raised[-1]) | ", ""),
+        ("~far & negative", "negative"),
+        ("~far & negative", "~far & ~negative"),
+        ("return changed | bit", "return bit"),
+        ("changed & ~sign", "changed & sign"),
+        ("changed & sign", "changed & ~sign"),
+        ("kept = ~changed & bit", "kept = bit"),
     ],
 )
 def test_mutants_of_what_is_raised_are_caught(right: str, wrong: str) -> None:
     with mutant(saturate_raised, right, wrong), caught():
+        # Of the bits of 5 and −5, and of 6 and −6, one and another are the same.
         check_bounds(5, 5, raised=True)
+        check_bounds(5, 6, raised=True)
 
 
 def check_bounds(width: int, limit: int, *, raised: bool = False) -> None:

@@ -70,7 +70,7 @@ MUTANTS = [
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "raised.eq(fresh)", "raised.eq(start)"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "raised.eq(fresh)", "raised.eq(fresh + step)"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
-    Mutant("x2, 7 clocks", "p3_overflow", saturate_raised, "beyond: Value = negative", "beyond: Value = ~negative"),
+    Mutant("x2, 7 clocks", "p3_overflow", saturate_raised, "exceeds = equal", "exceeds = ~equal"),
     Mutant("eq. (21), 1 clock", "p4_update", AlterationDetector, " & differs", ""),
     Mutant(
         "eq. (21), 1 clock",
