@@ -83,6 +83,7 @@ def test_it_is_not_where_the_slack_is_less(name: str, bits: Bits) -> None:
     assert differing(name, bits) > 0
 
 
+OPS_OF_MQ = {Op.TO_MQ, Op.MUL, Op.DIV, Op.FRACTION, Op.DOUBLE, Op.FROM_MQ, Op.OUT}
 Way = list[tuple[int, Instruction, bool]]  # where it begins, what it is, whether it jumps
 
 
@@ -145,4 +146,10 @@ def test_the_program_of_track(core: str) -> None:
             if item.op == Op.PHASE and item.address == Phase.TRACKS:
                 assert [one.address for one in behind if one.op == Op.LEVEL][-1:] == [Level.FIRST]
             assert item.op != Op.MUL or item.steps < program.form.width
+            if item.op == Op.JUMP and way[k][2]:
+                place = next(place for place, one in enumerate(program.instructions) if one is item)
+                skipped = {one.op for one in program.instructions[place + 1 : place + 3]}
+                assert not {Op.POSITIVE, Op.NEGATIVE} & skipped
+                after = [one.op for _, one, _ in way[k + 1 :] if one.op in OPS_OF_MQ]
+                assert not OPS_OF_MQ & skipped or after[0] == Op.TO_MQ  # which sets it, and does not use it
             assert item.op != Op.OUT or begin % 2 == 0

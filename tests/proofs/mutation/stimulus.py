@@ -171,7 +171,7 @@ def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
             while not len((run := golden.run(spec, trace)).updates.clock):
                 trace = noise(spec, rng, 4 * spec.longest_tick, 2)
             clocks = run.ticks.clock - spec.tick_latency if of_tick else run.updates.clock
-            found.append(trace.until(int(rng.choice(clocks[:2])) - before))
+            found.append(trace.until(max(int(rng.choice(clocks[:2])) - before, 1)))
     return [*found, noise(spec, rng, 4 * spec.longest_tick, 2)]
 
 
