@@ -34,7 +34,11 @@ def saturate_raised(m: Module, raised: Signal, limit: int) -> tuple[Signal, Sign
     """
     place = limit.bit_length()
     lower, negative = raised[:place], ~raised[place]
-    far, above, below, changed, sign = Signal(), Signal(), Signal(), Signal(), Signal()
+    far = Signal()
+    above = Signal()
+    below = Signal()
+    changed = Signal()
+    sign = Signal()
     held = Signal(signed(place + 1))
     is_above, is_below = _exceeds(lower, limit, Const(0)), _exceeds(~lower, limit, Const(1))
     m.d.comb += [
