@@ -177,9 +177,10 @@ This page is made by `make size` (`python bench/size.py`) with {used}.
 """
 
 
-SPEED_TEXT = """No core is larger. With an external tick the room is small: m_e may be a number of 1,920 counts that has to
-be held within 13, and the same gates written in another way take 4 LUTs of ECP5 more or less. A division takes 6 clocks
-less, with an external tick 5. Differences of Fmax of a few percent are less than those between seeds."""
+SPEED_TEXT = """No core is larger. With an external tick the room is small: m_e may be a number of 1,920
+counts that has to be held within 13, and the same gates written in another way take 4 LUTs of ECP5 more or less. A
+division takes 6 clocks less, with an external tick 5. Differences of Fmax of a few percent are less than those between
+seeds."""
 
 
 Results = Mapping[tuple[str, str], Measurement]
