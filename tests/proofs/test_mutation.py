@@ -10,6 +10,7 @@ import proofs.mutation.__main__ as command
 import proofs.mutation.equivalent
 import proofs.mutation.score
 import pytest
+from proofs.mutation.boxes import BOXES
 from proofs.mutation.cases import CASES, Case
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.inductive import Known
@@ -17,7 +18,7 @@ from proofs.mutation.loops import LOOPS, Commanded
 from proofs.mutation.netlist import GROUP, exported, mutants
 from proofs.mutation.score import hold
 from proofs.mutation.simulate import library, run
-from proofs.mutation.stimulus import Stimulus, steps, stimulus
+from proofs.mutation.stimulus import Stimulus, ending, steps, stimulus
 from proofs.mutation.track_lemmas import begins
 from support.long import long
 
@@ -52,6 +53,12 @@ def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pyt
     total = capsys.readouterr().out.splitlines()[-1]
     assert total.startswith("| mt | 40 |"), total
     assert total.endswith("| 100.0 % |"), total
+
+
+def test_a_motion_that_ends_about_the_first_update_has_a_clock() -> None:
+    """Where ticks are short, some of them would end before they begin."""
+    box = next(box for box in BOXES if box.name == "registers, native")
+    assert min(trace.n_clocks for trace in ending(box.spec, np.random.default_rng(1))) == 1
 
 
 def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -> None:
