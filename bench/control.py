@@ -14,9 +14,9 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
 from tachometry.sim.figures.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
 from tachometry.sim.plots.usable_gain import Found, save_usable_gains
-from tachometry.sim.studies.control import Outcome, Task, each_seed, mean, outcome_of
-from tachometry.sim.studies.gate_check import check
-from tachometry.sim.studies.usable_gain import IDEAL, KINDS, REAL, TICKS, setting, usable, variants
+from tachometry.sim.studies.loops.control import Outcome, Task, each_seed, mean, outcome_of
+from tachometry.sim.studies.loops.gate_check import check
+from tachometry.sim.studies.loops.usable_gain import IDEAL, KINDS, REAL, TICKS, setting, usable, variants
 
 DISCS = {"ideal disc": IDEAL, "real disc": REAL}
 SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}

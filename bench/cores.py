@@ -7,9 +7,9 @@ from fractions import Fraction
 from typing import Any
 
 from tachometry.boards.fpga import ecp5_memory
-from tachometry.hdl import export
-from tachometry.hdl.demo.demo import Demo
-from tachometry.hdl.export import verilog_of
+from tachometry.hdl.core.demo import Demo
+from tachometry.hdl.export import export
+from tachometry.hdl.export.verilog import verilog_of
 from tachometry.sim.studies.size import CORE, TARGETS
 from tachometry.spec import (
     AxesSpec,

@@ -16,8 +16,8 @@ from pages import markdown, write
 
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
-from tachometry.sim.studies.baselines import Estimate
-from tachometry.sim.studies.encoder_errors import (
+from tachometry.sim.studies.comparing.baselines import Estimate
+from tachometry.sim.studies.comparing.encoder_errors import (
     CYCLE,
     Counts,
     by_counts,

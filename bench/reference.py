@@ -11,13 +11,13 @@ from pages import markdown, write
 
 from tachometry.cli.group import cli
 from tachometry.cli.options.option import Option
+from tachometry.hdl.export.registers.page import tables
 from tachometry.spec import METHODS, Encoder, Port, TachometerSpec, Timing, of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.registers.buses import BUSES
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
-from tachometry.spec.registers.page import tables
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 # Cores with all ports that the methods have.

@@ -14,11 +14,11 @@ from pages import markdown
 
 from tachometry.cli.options.methods import listed_methods
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.studies.baselines import Steps
-from tachometry.sim.studies.compare import Curve, common_instants, core_curve
-from tachometry.sim.studies.rivals import BASELINES, settings, steps_curve
-from tachometry.sim.studies.situations import PULSES_PER_REV, SITUATIONS, Situation
-from tachometry.sim.studies.tune import TUNED, core_settings, error_of
+from tachometry.sim.studies.comparing.baselines import Steps
+from tachometry.sim.studies.comparing.compare import Curve, common_instants, core_curve
+from tachometry.sim.studies.comparing.rivals import BASELINES, settings, steps_curve
+from tachometry.sim.studies.comparing.situations import PULSES_PER_REV, SITUATIONS, Situation
+from tachometry.sim.studies.comparing.tune import TUNED, core_settings, error_of
 from tachometry.spec import of_texts
 
 # Columns that are not tuned: one setting for all situations, as `tachometry compare --methods` takes it.

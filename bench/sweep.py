@@ -13,8 +13,8 @@ from tachometry.cli.options.sweep import by_name, point_options
 from tachometry.cli.reports.terminal import print_table
 from tachometry.cli.sweeping.points import points_of
 from tachometry.cli.sweeping.settings import of_file
-from tachometry.sim.studies import cluster
-from tachometry.sim.studies.sweep import Point, run_point
+from tachometry.sim.studies.sweeping import cluster
+from tachometry.sim.studies.sweeping.sweep import Point, run_point
 
 FILE = Path(__file__).parents[1] / "docs" / "sweep.toml"
 COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]

@@ -9,8 +9,8 @@ from pages import markdown
 from situations import Cell
 
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.studies.compare import core_curve
-from tachometry.sim.studies.situations import SITUATIONS, Situation
+from tachometry.sim.studies.comparing.compare import core_curve
+from tachometry.sim.studies.comparing.situations import SITUATIONS, Situation
 from tachometry.spec import of_texts
 
 TICKS = ("100us", "20us")

@@ -1,7 +1,6 @@
 """What is synthesised: Amaranth components, one file a box."""
 
-from tachometry.hdl.core import AnyTachometer, core_of
-from tachometry.hdl.export import export
-from tachometry.hdl.tachometer import Tachometer
+from tachometry.hdl.core.core import AnyTachometer, core_of
+from tachometry.hdl.core.tachometer import Tachometer
 
-__all__ = ["AnyTachometer", "Tachometer", "core_of", "export"]
+__all__ = ["AnyTachometer", "Tachometer", "core_of"]

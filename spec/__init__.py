@@ -4,20 +4,20 @@ from collections.abc import Mapping
 from itertools import chain, combinations
 from typing import Any
 
-from tachometry.spec.axes import AxesSpec, CoreSpec
-from tachometry.spec.encoder import Encoder
+from tachometry.spec.core.encoder import Encoder
+from tachometry.spec.core.parameters import TWO_TICKS
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.timing import Timing
+from tachometry.spec.language.option import Option, ParameterError, is_derived, options_of, read_options
+from tachometry.spec.language.port import Port
+from tachometry.spec.language.units import Speed
+from tachometry.spec.methods.axes import AxesSpec, CoreSpec
 from tachometry.spec.methods.m import MTachometer
 from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.t import TTachometer
 from tachometry.spec.methods.track import TrackTachometer
-from tachometry.spec.option import Option, ParameterError, is_derived, options_of, read_options
-from tachometry.spec.parameters import TWO_TICKS
-from tachometry.spec.port import Port
-from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.timing import Timing
-from tachometry.spec.units import Speed
 
 # Every method by its name; `DATAPATHS` in hdl/ and `MODELS` in sim/golden/ hold what belongs to it.
 METHODS: dict[str, type[TachometerSpec]] = {

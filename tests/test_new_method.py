@@ -20,8 +20,8 @@ from tachometry.sim.golden.methods import m as golden_m
 from tachometry.sim.signals.run import Table
 from tachometry.sim.studies.pairs import configurations, factors
 from tachometry.spec import METHODS, MTachometer, common_options
-from tachometry.spec.option import option
-from tachometry.spec.port import UPDATE, Port, held
+from tachometry.spec.language.option import option
+from tachometry.spec.language.port import UPDATE, Port, held
 
 CORE = "--ppr 24 --clock 100kHz --tick 1ms --max-time 20ms".split()
 X = ["--method", "x", "--doubled"]

@@ -16,7 +16,7 @@ from tachometry.sim.signals.tables import write_counts, write_events, write_trac
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.sim.testbench.vectors import strobe_rows
 from tachometry.spec import METHODS
-from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.manifest import manifest
 
 CORES = [words for method in METHODS for words in configurations(method)]
 

@@ -4,7 +4,7 @@ from amaranth import Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.front_end.synchronizer import Synchronizer
+from tachometry.hdl.wires.synchronizer import Synchronizer
 
 
 class CapturePin(wiring.Component):

@@ -9,10 +9,10 @@ from amaranth.lib.wiring import In
 
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.capture_pin import CapturePin
-from tachometry.hdl.demo.demo import Demo
+from tachometry.hdl.core.demo import Demo
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.provenance import LICENSE, generator
+from tachometry.spec.language.provenance import LICENSE, generator
 from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.demo import demo_manifest, demo_map
 

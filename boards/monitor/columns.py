@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tachometry.boards.host.snapshot import Snapshot
-from tachometry.spec.port import Port
+from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.language.port import Port
 from tachometry.spec.registers.demo import DemoMap
-from tachometry.spec.tachometer import BOUNDS
 
 Value = float | int | bool | None
 

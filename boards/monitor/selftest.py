@@ -11,8 +11,8 @@ from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.link import NoAnswer
 from tachometry.sim.golden.emulator import Change, GoldenEmulator
 from tachometry.sim.golden.registers import Access, GoldenBank
-from tachometry.spec.emulator import EmulatorSettings, fastest, rate_of, speed_of
 from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
 
 _EVENTS = ("updated", "indexed")  # flags that say what was between two captures
 _SILENCE = 30.0  # seconds after which no more telemetry will come

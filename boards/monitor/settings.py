@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 
 from tachometry.spec import ParameterError, TachometerSpec
-from tachometry.spec.emulator import (
+from tachometry.spec.language.units import FRACTION, SPEED, TIME, Unit, read_exactly, read_nearest, rounded
+from tachometry.spec.registers.emulator import (
     BOUNCE_WIDTH,
     DROP_WIDTH,
     ERROR_WIDTH,
@@ -16,7 +17,6 @@ from tachometry.spec.emulator import (
     speed_of,
 )
 from tachometry.spec.registers.map import WORD
-from tachometry.spec.units import FRACTION, SPEED, TIME, Unit, read_exactly, read_nearest, rounded
 
 _ACCELERATION = {name: SPEED[speed] for name, speed in {"rad/s/s": "rad/s", "rev/s/s": "rev/s", "rpm/s": "rpm"}.items()}
 _OF_PERIOD = {"": Unit(), "%": Unit(Fraction(1, 100)), "deg": Unit(Fraction(1, 360))}

@@ -17,9 +17,9 @@ from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
 from tachometry.spec.registers.demo import demo_map
+from tachometry.spec.registers.manifest import check_module_name
 
 if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
     from tachometry.boards.fpga.build import Built
@@ -111,7 +111,7 @@ def build(
     with Outputs({kind: folder / f"{name}{kind}" for kind in suffixes}) as outputs:
         from tachometry.boards.fpga.top import component, described
         from tachometry.cli.reports.terminal import activity
-        from tachometry.hdl.export import verilog_of
+        from tachometry.hdl.export.verilog import verilog_of
 
         core = component(spec, on)
         manifest = described(spec, on, board, name)

@@ -19,14 +19,14 @@ from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.reports.compare import print_comparison, shown_time, write_comparison, write_costs
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import parse_time
+from tachometry.spec.language.units import parse_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
     from tachometry.sim.signals.recording import Recording
-    from tachometry.sim.studies.compare import TrueSpeed
+    from tachometry.sim.studies.comparing.compare import TrueSpeed
+    from tachometry.sim.studies.comparing.tune import Cost
     from tachometry.sim.studies.size import Measurement
-    from tachometry.sim.studies.tune import Cost
 
 
 @click.command(
@@ -131,8 +131,8 @@ def compare(
     the true speed that comes closest. It is left out where it says nothing: at constant speed, and where noise hides
     it. A capture does not tell the true speed, so there are no errors.
     """
-    from tachometry.sim.studies.compare import common_instants, score
-    from tachometry.sim.studies.rivals import BASELINES, baseline_model
+    from tachometry.sim.studies.comparing.compare import common_instants, score
+    from tachometry.sim.studies.comparing.rivals import BASELINES, baseline_model
 
     files = {"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}
     inputs = tables if capture is None else [capture]
@@ -236,7 +236,7 @@ def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import progress_bar
-    from tachometry.hdl import export
+    from tachometry.hdl.export import export
     from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core
 
     specs = {name: spec for name, spec in named.specs.items() if spec is not None}

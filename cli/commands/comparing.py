@@ -14,8 +14,8 @@ from tachometry.spec import Encoder, TachometerSpec
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.motion import FloatArray
     from tachometry.sim.signals.recording import Recording
-    from tachometry.sim.studies.compare import Curve, TrueSpeed
-    from tachometry.sim.studies.tune import Cost
+    from tachometry.sim.studies.comparing.compare import Curve, TrueSpeed
+    from tachometry.sim.studies.comparing.tune import Cost
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class Setting:
             If its options are wrong, or do not fit the recording.
         """
         from tachometry.sim.signals.recording import PinTrace
-        from tachometry.sim.studies.compare import core_curve
-        from tachometry.sim.studies.rivals import baseline_curve
+        from tachometry.sim.studies.comparing.compare import core_curve
+        from tachometry.sim.studies.comparing.rivals import baseline_curve
 
         if self.spec is None:
             return baseline_curve(self.name, recording, self.encoder.counts_per_rev, self.encoder.decoding)
@@ -58,8 +58,8 @@ def given(named: Methods, encoder: Encoder) -> list[Setting]:
 
 def _tried(setting: Setting, make: Make, *, of_cores: bool) -> list[Setting]:
     """All settings of a method; one if it is given with options, and of a core that is not to be tuned."""
-    from tachometry.sim.studies.rivals import settings
-    from tachometry.sim.studies.tune import TUNED, core_settings
+    from tachometry.sim.studies.comparing.rivals import settings
+    from tachometry.sim.studies.comparing.tune import TUNED, core_settings
 
     if ":" in setting.name:
         return [setting]
@@ -108,7 +108,7 @@ def tuned(
     ValueError
         If a method has no setting that can be.
     """
-    from tachometry.sim.studies.tune import best, possible
+    from tachometry.sim.studies.comparing.tune import best, possible
 
     specs: dict[str, TachometerSpec | None] = {}
     n_tried = {}
@@ -139,8 +139,8 @@ def costs(
 
     from tachometry.sim.encoder.motion import parse_motion
     from tachometry.sim.encoder.virtual import VirtualEncoder
-    from tachometry.sim.studies.compare import common_instants
-    from tachometry.sim.studies.tune import SETTLED_S, cost, triangle
+    from tachometry.sim.studies.comparing.compare import common_instants
+    from tachometry.sim.studies.comparing.tune import SETTLED_S, cost, triangle
 
     speed = float(np.sqrt(np.mean(true_speed(instants) ** 2)))
     if not speed:

@@ -14,12 +14,12 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.hdl.export.registers.files import REGISTER_FILES
+from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.spec import AxesSpec, TachometerSpec
 from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.manifest import check_module_name
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
-from tachometry.spec.registers.files import REGISTER_FILES
-from tachometry.spec.targets.target import TARGETS, bus_for
+from tachometry.spec.registers.manifest import check_module_name
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
@@ -151,7 +151,7 @@ def generate(
 
             alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
             bench = cocotb_bench(spec, name, None if record is None else record(alone).recording)
-        from tachometry.hdl import export
+        from tachometry.hdl.export import export
 
         texts = export(spec, name, bus, baud, target) | bench
         for file, text in texts.items():

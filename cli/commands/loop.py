@@ -15,14 +15,14 @@ from tachometry.cli.options.option import option, output
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.sweeping.command import VaryingCommand
 from tachometry.cli.sweeping.settings import Settings
-from tachometry.spec.units import plural
+from tachometry.spec.language.units import plural
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.cli.sweeping.loops import Loops
     from tachometry.sim.engines.loop import Log
-    from tachometry.sim.studies.control import Outcome
-    from tachometry.sim.studies.loops import LoopPoint
-    from tachometry.sim.studies.sweep import Row
+    from tachometry.sim.studies.loops.control import Outcome
+    from tachometry.sim.studies.loops.loops import LoopPoint
+    from tachometry.sim.studies.sweeping.sweep import Row
 
 
 @click.command(
@@ -157,7 +157,7 @@ def _alone(point: LoopPoint, jobs: int | None) -> tuple[Log, list[Outcome]]:
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import progress_bar
-    from tachometry.sim.studies.control import each_seed
+    from tachometry.sim.studies.loops.control import each_seed
 
     first: Log = {}
     outcomes = []
@@ -171,8 +171,8 @@ def _alone(point: LoopPoint, jobs: int | None) -> tuple[Log, list[Outcome]]:
 
 
 def _mean(outcomes: list[Outcome]) -> Row:
-    from tachometry.sim.studies.control import mean
-    from tachometry.sim.studies.loops import row_of
+    from tachometry.sim.studies.loops.control import mean
+    from tachometry.sim.studies.loops.loops import row_of
 
     return row_of(mean(outcomes))
 
@@ -182,7 +182,7 @@ def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, R
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import PerSecond, progress_bar
-    from tachometry.sim.studies import cluster
+    from tachometry.sim.studies.sweeping import cluster
 
     cluster.require()
     rows: dict[str, Row] = {}

@@ -13,8 +13,8 @@ from tachometry.cli.commands.monitored import SIMULATED, attached, simulated
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import CoreTexts, optional_core_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
+from tachometry.spec.language.units import parse_time
 from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
-from tachometry.spec.units import parse_time
 
 _GROUP = "Monitor"
 

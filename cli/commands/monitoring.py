@@ -21,7 +21,7 @@ from tachometry.boards.monitor.session import Session, connected
 from tachometry.cli.commands.monitored import Target
 from tachometry.cli.files import Outputs
 from tachometry.cli.reports.monitor import Display, State
-from tachometry.spec.units import plural
+from tachometry.spec.language.units import plural
 
 # A terminal that is closed, too, where there is this signal.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]

@@ -13,7 +13,7 @@ from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.spec import Speed, TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
-from tachometry.spec.units import SpeedUnit
+from tachometry.spec.language.units import SpeedUnit
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     import numpy as np

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tachometry.cli.files import Outputs
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
-from tachometry.spec.units import format_time
+from tachometry.spec.language.units import format_time
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.sim.encoder.virtual import Encoding

@@ -15,11 +15,11 @@ from tachometry.cli.options.sweep import point_options
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.sweeping.command import VaryingCommand
 from tachometry.cli.sweeping.settings import Settings
-from tachometry.spec.units import parse_time, plural
+from tachometry.spec.language.units import parse_time, plural
 
 if TYPE_CHECKING:  # numpy, pyarrow and Dask are slow to import, and --help needs none of them
     from tachometry.cli.sweeping.points import Points
-    from tachometry.sim.studies.sweep_results import Results
+    from tachometry.sim.studies.sweeping.results import Results
 
 # What a heat map can show: the column, what it is, and whether colours go by its logarithm. Columns of speeds are in
 # rad/s, and are shown in the unit of the cores.
@@ -138,7 +138,7 @@ def sweep(
     Ctrl-C ends the sweep; what is done is in --results, and the same command goes on from there. Exit status 1 if
     hardware and golden model differ. Needs the extra `sweep`.
     """
-    from tachometry.sim.studies import cluster
+    from tachometry.sim.studies.sweeping import cluster
 
     cluster.require()
     earliest = 0.0 if start is None else float(parse_time("start", start))
@@ -154,7 +154,7 @@ def sweep(
     from tachometry.cli.reports.sweep import print_sweep
     from tachometry.cli.sweeping.points import points_of
     from tachometry.sim.engines.pick import pick
-    from tachometry.sim.studies.sweep_results import Results
+    from tachometry.sim.studies.sweeping.results import Results
 
     if engine == "auto":
         engine = pick(engine).name
@@ -195,7 +195,7 @@ def _run(
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import PerSecond, progress_bar
-    from tachometry.sim.studies import cluster
+    from tachometry.sim.studies.sweeping import cluster
 
     if not missing:
         return

@@ -6,7 +6,7 @@ from typing import Any
 
 from tachometry.cli.options.option import all_of, option
 from tachometry.spec import AxesSpec, ParameterError, STachometer, TachometerSpec
-from tachometry.spec.axes import MAX_AXES
+from tachometry.spec.methods.axes import MAX_AXES
 
 _AXES = "Axes"
 

@@ -11,7 +11,7 @@ import click
 
 from tachometry.cli.options.option import all_of, option, refuse_without
 from tachometry.spec import AxesSpec, CoreSpec
-from tachometry.spec.units import parse_frequency
+from tachometry.spec.language.units import parse_frequency
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.signals.recording import Recording

@@ -14,9 +14,9 @@ from tachometry.cli.options.motion import Quantity, disc_options
 from tachometry.cli.options.option import all_of, option
 from tachometry.cli.options.sweep import by_name
 from tachometry.spec import TachometerSpec
-from tachometry.spec.option import ParameterError
-from tachometry.spec.timing import whole_clocks
-from tachometry.spec.units import (
+from tachometry.spec.core.timing import whole_clocks
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import (
     BANDWIDTH,
     CURRENT,
     TIME,
@@ -28,7 +28,7 @@ from tachometry.spec.units import (
 )
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.studies.control import Load, Setting
+    from tachometry.sim.studies.loops.control import Load, Setting
 
 _LOOP, _MOTOR = "Controller", "Motor and load"
 _RATE, _TORQUE, _TIME = Quantity(BANDWIDTH, "rad/s"), Quantity(TORQUE, "Nm"), Quantity(TIME, "s")
@@ -146,7 +146,7 @@ Make = Callable[[TachometerSpec], "Setting"]
 
 
 def _load(text: str | None) -> Load | None:
-    from tachometry.sim.studies.control import Load
+    from tachometry.sim.studies.loops.control import Load
 
     if text is None:
         return None
@@ -193,7 +193,7 @@ def _setting(
 
     from tachometry.sim.encoder.motion import parse_motion
     from tachometry.sim.encoder.virtual import VirtualEncoder
-    from tachometry.sim.studies.control import Setting, Task, in_gates
+    from tachometry.sim.studies.loops.control import Setting, Task, in_gates
 
     if not (torque_noise >= 0 and math.isfinite(torque_noise)):
         raise ParameterError("torque_noise", f"must be at least 0 Nm, not {torque_noise:g}")

@@ -20,8 +20,8 @@ from tachometry.spec import (
     of_texts,
     own_options,
 )
-from tachometry.spec import option as declaration
-from tachometry.spec.units import parse_frequency
+from tachometry.spec.language import option as declaration
+from tachometry.spec.language.units import parse_frequency
 
 _PREFIX = "core_"
 _CLOCK = "clock"

@@ -8,7 +8,7 @@ import click
 
 from tachometry.cli.options.option import all_of, option
 from tachometry.spec import ParameterError, TachometerSpec
-from tachometry.spec.units import parse_time
+from tachometry.spec.language.units import parse_time
 
 _SIMULATION = "Simulation"
 

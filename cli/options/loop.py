@@ -7,7 +7,7 @@ from typing import Any
 from tachometry.cli.options.option import all_of, option
 from tachometry.spec import AxesSpec, CoreSpec, ParameterError
 from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.option import Option, options_of, read_options
+from tachometry.spec.language.option import Option, options_of, read_options
 
 _LOOP = "Loop"
 

@@ -12,7 +12,7 @@ import click
 
 from tachometry.cli.options.option import all_of, option, refuse_without
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import DEGREES, FRACTION, Units, read_nearest
+from tachometry.spec.language.units import DEGREES, FRACTION, Units, read_nearest
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder

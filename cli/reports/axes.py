@@ -15,8 +15,8 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import held_from, velocity_error
 from tachometry.sim.studies.lockstep import Lockstep
 from tachometry.spec import AxesSpec
-from tachometry.spec.manifest import manifest
-from tachometry.spec.units import format_time, plural
+from tachometry.spec.language.units import format_time, plural
+from tachometry.spec.registers.manifest import manifest
 
 
 def print_axes_core(spec: AxesSpec) -> None:

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tachometry.cli.options.methods import Methods
-from tachometry.spec.units import SpeedUnit, format_time
+from tachometry.spec.language.units import SpeedUnit, format_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.studies.compare import Score
+    from tachometry.sim.studies.comparing.compare import Score
+    from tachometry.sim.studies.comparing.tune import Cost
     from tachometry.sim.studies.size import Measurement
-    from tachometry.sim.studies.tune import Cost
 
 _SPEEDS = ("rms", "max")  # of a score, in rad/s
 _SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
@@ -107,7 +107,7 @@ def write_comparison(path: Path, scores: list[Score], sizes: Mapping[str, Measur
 def write_costs(path: Path, costs: Mapping[str, Sequence[Cost]], unit: SpeedUnit) -> None:
     """Write what all settings cost as CSV; the last column tells those that are in the figure."""
     from tachometry.sim.signals.files import write_csv
-    from tachometry.sim.studies.tune import front
+    from tachometry.sim.studies.comparing.tune import front
 
     rows = [
         (cost.method, cost.name, unit.of(cost.rms), cost.delay, int(cost in shown))

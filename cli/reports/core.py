@@ -8,10 +8,10 @@ from tachometry.sim.studies.plan import default_range, plan_at
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
-from tachometry.spec.manifest import manifest
+from tachometry.spec.language.units import SPEED, SpeedUnit, format_time, plural
 from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import WORD
-from tachometry.spec.units import SPEED, SpeedUnit, format_time, plural
 
 
 def print_core(spec: TachometerSpec, bus: str = "none") -> None:

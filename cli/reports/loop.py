@@ -3,7 +3,7 @@
 from tachometry.cli.reports.core import configuration, registers_row, short_time
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.units import plural
+from tachometry.spec.language.units import plural
 
 
 def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:

@@ -19,7 +19,7 @@ from tachometry.boards.monitor.columns import Column, Value
 from tachometry.boards.monitor.session import Frame
 from tachometry.cli.reports.streams import printable
 from tachometry.spec import TachometerSpec
-from tachometry.spec.tachometer import BOUNDS
+from tachometry.spec.core.tachometer import BOUNDS
 
 _SHOWN = 10.0  # seconds of the plot
 _LINE = 1.0  # seconds of board from a plain line to the next

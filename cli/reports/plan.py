@@ -9,7 +9,7 @@ from tachometry.cli.reports.core import configuration, short_time
 from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
 from tachometry.sim.studies.plan import Plan
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import SpeedUnit
+from tachometry.spec.language.units import SpeedUnit
 
 
 def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:

@@ -13,7 +13,7 @@ from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.run import Mismatch, Run
 from tachometry.sim.signals.tables import held_velocity, velocity_error
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import format_time, plural
+from tachometry.spec.language.units import format_time, plural
 
 
 def interrupted(n_clocks: int, wanted: int) -> int:

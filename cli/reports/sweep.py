@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tachometry.cli.reports.terminal import print_table, stdout_console
-from tachometry.spec.units import format_time, plural
+from tachometry.spec.language.units import format_time, plural
 
 if TYPE_CHECKING:
     from tachometry.cli.sweeping.points import Points
-    from tachometry.sim.studies.sweep_results import Results
+    from tachometry.sim.studies.sweeping.results import Results
 
 
 def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, results: Path | None) -> int:

@@ -17,9 +17,9 @@ from tachometry.cli.options.sweep import ENCODER, by_name, point_options
 from tachometry.cli.sweeping.settings import Settings, Text, arguments
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.studies.sweep import COLUMNS, Point
+from tachometry.sim.studies.sweeping.sweep import COLUMNS, Point
 from tachometry.spec import METHODS, TachometerSpec, methods_with, of_texts
-from tachometry.spec.units import FREQUENCY, SPEED, TIME, SpeedUnit, read_nearest
+from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, SpeedUnit, read_nearest
 
 Words = tuple[str, ...]
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
-from tachometry.spec.option import ParameterError, parse_flag
-from tachometry.spec.units import QUANTITY, ratio
+from tachometry.spec.language.option import ParameterError, parse_flag
+from tachometry.spec.language.units import QUANTITY, ratio
 
 Text = str | None  # None: without the option
 

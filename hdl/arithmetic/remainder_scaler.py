@@ -9,9 +9,9 @@ from amaranth import Cat, Const, Module, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
-from tachometry.hdl.arithmetic.registers import registers
 from tachometry.hdl.arithmetic.scaled import scaled_stream
+from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 
 

@@ -5,12 +5,12 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.axes.axis_window import AxisWindow
 from tachometry.hdl.axes.turns import Turns
-from tachometry.spec.axes import DECIDE, READ, AxesSpec
+from tachometry.hdl.wires.delay import delay
+from tachometry.spec.methods.axes import DECIDE, READ, AxesSpec
 
 
 class AxesDatapath(wiring.Component):

@@ -5,8 +5,8 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.front_end.decoder import transition
+from tachometry.hdl.wires.delay import delay
 
 
 class AxisCounters(wiring.Component):

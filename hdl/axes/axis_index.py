@@ -5,8 +5,8 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.axes.axis_counters import of_slot
+from tachometry.hdl.wires.delay import delay
 
 
 class AxisIndex(wiring.Component):

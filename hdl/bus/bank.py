@@ -10,7 +10,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.counter import SaturatingCounter
 from tachometry.hdl.bus.native import native_port
-from tachometry.spec.port import INDEX, UPDATE
+from tachometry.spec.language.port import INDEX, UPDATE
 from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
 
 _EVENTS = {"updated": UPDATE, "indexed": INDEX}  # flags that say that there was a strobe since the capture before

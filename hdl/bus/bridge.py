@@ -4,8 +4,8 @@ from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from tachometry.hdl.arithmetic.ports import members
 from tachometry.hdl.bus.native import native_port
+from tachometry.hdl.wires.ports import members
 from tachometry.spec.registers.buses import BUSES, CAPTURE
 from tachometry.spec.registers.map import RegisterMap
 

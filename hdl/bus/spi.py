@@ -3,7 +3,7 @@
 from amaranth import Cat, Module, Mux, Signal
 
 from tachometry.hdl.bus.bridge import Bridge, next_number
-from tachometry.hdl.front_end.synchronizer import Synchronizer
+from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.registers.frames import SPI_ADDRESS_WIDTH
 from tachometry.spec.registers.map import WORD
 

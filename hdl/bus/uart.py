@@ -4,7 +4,7 @@ from amaranth import Cat, Module, Mux, Signal
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.bridge import Bridge, next_number
-from tachometry.hdl.front_end.synchronizer import Synchronizer
+from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.registers.frames import (
     COUNT_WIDTH,
     CRC_POLYNOMIAL,

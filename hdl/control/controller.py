@@ -11,7 +11,7 @@ from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
 from tachometry.spec.control.form import GAINS, GUARD_BITS, TABLED, ControlForm, Term
 from tachometry.spec.control.ports import GAIN_PORTS
-from tachometry.spec.units import signed_width
+from tachometry.spec.language.units import signed_width
 
 
 def _choose(m: Module, term: Signal, values: Mapping[Term, ValueLike], found: Signal) -> None:

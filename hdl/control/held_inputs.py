@@ -6,8 +6,8 @@ from amaranth import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.ports import members
-from tachometry.spec.port import Port
+from tachometry.hdl.wires.ports import members
+from tachometry.spec.language.port import Port
 
 
 class HeldInputs(wiring.Component):

@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
-from tachometry.hdl.front_end.synchronizer import Synchronizer
+from tachometry.hdl.wires.synchronizer import Synchronizer
 
 
 class InputConditioner(wiring.Component):

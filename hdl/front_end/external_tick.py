@@ -4,8 +4,8 @@ from amaranth import Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
-from tachometry.hdl.front_end.synchronizer import Synchronizer
+from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.synchronizer import Synchronizer
 
 
 class ExternalTick(wiring.Component):

@@ -4,7 +4,7 @@ from amaranth import Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
+from tachometry.hdl.wires.delay import delay
 
 
 class IndexCapture(wiring.Component):

@@ -4,8 +4,8 @@ from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.saturate import raised_for, saturate_raised
+from tachometry.hdl.wires.delay import delay
 
 
 class PulseCounter(wiring.Component):

@@ -5,10 +5,10 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.quotient import Quotient
-from tachometry.hdl.arithmetic.registers import registers
 from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
+from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.registers import registers
 from tachometry.spec import MTachometer
 
 

@@ -5,11 +5,11 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.divider import Divider
-from tachometry.hdl.arithmetic.registers import registers
 from tachometry.hdl.methods.datapath import stamped
 from tachometry.hdl.output.update import update_layout, update_stream
+from tachometry.hdl.wires.registers import registers
+from tachometry.spec.core.tachometer import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
-from tachometry.spec.tachometer import BOUNDS
 
 
 class QuotientVelocity(wiring.Component):

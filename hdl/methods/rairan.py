@@ -5,11 +5,11 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
 from tachometry.hdl.arithmetic.idle import IdleCounter
-from tachometry.hdl.arithmetic.registers import registers
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.rairan_counters import RairanCounters
+from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.registers import registers
 from tachometry.spec import RairanTachometer
 
 

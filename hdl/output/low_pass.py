@@ -5,9 +5,9 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.registers import registers
 from tachometry.hdl.output.update import update_stream
 from tachometry.hdl.output.update_age import UpdateAge
+from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats import low_pass
 
 

@@ -4,8 +4,8 @@ from amaranth import signed
 from amaranth.lib import data, stream
 
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.tachometer import BOUNDS
 from tachometry.spec.formats.velocity_output import VelocityOutput
-from tachometry.spec.tachometer import BOUNDS
 
 # The velocities of an update, and which way each is rounded: to the nearest (0), down (−1) or up (1).
 VELOCITIES = {"velocity": 0, **BOUNDS}

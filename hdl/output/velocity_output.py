@@ -10,10 +10,10 @@ from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.delay import delay
-from tachometry.hdl.arithmetic.registers import registers
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.output.update import VELOCITIES, shown_layout, update_stream
+from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats import velocity_output
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tachometry.sim.signals.files import replacing
 from tachometry.sim.signals.recording import MAX_EDGES
-from tachometry.spec.option import ParameterError
+from tachometry.spec.language.option import ParameterError
 
 Channel = str | int
 SAME = -(1 << 16)  # as the channel of B: that of A

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError
 from tachometry.sim.captures.sigrok import agreed_samplerate, divide, parse_samplerate
-from tachometry.spec.units import TIME, plain_unit
+from tachometry.spec.language.units import TIME, plain_unit
 
 LONGEST = 1 << 16  # bytes, with the comments before it
 COMMENTS = ("#", ";")

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.encoder.motion import FloatArray, cos2pi
-from tachometry.spec.option import ParameterError
-from tachometry.spec.units import TIME, read_nearest
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import TIME, read_nearest
 
 Rows = NDArray[np.intp]
 Levels = NDArray[np.uint8]

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tachometry.spec.option import ParameterError
-from tachometry.spec.units import ANGLE, FREQUENCY, SPEED, TIME, Units, read_nearest
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import ANGLE, FREQUENCY, SPEED, TIME, Units, read_nearest
 
 FloatArray = NDArray[np.float64]
 

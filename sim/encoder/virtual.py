@@ -15,7 +15,7 @@ from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY, Bounce
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
-from tachometry.spec.option import ParameterError
+from tachometry.spec.language.option import ParameterError
 
 MAX_PULSES_PER_REV = 1 << 26
 MAX_UNEVEN_PULSES = 1 << 20  # of a disc whose edges are all displaced: each takes memory

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from amaranth.lib import wiring
 
-from tachometry.hdl.demo.demo import Demo
+from tachometry.hdl.core.demo import Demo
 from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.spec import Port

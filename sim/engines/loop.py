@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.spec import TachometerSpec
-from tachometry.spec.option import ParameterError
+from tachometry.spec.language.option import ParameterError
 
 PARTS = ("plant.h", "control.h", "loop.h")
 COLUMNS = ("time", "command", "speed", "angle", "held", "y", "z", "disturbance", "current", "driven", "position")

@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl import AnyTachometer, core_of
 from tachometry.spec import CoreSpec
-from tachometry.spec.port import INDEX, TICK, UPDATE
+from tachometry.spec.language.port import INDEX, TICK, UPDATE
 
 WORD = 32  # bits
 _ORDER = {TICK: 1, UPDATE: 2, INDEX: 3}  # of strobes in the waveform; errors come first

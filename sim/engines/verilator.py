@@ -8,7 +8,7 @@ from unittest.mock import patch
 
 from amaranth.back import verilog
 
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.sim.engines import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 

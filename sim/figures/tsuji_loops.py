@@ -11,7 +11,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Gains, Log, Motor, Observer
 from tachometry.sim.figures.lab import Lab
 from tachometry.sim.figures.result import Claim, Curve, Panel, Result
-from tachometry.sim.studies.control import Command, Load, Setting, Task, as_shown, each_seed, mean
+from tachometry.sim.studies.loops.control import Command, Load, Setting, Task, as_shown, each_seed, mean
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing
 
 _LINES = 500

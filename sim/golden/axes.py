@@ -8,8 +8,8 @@ from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.axes import COUNT_LATENCY, AxesSpec
-from tachometry.spec.port import INDEX, TICK, UPDATE
+from tachometry.spec.language.port import INDEX, TICK, UPDATE
+from tachometry.spec.methods.axes import COUNT_LATENCY, AxesSpec
 
 
 def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]]) -> Run:

@@ -13,7 +13,7 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.control.form import GAINS, GUARD_BITS, ControlForm, Term
 from tachometry.spec.control.loop import LoopSpec
 from tachometry.spec.control.ports import CONTROL, CURRENT
-from tachometry.spec.port import UPDATE
+from tachometry.spec.language.port import UPDATE
 
 __all__ = ["Command", "Control", "Demand", "Gains", "control", "run_loop"]
 

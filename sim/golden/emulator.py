@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec.emulator import (
+from tachometry.spec.registers.emulator import (
     BOUNCE_BITS,
     DROP_BITS,
     DROP_WIDTH,
@@ -71,7 +71,7 @@ class _Random:
 
 
 class _Line:
-    """One line, see `hdl.demo.line`."""
+    """One line, see `hdl.core.line`."""
 
     def __init__(self, k: int, random: _Random) -> None:
         self._k, self._random = k, random

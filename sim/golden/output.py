@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.tachometer import BOUNDS
+from tachometry.spec.core.tachometer import BOUNDS
 
 
 def in_unit(spec: TachometerSpec, updates: Table) -> Table:

@@ -8,7 +8,7 @@ import numpy as np
 from tachometry.sim import golden
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec.port import INDEX, TICK, UPDATE
+from tachometry.spec.language.port import INDEX, TICK, UPDATE
 from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
 
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
-from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
+from tachometry.spec.core.tachometer import TICK_IN_TO_WINDOW_END
 
 
 def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

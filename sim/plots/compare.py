@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.plots.style import COLOURS, columns, in_words, place_panels, save_figure
-from tachometry.sim.studies.compare import Curve, Score, TrueSpeed
+from tachometry.sim.studies.comparing.compare import Curve, Score, TrueSpeed
 from tachometry.spec import TachometerSpec
 
 

@@ -17,9 +17,9 @@ from tachometry.sim.plots.style import (
     place_panels,
     save_figure,
 )
-from tachometry.sim.studies.control import Setting
-from tachometry.sim.studies.loops import FIGURES
-from tachometry.spec.units import FREQUENCY, SPEED, TIME, read_nearest
+from tachometry.sim.studies.loops.control import Setting
+from tachometry.sim.studies.loops.loops import FIGURES
+from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, read_nearest
 
 Log = Mapping[str, FloatArray]
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from tachometry.sim.plots.style import COLOURS, ESTIMATE, FORCED, in_words, place_panels, save_figure
 from tachometry.sim.studies.plan import Plan
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import SpeedUnit
+from tachometry.spec.language.units import SpeedUnit
 
 _HEIGHTS = {"resolution": 3.4, "time": 2.4}  # inches
 

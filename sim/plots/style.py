@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tachometry.spec import METHODS, TachometerSpec
-from tachometry.spec.units import format_time
+from tachometry.spec.language.units import format_time
 
 FloatArray = NDArray[np.float64]
 TrueSpeed = Callable[[FloatArray], FloatArray]

@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from tachometry.sim.plots.style import COLOURS, in_words, place_panels, save_figure
-from tachometry.sim.studies.tune import Cost, front
+from tachometry.sim.studies.comparing.tune import Cost, front
 from tachometry.spec import TachometerSpec
 
 _MARKS = "os^Dv<>pPX"

@@ -9,8 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tachometry.sim.plots.style import COLOURS, save_figure
-from tachometry.sim.studies.control import Outcome
-from tachometry.spec.units import format_time
+from tachometry.sim.studies.loops.control import Outcome
+from tachometry.spec.language.units import format_time
 
 _MARKS = "os^DvP"
 # Inches.

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.recording import MAX_TICKS, PinTrace, Recording, check_ticks, merged
 from tachometry.sim.signals.run import Run
-from tachometry.spec.axes import AxesSpec
-from tachometry.spec.port import TICK, UPDATE
+from tachometry.spec.language.port import TICK, UPDATE
+from tachometry.spec.methods.axes import AxesSpec
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.spec import TachometerSpec
-from tachometry.spec.tachometer import TICK_IN_TO_WINDOW_END
-from tachometry.spec.units import format_time
+from tachometry.spec.core.tachometer import TICK_IN_TO_WINDOW_END
+from tachometry.spec.language.units import format_time
 
 LINES = ("a", "b", "z", "tick_in")
 

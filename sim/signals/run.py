@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.arrays import Ints
 from tachometry.spec.control import AnySpec
-from tachometry.spec.port import INDEX, TICK, UPDATE
+from tachometry.spec.language.port import INDEX, TICK, UPDATE
 
 
 @dataclass(frozen=True, eq=False)

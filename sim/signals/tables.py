@@ -13,7 +13,7 @@ from tachometry.sim.signals.axes import of_axis
 from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
-from tachometry.spec.port import TICK, UPDATE
+from tachometry.spec.language.port import TICK, UPDATE
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from fractions import Fraction
 from itertools import combinations, product
 
 from tachometry.spec import TachometerSpec, common_options, of_texts, own_options, spec_class
-from tachometry.spec.option import Option
+from tachometry.spec.language.option import Option
 
 _PPR = 500
 _CLOCK_HZ = 48_000_000

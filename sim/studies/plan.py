@@ -12,7 +12,7 @@ from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.theory.performance import PERFORMANCES, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import TachometerSpec
-from tachometry.spec.units import SpeedUnit
+from tachometry.spec.language.units import SpeedUnit
 
 _UNITS = 10  # of the default range
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them

@@ -14,7 +14,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.form import POSITION_FRAC_BITS
 from tachometry.spec.control.ports import GAIN_PORTS
-from tachometry.spec.port import Port
+from tachometry.spec.language.port import Port
 
 _COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 _DEMANDS = tuple(f"generator_{name}" for name in ("mode", "velocity", "acceleration", "amplitude", "rate"))

@@ -17,8 +17,8 @@ from tachometry.sim.testbench.loop_inputs import changes as loop_changes
 from tachometry.sim.testbench.loop_inputs import loop_inputs
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.option import ParameterError
-from tachometry.spec.provenance import LICENSE, generator, notice
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.provenance import LICENSE, generator, notice
 
 # Clocks of the motion, and of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING, _STANDING = 160_000, 800_000

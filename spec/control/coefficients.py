@@ -16,7 +16,7 @@ from tachometry.spec.control.form import (
     ControlForm,
     Term,
 )
-from tachometry.spec.units import PI
+from tachometry.spec.language.units import PI
 
 if TYPE_CHECKING:
     from tachometry.spec.control.loop import LoopSpec

@@ -41,7 +41,7 @@ from enum import IntEnum
 from fractions import Fraction
 from functools import cached_property
 
-from tachometry.spec.units import ceil_log2, signed_width
+from tachometry.spec.language.units import ceil_log2, signed_width
 
 GUARD_BITS = 4  # of the sum that becomes the current
 POSITION_FRAC_BITS = 8  # of the commanded position

@@ -27,7 +27,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tachometry.spec.control.form import ACCELERATION_WIDTH, POSITION_FRAC_BITS
-from tachometry.spec.units import PI
+from tachometry.spec.language.units import PI
 
 if TYPE_CHECKING:
     from tachometry.spec.control.loop import LoopSpec

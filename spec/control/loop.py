@@ -8,16 +8,15 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from tachometry.spec.axes import CoreSpec
 from tachometry.spec.control.coefficients import control_form, extra_bits_of, ratios_of
 from tachometry.spec.control.form import ACCELERATION_WIDTH, ControlForm, Term, factor_bits
 from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
 from tachometry.spec.control.ports import loop_ports
-from tachometry.spec.option import Derived, ParameterError, option, options_of, settle
-from tachometry.spec.port import HasPorts, Port
-from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.timing import Timing, whole_clocks
-from tachometry.spec.units import (
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.timing import Timing, whole_clocks
+from tachometry.spec.language.option import Derived, ParameterError, option, options_of, settle
+from tachometry.spec.language.port import HasPorts, Port
+from tachometry.spec.language.units import (
     CURRENT,
     PI,
     PLAIN,
@@ -28,6 +27,7 @@ from tachometry.spec.units import (
     read_exactly,
     rounded,
 )
+from tachometry.spec.methods.axes import CoreSpec
 
 MAX_PERIOD = 1 << 24
 MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from tachometry.spec.control.coefficients import gain_per_lsb
 from tachometry.spec.control.form import GAINS, POSITION_FRAC_BITS, Term
 from tachometry.spec.control.generator import AMPLITUDE_WIDTH, MODE_WIDTH, RATE_FRAC_BITS, WORD
-from tachometry.spec.port import Port, held, strobe
-from tachometry.spec.units import signed_width
+from tachometry.spec.language.port import Port, held, strobe
+from tachometry.spec.language.units import signed_width
 
 if TYPE_CHECKING:
     from tachometry.spec.control.loop import LoopSpec

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import count
 
-from tachometry.spec.units import signed_width
+from tachometry.spec.language.units import signed_width
 
 # Up to this many m are tried.
 _MAX_TRIED = 2048

@@ -26,7 +26,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
-from tachometry.spec.units import ceil_log2, signed_width
+from tachometry.spec.language.units import ceil_log2, signed_width
 
 LEVELS = 16  # of λ, from λ_0 to λ_0/10, with equal ratios
 RATIOS = tuple(10 ** (-level / (LEVELS - 1)) for level in range(LEVELS))

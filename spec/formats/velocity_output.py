@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tachometry.spec.option import ParameterError
-from tachometry.spec.units import PI, SPEED
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import PI, SPEED
 
 NATIVE = "count/tick"
 # So many of each unit are one revolution per second.

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
 
-from tachometry.spec.option import ParameterError
-from tachometry.spec.units import FRACTION, read_exactly
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import FRACTION, read_exactly
 
 
 def parse_target(what: str, text: str) -> Fraction:

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
+from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.formats.reciprocal import Reciprocal
-from tachometry.spec.option import ParameterError, option
-from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.units import plural, signed_width
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.units import plural, signed_width
 
 MAX_AVERAGE = 256
 

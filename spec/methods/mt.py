@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
+from tachometry.spec.core.timing import whole_clocks
+from tachometry.spec.language.option import Derived, ParameterError, option
 from tachometry.spec.methods.timed import TimedTachometer
-from tachometry.spec.option import Derived, ParameterError, option
-from tachometry.spec.timing import whole_clocks
 
 
 def _clocks(what: str, text: str) -> Derived:

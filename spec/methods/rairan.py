@@ -5,11 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.port import UPDATE, Port, held
+from tachometry.spec.language.units import rounded
 from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target
-from tachometry.spec.option import ParameterError, option
-from tachometry.spec.port import UPDATE, Port, held
-from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.units import rounded
 
 # The estimates are looked up by Ndt1, or by Nep1 − 1, in a table with as many entries at most.
 MAX_TABLE = 2048

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
+from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
-from tachometry.spec.option import ParameterError, option
-from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.units import plural, signed_width
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.units import plural, signed_width
 
 # Up to this many ticks 1/m_s can be looked up in a table of block RAM.
 MAX_TABLE = 2048

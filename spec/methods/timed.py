@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from tachometry.spec.option import ParameterError, option
-from tachometry.spec.port import UPDATE, Port, held
-from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.units import plural
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.port import UPDATE, Port, held
+from tachometry.spec.language.units import plural
 
 _TIMERS = ("clock", "tick")
 

@@ -6,13 +6,13 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.formats.tracking import Tracking
 from tachometry.spec.formats.tracking_program import Program
 from tachometry.spec.formats.velocity_output import NATIVE
-from tachometry.spec.option import ParameterError, option
-from tachometry.spec.port import UPDATE, Port, held
-from tachometry.spec.tachometer import TachometerSpec
-from tachometry.spec.units import FRACTION, format_time, parse_bandwidth, read_exactly
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.port import UPDATE, Port, held
+from tachometry.spec.language.units import FRACTION, format_time, parse_bandwidth, read_exactly
 
 MOST_WIDTH = 64  # bits of a word
 MOST_ACCELERATION_WIDTH = 48

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tachometry.spec.control import AnySpec
-from tachometry.spec.manifest import described_port, manifest
-from tachometry.spec.option import ParameterError
-from tachometry.spec.port import Port
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import Port
 from tachometry.spec.registers.frames import QUIET_BITS, SPI_SCK_CYCLES
 from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.manifest import described_port, manifest
 from tachometry.spec.registers.map import WORD, RegisterMap
 
 

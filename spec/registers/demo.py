@@ -6,14 +6,14 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.emulator import BOUNCE_WIDTH, DROP_WIDTH, ERROR_WIDTH, JITTER_WIDTH, RATE_SHIFT
-from tachometry.spec.manifest import described_port
-from tachometry.spec.option import ParameterError
-from tachometry.spec.port import TICK, Port, held
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import TICK, Port, held
 from tachometry.spec.registers.buses import Bus, manifest_on
+from tachometry.spec.registers.emulator import BOUNCE_WIDTH, DROP_WIDTH, ERROR_WIDTH, JITTER_WIDTH, RATE_SHIFT
 from tachometry.spec.registers.loop import LoopMap
+from tachometry.spec.registers.manifest import described_port
 from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
-from tachometry.spec.tachometer import TachometerSpec
 
 ENCODER_LINES = ("a", "b", "z")
 DRIVE = "drive"  # the current of a loop, as a stream of bits

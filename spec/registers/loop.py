@@ -4,12 +4,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from tachometry.spec.axes import AxesSpec
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.control.form import GAINS
 from tachometry.spec.control.ports import CONTROL, CURRENT, GAIN_PORTS, loop_entries
-from tachometry.spec.option import ParameterError
-from tachometry.spec.port import Port
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import Port
+from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
 
 _MODE, _POSITION = "generator_mode", "command_position"

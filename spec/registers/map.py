@@ -19,9 +19,9 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.control import AnySpec
-from tachometry.spec.manifest import manifest
-from tachometry.spec.port import INDEX, TICK, UPDATE, Port
-from tachometry.spec.tachometer import TachometerSpec
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port
+from tachometry.spec.registers.manifest import manifest
 
 WORD = 32  # bits
 IDENTIFICATION = int.from_bytes(b"TACH", "big")

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 from support.script import load
 
-from tachometry.sim.studies.control import Outcome
-from tachometry.sim.studies.gate_check import Checked
-from tachometry.sim.studies.usable_gain import KINDS, TICKS
+from tachometry.sim.studies.loops.control import Outcome
+from tachometry.sim.studies.loops.gate_check import Checked
+from tachometry.sim.studies.loops.usable_gain import KINDS, TICKS
 
 bench = load("control")
 

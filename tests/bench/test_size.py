@@ -6,7 +6,7 @@ import pytest
 from support.compiled import lint
 from support.script import load
 
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.sim.studies import size as synthesis
 from tachometry.spec import METHODS, Encoder, STachometer, Timing
 from tachometry.spec.control import LoopSpec

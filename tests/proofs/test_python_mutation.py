@@ -71,9 +71,14 @@ def test_tests_that_take_next_to_no_time_come_first() -> None:
 
 
 def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:
-    (tmp_path / "test_x.py").write_text("from tachometry.spec.units import PI\nfrom tachometry.spec import numbers\n")
+    (tmp_path / "test_x.py").write_text(
+        "from tachometry.spec.language.units import PI\nfrom tachometry.spec.core import numbers\n"
+    )
     (tmp_path / "test_y.py").write_text("import tachometry.spec\n")
-    entry, all_files = {"seconds": 1.0, "lines": {"spec/units.py": [3]}}, ("spec/units.py", "spec/numbers.py", "x.py")
+    entry, all_files = (
+        {"seconds": 1.0, "lines": {"spec/language/units.py": [3]}},
+        ("spec/language/units.py", "spec/core/numbers.py", "x.py"),
+    )
     before = {
         "": {"seconds": 0.0, "lines": {file: [1] for file in all_files}},
         "test_x.py::test_pi": entry,
@@ -81,9 +86,9 @@ def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:
     }
     found = with_imports(tmp_path, before)
     lines = found["test_x.py::test_pi"]["lines"]
-    assert (lines["spec/units.py"], lines["spec/numbers.py"]) == ([3], [])
-    assert found["test_y.py::test_all"]["lines"].keys() == {"spec/units.py", "spec/numbers.py"}
-    assert chosen_for(found, "spec/numbers.py", 5, 20) == ["test_x.py::test_pi", "test_y.py::test_all"]
+    assert (lines["spec/language/units.py"], lines["spec/core/numbers.py"]) == ([3], [])
+    assert found["test_y.py::test_all"]["lines"].keys() == {"spec/language/units.py", "spec/core/numbers.py"}
+    assert chosen_for(found, "spec/core/numbers.py", 5, 20) == ["test_x.py::test_pi", "test_y.py::test_all"]
 
 
 SCRIPT = """
@@ -94,11 +99,11 @@ from proofs.python_mutation.judge import judge_all
 from proofs.python_mutation.mutants import mutants_of
 judge._STARTED = 5
 root, folder = Path(sys.argv[1]), Path(sys.argv[2])
-tests = ["tests/spec/test_spec.py::test_widths_hold_what_they_must"]
-jobs = [(m, tests, 1.0) for m in mutants_of(root, "spec/units.py") if m.where == "signed_width"][:1]
+tests = ["tests/spec/core/test_spec.py::test_widths_hold_what_they_must"]
+jobs = [(m, tests, 1.0) for m in mutants_of(root, "spec/language/units.py") if m.where == "signed_width"][:1]
 jobs += [(m, tests, 1.0) for m in mutants_of(root, "sim/golden/low_pass.py")][:1]  # which they never run
 jobs += [(jobs[0][0], [], 0.0)]
-digits = ["tests/spec/test_formats.py::test_the_product_is_a_sum_of_few_shifted_terms"]
+digits = ["tests/spec/formats/test_formats.py::test_the_product_is_a_sum_of_few_shifted_terms"]
 endless = [m for m in mutants_of(root, "spec/formats/velocity_output.py") if m.where == "_canonical"]
 jobs += [(m, digits, 0.0) for m in endless if m.change == "1 → 0 #2"]  # a number that never becomes 0
 for verdict in sorted(judge_all(root, jobs, 2, folder, lambda verdict: None), key=lambda v: v.mutant.file + v.what):
@@ -115,9 +120,9 @@ def test_a_wrong_line_is_noticed_by_its_tests_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("killed", "fine"), [(96, True), (94, False)])
 def test_the_score_of_every_room_must_be_high(killed: int, fine: bool, capsys: pytest.CaptureFixture[str]) -> None:
-    mutants = [Mutant("spec/units.py", nth, 0, nth, "here", f"{nth} → 0") for nth in range(100)]
+    mutants = [Mutant("spec/language/units.py", nth, 0, nth, "here", f"{nth} → 0") for nth in range(100)]
     verdicts = [Verdict(m, "killed" if nth < killed else "survived", 3, 1.0) for nth, m in enumerate(mutants)]
     assert report(verdicts) == fine
     out = capsys.readouterr().out
     assert f"| spec | 100 | {killed} | 0 | 0 | {100 - killed} | {killed}.0 % |" in out
-    assert "spec/units.py: here: 99 → 0" in out
+    assert "spec/language/units.py: here: 99 → 0" in out

@@ -11,7 +11,8 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from support.simulate import clock_by_clock
-from tachometry.hdl.control import controller, loop_core, update_window
+from tachometry.hdl.control import controller, update_window
+from tachometry.hdl.core import loop_core
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.command_generator import Command, Demand, Gains

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from support.compiled import lint
 from support.serial import Host
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines import build

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import tachometry.hdl
-from tachometry.hdl.bus_tachometer import BRIDGES
+from tachometry.hdl.core.bus_tachometer import BRIDGES
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.sim.golden.methods import MODELS
 

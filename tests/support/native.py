@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.sim.engines import build, verilator
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from support.compiled import lint
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.verilator import Verilator
 from tachometry.sim.signals.recording import PinTrace

@@ -7,7 +7,7 @@ from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Table
 from tachometry.spec import STachometer
-from tachometry.spec.tachometer import BOUNDS
+from tachometry.spec.core.tachometer import BOUNDS
 
 
 def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -10,8 +10,8 @@ from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.ordered import chain, next_place, places, spans
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Table
+from tachometry.spec.core.tachometer import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
-from tachometry.spec.tachometer import BOUNDS
 
 Ints = NDArray[np.int64]
 

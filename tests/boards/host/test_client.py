@@ -14,11 +14,11 @@ from support.native import NativeCore, check_golden, logged, snapshots
 from tachometry.boards.host import client
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.boards.host.snapshot import Snapshot
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
-from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import RegisterMap
 
 CASES = [("m", 16), ("s", 4), ("rairan", 2), ("t", 3), ("mt", 1)]

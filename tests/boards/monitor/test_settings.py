@@ -4,7 +4,7 @@ import pytest
 
 from tachometry.boards.monitor.settings import emulator_settings
 from tachometry.spec import of_texts
-from tachometry.spec.emulator import fastest, rad_per_s, rate_of
+from tachometry.spec.registers.emulator import fastest, rad_per_s, rate_of
 
 SPEC = of_texts("m", {"ppr": "500", "clock": "12MHz"})
 

@@ -11,7 +11,7 @@ from support.command import run
 from support.compiled import lint
 
 from tachometry.cli.commands import verify as command
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.sim.studies.axes import AXES, core_of
 
 CORE = "--ppr 25 --clock 20kHz --tick 2ms --max-time 8ms --max-speed 100rad/s --engine pysim".split()

@@ -12,8 +12,8 @@ from support.command import run
 from support.fake_tools import FakeTools
 
 from tachometry.boards.fpga.boards import BOARDS
-from tachometry.hdl.bus_tachometer import BusTachometer
-from tachometry.hdl.export import verilog_of
+from tachometry.hdl.core.bus_tachometer import BusTachometer
+from tachometry.hdl.export.verilog import verilog_of
 from tachometry.spec import of_texts
 from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_manifest

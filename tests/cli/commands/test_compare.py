@@ -7,7 +7,7 @@ import pytest
 from support.command import run
 
 from tachometry.sim.studies import size as synthesis
-from tachometry.sim.studies.rivals import BASELINES
+from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.spec import METHODS, TachometerSpec
 
 CORE = "--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms".split()

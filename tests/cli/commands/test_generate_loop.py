@@ -13,7 +13,7 @@ from tachometry.sim.engines import build
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_entries
-from tachometry.spec.option import options_of
+from tachometry.spec.language.option import options_of
 
 CORE = "--ppr 25 --clock 1MHz --tick 250us --max-time 2ms --max-speed 500rad/s --loop".split()
 PAGE = (Path(__file__).parents[3] / "docs" / "integration.md").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from support import command
 
 from tachometry.sim.engines import build
 from tachometry.sim.engines.loop import COLUMNS
-from tachometry.sim.studies import cluster
+from tachometry.sim.studies.sweeping import cluster
 
 CORE = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms".split()
 SHORT = [*CORE, "--motion", "ramp:0:4:30ms+constant:4:50ms", "--from", "40ms"]

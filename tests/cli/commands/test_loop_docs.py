@@ -15,8 +15,8 @@ from tachometry.cli.options.sweep import by_name
 from tachometry.cli.sweeping.loops import loops_of
 from tachometry.cli.sweeping.settings import of_command_line
 from tachometry.sim.engines.loop import Observer
-from tachometry.sim.studies.control import Outcome, outcome_of, simulation_of
-from tachometry.sim.studies.usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
+from tachometry.sim.studies.loops.control import Outcome, outcome_of, simulation_of
+from tachometry.sim.studies.loops.usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
 
 PAGE = (Path(__file__).parents[3] / "docs" / "control.md").read_text(encoding="utf-8")
 COMMANDS = [

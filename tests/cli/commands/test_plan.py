@@ -16,7 +16,7 @@ from support.command import run
 from tachometry.sim.theory import tsuji
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.formats.reciprocal import DividedReciprocal
-from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.manifest import manifest
 
 OPTIONS = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400rad/s".split()
 SPEC = STachometer(

@@ -13,8 +13,8 @@ import pytest
 from distributed import LocalCluster
 from support import command
 
-from tachometry.sim.studies import sweep
-from tachometry.sim.studies.sweep import COLUMNS
+from tachometry.sim.studies.sweeping import sweep
+from tachometry.sim.studies.sweeping.sweep import COLUMNS
 
 CORE = "--ppr 100 --clock 1MHz --max-time 20ms".split()
 MOTION = ["--motion", "constant:{speed}:100ms", "--from", "40ms"]
@@ -183,7 +183,7 @@ def test_what_cannot_be_is_told_in_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tachometry.sim.studies.cluster._PATIENCE", 0.2)
+    monkeypatch.setattr("tachometry.sim.studies.sweeping.cluster._PATIENCE", 0.2)
     Path("s.toml").write_text(BASE)
     assert run("s.toml", *options) == 2
     captured = capsys.readouterr()
@@ -195,7 +195,7 @@ def test_what_cannot_be_is_told_in_one_line(
 
 
 def test_a_scheduler_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tachometry.sim.studies.cluster._PATIENCE", 0.2)
+    monkeypatch.setattr("tachometry.sim.studies.sweeping.cluster._PATIENCE", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         assert run(*CORE, *MOTION, *AXES, "--scheduler", address) == 2
@@ -210,7 +210,7 @@ def test_an_interrupt_before_there_is_a_row(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tachometry.sim.studies.cluster.cluster", interrupted)
+    monkeypatch.setattr("tachometry.sim.studies.sweeping.cluster.cluster", interrupted)
     assert run(*CORE, *MOTION, *AXES, "--results", tmp_path / "r.parquet") == 130
     assert capsys.readouterr().err == "tachometry: interrupted after 0 of 8 points\n"
     assert list(tmp_path.iterdir()) == []

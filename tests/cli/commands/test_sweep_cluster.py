@@ -25,7 +25,7 @@ POINTS = 100
 TRACE = """
 import os, select
 from distributed import Status, get_worker
-from tachometry.sim.studies import sweep
+from tachometry.sim.studies.sweeping import sweep
 if not hasattr(sweep, "traced"):
     sweep.traced = sweep.run_point
     gate = os.open({gate!r}, os.O_RDWR | os.O_NONBLOCK)
@@ -174,7 +174,7 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
 def test_a_point_that_no_worker_outlives(tmp_path: Path) -> None:
     script = tmp_path / "die.py"
     script.write_text(
-        "import os\nfrom tachometry.sim.studies import sweep\nsweep.run_point = lambda point: os._exit(1)\n"
+        "import os\nfrom tachometry.sim.studies.sweeping import sweep\nsweep.run_point = lambda point: os._exit(1)\n"
     )
     more = {
         "DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{script}"]',

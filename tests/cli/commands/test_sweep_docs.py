@@ -11,7 +11,7 @@ from tachometry.cli.commands.sweep import sweep
 from tachometry.cli.options.sweep import by_name, point_options
 from tachometry.cli.sweeping.points import points_of
 from tachometry.cli.sweeping.settings import of_command_line, of_file
-from tachometry.sim.studies.sweep import COLUMNS, run_point
+from tachometry.sim.studies.sweeping.sweep import COLUMNS, run_point
 
 DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "sweep.md").read_text()

@@ -21,7 +21,7 @@ from tachometry.hdl.methods import count_way
 from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.sim.testbench.vectors import usual_motion
 from tachometry.spec import Encoder, STachometer, Timing
-from tachometry.spec.provenance import notice
+from tachometry.spec.language.provenance import notice
 
 SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us"
 CASES = {

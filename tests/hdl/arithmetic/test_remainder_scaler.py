@@ -13,8 +13,8 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.arithmetic import carried_reciprocal, remainder_scaler
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.core.timing import MAX_TICKS
 from tachometry.spec.formats.reciprocal import DividedReciprocal
-from tachometry.spec.timing import MAX_TICKS
 
 
 def long_spec(max_ticks: int, frac_bits: int, *, tick_cycles: int = 1, cancel: bool = True) -> STachometer:

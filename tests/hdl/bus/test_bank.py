@@ -7,8 +7,8 @@ from support.long import only
 from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
-from tachometry.hdl import register_core
 from tachometry.hdl.bus import bank, tick_position
+from tachometry.hdl.core import register_core
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import METHODS

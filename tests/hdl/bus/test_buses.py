@@ -23,17 +23,17 @@ from support.lockstep import random_ticks
 from support.long import long
 from support.mutant import mutant
 
-from tachometry.hdl import export
 from tachometry.hdl.bus.apb import ApbBridge
 from tachometry.hdl.bus.axi_lite import AxiLiteBridge
 from tachometry.hdl.bus.wishbone import WishboneBridge
+from tachometry.hdl.export import export
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import Encoder, STachometer, Timing
-from tachometry.spec.port import Port
+from tachometry.spec.language.port import Port
 from tachometry.spec.registers.buses import BUSES, CAPTURE
 from tachometry.spec.registers.map import RegisterMap
 

@@ -12,12 +12,12 @@ from support.mutant import caught
 from support.native import HEADER, NAME, check_golden, library, logged, snapshots, write_trace
 from support.script import load
 
+from tachometry.hdl.export.registers.files import register_files
+from tachometry.hdl.export.registers.page import tables
 from tachometry.sim.engines import build
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
-from tachometry.spec.registers.files import register_files
 from tachometry.spec.registers.map import RegisterMap
-from tachometry.spec.registers.page import tables
 
 STRICT = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion")
 STEPS = 6

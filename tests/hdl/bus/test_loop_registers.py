@@ -11,8 +11,9 @@ from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 from support.verilog import play
 
-from tachometry.hdl import export, register_core
 from tachometry.hdl.bus import bank
+from tachometry.hdl.core import register_core
+from tachometry.hdl.export import export
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.loop_registers import GoldenLoopBank
 from tachometry.sim.golden.registers import Access

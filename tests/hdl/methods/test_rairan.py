@@ -13,7 +13,7 @@ from tachometry.hdl.methods import dt_shift, rairan
 from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.sim.golden.methods.rairan import Model
 from tachometry.spec import Speed
-from tachometry.spec.tachometer import BOUNDS
+from tachometry.spec.core.tachometer import BOUNDS
 
 NAMES = ["velocity", "interval", "forced", "n_ep1", "n_dt1"]
 

@@ -14,7 +14,7 @@ from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Timing
-from tachometry.spec.tachometer import BOUNDS
+from tachometry.spec.core.tachometer import BOUNDS
 
 CLOCKS = 2400
 NAMES = [*OUTPUTS[1:], *BOUNDS, "bounds_valid"]

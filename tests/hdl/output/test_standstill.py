@@ -16,7 +16,7 @@ from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import METHODS, Encoder, STachometer, Timing, of_texts
-from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.manifest import manifest
 
 WIDTH = 4
 

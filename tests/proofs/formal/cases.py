@@ -24,7 +24,7 @@ from tachometry.spec import (
     TTachometer,
 )
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal as CarriedSpec
-from tachometry.spec.units import signed_width
+from tachometry.spec.language.units import signed_width
 
 
 def core(

@@ -8,7 +8,7 @@ from support.control import Beside
 
 from tachometry.spec import Encoder, STachometer
 from tachometry.spec.control.form import GUARD_BITS, Coefficients, ControlForm, Term
-from tachometry.spec.units import signed_width
+from tachometry.spec.language.units import signed_width
 
 _SPEC = STachometer(encoder=Encoder(1))
 # Numbers as small as a solver can look at; the coefficients are of no real motor.

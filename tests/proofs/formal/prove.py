@@ -13,7 +13,7 @@ from unittest.mock import patch
 from amaranth.back import verilog
 from amaranth.lib import wiring
 
-from tachometry.hdl import export
+from tachometry.hdl.export import export
 from tachometry.spec import TachometerSpec
 
 _SECONDS = 280

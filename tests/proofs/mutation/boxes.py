@@ -17,8 +17,8 @@ from proofs.mutation.loops import LOOPS
 from proofs.mutation.stimulus import Stimulus, noise_lines, stimulus
 from support.serial import SpiHost, UartHost
 
-from tachometry.hdl.bus_tachometer import BusTachometer
-from tachometry.hdl.demo.demo import Demo
+from tachometry.hdl.core.bus_tachometer import BusTachometer
+from tachometry.hdl.core.demo import Demo
 from tachometry.spec import Port, of_texts
 from tachometry.spec.registers import frames
 from tachometry.spec.registers.buses import BUSES, Bus, ports_on
@@ -273,7 +273,7 @@ BOXES: list[Case] = [
     Box("axi-lite", _SPEC, 60, bus="axi-lite", lines=_axi_lite, sources="hdl/bus/axi_lite.py*"),
     Box("spi", _SPEC, 80, bus="spi", lines=_spi, sources="hdl/bus/spi.py*"),
     Box("uart", _SPEC, 80, bus="uart", lines=_uart, sources="hdl/bus/uart.py*"),
-    Box("emulator", _SPEC, 100, bus="uart", demo=True, lines=_settings, sources="hdl/demo/*"),
+    Box("emulator", _SPEC, 100, bus="uart", demo=True, lines=_settings, sources="hdl/core/*"),
     Box("telemetry", _SPEC, 60, bus="uart", demo=True, lines=_settings, sources="hdl/bus/telemetry.py*"),
     *AXES,
     *LOOPS,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from proofs.mutation.cases import Case
 from proofs.mutation.stimulus import Stimulus, bursts, noise, steady
 
-from tachometry.hdl.control import LoopCore
+from tachometry.hdl.core.loop_core import LoopCore
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.control import Command, run_loop

@@ -274,9 +274,9 @@ _argue(
     "In general a ratio of 1 is 2^shift, all of whose zeros are dropped: 1 and no shift. No ratio is 2 or 0.",
     *("1 → 2", "1 → 0"),
 )
-_argue("spec/numbers.py: Numbers", "It declares no parameters of its own.", "True → False #2")
+_argue("spec/core/numbers.py: Numbers", "It declares no parameters of its own.", "True → False #2")
 _argue(
-    "spec/numbers.py: Numbers.min_tick_cycles",
+    "spec/core/numbers.py: Numbers.min_tick_cycles",
     "It is 2 at least anyway.",
     *("0 → 1", "0 → 1 #2", "0 → -1", "0 → -1 #2"),
 )
@@ -291,12 +291,12 @@ _argue(
     "1 → 0 #2",
 )
 _argue(
-    "spec/numbers.py: Numbers.needed_velocity_width",
+    "spec/core/numbers.py: Numbers.needed_velocity_width",
     "The greatest output does not depend on the width that it is held within.",
     *("0 → 1", "0 → -1"),
 )
 _argue(
-    "spec/units.py: ceil_log2",
+    "spec/language/units.py: ceil_log2",
     "A numerator of i bits over a denominator of j bits is more than 2^(i−j−1), so it never comes to this.",
     "k - 1 → k + 1 #2",
 )
@@ -306,8 +306,8 @@ _argue(
     *("1 → 2", "8 → 9"),
 )
 _argue("spec/registers/buses.py: ", "32 // 7 is 4, as 32 // 8 is.", *("8 → 7 #2", "8 → 7 #3"))
-_argue("spec/registers/c_driver.py: _joined", "Of one word the last is the first.", "0 → -1")
-_argue("spec/registers/rdl.py: _text", "No word of a text is as long as a line.", "False → True")
+_argue("hdl/export/registers/c_driver.py: _joined", "Of one word the last is the first.", "0 → -1")
+_argue("hdl/export/registers/rdl.py: _text", "No word of a text is as long as a line.", "False → True")
 _argue(
     "sim/golden/output.py: in_unit",
     "Products of 61 and 62 bits fit 64 bits, and Python's integers give the same.",
@@ -347,8 +347,8 @@ _argue(
 )
 _argue("spec/formats/tracking_code.py: Op", "No other operation has this number.", "26 → 27")
 _argue("spec/formats/tracking_code.py: Do", "What has no word does not use what is read.", "0 → 1")
-_argue("spec/axes.py: _nearest", "No tick of one clock has a turn of an axis.", "0 → 1")
-_argue("spec/registers/values.py: CapturedValue.field", "A register of a value has one field.", "0 → -1 #2")
+_argue("spec/methods/axes.py: _nearest", "No tick of one clock has a turn of an axis.", "0 → 1")
+_argue("hdl/export/registers/values.py: CapturedValue.field", "A register of a value has one field.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled", "It is replaced when the address is known.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled.wait", "A wait does not use the word that is read.", "0 → 1")
 _argue("spec/methods/mt.py: MTTachometer.max_interval", "A window takes a period at least anyway.", "0 → -1")
@@ -383,11 +383,17 @@ _argue(
 for _where in ("form.py: ControlForm._most_error_of_gains", "coefficients.py: control_form"):
     _argue(f"spec/control/{_where}", "A gain has one coefficient.", "0 → -1 #2")
 _argue("spec/control/form.py: Term", "No other product has this number.", "0 → -1")
-_argue("spec/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))
-_argue("spec/docstrings.py: with_inherited", "The heading is then taken for a name, which no parameter has.", "1 → 0")
-_argue("spec/registers/rdl.py: _text", "The end of a line is a space to who reads it.", *("110 → 111", "110 → 109"))
+_argue("spec/registers/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))
 _argue(
-    "spec/registers/c_header.py: comment",
+    "spec/language/docstrings.py: with_inherited",
+    "The heading is then taken for a name, which no parameter has.",
+    "1 → 0",
+)
+_argue(
+    "hdl/export/registers/rdl.py: _text", "The end of a line is a space to who reads it.", *("110 → 111", "110 → 109")
+)
+_argue(
+    "hdl/export/registers/c_header.py: comment",
     "Compilers do not read where the lines of a comment end.",
     *("110 → 111", "110 → 109"),
 )

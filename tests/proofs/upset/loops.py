@@ -23,7 +23,7 @@ from tachometry.sim.signals.recording import PinTrace, merged
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.port import UPDATE
+from tachometry.spec.language.port import UPDATE
 
 _CYCLES = 60  # of a motion
 _COMMANDS = ("command_position", "command_velocity", "command_acceleration", "enable")

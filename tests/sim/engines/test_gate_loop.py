@@ -14,11 +14,11 @@ from tachometry.sim.engines.gate_loop import GateLoop, Through
 from tachometry.sim.engines.loop import Log, Observer
 from tachometry.sim.golden.command_generator import Command
 from tachometry.sim.golden.control import Control, run_loop
-from tachometry.sim.studies.control import Load, Outcome, Task, edges_of, in_gates, simulation_of
-from tachometry.sim.studies.gate_check import check
-from tachometry.sim.studies.usable_gain import KINDS, MOTOR, REAL, setting
+from tachometry.sim.studies.loops.control import Load, Outcome, Task, edges_of, in_gates, simulation_of
+from tachometry.sim.studies.loops.gate_check import check
+from tachometry.sim.studies.loops.usable_gain import KINDS, MOTOR, REAL, setting
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.option import ParameterError
+from tachometry.spec.language.option import ParameterError
 
 DOUBLE = replace(
     setting(KINDS[0], 80.0, 20e-6, REAL),

@@ -9,12 +9,12 @@ from support.long import only
 from support.mutant import caught, mutant
 
 from tachometry.hdl.arithmetic.idle import IdleCounter
+from tachometry.hdl.core.tachometer import Tachometer
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.rairan import RairanMethod
 from tachometry.hdl.methods.s import SMethod
-from tachometry.hdl.tachometer import Tachometer
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.signals.recording import PinTrace

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from support.options import had_by
 
+from tachometry.hdl.export.registers import c_driver
+from tachometry.hdl.export.registers.values import captured_values
 from tachometry.sim import golden
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import Lockstep
-from tachometry.spec import METHODS, Encoder, manifest, of_texts
-from tachometry.spec.registers import c_driver, frames
+from tachometry.spec import METHODS, Encoder, of_texts
+from tachometry.spec.registers import frames, manifest
 from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.map import RegisterMap
-from tachometry.spec.registers.values import captured_values
 
 ROOMS = ("tachometry.spec.", "tachometry.sim.golden.", "tachometry.sim.signals.run", "tachometry.sim.studies.lockstep")
 SMALL = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100", "bounds": "yes", "lowpass": "1kHz"}

@@ -7,7 +7,7 @@ from support.options import had_by
 from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
-from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.manifest import manifest
 
 CORE = {"ppr": "25", "clock": "1MHz", "tick": "16", "max-time": "160"}
 RAD_PER_S = {"rpm": 2 * np.pi / 60, "rev/s": 2 * np.pi}

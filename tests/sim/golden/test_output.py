@@ -10,7 +10,7 @@ from tachometry.sim.golden.output import in_unit
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, STachometer, Timing
-from tachometry.spec.units import PI
+from tachometry.spec.language.units import PI
 
 REV_PER_UNIT = {"rad/s": 1 / (2 * PI), "rev/s": Fraction(1), "rpm": Fraction(1, 60)}
 

@@ -6,7 +6,7 @@ import pytest
 
 from tachometry.sim.studies.pairs import apart, configurations, factors, rows, spec_of
 from tachometry.spec import METHODS, TachometerSpec, common_options, own_options
-from tachometry.spec.option import is_derived
+from tachometry.spec.language.option import is_derived
 
 # What cannot be together at all, of every method that has both.
 APART = {

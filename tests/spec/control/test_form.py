@@ -22,7 +22,7 @@ from tachometry.spec.control.form import (
     Term,
     coefficients,
 )
-from tachometry.spec.option import options_of
+from tachometry.spec.language.option import options_of
 
 CORE = STachometer(
     encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")

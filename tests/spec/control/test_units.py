@@ -13,7 +13,7 @@ from tachometry.sim.golden.command_generator import Command, Demand, Generator
 from tachometry.sim.golden.control import Control
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.generator import CONSTANT, RAMP, SINE
-from tachometry.spec.manifest import manifest
+from tachometry.spec.registers.manifest import manifest
 
 COUNTS = 2000  # a revolution
 INERTIA, CONSTANT_OF_TORQUE, K_P, K_V, OBSERVER = 2e-4, 0.05, 900.0, 70.0, 250.0

@@ -2,13 +2,13 @@
 
 import pytest
 
+from tachometry.hdl.export.registers.values import captured_values, in_unit
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers import frames
 from tachometry.spec.registers.demo import DemoMap
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import Field, RegisterMap
-from tachometry.spec.registers.values import captured_values, in_unit
 
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"}
 

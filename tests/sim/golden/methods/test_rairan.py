@@ -13,8 +13,8 @@ from tachometry.sim.golden.methods.rairan import Model, orbit
 from tachometry.sim.signals.run import Table
 from tachometry.sim.theory.rairan import rairan_eq13_max_error
 from tachometry.spec import RairanTachometer, Speed
+from tachometry.spec.core.tachometer import BOUNDS
 from tachometry.spec.methods.adaptive import parse_target
-from tachometry.spec.tachometer import BOUNDS
 
 
 def held(updates: Table, name: str, n: int, first: int) -> np.ndarray:

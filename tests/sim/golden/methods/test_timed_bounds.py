@@ -14,8 +14,8 @@ from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods import timed
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTTachometer, Timing, TTachometer
+from tachometry.spec.core.tachometer import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
-from tachometry.spec.tachometer import BOUNDS
 
 INSTANTS = 1 << 10  # in a clock
 TICK = 20

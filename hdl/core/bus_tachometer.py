@@ -1,0 +1,68 @@
+"""The whole core on a bus."""
+
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
+
+from tachometry.hdl.bus.apb import ApbBridge
+from tachometry.hdl.bus.axi_lite import AxiLiteBridge
+from tachometry.hdl.bus.bridge import Bridge, NativeBridge
+from tachometry.hdl.bus.spi import SpiBridge
+from tachometry.hdl.bus.uart import UartBridge
+from tachometry.hdl.bus.wishbone import WishboneBridge
+from tachometry.hdl.core.register_core import RegisterCore
+from tachometry.hdl.wires.ports import members
+from tachometry.spec.registers.buses import Bus
+from tachometry.spec.registers.map import RegisterMap
+
+# Bridges by the names of their buses.
+BRIDGES: dict[str, type[Bridge]] = {
+    bridge.bus: bridge for bridge in (NativeBridge, WishboneBridge, ApbBridge, AxiLiteBridge, SpiBridge, UartBridge)
+}
+
+
+def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
+    """The bridge from a bus to these registers.
+
+    Raises
+    ------
+    ParameterError
+        If the clock cannot make the bits of the bus.
+    """
+    cycles = (bus.bit_cycles(registers.spec.timing.clock_hz),) if bus.baud else ()
+    return BRIDGES[bus.name](registers, *cycles)
+
+
+class BusTachometer(wiring.Component):
+    """A tachometer, maybe with a control loop, with its registers on a bus.
+
+    Parameters
+    ----------
+    registers : RegisterMap
+    bus : Bus
+
+    Members
+    -------
+    `core_ports` of the registers, less `clk` and `rst`, and the ports of the bus.
+
+    Raises
+    ------
+    ParameterError
+        If the clock cannot make the bits of the bus.
+    """
+
+    def __init__(self, registers: RegisterMap, bus: Bus) -> None:
+        self.core = RegisterCore(registers)
+        self.bridge = bridge_on(registers, bus)
+        super().__init__(members((*registers.core_ports, *bus.ports(registers))))
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.core = core = self.core
+        m.submodules.bridge = bridge = self.bridge
+        wiring.connect(m, bridge.native, core.bus)
+        for name, member in self.signature.members.items():
+            inner = getattr(bridge if name in bridge.signature.members else core, name)
+            own = getattr(self, name)
+            m.d.comb += inner.eq(own) if member.flow == In else own.eq(inner)
+        return m

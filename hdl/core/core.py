@@ -1,0 +1,16 @@
+"""The hardware of a spec."""
+
+from tachometry.hdl.core.axes_tachometer import AxesTachometer
+from tachometry.hdl.core.loop_core import LoopCore
+from tachometry.hdl.core.tachometer import Tachometer
+from tachometry.spec import AxesSpec
+from tachometry.spec.control import AnySpec, LoopSpec
+
+AnyTachometer = Tachometer | AxesTachometer | LoopCore
+
+
+def core_of(spec: AnySpec) -> AnyTachometer:
+    """The whole core, for one axis or for many, or with a control loop."""
+    if isinstance(spec, LoopSpec):
+        return LoopCore(spec)
+    return AxesTachometer(spec) if isinstance(spec, AxesSpec) else Tachometer(spec)

@@ -1,0 +1,133 @@
+"""What the demo puts on a board."""
+
+from amaranth import Cat, Module, Mux, ResetInserter, Signal
+from amaranth.lib import wiring
+
+from tachometry.hdl.bus.telemetry import TelemetrySender
+from tachometry.hdl.bus.uart import UartBridge
+from tachometry.hdl.core.bus_tachometer import bridge_on
+from tachometry.hdl.core.emulator import EncoderEmulator
+from tachometry.hdl.core.register_core import RegisterCore
+from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.synchronizer import Synchronizer
+from tachometry.spec.registers.buses import CAPTURE, Bus
+from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports
+from tachometry.spec.registers.map import WORD
+
+
+class Demo(wiring.Component):
+    """A tachometer on pins or on an emulated encoder, with its registers on a bus; telemetry if that is a UART.
+
+    The tachometer may have a control loop, whose current is a stream of bits.
+
+    The settings survive a restart, which resets tachometer, loop, emulator and time.
+
+    Parameters
+    ----------
+    registers : DemoMap
+    bus : Bus
+
+    Members
+    -------
+    `demo_ports` of the spec, less `clk` and `rst`.
+
+    Raises
+    ------
+    ParameterError
+        If the clock cannot make the bits of the bus.
+    """
+
+    def __init__(self, registers: DemoMap, bus: Bus) -> None:
+        spec = registers.spec
+        self._map = registers
+        self.core = RegisterCore(registers)
+        self._lines = [pin.name for pin in spec.pins if pin.name in ENCODER_LINES]
+        self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None)
+        self.bridge = bridge_on(registers, bus)
+        self.telemetry: TelemetrySender | None = None
+        if isinstance(self.bridge, UartBridge):
+            self.telemetry = TelemetrySender(registers, bus.bit_cycles(spec.timing.clock_hz))
+        self._bus_ports = [port for port in bus.ports(registers) if port.name != CAPTURE.name]
+        super().__init__(members(demo_ports(registers, bus)))
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        core, bank, bridge = self.core, self.core.bank, self.bridge
+        m.submodules.core = core
+        m.submodules.bridge = bridge
+        m.submodules.emulator = emulator = ResetInserter(bank.restart)(self.emulator)
+        time = Signal(WORD)
+        changed = Signal(WORD)
+        # Nominal sampling periods: those of a core may last for ever.
+        cycles = self._map.spec.timing.tick_cycles
+        left = Signal(range(cycles))
+        period = Signal()
+        m.d.sync += [period.eq(left == 0), left.eq(Mux(left == 0, cycles - 1, left - 1))]
+        periods = Signal(PERIOD_WIDTH)  # since the last telemetry
+        sends = Signal()
+        m.d.sync += time.eq(time + 1)
+        with m.If(bank.written):
+            m.d.sync += changed.eq(time)
+        with m.If(period):
+            m.d.comb += sends.eq((bank.telemetry_period != 0) & (periods + 1 >= bank.telemetry_period))
+            m.d.sync += periods.eq(Mux(sends, 0, periods + 1))
+        with m.If(bank.restart):
+            m.d.sync += [signal.eq(0) for signal in (time, changed, left, period, periods)]
+        m.d.comb += [
+            bank.time.eq(time),
+            bank.changed.eq(changed),
+            *(getattr(emulator, field.port).eq(getattr(bank, field.port)) for field in self._map.emulated),
+        ]
+
+        for pin in self._map.spec.pins:
+            given = getattr(self, pin.name)
+            if pin.name in self._lines:
+                line = getattr(self.emulator, pin.name)
+                given = Mux(bank.emulated, line, given)
+                m.d.comb += getattr(self, f"emulated_{pin.name}").eq(line)
+            else:
+                given = Mux(bank.emulated, period, given)  # the external tick
+            m.d.comb += getattr(core, pin.name).eq(given)
+        if core.loop is not None:
+            # It comes from a pin, and many flip-flops follow it.
+            enable = Signal()
+            m.submodules.sync_enable = Synchronizer(self.enable, enable)
+            m.d.comb += [core.enable.eq(enable), self.drive.eq(core.drive)]
+
+        for port in self._bus_ports:
+            mine, its = getattr(self, port.name), getattr(bridge, port.name)
+            m.d.comb += its.eq(mine) if port.direction == "input" else mine.eq(its)
+        m.d.comb += core.capture.eq(self.capture)
+        self._native(m, sends)
+
+        wrong = Signal()
+        m.d.sync += wrong.eq((wrong | core.decode_error | (core.tick & core.overflow)) & ~bank.clear)
+        backward = Signal()
+        with m.If(core.velocity_valid):
+            m.d.sync += backward.eq(core.velocity < 0)
+        runs = Signal(range(self._map.spec.timing.clock_hz))
+        m.d.sync += runs.eq(runs + 1)
+        m.d.sync += self.leds.eq(Cat(~core.stalled, backward, wrong, runs[-1]))
+        return m
+
+    def _native(self, m: Module, sends: Signal) -> None:
+        """The bridge and the telemetry on one native port: one of them begins when the other has ended."""
+        native, bridge, telemetry = self.core.bus, self.bridge, self.telemetry
+        if telemetry is None:
+            wiring.connect(m, bridge.native, native)
+            return
+        m.submodules.telemetry = telemetry
+        of_bridge, of_telemetry = bridge.native, telemetry.native
+        m.d.comb += [
+            telemetry.send.eq(sends),
+            telemetry.wait.eq(bridge.occupied),
+            bridge.wait.eq(telemetry.busy),
+            self.uart_tx.eq(bridge.uart_tx & telemetry.line),
+            native.address.eq(Mux(of_telemetry.read, of_telemetry.address, of_bridge.address)),
+            native.read.eq(of_bridge.read | of_telemetry.read),
+            native.write.eq(of_bridge.write),
+            native.write_data.eq(of_bridge.write_data),
+            of_bridge.read_data.eq(native.read_data),
+            of_bridge.error.eq(native.error),
+            of_telemetry.read_data.eq(native.read_data),
+        ]

@@ -1,0 +1,141 @@
+"""An encoder that is not there."""
+
+from amaranth import Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.core.line import EmulatedLine
+from tachometry.spec.registers.emulator import (
+    BOUNCE_BITS,
+    BOUNCE_WIDTH,
+    DROP_BITS,
+    DROP_WIDTH,
+    ERROR_WIDTH,
+    FINE_WIDTH,
+    JITTER_WIDTH,
+    PHASE_WIDTH,
+    RANDOM_TAP,
+    RANDOM_WIDTH,
+    RATE_SHIFT,
+    START,
+)
+
+_HALF = 1 << FINE_WIDTH - 1
+_QUARTER = 1 << FINE_WIDTH - 2
+
+
+class EncoderEmulator(wiring.Component):
+    """Turns a phase by a speed, the speed towards what is asked for, and makes the lines of an encoder of it.
+
+    The lines follow the phase `spec.registers.emulator.LATENCY` clocks later. The random movement of the edges is
+    chosen anew in the middle between two of them, so that it makes no edges of its own: all errors together must stay
+    below an eighth of a period.
+
+    Parameters
+    ----------
+    lines_per_rev : int or None
+        Periods in a revolution, for the index line; None: there is none.
+
+    Members
+    -------
+    speed : In(signed(32))
+        Phase a clock that it goes to.
+    rate : In(32)
+        Change of the speed in two clocks, in 2^-16; 0: at once.
+    phase_error, duty_a, duty_b : In(signed(8))
+        How late B rises, A falls and B falls, in 2^-10 periods.
+    jitter : In(6)
+        Bits that take part in the random movement, in 2^-10 periods.
+    bounce : In(8)
+        Clocks for which a line bounces after an edge.
+    drop : In(8)
+        So many of 256 edges are left out.
+    jump : In(1)
+        Turns by half a period.
+    a, b : Out(1)
+    z : Out(1)
+        High in one quarter of a period in each revolution; only with `lines_per_rev`.
+    """
+
+    def __init__(self, lines_per_rev: int | None = None) -> None:
+        self._lines_per_rev = lines_per_rev
+        super().__init__(
+            {
+                "speed": In(signed(PHASE_WIDTH)),
+                "rate": In(PHASE_WIDTH),
+                **{name: In(signed(ERROR_WIDTH)) for name in ("phase_error", "duty_a", "duty_b")},
+                "jitter": In(JITTER_WIDTH),
+                "bounce": In(BOUNCE_WIDTH),
+                "drop": In(DROP_WIDTH),
+                "jump": In(1),
+                "a": Out(1),
+                "b": Out(1),
+                **({} if lines_per_rev is None else {"z": Out(1)}),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        speed = Signal(signed(PHASE_WIDTH + RATE_SHIFT))
+        target = Signal.like(speed)
+        # In two clocks: the sum and its comparison are long carry chains.
+        second = Signal()
+        down = Signal()
+        turned = Signal(signed(len(speed) + 1))
+        goes_down = Signal()
+        m.d.comb += [target.eq(self.speed << RATE_SHIFT), goes_down.eq(target < speed)]
+        passed = Mux(down, turned <= target, turned >= target)
+        m.d.sync += second.eq(~second)
+        with m.If(second):
+            m.d.sync += speed.eq(Mux((self.rate == 0) | passed, target, turned))
+        with m.Else():
+            m.d.sync += [down.eq(goes_down), turned.eq(speed + Mux(goes_down, -self.rate, self.rate))]
+
+        phase = Signal(PHASE_WIDTH, init=START)
+        after = Signal(signed(PHASE_WIDTH + 2))
+        m.d.comb += after.eq(phase + (speed >> RATE_SHIFT))
+        m.d.sync += phase.eq(after ^ (self.jump << PHASE_WIDTH - 1))
+
+        random = Signal(RANDOM_WIDTH, init=1)
+        m.d.sync += random.eq((random << 1) | (random[-1] ^ random[RANDOM_TAP - 1]))
+
+        fine = Signal(FINE_WIDTH)
+        between = Signal(2)  # changes in the middle between two edges
+        between_before = Signal(2, init=1)
+        moved = Signal(signed(JITTER_WIDTH + 1))
+        m.d.comb += [
+            fine.eq(phase[-FINE_WIDTH:]),
+            between.eq((fine + _QUARTER // 2)[FINE_WIDTH - 2 : FINE_WIDTH]),
+        ]
+        m.d.sync += between_before.eq(between)
+        with m.If(between != between_before):
+            late, early = random[:JITTER_WIDTH], random[JITTER_WIDTH : 2 * JITTER_WIDTH]
+            m.d.sync += moved.eq((late & self.jitter) - (early & self.jitter))
+
+        starts = {"a": _QUARTER, "b": _HALF + self.phase_error}
+        ends = {"a": self.duty_a, "b": self.duty_b}
+        for k, name in enumerate(starts):
+            m.submodules[f"line_{name}"] = line = EmulatedLine()
+            since = Signal(FINE_WIDTH, name=f"since_{name}")
+            m.d.comb += [
+                since.eq(fine - moved - starts[name]),
+                line.random.eq(random[BOUNCE_BITS[k]]),
+                line.drop.eq(random[DROP_BITS[k] : DROP_BITS[k] + DROP_WIDTH] < self.drop),
+                line.bounce.eq(self.bounce),
+                getattr(self, name).eq(line.line),
+            ]
+            m.d.sync += line.ideal.eq(since < _HALF + ends[name])
+        if self._lines_per_rev is not None:
+            self._index(m, fine, after[PHASE_WIDTH:])
+        return m
+
+    def _index(self, m: Module, fine: Signal, turns: object) -> None:
+        """The index line, in the first quarter of the first period."""
+        last = self._lines_per_rev - 1 if self._lines_per_rev else 0
+        period = Signal(range(last + 1))
+        with m.If(turns == 1):
+            m.d.sync += period.eq(Mux(period == last, 0, period + 1))
+        with m.Elif(turns != 0):
+            m.d.sync += period.eq(Mux(period == 0, last, period - 1))
+        index = Signal()
+        m.d.sync += [index.eq((period == 0) & (fine < _QUARTER)), self.z.eq(index)]

@@ -1,0 +1,45 @@
+"""A line of the emulated encoder."""
+
+from amaranth import Module, Mux, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.spec.registers.emulator import BOUNCE_WIDTH
+
+
+class EmulatedLine(wiring.Component):
+    """Leaves edges out, and lets the line bounce after the others.
+
+    Latency: two clocks.
+
+    Members
+    -------
+    ideal : In(1)
+        The line as it should be.
+    drop : In(1)
+        An edge in this clock is left out: the line keeps its level until the next edge.
+    bounce : In(8)
+        Clocks for which the line bounces.
+    random : In(1)
+        Whether a line that bounces has the wrong level.
+    line : Out(1)
+    """
+
+    def __init__(self) -> None:
+        super().__init__(
+            {"ideal": In(1), "drop": In(1), "bounce": In(BOUNCE_WIDTH), "random": In(1), "line": Out(1)},
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        before = Signal()
+        level = Signal()
+        left = Signal(BOUNCE_WIDTH)
+        m.d.sync += [
+            before.eq(self.ideal),
+            left.eq(Mux(left == 0, 0, left - 1)),
+            self.line.eq(level ^ (left.any() & self.random)),
+        ]
+        with m.If((self.ideal ^ before) & ~self.drop):
+            m.d.sync += [level.eq(self.ideal), left.eq(self.bounce)]
+        return m

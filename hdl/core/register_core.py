@@ -1,0 +1,98 @@
+"""The whole core with registers, on a native port."""
+
+from amaranth import Module, Mux, ResetInserter, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
+
+from tachometry.hdl.bus.bank import RegisterBank
+from tachometry.hdl.bus.native import native_port
+from tachometry.hdl.bus.tick_position import TickPosition
+from tachometry.hdl.core.loop_core import LoopCore
+from tachometry.hdl.core.tachometer import Tachometer
+from tachometry.hdl.wires.ports import members
+from tachometry.spec.registers.loop import LoopMap
+from tachometry.spec.registers.map import RegisterMap
+
+_OTHERWISE = ("position", "age")  # ports that the bank shows as they were at the latest tick, or are with it
+
+
+class RegisterCore(wiring.Component):
+    """A tachometer, maybe with a control loop, with its registers.
+
+    Parameters
+    ----------
+    registers : RegisterMap
+
+    Members
+    -------
+    `core_ports` of the registers, less `clk` and `rst`, and
+
+    bus : In(native_port)
+    capture : In(1)
+        Captures in every clock in which it is high.
+    """
+
+    def __init__(self, registers: RegisterMap) -> None:
+        self._map = registers
+        self.loop = LoopCore(registers.loop) if isinstance(registers, LoopMap) else None
+        self.tachometer = Tachometer(registers.spec) if self.loop is None else self.loop.tachometer
+        self.bank = RegisterBank(registers)
+        super().__init__(
+            {
+                **members(registers.core_ports),
+                "bus": In(native_port(registers.address_width - 2)),
+                "capture": In(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        spec = self._map.spec
+        core, bank = self.tachometer, self.bank
+        whole = core if self.loop is None else self.loop
+        # Long windows saturate what has been counted since the tick, and an index that resets is not in it.
+        counted = not (spec.own_ticks or spec.index_reset)
+        open_sum = core.pulse_counter.open_sum if counted else None
+        position = TickPosition(spec.position_width, 0 if open_sum is None else len(open_sum))
+        restarts = ResetInserter(bank.restart) if hasattr(bank, "restart") else lambda box: box
+        m.submodules.tachometer, m.submodules.tick_position = restarts(whole), restarts(position)
+        m.submodules.bank = bank
+        names = {port.name for port in self._map.ports} - {*_OTHERWISE}
+        same = [*(port.name for port in spec.outputs if port.name in names), *spec.strobes]
+        wiring.connect(m, wiring.flipped(self.bus), bank.bus)
+        written = {field.port for field in self._map.settings}
+        for pin in self._map.core.pins:
+            given = getattr(bank if pin.name in written else self, pin.name)
+            switched = given & bank.loop_enable if pin.name == "enable" else given
+            m.d.comb += getattr(whole, pin.name).eq(switched)
+        m.d.comb += [
+            *(getattr(self, port.name).eq(getattr(whole, port.name)) for port in self._map.core.outputs),
+            *(getattr(bank, name).eq(getattr(whole, name)) for name in same),
+            bank.capture.eq(self.capture),
+            core.conditioner.clear.eq(bank.clear),
+            position.tick.eq(core.tick),
+            position.position.eq(core.position),
+            bank.position.eq(position.latest),
+        ]
+        if self.loop is not None:
+            self._keep(m, self.loop)
+        if core.update_age is not None:
+            m.d.comb += bank.age.eq(core.update_age.after)
+        if open_sum is not None:
+            m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
+        return m
+
+    def _keep(self, m: Module, loop: LoopCore) -> None:
+        """What a program changes is shown as it was with its strobe, whenever it is captured."""
+        for strobe, names in self._map.core.strobes.items():
+            for name in names:
+                if name in self._map.spec.strobes.get(strobe, ()):
+                    continue
+                value = getattr(loop, name)
+                kept = Signal.like(value, name=f"kept_{name}")
+                shown = Mux(getattr(loop, strobe), value, kept)
+                m.d.sync += kept.eq(shown)
+                if hasattr(self.bank, "restart"):
+                    with m.If(self.bank.restart):
+                        m.d.sync += kept.eq(0)
+                m.d.comb += getattr(self.bank, name).eq(shown)

@@ -1,0 +1,187 @@
+"""The whole core."""
+
+from amaranth import Module, Signal
+from amaranth.lib import stream, wiring
+
+from tachometry.hdl.arithmetic.idle import HasIdleCounters, IdleCounter, IdleDivision
+from tachometry.hdl.front_end.conditioner import InputConditioner
+from tachometry.hdl.front_end.decoder import QuadratureDecoder
+from tachometry.hdl.front_end.external_tick import ExternalTick
+from tachometry.hdl.front_end.index_capture import IndexCapture
+from tachometry.hdl.front_end.position_counter import PositionCounter
+from tachometry.hdl.front_end.pulse_counter import PulseCounter
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.methods import DATAPATHS
+from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
+from tachometry.hdl.output.low_pass import LowPass
+from tachometry.hdl.output.standstill import Standstill
+from tachometry.hdl.output.update import update_layout
+from tachometry.hdl.output.update_age import UpdateAge
+from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
+from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import members
+from tachometry.spec import TachometerSpec
+from tachometry.spec.language.port import UPDATE
+
+
+class Tachometer(wiring.Component):
+    """Encoder pins in, position and velocity out.
+
+    Latencies are those of the spec: `pin_to_count`, `tick_latency`, `tick_to_velocity`, in clocks of the `sync` domain.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+        For instance an `STachometer`.
+
+    Members
+    -------
+    The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain: `a`, `b` in; `velocity`,
+    `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `stalled`
+    out; and those of its options.
+    """
+
+    def __init__(self, spec: TachometerSpec) -> None:
+        self._spec = spec
+        super().__init__(members(spec.ports))
+        self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
+        self.decoder = QuadratureDecoder(spec.encoder.decoding)
+        self.pulse_counter = PulseCounter(
+            max(spec.longest_tick, spec.max_pulse_count),
+            spec.max_pulse_count,
+            stretched=spec.own_ticks,
+            staged=spec.tick_latency - spec.registers_steps > 2,
+        )
+        self.position_counter = PositionCounter(spec.position_width, spec.tick_latency)
+        self.index_capture = IndexCapture(spec.position_width, spec.tick_latency) if spec.index else None
+        self.datapath = DATAPATHS[spec.method](spec)
+        self.sampling_clock: TickSource
+        if isinstance(self.datapath, OwnTicks):
+            self.sampling_clock = self.datapath
+        elif spec.max_tick_cycles:
+            self.sampling_clock = ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles, spec.tick_latency)
+        else:
+            self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
+        layout = update_layout(spec)
+        self.low_pass = None if spec.lowpass is None else LowPass(spec.low_pass, layout, clears=spec.last_at_rest)
+        self.standstill: Standstill | None = None
+        if not isinstance(self.datapath, OwnStandstill):
+            self.standstill = Standstill(spec.timing.max_ticks, spec.count_width, max_shift=spec.max_tick_shift)
+        self.update_age = UpdateAge(spec.timing.max_ticks, spec.stamp_width) if spec.age else None
+        self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
+        if spec.output is not None:
+            box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
+            self.velocity_output = box(spec.output, layout)
+
+    @property
+    def spec(self) -> TachometerSpec:
+        """What this core was built from."""
+        return self._spec
+
+    @property
+    def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
+        """See `IdleCounter` and `IdleDivision`."""
+        boxes: dict[str, object] = {"datapath": self.datapath}
+        if not self._spec.own_ticks:
+            boxes["sampling_clock"] = self.sampling_clock
+        return tuple(
+            counter.within(name)
+            for name, box in boxes.items()
+            if isinstance(box, HasIdleCounters)
+            for counter in box.idle_counters
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.conditioner = conditioner = self.conditioner
+        m.submodules.decoder = decoder = self.decoder
+        m.submodules.pulse_counter = pulse_counter = self.pulse_counter
+        m.submodules.position_counter = position_counter = self.position_counter
+        m.submodules.datapath = datapath = self.datapath
+        sampling_clock = self.sampling_clock
+        if not self._spec.own_ticks:
+            m.submodules.sampling_clock = sampling_clock
+        (step,) = delay(m, decoder.step, clocks=int(self._spec.registers_steps))
+        m.d.comb += [
+            conditioner.a.eq(self.a),
+            conditioner.b.eq(self.b),
+            decoder.level_a.eq(conditioner.level_a),
+            decoder.level_b.eq(conditioner.level_b),
+            decoder.ready.eq(conditioner.ready_a & conditioner.ready_b),
+            self.decode_error.eq(decoder.decode_error),
+            position_counter.step.eq(decoder.step),
+            self.position.eq(position_counter.position),
+            pulse_counter.step.eq(step),
+            pulse_counter.last.eq(sampling_clock.last),
+            self.tick.eq(pulse_counter.tick),
+            self.pulse_count.eq(pulse_counter.pulse_count),
+            self.overflow.eq(pulse_counter.overflow),
+        ]
+        ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
+        taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")}
+        taken |= {name: getattr(pulse_counter, name) for name in ("coming", "next_count")}
+        taken |= {"step_now": step, "stamp": ticks}
+        inputs = datapath.signature.members
+        if "step" in inputs:
+            # As late as `tick`: with it, all steps of the window have come.
+            (taken["step"],) = delay(m, decoder.step, clocks=self._spec.tick_latency)
+        if "step_before" in inputs:
+            (taken["step_before"],) = delay(m, decoder.step, clocks=self._spec.tick_latency - 1)
+        m.d.comb += [getattr(datapath, name).eq(value) for name, value in taken.items() if name in inputs]
+        if isinstance(datapath, OwnTicks):
+            m.d.comb += pulse_counter.beyond.eq(datapath.beyond)
+        self._rest(m)
+        updates = self._output(m)
+        if self.update_age is not None:
+            m.submodules.age = age = self.update_age
+            m.d.comb += [age.tick.eq(self.tick), age.update.eq(self.velocity_valid), self.age.eq(age.age)]
+            if self._spec.stamp_width:
+                before = Signal.like(ticks)
+                m.d.sync += before.eq(ticks)
+                m.d.comb += [ticks.eq(before + self.tick), age.fresh.eq(before - updates.p.stamp)]
+        if self.index_capture is not None:
+            m.submodules.index_capture = index = self.index_capture
+            m.d.comb += [
+                conditioner.z.eq(self.z),
+                index.level_z.eq(conditioner.level_z),
+                index.ready.eq(conditioner.ready_z),
+                index.position.eq(position_counter.next),
+                position_counter.clear.eq(index.rises & int(self._spec.index_reset)),
+                self.index_position.eq(index.index_position),
+                self.index_valid.eq(index.index_valid),
+            ]
+        if isinstance(sampling_clock, ExternalTick):
+            m.d.comb += [sampling_clock.tick_in.eq(self.tick_in), self.tick_error.eq(sampling_clock.tick_error)]
+        if self._spec.filter_clocks:
+            m.d.comb += self.swallowed_edges.eq(conditioner.swallowed_edges)
+        return m
+
+    def _rest(self, m: Module) -> None:
+        """Whether the shaft rests."""
+        if isinstance(self.datapath, OwnStandstill):
+            m.d.comb += self.stalled.eq(self.datapath.stalled)
+        if self.standstill is not None:
+            m.submodules.standstill = standstill = self.standstill
+            m.d.comb += [
+                standstill.tick.eq(self.tick),
+                standstill.m_e.eq(self.pulse_count),
+                self.stalled.eq(standstill.stalled),
+            ]
+            if isinstance(self.datapath, LongTicks):
+                m.d.comb += standstill.shift.eq(self.datapath.tick_shift)
+
+    def _output(self, m: Module) -> stream.Interface:
+        """From the datapath to the ports, by way of the low-pass filter and of the unit if they are there: updates."""
+        updates = self.datapath.updates
+        if self.low_pass is not None:
+            m.submodules.low_pass = low_pass = self.low_pass
+            wiring.connect(m, updates, low_pass.updates)
+            m.d.comb += low_pass.tick.eq(self.tick)
+            updates = low_pass.filtered
+        if self.velocity_output is not None:
+            m.submodules.velocity_output = output = self.velocity_output
+            wiring.connect(m, updates, output.updates)
+            updates = output.shown
+        m.d.comb += self.velocity_valid.eq(updates.valid)
+        m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in self._spec.strobes[UPDATE]]
+        return updates

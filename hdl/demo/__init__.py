@@ -1,1 +1,0 @@
-"""The demo: a tachometer with registers beside an emulated encoder, to be put on a board."""

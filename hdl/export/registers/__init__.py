@@ -1,0 +1,1 @@
+"""Files that describe the registers of a core on a bus."""

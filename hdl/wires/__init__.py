@@ -1,0 +1,1 @@
+"""Ports, registers, delays and synchronisers, which all boxes share."""

@@ -1,0 +1,1 @@
+"""Methods and what others use, side by side on the same edges."""

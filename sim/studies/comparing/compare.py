@@ -1,0 +1,138 @@
+"""Several methods on the same edges: what each makes of them, and how far it is from the truth."""
+
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.comparing import baselines
+from tachometry.spec import TachometerSpec
+
+TrueSpeed = Callable[[FloatArray], FloatArray]
+
+_MOST_INSTANTS = 200_000
+_LONGEST_DELAY = 0.02  # seconds, that is looked for
+_ALIKE = 1e-9  # of a speed; a constant one has no delay
+# Shares of the mean square error that go with a delay: enough in any case, and at least.
+_MUCH, _LITTLE = 0.25, 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """What a method shows.
+
+    Parameters
+    ----------
+    name, what : str
+    estimate : baselines.Estimate
+        Velocity in rad/s, held from each time (s) on.
+    measurement_time : float64 array, shape (n,), seconds
+        Of each update; empty where the method has none.
+    """
+
+    name: str
+    what: str
+    estimate: baselines.Estimate
+    measurement_time: FloatArray
+
+
+@dataclass(frozen=True)
+class Score:
+    """A curve against the truth; None is what cannot be determined.
+
+    Parameters
+    ----------
+    name, what : str
+    updates_per_second : float
+    mean_time, worst_time : float or None, seconds
+        Measurement time.
+    rms, max : float or None, rad/s
+        Error of the held velocity.
+    delay : float or None, seconds
+        Shift of the true speed that comes closest. None where it says nothing: the true speed is constant, or the curve
+        would be early, or hardly any of the error goes with the shift, or an offset might be its cause as well.
+    """
+
+    name: str
+    what: str
+    updates_per_second: float
+    mean_time: float | None
+    worst_time: float | None
+    rms: float | None
+    max: float | None
+    delay: float | None
+
+
+def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
+    """What a core shows, by its golden model, which the hardware equals bit for bit."""
+    return run_curve(name, spec, golden.run(spec, trace))
+
+
+def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
+    """What a core shows in a run."""
+    updates = run.updates
+    clock_hz = spec.timing.clock_hz
+    velocity = updates.velocity.astype(np.float64) * spec.rad_per_s_per_lsb
+    return Curve(
+        name,
+        f"{spec.method} method, tick {spec.timing.tick_cycles} clocks",
+        baselines.Estimate(updates.clock / clock_hz, velocity),
+        updates.interval.astype(np.float64) * (spec.interval_unit_cycles / clock_hz),
+    )
+
+
+def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float, earliest: float = 0.0) -> FloatArray:
+    """Evenly spaced instants, a tick apart or more, from when every curve has begun, and `earliest` (s), to the end."""
+    begun = max((curve.estimate.time[0] for curve in curves if len(curve.estimate.time)), default=0.0)
+    begun = max(begun, earliest)
+    n = min(int((duration - begun) / tick_seconds), _MOST_INSTANTS)
+    return begun + (duration - begun) / max(n, 1) * np.arange(n, dtype=np.float64)
+
+
+def rms_error(curve: Curve, instants: FloatArray, truth: FloatArray) -> float:
+    """RMS error of the held velocity, rad/s, at some instants (s), where the true speed is known."""
+    error = curve.estimate.at(instants) - truth
+    return float(np.sqrt(np.mean(error * error)))
+
+
+def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueSpeed | None) -> Score:
+    """How good a curve is at some evenly spaced instants (s)."""
+    times = curve.measurement_time
+    rms = worst = delay = None
+    if true_speed is not None and len(instants):
+        held, truth = curve.estimate.at(instants), true_speed(instants)
+        error = held - truth
+        rms, worst = float(np.sqrt(np.mean(error * error))), float(np.max(np.abs(error)))
+        reach = min(_LONGEST_DELAY, (instants[-1] - instants[0]) / 4)
+        if np.ptp(truth) > _ALIKE * np.max(np.abs(truth)):
+            with suppress(ValueError):  # a motion that looks alike at several shifts
+                delay = baselines.delay_seconds(instants, held, truth, reach)
+                if not _says_something(error, held - true_speed(np.maximum(instants - delay, 0)), delay):
+                    delay = None
+    return Score(
+        curve.name,
+        curve.what,
+        len(curve.estimate.time) / duration,
+        float(np.mean(times)) if len(times) else None,
+        float(np.max(times)) if len(times) else None,
+        rms,
+        worst,
+        delay,
+    )
+
+
+def _says_something(error: FloatArray, left: FloatArray, delay: float) -> bool:
+    """Whether a delay is more than noise or an offset, which look like one while the speed rises.
+
+    It is if a quarter of the mean square error goes with it; or less, but more than twice what goes with an offset.
+    """
+    square = float(np.mean(error * error))
+    if delay < 0 or square == 0:
+        return delay >= 0
+    explained, offset = 1 - float(np.mean(left * left)) / square, float(np.mean(error)) ** 2 / square
+    return explained >= _MUCH or explained >= max(_LITTLE, 2 * offset)

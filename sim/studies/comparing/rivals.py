@@ -1,0 +1,256 @@
+"""Baselines by name, with their parameters as options: `hostmot2`, `hostmot2:period=500us`, and all that a sweep tries.
+
+What a name has in front of its options is a key of `BASELINES`.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from tachometry.sim.signals.recording import Recording
+from tachometry.sim.studies.comparing import baselines, estimators
+from tachometry.sim.studies.comparing.baselines import Estimate, Steps
+from tachometry.sim.studies.comparing.compare import Curve
+from tachometry.spec.language.option import ParameterError, parse_flag, parse_whole
+from tachometry.spec.language.units import FREQUENCY, TIME, parse_bandwidth, read_nearest
+
+
+def _time(what: str, text: str) -> float:
+    return read_nearest(what, text, TIME)
+
+
+def _frequency(what: str, text: str) -> float:
+    return read_nearest(what, text, FREQUENCY, "Hz")
+
+
+def _bandwidth(what: str, text: str) -> float:
+    return float(parse_bandwidth(what, text))
+
+
+def _number(what: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ParameterError(what, f"must be a number, not {text!r}")
+    return value
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An option of a baseline.
+
+    Parameters
+    ----------
+    argument : str
+        Of the model.
+    read : callable
+        Makes its value from the option's name and the text.
+    """
+
+    argument: str
+    read: Callable[[str, str], Any]
+
+
+_PERIOD = Parameter("period_s", _time)
+_FILTER = Parameter("filter_s", _time)
+_ORDER = Parameter("order", parse_whole)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A float model of what others do.
+
+    Parameters
+    ----------
+    title : str
+        What it is.
+    usual : str
+        The settings that it has without options, in words: for the first four those that their projects come with.
+    model : callable
+        Takes `Steps` and the arguments of the parameters.
+    parameters : dict of str to Parameter
+        By the names of the options.
+    swept : tuple of dict of str to texts
+        What is tried for the best: in each, the product of all values, separated by spaces.
+    fixed : dict
+        Values of arguments that are left out, where they are not those of the model.
+    """
+
+    title: str
+    usual: str
+    model: Callable[..., Estimate]
+    parameters: Mapping[str, Parameter]
+    swept: tuple[Mapping[str, str], ...]
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _simplefoc(steps: Steps, period_s: float, filter_s: float) -> Estimate:
+    raw = baselines.mixed_method(steps, period_s)
+    return Estimate(raw.time, baselines.low_pass(raw.velocity, period_s, filter_s))
+
+
+def _moteus(steps: Steps, period_s: float, pll_filter_hz: float) -> Estimate:
+    natural = 2 * math.pi * pll_filter_hz / baselines.MOTEUS_3DB_RATIO
+    return baselines.tracking_loop(steps, period_s, natural, whole_counts=False)
+
+
+_PERIODS = "33us 100us 250us 500us 1ms 2ms 4ms 8ms"
+_FILTERS = "0us 500us 1ms 2ms 5ms 10ms 20ms 50ms"
+
+BASELINES: dict[str, Baseline] = {
+    "difference": Baseline(
+        "counts in a period, low-pass filter",
+        "1 ms, 5 ms",
+        baselines.finite_difference,
+        {"period": _PERIOD, "filter": _FILTER},
+        ({"period": _PERIODS, "filter": _FILTERS},),
+        {"period_s": 1e-3},
+    ),
+    "hostmot2": Baseline(
+        "LinuxCNC: timestamps",
+        "1 ms",
+        baselines.timestamp_method,
+        {"period": _PERIOD},
+        ({"period": _PERIODS},),
+        {"period_s": 1e-3},
+    ),
+    "simplefoc": Baseline(
+        "SimpleFOC: mixed time and frequency, low-pass filter",
+        "1 ms, 5 ms",
+        _simplefoc,
+        {"period": _PERIOD, "filter": _FILTER},
+        ({"period": _PERIODS, "filter": _FILTERS},),
+        {"period_s": 1e-3, "filter_s": 5e-3},
+    ),
+    "odrive": Baseline(
+        "ODrive: tracking loop",
+        "1000 rad/s, 125 us",
+        baselines.tracking_loop,
+        {"period": _PERIOD, "bandwidth": Parameter("bandwidth_rad_s", _bandwidth)},
+        (
+            {
+                "period": "33us 125us",
+                "bandwidth": "50rad/s 100rad/s 200rad/s 350rad/s 500rad/s 700rad/s 1000rad/s 1400rad/s 2000rad/s "
+                "2800rad/s 4000rad/s 8000rad/s 12000rad/s",
+            },
+        ),
+        {"period_s": 125e-6},
+    ),
+    "moteus": Baseline(
+        "moteus: tracking loop",
+        "400 Hz, 33 us",
+        _moteus,
+        {"period": _PERIOD, "pll-filter": Parameter("pll_filter_hz", _frequency)},
+        (
+            {
+                "period": "33us 100us",
+                "pll-filter": "20Hz 40Hz 80Hz 140Hz 200Hz 280Hz 400Hz 560Hz 800Hz 1120Hz 1600Hz 3200Hz 4500Hz",
+            },
+        ),
+        {"period_s": 1 / 30e3, "pll_filter_hz": 400.0},
+    ),
+    "least-squares": Baseline(
+        "polynomial through the latest edges (Brown 1992, Merry 2010)",
+        "16 edges, order 2, 100 us",
+        estimators.least_squares,
+        {"period": _PERIOD, "edges": Parameter("edges", parse_whole), "order": _ORDER},
+        (
+            {"edges": "2 3 4 6 8 12 16 24 32 48 64 96 128 192 256 512 1024", "order": "1"},
+            {"edges": "4 6 8 12 16 24 32 48 64 96 128 192 256 512 1024", "order": "2"},
+            {"edges": "8 16 32 64 128 256 512", "order": "3"},
+        ),
+        {"period_s": 100e-6},
+    ),
+    "foaw": Baseline(
+        "adaptive window (Janabi-Sharifi 2000)",
+        "best-fit, d = 1 count, at most 100 periods of 100 us",
+        estimators.adaptive_window,
+        {
+            "period": _PERIOD,
+            "noise-bound": Parameter("noise_bound", _number),
+            "longest": Parameter("longest", parse_whole),
+            "best-fit": Parameter("best_fit", parse_flag),
+        },
+        ({"period": "100us 250us 500us 1ms", "noise-bound": "0.5 0.75 1 1.25 1.5 2 3", "best-fit": "yes no"},),
+        {"period_s": 100e-6},
+    ),
+    "kalman": Baseline(
+        "Kalman filter in its steady state",
+        "position and speed, process noise 300 rad/s^2, 100 us",
+        estimators.kalman,
+        {"period": _PERIOD, "process-noise": Parameter("process_noise", _number), "order": _ORDER},
+        (
+            {"period": "33us 100us", "process-noise": "1 2 4 8 15 30 60 120 250 500 1e3 2e3 4e3 8e3 2e4", "order": "2"},
+            {
+                "period": "33us 100us",
+                "process-noise": "1e2 3e2 1e3 3e3 1e4 2e4 4e4 8e4 2e5 4e5 8e5 2e6 4e6 1e7 3e7 1e8",
+                "order": "3",
+            },
+        ),
+        {"period_s": 100e-6},
+    ),
+}
+
+
+def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
+    """What a baseline with options is in words, and its model.
+
+    Parameters
+    ----------
+    name : str
+        Such as `kalman:order=3:process-noise=1e5`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such baseline or option, or a text cannot be read. What is out of range is refused by the model.
+    """
+    method, *words = name.split(":")
+    if method not in BASELINES:
+        raise ParameterError("methods", f"must be of {', '.join(BASELINES)}, not {method!r}")
+    baseline = BASELINES[method]
+    arguments = dict(baseline.fixed)
+    for word in words:
+        option, _, text = word.partition("=")
+        if option not in baseline.parameters:
+            raise ValueError(f"options of {method} must be of {', '.join(baseline.parameters)}, not {option!r}")
+        parameter = baseline.parameters[option]
+        arguments[parameter.argument] = parameter.read(option, text)
+    settings = ", ".join(word.replace("=", " ", 1) for word in words) or baseline.usual
+    return f"{baseline.title}: {settings}", partial(baseline.model, **arguments)
+
+
+def baseline_curve(name: str, recording: Recording, counts_per_rev: int, decoding: int) -> Curve:
+    """What a baseline shows, with an ideal decoder.
+
+    Raises
+    ------
+    ValueError
+        If the name or its options are not known, or it is shorter than two of its periods.
+    """
+    return steps_curve(name, Steps.of_recording(recording, counts_per_rev, decoding))
+
+
+def steps_curve(name: str, steps: Steps) -> Curve:
+    """What a baseline shows of steps; errors as of `baseline_curve`."""
+    what, model = baseline_model(name)
+    estimate = model(steps)
+    if len(estimate.time) < 2:
+        raise ParameterError("motion", f"must last at least two control periods of {name}, not {steps.duration:.6g} s")
+    return Curve(name, what, estimate, np.empty(0))
+
+
+def settings(method: str) -> list[str]:
+    """Names of a baseline with all settings that are tried for the best, its usual one first."""
+    found = [method]
+    for swept in BASELINES[method].swept:
+        for values in product(*(texts.split() for texts in swept.values())):
+            found.append(":".join([method, *(f"{name}={text}" for name, text in zip(swept, values, strict=True))]))
+    return found

@@ -1,0 +1,108 @@
+"""A point of a sweep over control loops: a setting with its seeds, and the row of figures that comes of it."""
+
+import hashlib
+import pickle
+import platform
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tachometry.sim.engines.build import digest
+from tachometry.sim.studies.loops import control
+from tachometry.sim.studies.loops.control import Outcome, Setting, mean
+from tachometry.sim.studies.sweeping.sweep import OtherCode, Row, code_digest
+from tachometry.spec.language.option import ParameterError
+
+# Columns of an outcome, in order, with what tables call them.
+FIGURES = {
+    "rms": ("rms_error_rad_s", "RMS error (rad/s)"),
+    "largest": ("greatest_error_rad_s", "greatest"),
+    "dip": ("dip_rad_s", "dip (rad/s)"),
+    "sound": ("current_above_50_hz_a", "current > 50 Hz (A rms)"),
+    "limited": ("share_at_limit", "at limit"),
+}
+
+
+@dataclass(frozen=True)
+class LoopPoint:
+    """A setting with its seeds.
+
+    Parameters
+    ----------
+    method : str
+        What the method is called.
+    setting : Setting
+    text : str
+        The motion in words.
+    seeds : tuple of int
+    """
+
+    method: str
+    setting: Setting
+    text: str
+    seeds: tuple[int, ...]
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of all that decides the row."""
+        motion = [array.tobytes() for array in vars(self.setting.task.motion).values()]
+        one = self.setting
+        rest = (
+            one.spec,
+            one.gains,
+            one.task.load,
+            one.task.virtual,
+            one.task.noise,
+            one.motor,
+            one.encoder,
+            one.begin,
+            one.gates,
+        )
+        return digest(self.code, self.method, motion, *rest, self.seeds)
+
+    @property
+    def code(self) -> str:
+        """Digest of the code that the row depends on."""
+        return _code()
+
+
+def _code() -> str:
+    own = [Path(file).read_bytes() for file in (control.__file__, __file__)]
+    return hashlib.sha256(code_digest(hardware=True).encode() + b"".join(own)).hexdigest()
+
+
+def run_packed(code: str, packed: bytes) -> Row:
+    """The row of a pickled point, on any machine with the same code: the figures of `FIGURES`, and `point`.
+
+    Raises
+    ------
+    OtherCode
+        If the code here is not that which is meant.
+    """
+    if code != _code():
+        raise OtherCode(f"{platform.node()} has another one")
+    point: LoopPoint = pickle.loads(packed)
+    try:
+        outcomes = [point.setting.outcome(log) for log in control.each_seed(point.setting, point.seeds, jobs=1)]
+    except ValueError as error:
+        raise ParameterError.longer(error, f" (method {point.method}, motion {point.text})") from None
+    return {"point": point.digest} | row_of(mean(outcomes))
+
+
+def row_of(outcome: Outcome) -> dict[str, Any]:
+    """The columns of an outcome."""
+    return {column: getattr(outcome, name) for name, (column, _) in FIGURES.items()}
+
+
+def seeds_from(first: int, count: int) -> tuple[int, ...]:
+    """So many seeds, one after the other.
+
+    Raises
+    ------
+    ParameterError
+        If it is none, or more than a thousand.
+    """
+    if not 1 <= count <= 1000:
+        raise ParameterError("seeds", f"must be from 1 to 1000, not {count}")
+    return tuple(range(first, first + count))

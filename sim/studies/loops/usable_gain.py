@@ -1,0 +1,153 @@
+"""How far the gain of a velocity loop can be raised: what the tick, the method and the disc are worth in control."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.loop import Gains, Motor, Observer
+from tachometry.sim.studies.loops.control import Load, Outcome, Setting, Task, outcome_of
+from tachometry.spec import TachometerSpec, of_texts
+
+# k_v in 1/s. Each is a fifth more than the one before.
+GAINS = tuple(round(20 * 2 ** (k / 4), 1) for k in range(21))
+SOUND = 1.0  # A rms, above 50 Hz
+DEVIATION = 0.5  # rad/s
+
+IDEAL = VirtualEncoder(500)
+REAL = VirtualEncoder(500, jitter=0.05, nonuniformity=0.1, phase_error_deg=10)
+MOTOR = Motor(coulomb=0.005)
+TASK = Task(
+    motion=parse_motion("ramp:0:39rad/s:300ms+constant:39rad/s:900ms"),
+    load=Load(torque=0.2, begin=0.8, seconds=0.2),
+    noise=0.005,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """A way to close the loop.
+
+    Parameters
+    ----------
+    name : str
+    method : str
+    way : Observer
+    filtered : bool
+        Whether there is a low-pass filter of the velocity.
+    options : tuple of (str, str)
+        Of the method.
+    shortest : float, s
+        The shortest tick of the core; with shorter control ticks it keeps this one.
+    """
+
+    name: str
+    method: str
+    way: Observer
+    filtered: bool = True
+    options: tuple[tuple[str, str], ...] = ()
+    shortest: float = 0.0
+
+
+_SILENT = (("bound-decay", "no"),)  # updates without a count are no measurements, and would have eq. (22)'s weight
+KINDS = (
+    Kind(name="S, synchronised", method="s", way=Observer.SYNCHRONISED),
+    Kind(name="S, conventional", method="s", way=Observer.CONVENTIONAL),
+    Kind(name="M/T, synchronised", method="mt", way=Observer.SYNCHRONISED, options=_SILENT, shortest=20e-6),
+    Kind(name="M/T, conventional", method="mt", way=Observer.CONVENTIONAL, options=_SILENT, shortest=20e-6),
+    Kind(
+        name="tracking",
+        method="track",
+        way=Observer.SYNCHRONISED,
+        filtered=False,
+        options=(("max-speed", "100rad/s"),),
+        shortest=20e-6,
+    ),
+)
+# Control ticks in seconds, with the clock, and the tick of a core in words.
+TICKS = {
+    1e-3: ("48MHz", "1ms"),
+    1e-4: ("48MHz", "100us"),
+    20e-6: ("48MHz", "20us"),
+    1e-6: ("48MHz", "1us"),
+    20e-9: ("50MHz", "20ns"),
+}
+
+
+def core(kind: Kind, seconds: float, decoding: int = 4) -> TachometerSpec:
+    """The core of a kind at a control tick: at one clock per tick with bits that keep the LSB below 2^-6 rad/s."""
+    clock, tick = TICKS[seconds]
+    if seconds < kind.shortest:
+        clock, tick = TICKS[20e-6]
+    texts = {"ppr": "500", "clock": clock, "tick": tick, "max-time": "10ms", "decoding": str(decoding)}
+    if tick == "20ns":
+        texts["frac-bits"] = "24"
+    return of_texts(kind.method, texts | dict(kind.options))
+
+
+def gains_of(kind: Kind, kv: float, seconds: float) -> Gains:
+    """Gains as in the paper's Fig. 15: k_p = (k_v/2)², G = 2·k_v."""
+    filter_rate = 2 * kv if kind.filtered else float("inf")
+    return Gains(
+        position=(kv / 2) ** 2, velocity=kv, observer=2 * kv, filter=filter_rate, seconds=seconds, way=kind.way
+    )
+
+
+def setting(kind: Kind, kv: float, seconds: float, encoder: VirtualEncoder, decoding: int = 4) -> Setting:
+    """The loop with a gain: 39 rad/s, and 0.2 Nm for 0.2 s."""
+    spec, gains = core(kind, seconds, decoding), gains_of(kind, kv, seconds)
+    return Setting(spec=spec, gains=gains, task=TASK, motor=MOTOR, encoder=encoder, begin=0.5)
+
+
+def is_usable(outcome: Outcome) -> bool:
+    """Whether nothing is heard, and the loop does not swing: the current stays below its limit, the speed close."""
+    return outcome.sound <= SOUND and outcome.limited == 0 and outcome.largest <= DEVIATION
+
+
+def usable(
+    at: Callable[[float], Setting], seeds: Sequence[int], jobs: int | None = None
+) -> tuple[float, Outcome] | None:
+    """The greatest of `GAINS` that is usable, and its outcome; None if the least is not.
+
+    It is found by bisection with the first two seeds. From there on gains go down until one is usable with all seeds.
+    """
+    low, high = -1, len(GAINS)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if is_usable(outcome_of(at(GAINS[middle]), seeds[:2], jobs)):
+            low = middle
+        else:
+            high = middle
+    for kv in reversed(GAINS[: low + 1]):
+        found = outcome_of(at(kv), seeds, jobs)
+        if is_usable(found):
+            return kv, found
+    return None
+
+
+def variants(base: Setting) -> Iterator[tuple[str, Setting]]:
+    """What a loop depends on that the paper does not say, one thing changed at a time."""
+    gains, motor = base.gains, base.motor
+    yield "as assumed", base
+    yield "k_v on the velocity before the filter", replace(base, gains=replace(gains, on_filtered=False))
+    yield "no friction", replace(base, motor=replace(motor, coulomb=0.0))
+    yield "friction of 20 mNm", replace(base, motor=replace(motor, coulomb=0.02))
+    yield "viscous friction of 0.5 mNm/(rad/s)", replace(base, motor=replace(motor, viscous=5e-4))
+    yield "no torque noise", replace(base, task=replace(base.task, noise=0.0))
+    yield "ideal disc", replace(base, encoder=IDEAL)
+    yield "half the errors of the disc", replace(base, encoder=_halved(base.encoder))
+    yield "a delay of half a tick", replace(base, gains=replace(gains, delay=gains.seconds / 2))
+    yield "a delay of a tick", replace(base, gains=replace(gains, delay=gains.seconds))
+    yield "driver of 1 ms", replace(base, motor=replace(motor, driver_seconds=1e-3))
+    yield "inertia 20 % above the controller's", replace(base, motor=replace(motor, inertia=1.2 * motor.inertia))
+    yield "current limit of 20 A", replace(base, gains=replace(gains, current_limit=20.0))
+    yield "acceleration of the command fed forward", replace(base, gains=replace(gains, feed_forward=True))
+
+
+def _halved(encoder: VirtualEncoder) -> VirtualEncoder:
+    return replace(
+        encoder,
+        jitter=encoder.jitter / 2,
+        nonuniformity=encoder.nonuniformity / 2,
+        phase_error_deg=encoder.phase_error_deg / 2,
+    )

@@ -1,0 +1,1 @@
+"""Many cores on many motions."""

@@ -1,0 +1,164 @@
+"""Where the points of a sweep run: processes of this machine, or the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import pickle
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any
+
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import plural
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from tachometry.sim.studies.loops.loops import LoopPoint
+    from tachometry.sim.studies.sweeping.sweep import Point, Row
+
+_PATIENCE = 10.0  # seconds until a scheduler has answered
+_AT_ONCE = 1000  # points that are sent to the scheduler together
+# Dask has its workers give all memory back at once, which takes longer than a point itself: they keep so many bytes.
+_LOCAL: dict[str, Any] = {
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 25,
+    # Anybody on this machine can ask their HTTP servers, which shall have no answers.
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+}
+
+
+def require() -> None:
+    """See that the extra is there: distributed, pyarrow and cryptography."""
+    for name in ("distributed", "pyarrow", "cryptography"):
+        try:
+            __import__(name)
+        except ImportError:
+            raise OSError(
+                f"a sweep needs the extra `sweep`: {name} is not installed: pip install 'tachometry[sweep]'"
+            ) from None
+
+
+@contextmanager
+def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
+    """A client of a scheduler, or, without an address, of so many processes here, by default one for each core.
+
+    Whoever may talk to a Dask scheduler or worker may run Python there. The processes here talk to nobody else: by TLS,
+    with certificates that are made for them and only live in their memory.
+
+    Raises
+    ------
+    OSError
+        If the scheduler does not answer.
+    """
+    import dask
+    from distributed import Client, LocalCluster, Security
+
+    with ExitStack() as stack:
+        stack.callback(logging.disable, logging.root.manager.disable)
+        logging.disable()  # what goes wrong comes as an exception
+        if scheduler is not None:
+            try:
+                asyncio.run(_greet(scheduler))
+                client = stack.enter_context(Client(scheduler, timeout=_PATIENCE))
+            except (OSError, ValueError, TypeError) as error:
+                raise OSError(f"--scheduler {scheduler} does not answer: {error}") from None
+            if not client.scheduler_info()["workers"]:
+                print(f"tachometry: {scheduler} has no workers yet: waiting for them", file=sys.stderr)
+        else:
+            try:
+                with _deaf_to_interrupts(), dask.config.set(_LOCAL):
+                    local = LocalCluster(
+                        n_workers=jobs,
+                        threads_per_worker=1,
+                        protocol="tls://",
+                        security=Security.temporary(),
+                        dashboard_address="127.0.0.1:0",
+                        scheduler_kwargs={"dashboard": False},
+                        silence_logs=logging.CRITICAL,
+                    )
+            except RuntimeError as error:
+                raise OSError(f"cannot start the processes of a sweep: {error.__cause__ or error}") from None
+            client = stack.enter_context(Client(stack.enter_context(local)))
+        yield client
+
+
+async def _greet(scheduler: str) -> None:
+    """See that a scheduler answers: a client has no patience's end where one accepts and says nothing."""
+    from distributed import Security
+    from distributed.comm import connect
+
+    arguments = Security().get_connection_args("client")
+    try:
+        comm = await asyncio.wait_for(connect(scheduler, timeout=_PATIENCE, **arguments), _PATIENCE)
+    except TimeoutError:
+        raise OSError(f"nothing within {_PATIENCE:g} s") from None
+    await comm.close()
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """What is started in the meantime takes no notice of Ctrl-C: this process ends it in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweep") -> Iterator[Row]:
+    """Rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
+
+    They are run by the function `run_packed` of a module of this room, `study`.
+
+    Raises
+    ------
+    ValueError
+        At the end, if a point cannot be run.
+    OSError
+        At the end, if a worker lacks what it needs; at once, if one has another version, or the scheduler goes.
+    """
+    from distributed import KilledWorker, as_completed
+
+    def run(code: str, packed: bytes) -> Row:  # travels as it is: a scheduler and workers need not know it
+        from importlib import import_module
+
+        found: Row = import_module(f"tachometry.sim.studies.{study}").run_packed(code, packed)
+        return found
+
+    packed = [pickle.dumps(point) for point in points.values()]
+    codes = [point.code for point in points.values()]
+    # Keys of one kind: what the scheduler does for a task grows with the number of kinds.
+    keys = [("point", digest) for digest in points]
+    futures = client.map(run, codes, packed, key=keys, batch_size=_AT_ONCE, pure=False)
+    # Nothing else may hold futures: a worker keeps the row of one that is held, and where it dies, runs it again.
+    arrived = as_completed(futures, with_results=True, raise_errors=False)
+    del futures
+    failed: list[Exception] = []
+    for future, found in arrived:
+        if future.status == "finished":
+            yield found
+            continue
+        error = found[1] if future.status == "error" else found
+        if future.status == "cancelled":
+            raise OSError(f"the scheduler has gone: {error}")
+        if isinstance(error, ImportError):
+            raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
+        if isinstance(error, KilledWorker):
+            point = points[error.task[1]]
+            error = OSError(f"every worker died at the point of {point.method} on {point.text}: {error}")
+        failed.append(error)
+    if failed:
+        first = failed[0]
+        if not isinstance(first, ValueError | OSError):
+            raise first
+        more = f"; {len(failed)} of {plural(len(points), 'point')} could not be run"
+        raise ParameterError.longer(first, more) if isinstance(first, ValueError) else OSError(f"{first}{more}")

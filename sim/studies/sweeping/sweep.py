@@ -1,0 +1,330 @@
+"""A point of a sweep: a core on a motion, what it is known by, and the row of figures that comes of it."""
+
+import functools
+import hashlib
+import pickle
+import platform
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import Motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.build import digest
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.comparing.compare import common_instants, run_curve, score
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import METHODS, Option, TachometerSpec, own_options
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import format_time
+
+Row = dict[str, Any]
+
+# Columns of what a point is, and what came of it.
+_RESULTS: dict[str, tuple[str, str]] = {
+    "point": ("text", "digest of all that decides the row"),
+    "method": ("text", "as in `methods`"),
+    "motion": ("text", "as in `motion`, its values in place"),
+    "engine": ("text", "what ran the hardware beside the golden model"),
+    "mismatches": ("int", "values in which hardware and golden model differ"),
+    "clocks": ("int", "clocks of the core"),
+    "updates": ("int", "updates of the velocity"),
+    "forced_updates": ("int", "those by the maximum time alone"),
+    "updates_per_s": ("float", "1/s"),
+    "mean_time_s": ("float", "s, mean measurement time"),
+    "worst_time_s": ("float", "s, longest measurement time"),
+    "true_rms_rad_s": ("float", "rad/s, RMS of the true speed while it is compared"),
+    "rms_error_rad_s": ("float", "rad/s, RMS error of the held velocity"),
+    "max_error_rad_s": ("float", "rad/s, greatest error"),
+    "relative_error": ("float", "RMS error over RMS of the true speed"),
+    "delay_s": ("float", "s, shift of the true speed that comes closest"),
+    "ppr": ("int", "pulses per revolution"),
+    "decoding": ("int", "counts per pulse"),
+    "clock_hz": ("int", "Hz"),
+    "tick_s": ("float", "s; with Rairán's method dt"),
+    "max_time_s": ("float", "s"),
+    "max_tick_period_s": ("float", "s, of an external tick"),
+    "unit": ("text", "of the velocity"),
+    "frac_bits": ("int", "bits"),
+    "velocity_width": ("int", "bits"),
+    "max_speed_rad_s": ("float", "rad/s"),
+    "position_width": ("int", "bits"),
+    "filter": ("int", "clocks"),
+    "index": ("bool", "as the option"),
+    "index_reset": ("bool", "as the option"),
+    "age": ("bool", "as the option"),
+    "bounds": ("bool", "as the option"),
+    "lowpass_rad_s": ("float", "rad/s"),
+}
+_ENCODER: dict[str, tuple[str, str]] = {
+    "vibration_rad": ("float", "rad, amplitude"),
+    "vibration_hz": ("float", "Hz"),
+    "jitter": ("float", "fraction of a gap"),
+    "nonuniformity": ("float", "edge pitches"),
+    "phase_error_deg": ("float", "electrical degrees"),
+    "duty_error_deg": ("float", "electrical degrees"),
+    "bounce_count": ("int", "per edge"),
+    "bounce_s": ("float", "s"),
+    "lost": ("float", "probability"),
+    "illegal": ("float", "probability"),
+    "seed": ("int", "as the option"),
+    "from_s": ("float", "s, errors before are left out"),
+}
+_KINDS = {bool: "bool", int: "int", str: "text"}
+
+
+class _Columns(Mapping[str, tuple[str, str]]):
+    """All columns; among them those of the options that methods have of their own, as they are declared."""
+
+    def __getitem__(self, name: str) -> tuple[str, str]:
+        return self._all()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def _all(self) -> dict[str, tuple[str, str]]:
+        own = {_column(about): _content(about) for method in METHODS for about in own_options(method)}
+        return _RESULTS | own | _ENCODER
+
+
+# Every column of the results: its kind, and what is in it, with its unit. What does not exist or cannot be determined
+# is empty.
+COLUMNS = _Columns()
+
+
+def _column(about: Option) -> str:
+    """Name of the column of a method's option, with its unit; clocks are shown as seconds."""
+    return about.field + {"clocks": "_s", "rad/s": "_rad_s"}.get(about.unit, "")
+
+
+def _content(about: Option) -> tuple[str, str]:
+    if about.unit == "clocks":
+        return "float", "s"
+    return _KINDS.get(type(about.default), "float"), about.unit or "as the option"
+
+
+@dataclass(frozen=True)
+class Point:
+    """A core on a motion.
+
+    Parameters
+    ----------
+    method : str
+        What the method is called.
+    spec : TachometerSpec
+    encoder : VirtualEncoder
+    motion : Motion
+    text : str
+        The motion in words.
+    values : dict of str to float
+        What the sweep varies within the motion, in rad/s, s and Hz: a column each.
+    earliest : float, seconds
+        Errors before it are left out.
+    engine : str or None
+        What runs the hardware; None: the golden model alone, which it equals.
+
+    Raises
+    ------
+    ValueError
+        If the motion is shorter than a tick, or no two ticks of it are compared.
+    """
+
+    method: str
+    spec: TachometerSpec
+    encoder: VirtualEncoder
+    motion: Motion
+    text: str
+    values: dict[str, float] = field(default_factory=dict)
+    earliest: float = 0.0
+    engine: str | None = None
+
+    def __post_init__(self) -> None:
+        needed = self.spec.longest_tick + self.spec.tick_latency
+        if self.motion.duration * self.spec.timing.clock_hz < needed:
+            least = format_time(self.spec.seconds(needed))
+            raise ParameterError(
+                "motion", f"must last at least {needed} clocks of --clock ({least}), a tick and its latency"
+            )
+        duration = self.motion.duration
+        if self.earliest and duration - self.earliest < 2 * float(self.spec.timing.tick_seconds):
+            lasts = format_time(Fraction(f"{duration:.6g}"))
+            raise ParameterError("motion", f"must last two ticks or more beyond --from, longer than {lasts}")
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Digest of all that decides the row, the code that makes it included."""
+        motion = [array.tobytes() for array in vars(self.motion).values()]
+        rest = (self.method, self.spec, self.encoder, self.values, self.earliest, self.engine)
+        return digest(self.code, motion, *rest)
+
+    @property
+    def code(self) -> str:
+        """Digest of the code that the row depends on."""
+        return code_digest(hardware=self.engine is not None)
+
+
+class OtherCode(ImportError):
+    """A worker has another version."""
+
+
+# Code that decides the row of a point, and, where an engine runs the hardware beside the golden model, that, too.
+_CODE = (
+    *("spec", "sim/golden", "sim/encoder", "sim/signals"),
+    *(f"sim/studies/{name}.py" for name in ("__init__", "lockstep", "sweeping/__init__", "sweeping/sweep")),
+    *(f"sim/studies/comparing/{name}.py" for name in ("__init__", "compare", "baselines")),
+)
+_HARDWARE_CODE = ("hdl", "sim/engines")
+
+
+@functools.cache
+def code_digest(hardware: bool = False) -> str:
+    """Digest of the code that rows depend on, those with an engine if `hardware`: equal code gives equal results."""
+    found = hashlib.sha256()
+    for name in (*_CODE, *(_HARDWARE_CODE if hardware else ())):
+        layer, _, rest = name.partition("/")
+        for file in _sources(_layer(layer) / rest):
+            found.update(f"{layer}/{file.relative_to(_layer(layer)).as_posix()}\n".encode())
+            found.update(file.read_bytes())
+    return found.hexdigest()
+
+
+def _layer(name: str) -> Path:
+    module = find_spec(f"tachometry.{name}")  # not imported: the golden models need no Amaranth
+    assert module is not None
+    assert module.origin is not None
+    return Path(module.origin).parent
+
+
+def _sources(place: Path) -> list[Path]:
+    if place.is_file():
+        return [place]
+    return sorted(path for path in place.rglob("*") if path.suffix in (".py", ".h"))
+
+
+def run_packed(code: str, packed: bytes) -> Row:
+    """`run_point` of a pickled point, on any machine with the same code.
+
+    Raises
+    ------
+    OtherCode
+        If the code here is not that which is meant.
+    ValueError
+        As `run_point`, with the point.
+    """
+    if code not in (code_digest(), code_digest(hardware=True)):
+        raise OtherCode(f"{platform.node()} has another one")
+    point = pickle.loads(packed)
+    try:
+        return run_point(point)
+    except ValueError as error:
+        raise ParameterError.longer(error, f" (method {point.method}, motion {point.text})") from None
+
+
+def run_point(point: Point) -> Row:
+    """Run a point: its row, with all of `COLUMNS` and one for each of its values.
+
+    Raises
+    ------
+    ValueError
+        If the motion has too many edges.
+    OSError
+        If the engine lacks what it needs here.
+    """
+    spec, encoding = point.spec, point.encoder.record(point.motion)
+    duration = encoding.recording.duration
+    trace = PinTrace.of(encoding.recording, spec)
+    run = golden.run(spec, trace)
+    mismatches = None
+    if point.engine is not None:
+        mismatches = lockstep(spec, trace, pick(point.engine), expected=run).n_mismatches
+    curve = run_curve(point.method, spec, run)
+    instants = np.empty(0)
+    if len(run.updates.clock):
+        instants = common_instants([curve], duration, float(spec.timing.tick_seconds), point.earliest)
+    found = score(curve, duration, instants, encoding.true_speed)
+    truth = encoding.true_speed(instants)
+    true_rms = float(np.sqrt(np.mean(truth * truth))) if len(truth) else None
+    figures = {
+        "point": point.digest,
+        "method": point.method,
+        "motion": point.text,
+        "engine": point.engine,
+        "mismatches": mismatches,
+        "clocks": trace.n_clocks,
+        "updates": len(run.updates.clock),
+        "forced_updates": int(np.count_nonzero(run.updates.forced)),
+        "updates_per_s": found.updates_per_second,
+        "mean_time_s": found.mean_time,
+        "worst_time_s": found.worst_time,
+        "true_rms_rad_s": true_rms,
+        "rms_error_rad_s": found.rms,
+        "max_error_rad_s": found.max,
+        "relative_error": found.rms / true_rms if found.rms is not None and true_rms else None,
+        "delay_s": found.delay,
+        "from_s": point.earliest,
+    }
+    return dict.fromkeys(COLUMNS) | figures | _core(spec) | _encoder(point.encoder) | point.values
+
+
+def _core(spec: TachometerSpec) -> Row:
+    """Columns of the configuration."""
+
+    def seconds(clocks: int | None) -> float | None:
+        return None if clocks is None else float(spec.seconds(clocks))
+
+    timing = spec.timing
+    own = {}
+    for about in own_options(spec.method):
+        value = spec.parameters[about.field]
+        if about.unit == "clocks":
+            value = seconds(value)
+        elif about.unit == "rad/s":
+            value = float(getattr(spec, about.field))
+        own[_column(about)] = value
+    return {
+        "ppr": spec.encoder.pulses_per_rev,
+        "decoding": spec.encoder.decoding,
+        "clock_hz": timing.clock_hz,
+        "tick_s": seconds(timing.tick_cycles),
+        "max_time_s": seconds(timing.max_ticks * timing.tick_cycles),
+        "max_tick_period_s": seconds(spec.max_tick_cycles),
+        "unit": spec.unit,
+        "frac_bits": spec.frac_bits,
+        "velocity_width": spec.velocity_width,
+        "max_speed_rad_s": None if spec.max_speed is None else spec.max_speed.rad_per_s,
+        "position_width": spec.position_width,
+        "filter": spec.filter_clocks,
+        "index": spec.index,
+        "index_reset": spec.index_reset,
+        "age": spec.age,
+        "bounds": spec.bounds,
+        "lowpass_rad_s": None if spec.lowpass is None else float(spec.lowpass),
+    } | own
+
+
+def _encoder(encoder: VirtualEncoder) -> Row:
+    """Columns of the encoder and what is wrong with it."""
+    vibration, bounce = encoder.vibration, encoder.bounce
+    return {
+        "vibration_rad": None if vibration is None else vibration.amplitude_rad,
+        "vibration_hz": None if vibration is None else vibration.frequency_hz,
+        "jitter": encoder.jitter,
+        "nonuniformity": encoder.nonuniformity,
+        "phase_error_deg": encoder.phase_error_deg,
+        "duty_error_deg": encoder.duty_error_deg,
+        "bounce_count": None if bounce is None else bounce.count,
+        "bounce_s": None if bounce is None else bounce.time_s,
+        "lost": encoder.lost,
+        "illegal": encoder.illegal,
+        "seed": encoder.seed,
+    }

@@ -1,0 +1,1 @@
+"""What every core of one axis has: encoder, timing, options, widths, latencies, ports."""

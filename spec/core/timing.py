@@ -1,0 +1,142 @@
+"""The clock, the sampling period and the longest measurement."""
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tachometry.spec.language.option import Derived, Option, ParameterError, option, read_options, settle
+from tachometry.spec.language.units import TIME, format_time, parse_frequency, plural, read_exactly
+
+MAX_CLOCK_HZ = 10**11
+MAX_TICK_CYCLES = 1 << 20
+MIN_TICKS, MAX_TICKS = 2, 1 << 20
+
+_GROUP = "Timing"
+
+
+def _clocks(what: str, text: str) -> Derived:
+    return Derived(lambda timing: whole_clocks(what, text, timing.clock_hz))
+
+
+def _ticks(what: str, text: str) -> Derived:
+    return Derived(
+        lambda timing: _whole(what, text, timing.tick_seconds, "tick", Fraction(1, timing.clock_hz), MIN_TICKS)
+    )
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Clock, tick and maximum measurement time.
+
+    Parameters
+    ----------
+    clock_hz : int
+        Frequency of `clk` in Hz.
+    tick_cycles : int
+        T, clocks in a sampling period T_s; 20 µs, if it is not given.
+    max_ticks : int
+        Ticks after which an update is forced (Tsuji 2009, Sec. V-B: 10 ms, which it is if it is not given).
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range.
+    """
+
+    clock_hz: int = option(
+        None,
+        "Clock of the core, in Hz, kHz, MHz or GHz; a plain number is Hz.",
+        text="48MHz",
+        name="clock",
+        metavar="FREQUENCY",
+        group=_GROUP,
+        parse=parse_frequency,
+    )
+    tick_cycles: int = option(
+        None,
+        "Sampling period Ts, in s, ms, us or ns, a whole number of clocks; a plain number is clocks.",
+        text="20us",
+        name="tick",
+        metavar="TIME",
+        unit="clocks",
+        group=_GROUP,
+        parse=_clocks,
+        tests=("1", "3", "960", "2"),
+        few=3,
+        also=(
+            Option(
+                "Sampling period of method rairan, whose tick is called dt (instead of --tick).",
+                name="dt",
+                metavar="TIME",
+                group=_GROUP,
+                parse=_clocks,
+                fits=lambda spec: spec.own_ticks,
+            ),
+        ),
+    )
+    max_ticks: int = option(
+        None,
+        "Longest measurement: after it an update is forced, so that standstill is seen. In s, ms, us or ns, 2 to 2^20 "
+        "whole ticks; a plain number is clocks.",
+        text="10ms",
+        name="max-time",
+        metavar="TIME",
+        unit="ticks",
+        group=_GROUP,
+        parse=_ticks,
+        tests=("2", "500", "3", "4096"),
+        few=3,
+    )
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.clock_hz <= MAX_CLOCK_HZ:
+            raise ParameterError("clock", f"must be from 1 Hz to 100 GHz, not {float(self.clock_hz):.6g} Hz")
+        settle(self, "tick_cycles")
+        if not 1 <= self.tick_cycles <= MAX_TICK_CYCLES:
+            raise ParameterError("tick_cycles", f"must be from 1 to {MAX_TICK_CYCLES}, not {self.tick_cycles}")
+        settle(self)
+        if not MIN_TICKS <= self.max_ticks <= MAX_TICKS:
+            raise ParameterError("max_ticks", f"must be from {MIN_TICKS} to {MAX_TICKS}, not {self.max_ticks}")
+
+    @classmethod
+    def parse(
+        cls, clock: str | int | None = None, tick: str | int | None = None, max_time: str | int | None = None
+    ) -> "Timing":
+        """Timing from texts (`48MHz`, `20us`, `10ms`) or whole numbers (Hz, clocks, clocks); None is the default.
+
+        Raises
+        ------
+        ParameterError
+            Also if the tick is not a whole number of clocks, or the maximum time not of ticks: the message names the
+            two nearest that are.
+        """
+        given = {"clock": clock, "tick": tick, "max-time": max_time}
+        return cls(**read_options(cls, {name: str(value) for name, value in given.items() if value is not None}))
+
+    @property
+    def tick_seconds(self) -> Fraction:
+        """T_s in seconds, exactly."""
+        return Fraction(self.tick_cycles, self.clock_hz)
+
+
+def whole_clocks(what: str, given: str, clock_hz: int) -> int:
+    """A time such as `40us`, or a number of clocks, as a whole number of clocks; ParameterError if it is none."""
+    return _whole(what, given, Fraction(1, clock_hz), "clock", Fraction(1, clock_hz))
+
+
+def _whole(what: str, given: str, period: Fraction, name: str, given_in: Fraction, least: int = 1) -> int:
+    """`given`, a time or a number of clocks, as a whole number of periods, of which `least` are needed."""
+    number = given.strip()
+    plain = re.fullmatch(r"\d{1,30}", number, re.ASCII)
+    or_plain = "or a whole number of clocks"
+    seconds = int(number) * given_in if plain else read_exactly(what, number, TIME, also=or_plain)
+    if seconds <= 0:
+        raise ParameterError(what, f"must be longer than 0, not {given}")
+    periods = seconds / period
+    if periods.denominator == 1:
+        return int(periods)
+    possible = sorted({max(int(periods) + more, least) for more in (0, 1)})
+    nearest = " and ".join(f"{plural(n, name)} ({format_time(n * period)})" for n in possible)
+    raise ParameterError(
+        what, f"must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"
+    )

@@ -1,0 +1,91 @@
+"""Ports of the exported core: what each one is, and with which strobe it is new.
+
+Everything that shows or compares a core reads this list: engines, comparison, waveform, CSV, testbench, manifest,
+documents. A port that is added here, and driven by hardware and golden model, appears in all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+TICK, UPDATE, INDEX = "tick", "velocity_valid", "index_valid"
+
+
+@dataclass(frozen=True)
+class Port:
+    """A scalar port of the exported core.
+
+    Parameters
+    ----------
+    name : str
+    direction : str
+        `input` or `output`.
+    width : int
+        Bits.
+    signed : bool
+    held_by : str
+        Of an output, the strobe in whose clocks it is read; a strobe is read with itself.
+    unit : str
+        What one LSB is.
+    help : str
+        What the port means, in a sentence or two.
+    """
+
+    name: str
+    direction: str
+    width: int = 1
+    signed: bool = False
+    held_by: str = ""
+    unit: str = ""
+    help: str = ""
+
+    @property
+    def is_strobe(self) -> bool:
+        """Whether it is high for one clock when something is new."""
+        return self.held_by == self.name
+
+
+def pin(name: str, help: str, width: int = 1) -> Port:
+    """An input, of one bit as a rule."""
+    return Port(name, "input", width, help=help)
+
+
+def strobe(name: str, help: str) -> Port:
+    """An output that is high for one clock when something is new."""
+    return Port(name, "output", held_by=name, help=help)
+
+
+def held(by: str, name: str, width: int = 1, *, signed: bool = False, unit: str = "", help: str) -> Port:
+    """An output that is read in the clocks of the strobe `by`."""
+    return Port(name, "output", width, signed, by, unit, help)
+
+
+class HasPorts:
+    """What follows from the ports of an exported core."""
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Ports of the exported core, in order."""
+        raise NotImplementedError
+
+    @property
+    def pins(self) -> tuple[Port, ...]:
+        """Inputs beside clock and reset."""
+        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
+
+    @property
+    def outputs(self) -> tuple[Port, ...]:
+        """Outputs of the exported core, in order."""
+        return tuple(port for port in self.ports if port.direction == "output")
+
+    @property
+    def strobes(self) -> dict[str, tuple[str, ...]]:
+        """Outputs that strobe, each with the names of the outputs that are new with it."""
+        outputs = self.outputs
+        return {
+            strobe.name: tuple(
+                port.name for port in outputs if port.held_by == strobe.name and port.name != strobe.name
+            )
+            for strobe in outputs
+            if strobe.is_strobe
+        }

@@ -1,0 +1,253 @@
+"""Quantities with units, read exactly: `20us`, `48MHz`, `400rad/s`, `5deg`."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from tachometry.spec.language.option import ParameterError
+
+# π to 50 digits: speeds in rad/s are compared with whole counts and scaled by constants of up to 48 bits.
+PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
+
+# A decimal number and its unit. Exponents beyond three digits would make numbers that fill the memory.
+# µ is the sign of either code point, U+00B5 or U+03BC.
+QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-zµμ/%]*)"
+_QUANTITY = re.compile(QUANTITY, re.ASCII)
+_LONGEST = 400  # characters of a number
+# Sizes of a number: products of several still are floats.
+_LEAST, _GREATEST = Fraction(1, 10**30), Fraction(10**30)
+
+
+class Unit(NamedTuple):
+    """A unit: how many of the first unit of its table it is.
+
+    Parameters
+    ----------
+    size : Fraction
+        The rational factor.
+    pi : Fraction or None
+        A factor of so many π, in units that have one.
+    """
+
+    size: Fraction = Fraction(1)
+    pi: Fraction | None = None
+
+    @property
+    def exact(self) -> Fraction:
+        """The whole factor, with π to 50 digits."""
+        return self.size if self.pi is None else self.size * self.pi * PI
+
+    def nearest(self, value: Fraction) -> float:
+        """So many of this unit as a float; what has no π in it is rounded once, so 7us is exactly 7e-6."""
+        rational = float(value * self.size)
+        return rational if self.pi is None else rational * (math.pi * self.pi.numerator / self.pi.denominator)
+
+
+Units = Mapping[str, Unit]
+
+
+def _decimal(**exponents: int) -> dict[str, Unit]:
+    return {name: Unit(Fraction(10) ** exponent) for name, exponent in exponents.items()}
+
+
+TIME = _decimal(s=0, ms=-3, us=-6, ns=-9)
+FREQUENCY = _decimal(Hz=0, kHz=3, MHz=6, GHz=9)
+SPEED = {"rad/s": Unit(), "rev/s": Unit(pi=Fraction(2)), "rpm": Unit(pi=Fraction(1, 30))}
+ANGLE = {**_decimal(rad=0, mrad=-3), "deg": Unit(pi=Fraction(1, 180))}
+DEGREES = {"deg": Unit()}
+BANDWIDTH = {"rad/s": Unit(), **{name: Unit(unit.size, Fraction(2)) for name, unit in FREQUENCY.items()}}
+FRACTION = {"": Unit(), "%": Unit(Fraction(1, 100))}
+PLAIN = {"": Unit()}
+CURRENT = _decimal(A=0, mA=-3)
+TORQUE_CONSTANT = {"Nm/A": Unit(), "mNm/A": Unit(Fraction(1, 1000))}
+TORQUE = _decimal(Nm=0, mNm=-3)
+
+
+def read_quantity(what: str, text: str, units: Units, default: str = "", also: str = "") -> tuple[Fraction, str]:
+    """The decimal number in a text, exactly, and its unit.
+
+    Parameters
+    ----------
+    what : str
+        What the message calls the quantity.
+    text : str
+    units : mapping of str to Unit
+        Those that it may have.
+    default : str
+        Unit of a number without one.
+    also : str
+        What else may stand there, which the caller reads, for the message.
+
+    Raises
+    ------
+    ParameterError
+        If the text is not of this form, or the number absurdly large or small.
+    """
+    number = text.strip()
+    match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
+    unit = plain_unit(match[2]) or default if match else ""
+    if match is None or unit not in units:
+        names = ", ".join(filter(None, units))
+        allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
+        if "" in units:
+            allowed = names and f"or one in {names}"
+        raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed, also)))}, not {text!r}")
+    value = Fraction(match[1])
+    if value and not _LEAST <= abs(value) <= _GREATEST:
+        raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")
+    return value, unit
+
+
+def plain_unit(unit: str) -> str:
+    """The name of a unit in the tables, such as `us` for `µs`."""
+    return re.sub("^[µμ]", "u", unit)
+
+
+def read_exactly(what: str, text: str, units: Units, default: str = "", also: str = "") -> Fraction:
+    """The quantity in the first of the units, exactly; arguments and errors as of `read_quantity`."""
+    value, unit = read_quantity(what, text, units, default, also)
+    return value * units[unit].exact
+
+
+def rounded(value: Fraction | float, *, up: bool, digits: int = 4) -> str:
+    """A limit to some digits, from above or from below, so that what is told is allowed."""
+    exact = Fraction(value)
+    with localcontext(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR):
+        return f"{float(Decimal(exact.numerator) / exact.denominator):.{digits}g}"
+
+
+def read_nearest(what: str, text: str, units: Units, default: str = "") -> float:
+    """The quantity in the first of the units as a float; arguments and errors as of `read_quantity`."""
+    value, unit = read_quantity(what, text, units, default)
+    return units[unit].nearest(value)
+
+
+def ratio(unit: str, other: str) -> Fraction | None:
+    """How many of `unit` one of `other` is, exactly; None if there is no exact ratio."""
+    for units in (TIME, FREQUENCY, SPEED, ANGLE):
+        if unit in units and other in units and (units[unit].pi is None) == (units[other].pi is None):
+            return units[other].exact / units[unit].exact
+    return None
+
+
+def parse_time(what: str, text: str) -> Fraction:
+    """Seconds in a text such as `20us`; `what` names the quantity in the message of the ValueError."""
+    return read_exactly(what, text, TIME)
+
+
+def parse_frequency(what: str, text: str | int) -> int:
+    """Hertz in a text such as `48MHz`, a whole number; a plain number is hertz.
+
+    Raises
+    ------
+    ValueError
+        If the text is no frequency, or not a positive whole number of hertz.
+    """
+    hertz = read_exactly(what, str(text), FREQUENCY, "Hz")
+    if hertz.denominator != 1 or hertz <= 0:
+        raise ParameterError(what, f"must be a positive whole number of Hz, not {text!r}")
+    return int(hertz)
+
+
+def parse_bandwidth(what: str, text: str) -> Fraction:
+    """rad/s in a text such as `200rad/s` or `30Hz`."""
+    return read_exactly(what, text, BANDWIDTH)
+
+
+def format_time(seconds: Fraction) -> str:
+    """A time as people write it: the largest unit that leaves a number of at least 1."""
+    for unit, (size, _) in TIME.items():
+        if seconds >= size:
+            return f"{float(seconds / size):.9g}{unit}"
+    return f"{float(seconds):.9g}s"
+
+
+def plural(number: int, what: str) -> str:
+    """So many of a thing."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
+def ceil_log2(number: Fraction) -> int:
+    """The least k for which 2^k is at least `number`."""
+    k = number.numerator.bit_length() - number.denominator.bit_length()  # off by one at most
+    return k + 1 if number > Fraction(2) ** k else k if number > Fraction(2) ** (k - 1) else k - 1
+
+
+def signed_width(limit: int) -> int:
+    """Bits of a two's complement number that holds -limit … +limit."""
+    return limit.bit_length() + 1
+
+
+class SpeedUnit(NamedTuple):
+    """The unit in which commands show speeds; everything else has them in rad/s.
+
+    Parameters
+    ----------
+    name : str
+        `rad/s`, `rev/s` or `rpm`.
+    """
+
+    name: str
+
+    @property
+    def rad_per_s(self) -> float:
+        """One of this unit in rad/s."""
+        return float(SPEED[self.name].exact)
+
+    def of(self, rad_per_s: Any) -> Any:
+        """A number or an array in rad/s, in this unit."""
+        return rad_per_s / self.rad_per_s
+
+    @property
+    def suffix(self) -> str:
+        """What the names of columns end with."""
+        return self.name.replace("/", "_")
+
+
+@dataclass(frozen=True)
+class Speed:
+    """An angular speed with its unit, kept exactly as it was given.
+
+    Parameters
+    ----------
+    value : Fraction
+    unit : str
+        `rad/s`, `rev/s` or `rpm`.
+    """
+
+    value: Fraction
+    unit: str = "rad/s"
+
+    def __post_init__(self) -> None:
+        if self.unit not in SPEED:
+            raise ParameterError("unit", f"of a speed must be one of {', '.join(SPEED)}, not {self.unit!r}")
+        if self.value <= 0:
+            raise ParameterError("max_speed", f"must be greater than 0, not {self}")
+
+    @classmethod
+    def parse(cls, text: str, default: str = "") -> "Speed":
+        """Read `400rad/s`, `50rev/s` or `3000rpm`; `default` is the unit of a plain number."""
+        return cls(*read_quantity("max_speed", text, SPEED, default))
+
+    @property
+    def rad_per_s(self) -> float:
+        """The speed in rad/s."""
+        return float(self.value * SPEED[self.unit].exact)
+
+    def counts(self, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
+        """Speed / ω_u, counts per tick, with ω_u = 2π/(P·T_s)."""
+        size, pi = SPEED[self.unit]
+        turns = size / (2 * PI) if pi is None else size * pi / 2
+        return self.value * turns * counts_per_rev * tick_seconds
+
+    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
+        """The most counts that one tick can hold at this speed."""
+        return math.ceil(self.counts(counts_per_rev, tick_seconds))
+
+    def __str__(self) -> str:
+        number = self.value.numerator if self.value.denominator == 1 else float(self.value)
+        return f"{number}{self.unit}"

@@ -1,0 +1,304 @@
+"""Many axes through one datapath: each is looked at in turn, and keeps its state in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.timing import Timing
+from tachometry.spec.formats.reciprocal import Reciprocal
+from tachometry.spec.formats.velocity_output import NATIVE
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, HasPorts, Port, held, pin, strobe
+from tachometry.spec.language.units import Speed
+from tachometry.spec.methods.s import MAX_TABLE, STachometer
+
+MAX_AXES = 64
+# What is counted is back in memory before the same axis is looked at again.
+MIN_SLOTS = 4
+_NEAR = 2000  # clocks; 64 axes need some 800
+WARM_UP = 3  # rounds after reset: two until the levels are those of the pins, one for the level before
+# Clocks from a look at an axis: the count is in its register, is handed over, and the datapath begins.
+COUNT_LATENCY = 3
+HAND_OVER_LATENCY = 4
+# Clocks of a turn of the datapath: what its memories have is in registers, and m_e is.
+READ, DECIDE = 2, 3
+
+_FOR_ONE = "is for one axis"
+# Options of the core of one axis, the value that leaves them out, and why many axes do not have them.
+_LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
+    ("unit", NATIVE, f"the conversion of the velocity {_FOR_ONE}"),
+    ("filter_clocks", 0, "the levels of an axis are not looked at in every clock"),
+    ("index_reset", False, "the position of an axis is in the memory of the datapath"),
+    ("max_tick_cycles", None, "the core makes the ticks in step with its rounds"),
+    ("age", False, f"what counts the ticks {_FOR_ONE}"),
+    ("bounds", False, f"what finds them {_FOR_ONE}"),
+    ("lowpass", None, f"the filter {_FOR_ONE}"),
+)
+_STROBES = {
+    UPDATE: "One clock for every update of the velocity of an axis, together with its tick.",
+    TICK: "One clock for every axis and every sampling period, axis 0 first.",
+    "decode_error": "One clock: both lines of an axis changed at once, so the direction is unknown and nothing was "
+    "counted.",
+    INDEX: "One clock for every rising edge of z of an axis.",
+}
+
+
+def _slots(axes: int, cycles: int) -> int | None:
+    """S for a tick of so many clocks; None if no number divides it."""
+    return next((slots for slots in range(max(axes, MIN_SLOTS), MAX_AXES + 1) if cycles % slots == 0), None)
+
+
+def _axis(spec: STachometer, slots: int) -> STachometer:
+    """The core that each axis is if a round has so many slots."""
+    timing, speed = spec.timing, spec.max_speed
+    return replace(
+        spec,
+        timing=Timing(timing.clock_hz, timing.tick_cycles // slots, int(timing.max_ticks)),
+        max_speed=None if speed is None else Speed(speed.value * slots, speed.unit),
+    )
+
+
+def _turn_cycles(axis: STachometer) -> int:
+    # The next axis begins while the velocity of this one is shown. One clock starts the scaler, one takes its sum.
+    return DECIDE + 1 + axis.looked_up.digits + 1 - READ
+
+
+def _fits(spec: STachometer, axes: int, cycles: int) -> bool:
+    """Whether a tick of so many clocks has whole rounds, and room for the turns of all axes."""
+    slots = _slots(axes, cycles)
+    if slots is None:
+        return False
+    most = spec.timing.max_ticks * spec.timing.tick_cycles // cycles
+    axis = _axis(replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2))), slots)
+    return axes * _turn_cycles(axis) + slots <= cycles
+
+
+def _nearest(spec: STachometer, axes: int) -> list[int]:
+    """The longest tick below that of `spec` that fits, and the shortest above, in clocks, if they are near."""
+
+    def possible(cycles: int) -> bool:
+        try:
+            return _fits(spec, axes, cycles)
+        except ParameterError:  # no axis can have this tick
+            return False
+
+    cycles = spec.timing.tick_cycles
+    ways = (range(cycles - 1, max(cycles - _NEAR, 0), -1), range(cycles + 1, cycles + _NEAR))
+    found = (next(filter(possible, way), None) for way in ways)
+    return [one for one in found if one is not None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxesSpec(HasPorts):
+    """Several encoders, one S-method datapath.
+
+    In a round each axis is looked at once, in its slot of one clock. So an axis is, to the bit, a core of its own whose
+    clock is a round: see `axis`.
+
+    Parameters
+    ----------
+    tachometer : STachometer
+        What each axis would be as a core of its own; its clock and tick are those of this core.
+    axes : int
+        N, 1 to 64.
+    parallel : bool
+        Every output has a port for each axis, which holds it.
+
+    Raises
+    ------
+    ParameterError
+        If there cannot be such a core.
+    """
+
+    tachometer: STachometer
+    axes: int
+    parallel: bool = False
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.axes <= MAX_AXES:
+            raise ParameterError("axes", f"must be from 1 to {MAX_AXES}, not {self.axes}")
+        spec = self.tachometer
+        for name, value, why in _LEFT_OUT:
+            if getattr(spec, name) != value:
+                # What is wrong is the option, not the length that it may have.
+                name = {"max_tick_cycles": "external-tick"}.get(name, name)
+                raise ParameterError(name, f"must not be given together with axes: {why}")
+        if spec.velocity_width != spec.native_width:
+            raise ParameterError(
+                "velocity_width", "must not be given together with axes: it is what the greatest speed needs"
+            )
+        if spec.timing.max_ticks > MAX_TABLE:
+            raise ParameterError(
+                "max_ticks",
+                f"must be at most {MAX_TABLE} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
+            )
+        self._check_tick()
+
+    def _check_tick(self) -> None:
+        cycles = self.timing.tick_cycles
+        if not _fits(self.tachometer, self.axes, cycles):
+            fewest = max(self.axes, MIN_SLOTS)
+            some = f"a number from {fewest} to {MAX_AXES}" if fewest < MAX_AXES else f"{MAX_AXES}"
+            near = " or ".join(map(str, _nearest(self.tachometer, self.axes)))
+            raise ParameterError(
+                "tick_cycles",
+                f"must be a multiple of {some}, and long enough for a turn of every axis with --axes {self.axes}"
+                f"{f': {near}' if near else ''}, not {cycles}",
+            )
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return self.tachometer.method
+
+    @property
+    def timing(self) -> Timing:
+        """Clock, tick and maximum time of the core."""
+        return self.tachometer.timing
+
+    @cached_property
+    def slots(self) -> int:
+        """S, clocks of a round: the least number that is no less than N and divides a tick."""
+        found = _slots(self.axes, self.timing.tick_cycles)
+        assert found is not None  # see `_check_tick`
+        return found
+
+    @cached_property
+    def axis(self) -> STachometer:
+        """The core that each axis is: one of its clocks is a round of this core, and so speeds are S times as great."""
+        return _axis(self.tachometer, self.slots)
+
+    @property
+    def rounds(self) -> int:
+        """Rounds of a tick: an axis can count as many."""
+        return self.axis.timing.tick_cycles
+
+    @property
+    def turn_cycles(self) -> int:
+        """Clocks for which an axis has the datapath."""
+        return _turn_cycles(self.axis)
+
+    @property
+    def reciprocal(self) -> Reciprocal:
+        """The reciprocal of m_s, which is always looked up: there is no time between two axes to divide."""
+        return self.axis.looked_up
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is other than might be expected."""
+        if self.tachometer.max_speed is None or self.axis.max_count == self.tachometer.max_count:
+            return ()
+        return (
+            f"greatest speed: an axis is looked at {self.rounds} times in a tick, so it has at most as many counts",
+        )
+
+    @property
+    def memory(self) -> tuple[str, int, int]:
+        """The memory of the reciprocal: its kind, entries, bits of an entry."""
+        return "table", self.reciprocal.depth, self.reciprocal.width
+
+    def look(self, axis: int, number: Any) -> Any:
+        """The clock in which the level of an axis is looked at for the `number`-th time, of a number or an array."""
+        return number * self.slots + axis
+
+    def tick_clock(self, axis: int, tick: Any) -> Any:
+        """The clock in which `tick` is high for the `tick`-th tick of an axis, of a number or an array."""
+        begun = self.look(0, (tick + 1) * self.rounds - 1) + HAND_OVER_LATENCY
+        return begun + axis * self.turn_cycles + self.turn_cycles + READ + self.parallel
+
+    def seconds(self, clocks: int) -> Fraction:
+        """A number of clocks in seconds, exactly."""
+        return self.tachometer.seconds(clocks)
+
+    @property
+    def pin_to_count(self) -> int:
+        """Most clocks from the sampling of a level to its look: the synchroniser, and a round."""
+        return self.axis.pin_to_count + self.slots - 1
+
+    @property
+    def longest_tick(self) -> int:
+        """Clocks in a tick."""
+        return self.timing.tick_cycles
+
+    @property
+    def max_tick_cycles(self) -> None:
+        """There is no external tick."""
+        return
+
+    @property
+    def tick_latency(self) -> int:
+        """Clocks from the last one of a tick to the one in which it is shown of the last axis."""
+        return int(self.tick_clock(self.axes - 1, 0)) - (self.longest_tick - 1)
+
+    @property
+    def tick_to_velocity(self) -> int:
+        """Clocks from `tick` to `velocity_valid`: they come together."""
+        return 0
+
+    @property
+    def index_latency(self) -> int:
+        """Clocks from the look that sees the rise of an index line to `index_valid`."""
+        return COUNT_LATENCY + 1 + self.parallel
+
+    @property
+    def recovery_clocks(self) -> int:
+        """Clocks after which, from any state, all outputs are right again; position aside. See `TachometerSpec`.
+
+        Each axis is a core of its own whose clock is a round. Before that the slots go on to the end of their register,
+        and turns that have begun end; after it each axis has its turn.
+        """
+        own = self.axis.recovery_clocks
+        assert own is not None  # there is no low-pass filter
+        return own * self.slots + (1 << (self.slots - 1).bit_length()) + 2 * self.longest_tick
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Ports of the exported core, in order."""
+        return (*self._inputs(), *self._strobed(), *(self._held() if self.parallel else ()))
+
+    def _inputs(self) -> Iterable[Port]:
+        spec = self.axis
+        for port in (*spec.ports[:2], *spec.pins):
+            if port.name in ("clk", "rst"):
+                yield port
+            else:
+                yield pin(port.name, f"Bit k, of axis k: {port.help}", self.axes)
+
+    def _strobed(self) -> Iterable[Port]:
+        """Strobes and what axis they are of; what is new with them, if it is not held for each axis."""
+        last = (self.axes - 1).bit_length() or 1
+        for port in self._of_an_axis():
+            if not port.is_strobe:
+                if not self.parallel:
+                    yield port
+                continue
+            yield strobe(port.name, _STROBES[port.name])
+            if port.name != UPDATE:
+                name = "axis" if port.name == TICK else f"{port.name.removesuffix('_valid')}_axis"
+                yield held(port.name, name, last, help=f"The axis, from 0, that {port.name} is of.")
+
+    def _held(self) -> Iterable[Port]:
+        for port in self._of_an_axis():
+            if port.is_strobe:
+                continue
+            for axis in range(self.axes):
+                yield replace(port, name=f"{port.name}_{axis}", help=f"Of axis {axis}, held: {port.help}")
+
+    def _of_an_axis(self) -> tuple[Port, ...]:
+        """Those of the core that each axis is; but its clocks are rounds, and times here are in clocks of this core."""
+        units = {port.name: port.unit for port in self.tachometer.outputs}
+        return tuple(replace(port, unit=units[port.name]) for port in self.axis.outputs)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Every option in canonical form, defaults included."""
+        found = {"reciprocal_source": "table", "axes": self.axes, "parallel": self.parallel}
+        return {**self.tachometer.parameters, **found}
+
+
+CoreSpec = TachometerSpec | AxesSpec

@@ -1,0 +1,154 @@
+"""The manifest that lies beside the Verilog."""
+
+import re
+from typing import Any
+
+from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.control.ports import loop_entries
+from tachometry.spec.core.tachometer import TICK_IN_TO_WINDOW_END
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import Port
+from tachometry.spec.methods.axes import AxesSpec
+
+_OF_PORTS = ("name", "direction", "width", "signed")
+_KEYWORDS = frozenset(
+    """
+    always and assign automatic begin buf bufif0 bufif1 case casex casez cell cmos config deassign default defparam
+    design disable edge else end endcase endconfig endfunction endgenerate endmodule endprimitive endspecify endtable
+    endtask event for force forever fork function generate genvar highz0 highz1 if ifnone incdir include initial inout
+    input instance integer join large liblist library localparam macromodule medium module nand negedge nmos nor
+    noshowcancelled not notif0 notif1 or output parameter pmos posedge primitive pull0 pull1 pulldown pullup
+    pulsestyle_ondetect pulsestyle_onevent rcmos real realtime reg release repeat rnmos rpmos rtran rtranif0 rtranif1
+    scalared showcancelled signed small specify specparam strong0 strong1 supply0 supply1 table task time tran tranif0
+    tranif1 tri tri0 tri1 triand trior trireg unsigned use vectored wait wand weak0 weak1 while wire wor xnor xor
+
+    accept_on alias always_comb always_ff always_latch assert assume before bind bins binsof bit break byte chandle
+    checker class clocking const constraint context continue cover covergroup coverpoint cross dist do endchecker
+    endclass endclocking endgroup endinterface endpackage endprogram endproperty endsequence enum eventually expect
+    export extends extern final first_match foreach forkjoin global iff ignore_bins illegal_bins implements implies
+    import inside int interconnect interface intersect join_any join_none let local logic longint matches modport
+    nettype new nexttime null package packed priority program property protected pure rand randc randcase randsequence
+    ref reject_on restrict return s_always s_eventually s_nexttime s_until s_until_with sequence shortint shortreal
+    soft solve static string strong struct super sync_accept_on sync_reject_on tagged this throughout timeprecision
+    timeunit type typedef union unique unique0 until until_with untyped uwire var virtual void wait_order weak wildcard
+    with within
+    """.split()
+)
+
+
+def check_module_name(name: str) -> str:
+    """`name`, if it can be the name of a Verilog module.
+
+    Raises
+    ------
+    ValueError
+        If it is no plain identifier, or a keyword of Verilog or of SystemVerilog, in which the smoke test is written.
+    """
+    if name in _KEYWORDS:
+        raise ParameterError("name", f"must not be a Verilog keyword, which {name!r} is")
+    if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,63}", name) is None:
+        raise ParameterError("name", f"must be a letter or _ and up to 63 letters, digits or _, not {name!r}")
+    return name
+
+
+def described_port(port: Port) -> dict[str, Any]:
+    """What the manifest says of a port."""
+    return {key: getattr(port, key) for key in _OF_PORTS}
+
+
+def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
+    """All that a program or a driver must know of the exported core.
+
+    Raises
+    ------
+    ValueError
+        If `name` cannot be the name of a module.
+    """
+    if isinstance(spec, AxesSpec):
+        return _of_axes(spec, name)
+    if isinstance(spec, LoopSpec):
+        return _of_loop(spec, name)
+    if name in {port.name for port in spec.ports}:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    recovery = spec.recovery_clocks
+    return {
+        "module": check_module_name(name),
+        "method": spec.method,
+        "clock_hz": spec.timing.clock_hz,
+        "tick_cycles": spec.timing.tick_cycles,
+        "max_ticks": spec.timing.max_ticks,
+        "stalled_after_ticks": spec.stalled_after_ticks,
+        "counts_per_rev": spec.encoder.counts_per_rev,
+        "decoding": spec.encoder.decoding,
+        "velocity": {
+            "width": spec.velocity_width,
+            "frac_bits": spec.frac_bits,
+            "unit": spec.unit,
+            "rad_per_s_per_lsb": spec.rad_per_s_per_lsb,
+            "full_scale": spec.full_scale * 2.0**-spec.frac_bits,
+            "full_scale_rad_per_s": spec.full_scale * spec.rad_per_s_per_lsb,
+        },
+        **spec.method_entries,
+        "max_time_cycles": spec.max_time_cycles,
+        **({} if spec.min_time_cycles is None else {"min_time_cycles": spec.min_time_cycles}),
+        **({"bounds": {"none": spec.shown_absent_bound}} if spec.bounds else {}),
+        "interval_unit_cycles": spec.interval_unit_cycles,
+        "latency_cycles": {
+            "pin_to_count": spec.pin_to_count,
+            "tick_latency": spec.tick_latency,
+            "tick_to_velocity": spec.tick_to_velocity,
+            **({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if spec.max_tick_cycles else {}),
+        },
+        **({} if recovery is None else {"recovery_cycles": recovery}),
+        **(
+            {"external_tick_cycles": {"min": spec.min_tick_cycles, "max": spec.max_tick_cycles}}
+            if spec.max_tick_cycles
+            else {}
+        ),
+        "ports": [described_port(port) for port in spec.ports],
+        "parameters": spec.parameters,
+    }
+
+
+def _of_loop(spec: LoopSpec, name: str) -> dict[str, Any]:
+    """What a core with a control loop says beside its tachometer."""
+    if name in {port.name for port in spec.ports}:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    found = manifest(spec.tachometer, name)
+    found.pop("recovery_cycles", None)  # filter and observer forget gradually
+    return found | {
+        "loop": loop_entries(spec),
+        "ports": [described_port(port) for port in spec.ports],
+        "parameters": spec.parameters,
+    }
+
+
+def _of_axes(spec: AxesSpec, name: str) -> dict[str, Any]:
+    """What a core of many axes says otherwise than one of one axis."""
+    if name in {port.name for port in spec.ports}:
+        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+    alone, axis = spec.tachometer, spec.axis
+    found = manifest(alone, name)
+    of_velocity = {
+        "width": axis.velocity_width,
+        "full_scale": axis.full_scale * 2.0**-axis.frac_bits,
+        "full_scale_rad_per_s": axis.full_scale * alone.rad_per_s_per_lsb,
+    }
+    return found | {
+        "velocity": found["velocity"] | of_velocity,
+        "recovery_cycles": spec.recovery_clocks,
+        "axes": {
+            "axes": spec.axes,
+            "parallel": spec.parallel,
+            "round_cycles": spec.slots,
+            "turn_cycles": spec.turn_cycles,
+            "first_tick": spec.tick_clock(0, 0),
+        },
+        "latency_cycles": {
+            "pin_to_count": spec.pin_to_count,
+            "tick_latency": spec.tick_latency,
+            "tick_to_velocity": spec.tick_to_velocity,
+        },
+        "ports": [described_port(port) for port in spec.ports],
+        "parameters": spec.parameters,
+    }

@@ -1,0 +1,187 @@
+"""The whole core for many axes against its golden model, and what each of its boxes could do wrong."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from amaranth import Module, ResetInserter, Signal
+from support.axes import TICK_CYCLES, check, motions, small
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.axes.axes_datapath import AxesDatapath
+from tachometry.hdl.axes.axis_index import AxisIndex
+from tachometry.hdl.axes.held_outputs import HeldOutputs
+from tachometry.hdl.core.axes_tachometer import AxesTachometer
+from tachometry.sim import golden
+from tachometry.sim.signals.axes import AxesTrace
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec import AxesSpec
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        small(),
+        small(1, index=True, cancel=False),
+        small(2, parallel=True, index=True),
+        small(3, most=None, position_width=8),
+    ],
+    ids=["three axes", "one axis", "two held", "no greatest speed"],
+)
+def test_small_cores(spec: AxesSpec) -> None:
+    check(spec)
+
+
+def test_an_edge_is_in_the_tick_that_ends_pin_to_count_after_it() -> None:
+    """Of every axis; one that is sampled a clock later is too late for axis 0, which is looked at first."""
+    spec = small()
+
+    def counted(clock: int) -> list[int]:
+        """Pulse numbers of all axes in the second tick, of edges in a clock."""
+        low = np.zeros(2, dtype=np.uint8)
+        pins = PinTrace(np.array([0, clock]), a=np.array([0, 1], dtype=np.uint8), b=low, n_clocks=4 * TICK_CYCLES)
+        run = golden.run(spec, AxesTrace((pins,) * spec.axes))
+        found: list[int] = run.ticks.pulse_count[spec.axes : 2 * spec.axes].tolist()
+        return found
+
+    last = 2 * TICK_CYCLES - 1 - spec.pin_to_count
+    assert counted(last) == [1] * spec.axes
+    assert counted(last + 1)[0] == 0
+
+
+@pytest.mark.parametrize("clock", range(5, 11))
+def test_the_first_edge_that_counts_is_between_the_looks_of_the_second_and_third_round(clock: int) -> None:
+    """A level is looked at two clocks after it was sampled, with four slots a round."""
+    spec = small()
+    low = np.zeros(2, dtype=np.uint8)
+    pins = PinTrace(np.array([0, clock]), a=np.array([0, 1], dtype=np.uint8), b=low, n_clocks=4 * TICK_CYCLES)
+    trace = AxesTrace((pins,) * spec.axes)
+    check(spec, trace)
+    counted = golden.run(spec, trace).ticks.pulse_count[: spec.axes].tolist()
+    assert counted == [int(clock + 2 > spec.slots * 2 + axis) for axis in range(spec.axes)]
+
+
+def test_a_run_that_ends_earlier_has_the_same_rows_until_then() -> None:
+    """Wherever it ends."""
+    spec = small(2, index=True)
+    trace = motions(spec, 400)
+    whole = golden.run(spec, trace)
+    for n_clocks in range(300, 400):
+        short = golden.run(spec, trace.until(n_clocks))
+        for strobe, table in whole.tables.items():
+            before = table.rows(table.clock < n_clocks)
+            found = short.tables[strobe]
+            assert found.clock.tolist() == before.clock.tolist()
+            for name in table.columns:
+                assert found[name].tolist() == before[name].tolist(), (strobe, name)
+
+
+MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
+    "begins with the wrong axis": (AxesDatapath, "(self.slot == 0)", "(self.slot == 1)", {}),
+    "handed over to another": (
+        AxesDatapath,
+        "write_count.addr.eq(self.slot)",
+        "write_count.addr.eq(self.slot + 1)",
+        {},
+    ),
+    "counts of another": (AxesDatapath, "read_count.addr.eq(turns.axis)", "read_count.addr.eq(0)", {}),
+    "state of another": (AxesDatapath, "read.addr.eq(self.turns.axis)", "read.addr.eq(0)", {}),
+    "state kept for another": (AxesDatapath, "write.addr.eq(self.turns.axis)", "write.addr.eq(0)", {}),
+    "state never kept": (AxesDatapath, "write.en.eq(decides)", "write.en.eq(0)", {}),
+    "state of the only axis never kept": (AxesDatapath, "m.d.sync += only.eq(after)", "pass", {"axes": 1}),
+    "named as another": (AxesDatapath, "self.axis.eq(turns.axis)", "self.axis.eq(turns.axis + 1)", {}),
+    "position of saturated counts": (AxesDatapath, "before.position + count", "before.position + m_e", {}),
+    "tick after reset": (AxesDatapath, "turns.step[-1] & ~turns.clears", "turns.step[-1]", {}),
+    "no saturation": (AxesDatapath, "spec.axis.max_count < spec.rounds", "False", {}),
+    "velocity upon this count": (AxesDatapath, "base.eq(window.state.previous)", "base.eq(self.pulse_count)", {}),
+    "always forced": (AxesDatapath, "tag.forced.eq(forced)", "tag.forced.eq(1)", {}),
+    "stalled for ever": (AxesDatapath, "stalled.eq(window.next.rests)", "stalled.eq(1)", {}),
+    "index of a level": (AxisIndex, "ready & level & ~before.z", "ready & level", {"index": True}),
+    "index before there are levels": (AxisIndex, "ready & level & ~before.z", "level & ~before.z", {"index": True}),
+    "index of another axis": (AxisIndex, "write.addr.eq(self.axis)", "write.addr.eq(slot)", {"index": True}),
+    "index without this step": (AxisIndex, "before.position, 0) + self.step", "before.position, 0)", {"index": True}),
+    "held for another": (HeldOutputs, "self.axis == axis", "self.axis != axis", {"parallel": True}),
+    "held without a strobe": (HeldOutputs, "self.strobe &", "1 &", {"parallel": True}),
+    "strobe before what is held": (AxesTachometer, "delay(m, strobe, axis)", "(strobe, axis)", {"parallel": True}),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    box, right, wrong, options = MUTANTS[name]
+    with mutant(box, right, wrong), caught():
+        check(small(**{"axes": 2, **options}))
+
+
+class Restarted(AxesTachometer):
+    """A core with a reset of its own."""
+
+    def __init__(self, spec: AxesSpec) -> None:
+        super().__init__(spec)
+        self.restart = Signal()
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules += ResetInserter(self.restart)(super().elaborate(platform))
+        return m
+
+
+def check_reset() -> None:
+    """What is in the memories when a reset comes does not matter."""
+    spec = small(2, index=True)
+    trace, names = motions(spec, 900), [port.name for port in spec.outputs]
+    rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
+    for clock, *levels in zip(trace.clock.tolist(), *(line.tolist() for line in trace.lines.values()), strict=True):
+        rows[clock] = dict(zip(trace.lines, levels, strict=True))
+    rows[0]["restart"] = 0
+    # As long before the reset as after it, on other levels.
+    before = [{**row, **({"a": row["b"], "b": row["a"]} if "a" in row else {})} for row in rows[:701]]
+    seen = clock_by_clock(Restarted(spec), [*before, {"restart": 1}, *rows], names)
+    fresh = clock_by_clock(Restarted(spec), rows, names)
+    strobes = {port.name: port.held_by for port in spec.outputs}
+    for clock, (after, wanted) in enumerate(zip(seen[702:], fresh, strict=True)):
+        for name, strobe in strobes.items():
+            assert not wanted[strobe] or after[name] == wanted[name], (clock, name)
+            assert name != strobe or after[name] == wanted[name], (clock, name)
+
+
+def test_a_reset_clears_what_is_in_memory() -> None:
+    check_reset()
+
+
+@pytest.mark.parametrize(
+    ("box", "right", "wrong"),
+    [
+        (AxesDatapath, "self.overflow.eq(0), self.position.eq(0)", "self.overflow.eq(0)"),
+        (AxesDatapath, "window.clears.eq(turns.clears)", "window.clears.eq(0)"),
+        (AxisIndex, "Mux(ready, before.position, 0)", "before.position"),
+    ],
+)
+def test_mutants_that_remember_are_caught(box: Any, right: str, wrong: str) -> None:
+    with mutant(box, right, wrong), caught():
+        check_reset()
+
+
+def test_all_ticks_come_in_step() -> None:
+    """Latencies are those of the manifest: `first_tick`, `turn_cycles`, and a tick later the same again."""
+    spec = small(3)
+    ticks = golden.run(spec, motions(spec, 400)).ticks
+    first, turn = spec.tick_clock(0, 0), spec.turn_cycles
+    wanted = [first + turn * axis + TICK_CYCLES * tick for tick in range(12) for axis in range(3)]
+    assert ticks.clock.tolist() == wanted[: len(ticks)]
+    assert ticks["axis"].tolist() == [0, 1, 2] * (len(ticks) // 3)
+    assert spec.tick_latency == first + 2 * turn - (TICK_CYCLES - 1)
+
+
+def test_two_edges_within_a_round_are_illegal() -> None:
+    """An axis is looked at once in a round: it cannot tell which of two edges came first."""
+    spec = small(3)
+    quiet = PinTrace(np.array([0]), np.zeros(1, np.uint8), np.zeros(1, np.uint8), 400)
+    level = np.array([0, 1, 1], dtype=np.uint8)
+    for apart, errors in ((1, 1), (spec.slots, 0)):
+        at = spec.look(1, 40)
+        quick = PinTrace(np.array([0, at, at + apart]), level, np.array([0, 0, 1], dtype=np.uint8), 400)
+        run = golden.run(spec, AxesTrace((quiet, quick, quiet)))
+        assert len(run.errors) == errors
+        check(spec, AxesTrace((quiet, quick, quiet)))

@@ -1,0 +1,138 @@
+"""The whole demo, in the compiled engine: every frame that it sends against the golden models."""
+
+from dataclasses import asdict, replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.demo import DemoPort, uart
+from support.long import only
+
+from tachometry.boards.host.demo import DemoBoard
+from tachometry.boards.host.loop import LoopClient
+from tachometry.boards.monitor.selftest import Step, selftest
+from tachometry.spec import of_texts
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_map
+from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
+
+_COMMON = {"ppr": "16", "clock": "8MHz", "tick": "20us"}
+CORES = {
+    "index, filter, age": of_texts("s", {**_COMMON, "max-time": "2ms", "index": "yes", "age": "yes", "filter": "2"}),
+    "external tick, bounds": of_texts("m", {**_COMMON, "max-time": "1ms", "external-tick": "yes", "bounds": "yes"}),
+    "index that resets": of_texts("rairan", {**_COMMON, "max-time": "2ms", "index": "yes", "index-reset": "yes"}),
+}
+
+
+def random_steps(registers: DemoMap, seed: int) -> list[Step]:
+    """Settings that change at random instants."""
+    spec = registers.spec
+    rng = np.random.default_rng(seed)
+
+    def settings() -> EmulatorSettings:
+        return EmulatorSettings(
+            speed=speed_of(spec, float(rng.uniform(-1, 1) * rng.choice([0.01, 0.2, 0.9])) * fastest(spec)),
+            rate=int(rng.choice([0, rate_of(spec, fastest(spec) / 0.005)])),
+            **{name: int(rng.integers(-40, 40)) for name in ("phase_error", "duty_a", "duty_b")},
+            jitter=int(rng.choice([0, 7, 15])),
+            bounce=int(rng.choice([0, 1, 9])),
+            drop=int(rng.choice([0, 5])),
+        )
+
+    def changes() -> dict[str, int]:
+        if rng.random() < 0.2:
+            return {"jump": 1}
+        return {name: value for name, value in asdict(settings()).items() if rng.random() < 0.3} or {"speed": 0}
+
+    return [
+        Step(f"seed {seed}, {k}", settings(), [(float(rng.uniform(0, 0.004)), changes()) for _ in range(5)], 0.004)
+        for k in range(6)
+    ]
+
+
+@pytest.mark.parametrize("name", only([*CORES][:1], [*CORES]))
+def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
+    spec = CORES[name]
+    registers = DemoMap(spec)
+    port = DemoPort(spec)
+    board = DemoBoard(port, demo_manifest(registers, uart()), timeout=60)
+    results = selftest(board, registers, period=40, chosen=random_steps(registers, len(name)))
+    assert [result.difference for result in results if not result.passed] == []
+    assert min(result.frames for result in results) > 5
+    counts = board.link.receiver.counts
+    assert (counts.lost, counts.bytes_dropped, port.board.n_broken) == (0, 0, 0)
+
+
+def test_pins_and_settings_survive_a_restart() -> None:
+    spec = CORES["index, filter, age"]
+    registers = DemoMap(spec)
+    board = DemoBoard(DemoPort(spec), demo_manifest(registers, uart()), timeout=60)
+    board.set(speed=-123456, rate=7, phase_error=-5, duty_b=3, jitter=31, bounce=9, drop=200)
+    board.restart()
+    words = board.link.words(registers["SPEED"].offset, 4)
+    assert words == (-123456 % (1 << 32), 7, -5 % 256 | 3 << 16, 31 | 9 << 8 | 200 << 16)
+    # The pins do not change, whatever the emulator does.
+    assert board.client.snapshot()["position"] == 0
+    board.set(emulated=1, speed=-(1 << 24), rate=0)
+    assert board.client.snapshot()["position"] != 0
+
+
+def test_settings_that_do_not_fit_are_refused() -> None:
+    spec = CORES["index, filter, age"]
+    board = DemoBoard(DemoPort(spec), demo_manifest(DemoMap(spec), uart()), timeout=60)
+    with pytest.raises(ValueError, match="phase_error must be from -128 to 127, not 128"):
+        board.set(phase_error=128)
+    with pytest.raises(ValueError, match=r"settings must be some of rate, .*, jump, not nope"):
+        board.set(speed=5, nope=1)
+    assert board.link.read(DemoMap(spec)["SPEED"].offset) == 0
+    with pytest.raises(ValueError, match="ticks must be from 0 to 65535, not 65536"):
+        board.stream(65536)
+
+
+def test_the_speed_goes_where_it_shall_at_the_rate_that_is_set_with_it() -> None:
+    spec = CORES["index, filter, age"]
+    board = DemoBoard(DemoPort(spec), demo_manifest(DemoMap(spec), uart()), timeout=60)
+    speed = speed_of(spec, 0.5 * fastest(spec))
+    board.set(emulated=1, speed=speed, rate=1 << 10)
+    # 2^16 times as slowly as at once: in so many clocks it has hardly begun to turn.
+    assert board.client.snapshot()["position"] < 100
+
+
+def test_the_index_is_high_in_a_quarter_of_each_revolution() -> None:
+    """Found by the core, which captures its position."""
+    spec = replace(CORES["index, filter, age"], index=True)
+    board = DemoBoard(DemoPort(spec), demo_manifest(DemoMap(spec), uart()), timeout=60)
+    board.set(emulated=1, speed=speed_of(spec, 0.1 * fastest(spec)))
+    seen = set()
+    for _ in range(12):
+        snapshot = board.client.snapshot()
+        if snapshot["indexed"]:
+            seen.add(snapshot["index_position"] % spec.encoder.counts_per_rev)
+    assert len(seen) == 1
+
+
+def test_a_control_loop_on_a_board() -> None:
+    """The emulated shaft turns faster than is commanded, so the current brakes it; a restart keeps what was set."""
+    tachometer = of_texts("s", {"ppr": "500", "clock": "12MHz", "max-speed": "1000rad/s"})
+    spec = LoopSpec(tachometer=tachometer, gains="inputs", observer=Fraction(400))
+    registers = demo_map(spec)
+    described = demo_manifest(registers, uart())
+    assert {"drive", "enable"} <= {port["name"] for port in described["ports"]}
+    board = DemoBoard(DemoPort(spec), described, timeout=60)
+    client = LoopClient(board.link.read, board.link.write, described)
+    board.set(emulated=1, speed=speed_of(tachometer, 20.0), rate=0)
+    client.set(gain_position=0, gain_disturbance=0, gain_velocity=10, command_velocity=2)
+    assert client.snapshot()["current"] == 0
+    client.enable(True)
+    for _ in range(2):
+        board.client.snapshot()
+        now = client.snapshot()
+        ampere = described["loop"]["current"]["amperes_per_lsb"]
+        speed = now["filtered_velocity"] * described["loop"]["filtered_velocity"]["rad_per_s_per_lsb"]
+        assert now["current"] * ampere == pytest.approx(10 * (2 - speed) * 0.003 / 0.0603, rel=0.001)
+        assert speed > 2
+        board.restart()
+        board.link.words(0, 1)
+    client.enable(False)
+    client.snapshot()
+    assert client.snapshot()["current"] == 0

@@ -1,0 +1,172 @@
+"""The encoder emulator against its golden model, and against what its settings mean."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.core import emulator, line
+from tachometry.sim.golden.emulator import Change, GoldenEmulator
+from tachometry.spec.registers.emulator import LATENCY, EmulatorSettings
+
+CLOCKS, SEEDS = 3000, range(8)
+
+
+def random_changes(seed: int) -> list[Change]:
+    """Settings of all kinds, some of which make the errors overlap."""
+    rng = np.random.default_rng(seed)
+    changes = []
+    for clock in np.sort(rng.choice(np.arange(-1, CLOCKS), rng.integers(1, 12), replace=False)).tolist():
+        speed = int(rng.integers(-(1 << 31), 1 << 31)) >> int(rng.integers(0, 10))
+        settings = EmulatorSettings(
+            speed=speed,
+            rate=int(rng.integers(1 << 32)) >> int(rng.integers(0, 10)) if rng.random() < 0.7 else 0,
+            **{name: int(rng.integers(-128, 128)) for name in ("phase_error", "duty_a", "duty_b")},
+            jitter=(1 << int(rng.integers(0, 7))) - 1,
+            bounce=int(rng.integers(256)) >> int(rng.integers(0, 9)),
+            drop=int(rng.integers(256)) >> int(rng.integers(0, 9)),
+        )
+        changes.append(Change(clock, settings, bool(clock >= 0 and rng.random() < 0.3)))
+    return changes
+
+
+def emulated(changes: list[Change], n_clocks: int, lines_per_rev: int | None) -> list[tuple[int, ...]]:
+    """Levels of the gates' lines in each clock."""
+    rows: list[dict[str, int]] = [{"jump": 0} for _ in range(n_clocks)]
+    for change in changes:
+        if change.clock + 1 < n_clocks:
+            rows[change.clock + 1] |= asdict(change.settings)
+        if change.jump:
+            rows[change.clock]["jump"] = 1
+    names = ["a", "b", *["z"] * (lines_per_rev is not None)]
+    seen = clock_by_clock(emulator.EncoderEmulator(lines_per_rev), rows, names)
+    return [tuple(row[name] for name in names) for row in seen]
+
+
+def check(seed: int) -> None:
+    changes = random_changes(seed)
+    lines_per_rev = [None, 1, 5][seed % 3]
+    trace = GoldenEmulator(lines_per_rev).trace(changes, CLOCKS)
+    row = np.searchsorted(trace.clock, np.arange(CLOCKS), side="right") - 1
+    levels = np.stack(list(trace.lines.values()), axis=1)[row].tolist()
+    for clock, (got, wanted) in enumerate(zip(emulated(changes, CLOCKS, lines_per_rev), levels, strict=True)):
+        assert got == tuple(wanted), f"seed {seed}, clock {clock}"
+
+
+EMULATOR, LINE = emulator.EncoderEmulator, line.EmulatedLine
+MUTANTS = {
+    "the speed turns away": (
+        EMULATOR,
+        "Mux(goes_down, -self.rate, self.rate)",
+        "Mux(goes_down, self.rate, -self.rate)",
+    ),
+    "the speed never arrives": (EMULATOR, "| passed, target", "& passed, target"),
+    "the speed overshoots": (EMULATOR, "turned <= target, turned >= target", "turned >= target, turned <= target"),
+    "a jump turns by a quarter": (EMULATOR, "self.jump << PHASE_WIDTH - 1", "self.jump << PHASE_WIDTH - 2"),
+    "other random bits": (EMULATOR, "random[RANDOM_TAP - 1]", "random[RANDOM_TAP - 2]"),
+    "edges only move late": (EMULATOR, "- (early & self.jitter)", "- (late & self.jitter)"),
+    "edges move at other instants": (EMULATOR, "_QUARTER // 2)[", "_QUARTER)["),
+    "B is late by the duty error": (EMULATOR, "_HALF + self.phase_error", "_HALF + self.duty_b"),
+    "duty errors are swapped": (EMULATOR, '"a": self.duty_a, "b": self.duty_b', '"a": self.duty_b, "b": self.duty_a'),
+    "the index does not wrap": (EMULATOR, "period == last, 0", "period == last, last"),
+    "the index does not count down": (EMULATOR, "last, period - 1", "last, period"),
+    "a dropped edge changes the line": (LINE, "(self.ideal ^ before) & ~self.drop", "(self.ideal ^ before)"),
+    "lines bounce for ever": (LINE, "left == 0, 0", "left == 0, 1"),
+    "lines never bounce": (LINE, "left.any() & self", "left.all() & self"),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_caught(name: str) -> None:
+    with mutant(*MUTANTS[name]), caught():
+        for seed in SEEDS:
+            check(seed)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_lines_are_those_of_the_golden_model(seed: int) -> None:
+    check(seed)
+
+
+def edges(settings: EmulatorSettings, n_clocks: int) -> tuple[np.ndarray, np.ndarray]:
+    """Clocks of the edges of A and of B."""
+    trace = GoldenEmulator().trace([Change(-1, settings)], n_clocks)
+    return tuple(trace.clock[1:][np.diff(line.astype(int)) != 0] for line in (trace.a, trace.b))
+
+
+PERIOD = 4096
+STEADY = EmulatorSettings(speed=(1 << 32) // PERIOD)
+
+
+def test_a_steady_speed_gives_even_edges_and_forward_is_a_before_b() -> None:
+    a, b = edges(STEADY, 20 * PERIOD)
+    assert set(np.diff(a)) == set(np.diff(b)) == {PERIOD // 2}
+    assert set(b[: len(a)] - a[: len(b)]) == {PERIOD // 4}
+    a, b = edges(replace(STEADY, speed=-STEADY.speed), 20 * PERIOD)
+    assert set(a[: len(b)] - b[: len(a)]) == {PERIOD // 4}
+
+
+def test_errors_are_in_1024ths_of_a_period() -> None:
+    step = PERIOD // 1024
+    a, b = edges(replace(STEADY, phase_error=20, duty_a=-7, duty_b=100), 20 * PERIOD)
+    assert set(np.diff(a)) == {PERIOD // 2 - 7 * step, PERIOD // 2 + 7 * step}
+    assert set(np.diff(b)) == {PERIOD // 2 + 100 * step, PERIOD // 2 - 100 * step}
+    assert b[0] - a[0] == PERIOD // 4 + 20 * step
+
+
+def test_jitter_moves_every_edge_and_has_no_mean() -> None:
+    a, _ = edges(replace(STEADY, jitter=63), 4000 * PERIOD)
+    straight, _ = edges(STEADY, 4000 * PERIOD)
+    late = (a - straight) / (PERIOD / 1024)
+    assert len(a) == len(straight)
+    assert np.abs(late).max() <= 63
+    # The difference of two even distributions over 64 values.
+    assert abs(late.mean()) < 1
+    assert 0.95 < late.std() / np.sqrt((64**2 - 1) / 6) < 1.05
+
+
+def test_some_edges_are_dropped() -> None:
+    _, ideal = edges(STEADY, 4000 * PERIOD)
+    _, b = edges(replace(STEADY, drop=64), 4000 * PERIOD)
+    # Each gap that a dropped edge leaves takes the edge after it, too, if that is not dropped as well.
+    lost = 1 - len(b) / len(ideal)
+    assert 0.3 < lost < 0.5
+
+
+def test_lines_bounce_for_as_long_as_asked() -> None:
+    a, _ = edges(replace(STEADY, bounce=100), 400 * PERIOD)
+    ideal, _ = edges(STEADY, 400 * PERIOD)
+    since = a - ideal[np.searchsorted(ideal, a, side="right") - 1]
+    assert since.max() in (99, 100)
+    assert len(a) > 20 * len(ideal)
+
+
+def test_the_speed_changes_at_the_rate() -> None:
+    rate = 1 << 21  # in two clocks: reaches 2^20 phase a clock in 2^16 clocks
+    a, _ = edges(EmulatorSettings(speed=1 << 20, rate=rate), 1 << 19)
+    periods = (a[-1] - 2**16 / 2) * 2**20 / 2**32  # half of the ramp is missing
+    assert abs(len(a) / 2 - periods) <= 1
+
+
+def test_a_jump_changes_both_lines_at_once() -> None:
+    trace = GoldenEmulator().trace([Change(10, EmulatorSettings(), jump=True)], 100)
+    assert trace.clock.tolist() == [0, 11 + LATENCY]
+    assert (trace.a.tolist(), trace.b.tolist()) == ([0, 1], [0, 1])
+
+
+def test_the_random_bits_have_their_full_length() -> None:
+    """x^31 + x^28 + 1 over GF(2) is primitive: 2^31 - 1 is a prime, so x^(2^31) = x is enough."""
+    modulus = 1 << 31 | 1 << 28 | 1
+    value = 2
+    for _ in range(31):
+        squared = 0
+        for bit in range(31):
+            if value >> bit & 1:
+                squared ^= 1 << 2 * bit
+        for bit in range(61, 30, -1):
+            if squared >> bit & 1:
+                squared ^= modulus << bit - 31
+        value = squared
+    assert value == 2

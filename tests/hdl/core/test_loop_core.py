@@ -1,0 +1,151 @@
+"""The whole core with a control loop against the golden models: clock by clock, and as exported."""
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from amaranth import Module, ResetInserter, Signal
+from support.control import GENERATED, SERIAL, SMALL, check_core, core_case
+from support.mutant import caught, mutant
+from support.simulate import clock_by_clock
+from support.verilog import play_in_icarus
+
+from tachometry.hdl.control.control_clock import ControlClock
+from tachometry.hdl.control.held_inputs import HeldInputs
+from tachometry.hdl.control.sigma_delta import SigmaDelta
+from tachometry.hdl.core.loop_core import LoopCore
+from tachometry.sim import golden
+from tachometry.sim.golden.control import run_loop
+from tachometry.sim.signals.run import compare
+from tachometry.spec import Encoder, ParameterError, Timing, TTachometer
+from tachometry.spec.control import LoopSpec
+
+CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)))
+
+
+OTHERS = {
+    "generator": replace(CORE, command="generator"),
+    **dict.fromkeys(("given", "self"), replace(CORE, gains="inputs")),
+}
+
+
+def test_as_the_golden_model() -> None:
+    run = check_core(CORE)
+    current = run.tables["current_valid"]
+    assert 0.2 < np.mean(current.current_saturated) < 0.98
+    assert np.diff(run.tables["control_tick"].clock).tolist() == [CORE.period] * (len(run.tables["control_tick"]) - 1)
+    assert (current.clock - run.tables["control_tick"].clock[: len(current)]).tolist() == [CORE.latency] * len(current)
+
+
+def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
+    """With a generator, gains as inputs, and a method and options of the tachometer that change nothing about it."""
+    options: dict[str, Any] = {"lowpass": Fraction(4000), "filter_clocks": 3, "index": True, "index_reset": True}
+    tachometer = TTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 100, 3), frac_bits=6, **options)
+    spec = replace(SERIAL, tachometer=tachometer, command="generator", gains="inputs")
+    trace, commands, gains, changes = core_case(spec, 3, 15)
+    wanted = run_loop(spec, trace, commands, golden.tables, gains)
+    assert len(wanted.tables["current_valid"]) > 20
+    count, first = compare(wanted, play_in_icarus(spec, tmp_path, changes, trace.n_clocks))
+    assert not count, first
+
+
+@pytest.mark.parametrize(
+    ("box", "right", "wrong"),
+    [
+        (ControlClock, "left.eq(self._period - 1)", "left.eq(self._period)"),
+        (ControlClock, "init=self._first - 1", "init=self._first - 2"),
+        (LoopCore, "window.update.eq(tachometer.velocity_valid)", "window.update.eq(tachometer.tick)"),
+        (LoopCore, "generator.position.eq(tachometer.position)", "generator.position.eq(0)"),
+        (LoopCore, "given.coming.eq(clock.coming)", "given.coming.eq(clock.tick)"),
+        (HeldInputs, "self.coming & ~self.freeze", "self.coming"),
+    ],
+)
+def test_mutants_are_caught(box: Any, right: str, wrong: str) -> None:
+    with mutant(box, right, wrong), caught():
+        check_core(OTHERS.get(right.split(".")[0], CORE), n_edges=1)
+
+
+def test_the_first_control_tick_has_the_first_update() -> None:
+    """A period of a tick meets each update a clock after it has come."""
+    spec = replace(GENERATED, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), period=50)
+    run = check_core(spec, n_edges=1)
+    apart = run.updates.clock[:, None] - run.tables["control_tick"].clock
+    assert set(apart[np.abs(apart) < 25].tolist()) == {-1}
+
+
+class Restarted(LoopCore):
+    """A core with a reset of its own."""
+
+    def __init__(self, spec: LoopSpec) -> None:
+        super().__init__(spec)
+        self.restart = Signal()
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules += ResetInserter(self.restart)(super().elaborate(platform))
+        return m
+
+
+def test_a_reset_amid_a_program() -> None:
+    """From a reset on the core shows what it shows after the first one, wherever the program was."""
+    *_, changes = core_case(CORE, 5, 1)
+    names = [port.name for port in CORE.pins]
+    rows: list[dict[str, int]] = [{} for _ in range(700)]
+    for clock, *values in changes[changes[:, 0] < len(rows)].tolist():
+        rows[clock] = dict(zip(names, values, strict=True))
+    rows[0]["restart"] = 0
+    outputs = ("control_tick", "current_valid", "current", "filtered_velocity", "disturbance", "drive")
+    whole = clock_by_clock(Restarted(CORE), rows, outputs)
+    ticks = [clock for clock, row in enumerate(whole) if row["control_tick"]]
+    for amid in (9, CORE.latency - 1):
+        until = ticks[3] + amid
+        seen = clock_by_clock(Restarted(CORE), [*rows[:until], {"restart": 1}, *rows], outputs)[until + 1 :]
+        assert [row["control_tick"] for row in seen] == [row["control_tick"] for row in whole]
+        assert [row for row in seen if row["current_valid"]] == [row for row in whole if row["current_valid"]]
+
+
+def check_drive(width: int) -> None:
+    """Over 2^width clocks the bits add up to the value, whatever it is."""
+    most = 1 << (width - 1)
+    for value in (-most, -most + 1, -3, 0, 1, most // 3, most - 1):
+        seen = clock_by_clock(SigmaDelta(width), [{"value": value}] * ((1 << width) + 1), ["drive"])
+        ones = [row["drive"] for row in seen[1:]]
+        assert sum(ones) == value + most
+        # And every stretch of them does, within one.
+        expected = (value + most) / (1 << width)
+        total = np.cumsum(ones) - expected * np.arange(1, len(ones) + 1)
+        assert np.abs(total).max() <= 1
+
+
+def test_the_stream_of_bits() -> None:
+    check_drive(8)
+
+
+def test_a_stream_of_the_wrong_sign_is_caught() -> None:
+    with mutant(SigmaDelta, "~self.value[-1]", "self.value[-1]"), caught():
+        check_drive(8)
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"^control_period must be at least 45 clocks, as long as the controller"):
+        replace(CORE, period=44)
+
+
+@pytest.mark.parametrize("multiplier", ["serial", "parallel"])
+@pytest.mark.parametrize("command", ["ports", "generator"])
+def test_the_least_control_period_is_told_whatever_was_asked_for(multiplier: str, command: str) -> None:
+    """The shorter the period, the wider the words, and the longer they take."""
+    spec = replace(CORE, multiplier=multiplier, command=command, period=4800)
+    told = set()
+    for period in (1, 20, 40):
+        with pytest.raises(ParameterError, match=r"^control_period must be at least (\d+) clocks, ") as refused:
+            replace(spec, period=period)
+        told.add(int(re.findall(r"\d+", str(refused.value))[0]))
+    (least,) = told
+    assert replace(spec, period=least).period == least
+    with pytest.raises(ParameterError, match=f"^control_period must be at least {least} clocks, "):
+        replace(spec, period=least - 1)

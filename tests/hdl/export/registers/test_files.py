@@ -1,0 +1,256 @@
+"""Every register and every field of every configuration is in each of the texts, as the map and the ports say."""
+
+import math
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+from support.lockstep import random_case
+from support.mutant import caught
+from support.options import had_by
+from support.rdl import read_rdl
+
+from tachometry.boards.host.client import Client
+from tachometry.hdl.export import export
+from tachometry.hdl.export.registers.c_driver import c_driver
+from tachometry.hdl.export.registers.c_header import c_header
+from tachometry.hdl.export.registers.files import REGISTER_FILES, register_files
+from tachometry.hdl.export.registers.page import page
+from tachometry.hdl.export.registers.rdl import _text, rdl
+from tachometry.spec import METHODS, TachometerSpec, of_texts
+from tachometry.spec.control import LoopSpec
+from tachometry.spec.language.provenance import LICENSE, generator
+from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.manifest import manifest
+from tachometry.spec.registers.map import Register, RegisterMap
+
+SEEDS = range(8)
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
+WIDE = {"velocity-width": "64", "position-width": "48", "bounds": "yes"}
+
+
+@cache
+def maps(method: str) -> list[RegisterMap]:
+    specs = [random_case(seed, method)[0] for seed in SEEDS]
+    return [RegisterMap(spec) for spec in (*specs, of_texts(method, had_by(method, BASE | WIDE)))]
+
+
+def check_rdl(registers: RegisterMap, text: str, folder: Path) -> None:
+    top = read_rdl(text, folder)
+    assert (top.inst_name, top.total_size) == ("spindle", len(registers.registers) * 4)
+    found = [
+        (
+            *(one.inst_name, one.absolute_address, one.size * 8, one.get_property("accesswidth")),
+            [
+                (
+                    *(field.inst_name, field.low, field.width, field.get_property("reset")),
+                    *(field.is_sw_readable, field.is_sw_writable, bool(field.get_property("singlepulse"))),
+                    field.is_hw_writable,
+                )
+                for field in one.fields()
+            ],
+        )
+        for one in top.registers()
+    ]
+    assert found == [
+        (
+            *(one.name, one.offset, 32, 32),
+            [
+                (
+                    *(field.name, field.low, field.width, field.reset),
+                    *(field.access != "wo", field.access != "ro", field.single),
+                    field.access == "ro" and not one.constant,
+                )
+                for field in one.fields
+            ],
+        )
+        for one in registers
+    ]
+    for one, register in zip(top.registers(), registers, strict=True):
+        told = " ".join((one.get_property("desc") or "").split())
+        assert register.help in told
+        for field, meant in zip(one.fields(), register.fields, strict=True):
+            text = f"{told} {' '.join((field.get_property('desc') or '').split())}"
+            assert meant.help in text
+            assert meant.unit in text
+
+
+def check_header(registers: RegisterMap, text: str, folder: Path) -> None:
+    defined = re.findall(r"^#define SPINDLE_(\w+) (.+)$", text, re.MULTILINE)
+    macros = dict(defined)
+    assert len(defined) == len(macros)
+
+    def number(name: str) -> int:
+        assert name in macros
+        return int(macros.pop(name).removeprefix("UINT32_C(").rstrip(")"), 0)
+
+    for register in registers:
+        assert (number(f"{register.name}_OFFSET"), number(f"{register.name}_RESET")) == (
+            register.offset,
+            register.reset,
+        )
+        for field in register.fields:
+            prefix = f"{register.name}_{field.name.upper()}"
+            found = [number(f"{prefix}_{kind}") for kind in ("MASK", "SHIFT", "RESET")]
+            assert found == [field.mask, field.low, field.reset]
+            assert len(register.fields) == 1 or field.help in " ".join(text.replace("//", " ").split())
+    assert not {name for name in macros if name.endswith(("_OFFSET", "_MASK", "_SHIFT", "_RESET"))}
+    described = manifest(registers.spec)
+    assert int(macros["CLOCK_HZ"].removeprefix("UINT64_C(").rstrip(")")) == described["clock_hz"]
+    assert macros["UNIT"] == f'"{described["velocity"]["unit"]}"'
+    assert float(macros["RAD_PER_S_PER_LSB"]) == described["velocity"]["rad_per_s_per_lsb"]
+    assert float(macros["RAD_PER_COUNT"]) == pytest.approx(2 * math.pi / described["counts_per_rev"], rel=1e-15)
+    assert float(macros["UNIT_PER_LSB"]) == 0.5 ** described["velocity"]["frac_bits"]
+    for port in ("acceleration", "position_fine"):
+        assert (f"{port.upper()}_PER_LSB" in macros) == (port in described)
+        if port in described:
+            assert float(macros[f"{port.upper()}_PER_LSB"]) == 0.5 ** described[port]["frac_bits"]
+    if "acceleration" in described:
+        assert float(macros["RAD_PER_S2_PER_LSB"]) == described["acceleration"]["rad_per_s2_per_lsb"]
+
+
+def check_page(registers: RegisterMap, text: str, folder: Path) -> None:
+    rows = [re.split(r" \| ", line[2:-2]) for line in text.splitlines() if line.startswith("| `")]
+    found = {
+        row[1].strip("`"): (int(row[0].strip("`"), 16), int(row[3].strip("`"), 16)) for row in rows if len(row) == 5
+    }
+    assert found == {one.name: (one.offset, one.reset) for one in registers}
+    told = " ".join(text.split())
+    fields = {row[0].strip("`"): (row[1], row[2]) for row in rows if len(row) == 4}
+    for one in registers:
+        for field in one.fields:
+            if field.width < 32:
+                bits = str(field.low) if field.width == 1 else f"{field.low + field.width - 1}:{field.low}"
+                assert fields.pop(f"{one.name}.{field.name}") == (bits, field.access)
+            assert field.help.replace("|", "\\|") in told
+            assert field.unit in told
+    assert not fields
+
+
+def check_client(registers: RegisterMap, text: str, folder: Path) -> None:
+    """The snapshot has all outputs of the core but its strobes, which are told by the ports, not by the map."""
+    spec = registers.spec
+    described = manifest(spec) | {"registers": registers.described()}
+    memory = {one.offset: one.reset for one in registers}
+    values = {
+        port.name: 1 - (1 << port.width - 1) if port.signed else (1 << port.width) - 1
+        for port in spec.outputs
+        if not port.is_strobe
+    }
+    for one in registers:
+        for field in one.fields if one.captured else ():
+            value = values.get(field.port, 1)
+            memory[one.offset] |= (value >> field.shift & (1 << field.width) - 1) << field.low
+    snapshot = Client(memory.__getitem__, memory.__setitem__, described).snapshot()
+    assert dict(snapshot) == values | {"updated": 1} | ({"indexed": 1} if spec.index else {})
+    assert snapshot.flags.keys() == flags(spec) | {"updated"} | ({"indexed"} if spec.index else set())
+    assert snapshot.velocity_rad_per_s == values["velocity"] * spec.rad_per_s_per_lsb
+
+
+def check_driver(registers: RegisterMap, text: str, folder: Path) -> None:
+    """The same of its struct; tests/hdl/bus/test_driver.py runs it."""
+    struct = text[text.index("struct spindle_snapshot {") :]
+    members = dict(reversed(row) for row in re.findall(r"^  (\w+) (\w+);$", struct[: struct.index("};")], re.MULTILINE))
+    spec = registers.spec
+    expected = {"updated": "bool"} | ({"indexed": "bool"} if spec.index else {})
+    for port in spec.outputs:
+        if not port.is_strobe:
+            bits = 64 if port.width > 32 else 32
+            expected[port.name] = "bool" if port.width == 1 else f"{'' if port.signed else 'u'}int{bits}_t"
+    assert members == expected
+    counters = text[text.index("struct spindle_counters {") :]
+    assert re.findall(r"^  uint8_t (\w+);$", counters[: counters.index("};")], re.MULTILINE) == [*registers.counted]
+
+
+def flags(spec: TachometerSpec) -> set[str]:
+    return {port.name for port in spec.outputs if port.width == 1 and not port.is_strobe}
+
+
+Check = Callable[[RegisterMap, str, Path], None]
+Make = Callable[[RegisterMap, str], str]
+TEXTS: dict[str, tuple[Make, Check]] = {
+    "RDL": (rdl, check_rdl),
+    "header": (c_header, check_header),
+    "driver": (c_driver, check_driver),
+    "page": (page, check_page),
+    "client": (lambda registers, name: "", check_client),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("text", TEXTS)
+def test_every_register_and_field_is_there(text: str, method: str, tmp_path: Path) -> None:
+    make, check = TEXTS[text]
+    for registers in maps(method):
+        check(registers, make(registers, "spindle"), tmp_path)
+
+
+@pytest.mark.parametrize("command", ["ports", "generator"])
+@pytest.mark.parametrize("text", ["RDL", "header", "page"])
+def test_every_register_of_a_control_loop_is_there(text: str, command: str, tmp_path: Path) -> None:
+    make, check = TEXTS[text]
+    core = of_texts("s", BASE | {"max-speed": "500rad/s"})
+    spec = LoopSpec(tachometer=core, gains="inputs", command=command, multiplier="parallel")
+    check(registers_of(spec), make(registers_of(spec), "spindle"), tmp_path)
+
+
+def test_the_configurations_have_all_kinds() -> None:
+    """Values of two words, signed and not, and every option that adds a register."""
+    names = {one.name for method in METHODS for registers in maps(method) for one in registers}
+    assert {"VELOCITY_HIGH", "POSITION_HIGH", "INDEX_POSITION", "AGE", "VELOCITY_LOWER", "SWALLOWED_EDGES"} <= names
+    assert {"N_EP1", "DT_SHIFT", "ACCELERATION", "ACCELERATION_HIGH", "POSITION_FINE", "POSITION_FINE_HIGH"} <= names
+    assert any("tick_errors" in registers.counted for registers in maps("s"))
+
+
+class Fewer(RegisterMap):
+    """A map that has lost a register."""
+
+    lost = ""
+
+    @property
+    def registers(self) -> tuple[Register, ...]:
+        return tuple(one for one in RegisterMap(self.spec).registers if one.name != self.lost)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_text_without_a_register_is_noticed(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, check = TEXTS[text]
+    registers = maps("s")[0]
+    captured = [one.name for one in registers if one.captured and not one.captures and one.name != "STATUS"]
+    for lost in captured:
+        monkeypatch.setattr(Fewer, "lost", lost)
+        fewer = Fewer(registers.spec)
+        with caught():
+            check(fewer if text == "client" else registers, make(fewer, "spindle"), tmp_path)
+
+
+def test_words_with_hyphens_are_not_parted() -> None:
+    """Where a text of RDL goes on in the next line, there is a space."""
+    text = " ".join(["of-many-parts"] * 40)
+    lines = _text("desc = ", text)
+    assert max(map(len, lines)) <= 110
+    assert " ".join(line.strip() for line in lines) == f'desc = "{text}";'
+
+
+@pytest.mark.parametrize("name", ["field", "mem", "property", "NAME", "PREFIX", "real", "abstract", "ref"])
+def test_names_that_have_a_meaning_elsewhere(name: str, tmp_path: Path) -> None:
+    top = read_rdl(rdl(maps("s")[0], name), tmp_path)
+    assert top.inst_name == name
+    driver = c_driver(maps("s")[0], name)
+    assert f"static inline enum {name}_status {name}_init(const struct {name}_bus *bus)" in driver
+    assert f"#ifndef {name.upper()}_DRIVER_H" in driver
+
+
+def test_they_lie_beside_the_verilog_of_a_core_on_a_bus() -> None:
+    spec = of_texts("s", BASE)
+    without, with_bus = export(spec, "spindle"), export(spec, "spindle", "wishbone")
+    texts = register_files(RegisterMap(spec), "spindle")
+    assert [*texts] == [f"spindle{suffix}" for suffix in REGISTER_FILES]
+    assert {file: text for file, text in with_bus.items() if file not in without} == texts
+    for file, text in texts.items():
+        assert generator() in text, file
+        assert LICENSE in text, file
+        assert text.endswith("\n"), file
+        assert max(map(len, text.splitlines())) <= 120 or file.endswith(".md"), file

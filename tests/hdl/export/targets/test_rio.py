@@ -1,0 +1,311 @@
+"""The plugin for RIO, from the pins of the FPGA to those of HAL, against the golden model."""
+
+import json
+import re
+import shlex
+import subprocess
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.command import run as command_line
+from support.compiled import lint
+from support.lockstep import random_case
+from support.mutant import caught
+from support.options import had_by
+from support.rio import component, hal_type, loaded
+
+from tachometry.hdl.export import export
+from tachometry.hdl.export.targets.rio import hal_pins, rio_files
+from tachometry.sim import golden
+from tachometry.sim.engines import build
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
+from tachometry.spec.language.port import INDEX, TICK, UPDATE
+
+PAGE = (Path(__file__).parents[3] / "docs" / "linuxcnc.md").read_text(encoding="utf-8")
+NAME = "spindle"
+PLUGIN, WRAPPER, CORE = rio_files(NAME)
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
+EVERY = {
+    "s": {"external-tick": "yes", "index": "yes", "filter": "4", "unit": "rpm", "bounds": "yes", "age": "yes"},
+    "m": {"decoding": "1", "lowpass": "20Hz", "velocity-width": "12"},
+    "t": {"decoding": "2", "index": "yes", "position-width": "8"},
+    "mt": {"external-tick": "yes", "bounds": "yes"},
+    "rairan": {"filter": "100", "bounds": "yes"},
+    "track": {"external-tick": "yes", "index": "yes", "unit": "rpm", "velocity-width": "24"},
+}
+SCALE, OFFSET = -25.0, 3.5
+WIDE = "must be at most 32 for RIO, whose numbers have no more, not"
+EVERY_FRAME = 7  # ticks between two frames
+START = 50  # the frame with which the host begins
+_BENCH = """
+module bench;
+  reg clk = 0;
+  reg @PINS@;
+  @WIRES@
+  spindle_rio dut (.clk(clk), @CONNECTIONS@);
+  integer in, out, more, at, clock;
+  initial begin
+    in = $fopen("pins.txt", "r");
+    out = $fopen("rows.txt", "w");
+    more = $fscanf(in, "%d", at);
+    for (clock = 0; clock < @N_CLOCKS@; clock = clock + 1) begin
+      if (more == 1 && at == clock) begin
+        more = $fscanf(in, "@FORMAT@", @READ@);
+        more = $fscanf(in, "%d", at);
+      end
+      #1 clk = 0;
+      #1 if (dut.core.tick) $fdisplay(out, "%0d@FORMAT_OUT@", clock, @SENT@);
+      #1 clk = 1;
+      #1;
+    end
+    $fclose(out);
+    $finish;
+  end
+endmodule
+"""
+
+
+# Cores with all that the plugin shows, on shafts with errors: external ticks that fail, and counts beyond the greatest.
+SEEDS = (141, 170)
+
+
+@cache
+def case(seed: int) -> tuple[TachometerSpec, PinTrace]:
+    spec, _, trace = random_case(seed, "s")
+    # The position wraps often.
+    spec = replace(spec, index_reset=False, position_width=8, age=True)
+    assert spec.index
+    assert spec.filter_clocks
+    return spec, trace
+
+
+@cache
+def exported(seed: int) -> dict[str, str]:
+    return export(case(seed)[0], NAME, target="rio")
+
+
+def run(seed: int, folder: Path, file: str, right: str, wrong: str) -> tuple[list[int], list[dict[str, float]]]:
+    """Clocks of the frames, and what HAL then shows; with `right` replaced by `wrong` in a file."""
+    spec, trace = case(seed)
+    texts = dict(exported(seed))
+    texts[file] = texts[file].replace(right, wrong) if right else texts[file]
+    plugin = loaded(texts[PLUGIN], spec.timing.clock_hz)
+    sent, pins = plugin.interface_data(), [pin.name for pin in spec.pins]
+    # HAL takes what RIO sends as signed.
+    wires = [f"wire {'signed ' * (one['size'] > 1)}[{one['size'] - 1}:0] {name};" for name, one in sent.items()]
+    parts = {
+        "PINS": ", ".join(f"{pin} = 0" for pin in pins),
+        "WIRES": "\n  ".join(wires),
+        "CONNECTIONS": ", ".join(f".{name}({name})" for name in (*pins, *sent)),
+        "N_CLOCKS": trace.n_clocks,
+        "FORMAT": " ".join(["%b"] * len(pins)),
+        "READ": ", ".join(pins),
+        "FORMAT_OUT": " %0d" * len(sent),
+        "SENT": ", ".join(sent),
+    }
+    bench = re.sub("@([A-Z_]+)@", lambda mark: str(parts[mark[1]]), _BENCH)
+    rows = np.stack([trace.clock, *(trace.lines[pin] for pin in pins)], axis=1)
+    np.savetxt(folder / "pins.txt", rows.astype(np.int64), fmt="%d")
+    for name, text in {"wrapper.v": texts[WRAPPER], "core.v": texts[CORE], "bench.v": bench}.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    command = ["iverilog", "-g2001", "-s", "bench", "-o", "x.vvp", "core.v", "wrapper.v", "bench.v"]
+    subprocess.run(command, cwd=folder, check=True)
+    subprocess.run(["vvp", "-n", "x.vvp"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    frames = np.loadtxt(folder / "rows.txt", dtype=np.int64, ndmin=2)[::EVERY_FRAME][START:]
+    (folder / "hal.c").write_text(component(plugin), encoding="utf-8")
+    strict = ("-x", "c", "-std=c11", "-Wall", "-Werror")
+    build.run([*build.compiler(), *strict, "hal.c", "-o", "hal", "-lm"], "compiler", folder)
+    lines = [f"{SCALE} {OFFSET}"]
+    lines += [" ".join(map(str, (int(armed(number)), *row[1:]))) for number, row in enumerate(frames)]
+    said = build.run([folder / "hal"], "program", folder, "\n".join(lines))
+    shown = [dict(zip(plugin.signals(), map(float, line.split()), strict=True)) for line in said.splitlines()]
+    return [int(clock) for clock in frames[:, 0]], shown
+
+
+def armed(frame: int) -> bool:
+    """Whether index-enable is set before this frame."""
+    return frame % 10 in (0, 3)
+
+
+def check(seed: int, folder: Path, file: str = PLUGIN, right: str = "", wrong: str = "") -> None:
+    """Hold every pin in every frame against the golden model."""
+    spec, trace = case(seed)
+    clocks, shown = run(seed, folder, file, right, wrong)
+    tables = golden.tables(spec, trace)
+    ticks, updates, index = tables[TICK], tables[UPDATE], tables[INDEX]
+    overflows = ticks.clock[ticks.overflow.astype(bool)]
+    counted = {"decode-errors": tables["decode_error"].clock, "overflows": overflows}
+    counted |= {"tick-errors": tables["tick_error"].clock} if spec.max_tick_cycles else {}
+    period, before = 1 << spec.position_width, clocks[0]
+    through = dict(zip(ticks.clock.tolist(), np.unwrap(ticks.position, period=period).tolist(), strict=True))
+    per_lsb = spec.rad_per_s_per_lsb
+    first = ticks.rows(ticks.clock == clocks[0])
+    origin, enabled, resets = through[clocks[0]] - int(first.position[0]), False, 0
+    assert len(clocks) == len(ticks.clock[::EVERY_FRAME][START:]) == len(shown)
+    assert any(index.clock < clocks[0])
+    for frame, (clock, found) in enumerate(zip(clocks, shown, strict=True)):
+        at = int(np.searchsorted(ticks.clock, clock))
+        assert ticks.clock[at] == clock
+        enabled |= armed(frame)
+        # A counter of the FPGA shows an event in the clock after it.
+        new = index.rows((index.clock >= before) & (index.clock < clock))
+        if enabled and len(new):
+            latest = index.rows(index.clock <= clock)
+            since = (through[clock] - int(latest.index_position[-1]) + period // 2) % period - period // 2
+            origin, enabled, resets = through[clock] - since, False, resets + 1
+        before = clock
+        count = through[clock] - origin
+        row = int(np.searchsorted(updates.clock, clock, side="right")) - 1
+        velocity = per_lsb * int(updates.velocity[row]) if row >= 0 else 0
+        per_s = velocity / (2 * np.pi) * spec.encoder.counts_per_rev
+        expected = {
+            "velocity": pytest.approx(per_s / SCALE, rel=1e-6),
+            "velocity-rpm": pytest.approx(velocity * 30 / np.pi, rel=1e-6),
+            "position": (count + OFFSET) / SCALE,
+            "count": count,
+            "index-enable": enabled,
+            "stalled": ticks.stalled[at],
+            "age": ticks.age[at],
+            "swallowed-edges": ticks.swallowed_edges[at],
+            **{name: np.count_nonzero(events < clock) for name, events in counted.items()},
+        }
+        if spec.output:
+            expected["velocity-overflow"] = updates.velocity_overflow[row] if row >= 0 else 0
+        assert found == expected, (frame, clock)
+    assert resets >= 1
+    assert max(through.values()) - min(through.values()) > period
+    assert enabled or resets > 1
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pins_of_hal_say_what_the_golden_model_says(seed: int, tmp_path: Path) -> None:
+    check(seed, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("seed", "file", "right", "wrong"),
+    [
+        (141, PLUGIN, "total += (int32_t)(((uint32_t)now - (uint32_t)before) << 24) >> 24;", "total += now - before;"),
+        (141, PLUGIN, "    before = now;", ""),
+        (141, PLUGIN, "indexes != indexes_before", "indexes < 256"),
+        (141, PLUGIN, " && indexes_before >= 0", ""),
+        (141, PLUGIN, "    indexes_before = indexes;", ""),
+        (141, PLUGIN, "*data->$index_enable = 0;", ""),
+        (141, PLUGIN, "origin = total - ", "origin = total + "),
+        (141, PLUGIN, "(uint32_t)data->$sent_indexed_at) << 24) >> 24)", "(uint32_t)data->$sent_indexed_at)))"),
+        (141, PLUGIN, " + *data->${position}_OFFSET", ""),
+        (141, PLUGIN, "/ *data->${{position}}_SCALE", ""),
+        (141, PLUGIN, "RPM = ", "RPM = 60 * "),
+        (141, PLUGIN, "    return;\n", ""),
+        (170, PLUGIN, "events += (uint8_t)((uint8_t)value - before);", "events = (uint8_t)(value + before - before);"),
+        (141, WRAPPER, "{10{core_velocity[21]}}", "10'd0"),
+        (141, WRAPPER, ".a(a),", ".a(b),"),
+        (141, WRAPPER, "if (index_valid)", "if (tick)"),
+        (141, WRAPPER, "if (decode_error)", "if (tick_error)"),
+        (141, WRAPPER, "tick_errors <= tick_errors + 8'd1", "tick_errors <= 8'd1"),
+        (170, WRAPPER, "tick & overflow", "overflow"),
+    ],
+)
+def test_wrong_plugins_are_caught(seed: int, file: str, right: str, wrong: str, tmp_path: Path) -> None:
+    assert exported(seed)[file].count(right) == 1
+    with caught():
+        check(seed, tmp_path, file, right, wrong)
+
+
+def core(method: str) -> TachometerSpec:
+    return of_texts(method, had_by(method, BASE | EVERY[method]))
+
+
+@cache
+def made(method: str) -> dict[str, str]:
+    return export(core(method), NAME, target="rio")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_plugin_fits_its_verilog_and_the_core(method: str, tmp_path: Path) -> None:
+    files, spec = made(method), core(method)
+    for file in (WRAPPER, CORE):
+        (tmp_path / Path(file).name).write_text(files[file], encoding="utf-8")
+    lint(["spindle_rio.v", "spindle.v"], "spindle_rio", tmp_path)
+    assert files[CORE] == files["spindle.v"]
+    plugin = loaded(files[PLUGIN], spec.timing.clock_hz)
+    found = re.findall(r"^  (input|output) \w+ (?:\[(\d+):0\] )?(\w+),?$", files[WRAPPER], re.MULTILINE)
+    ports = {name: (direction, int(high or 0) + 1) for direction, high, name in found}
+    sent = {name: ("output", one["size"]) for name, one in plugin.INTERFACE.items()}
+    assert ports == {"clk": ("input", 1)} | {pin: ("input", 1) for pin in plugin.PINDEFAULTS} | sent
+    assert list(plugin.PINDEFAULTS) == [pin.name for pin in spec.pins]
+    assert [plugin.NAME, *plugin.VERILOGS] == ["spindle_rio", "spindle_rio.v", "spindle.v"]
+    assert {name: hal_type(pin) for name, pin in plugin.SIGNALS.items()} == {
+        name: pin.kind for name, pin in hal_pins(spec).items()
+    }
+    # RIO compares the last words of names.
+    for name in sent:
+        assert not [other for other in sent if other.endswith(f"_{name}")]
+
+
+def test_numbers_come_from_the_spec() -> None:
+    """As RIO's test programs show them."""
+    spec = core("m")
+    plugin = loaded(made("m")[PLUGIN], 1_000_000)
+    rpm = spec.rad_per_s_per_lsb * 30 / np.pi
+    for value in (-5, 0, 1000):
+        assert plugin.convert("velocity-rpm", {}, value) == pytest.approx(value * rpm)
+        assert plugin.convert("velocity", {}, value) == pytest.approx(value * rpm / 60 * spec.encoder.counts_per_rev)
+        assert plugin.convert("age", {}, value) == value
+
+
+def test_a_board_with_another_clock_is_refused() -> None:
+    assert loaded(made("m")[PLUGIN], 1_000_000).gateware_instances() == {"tacho0": {}}
+    text = "^the clock of the FPGA must be 1000000 Hz for spindle_rio, not 27000000 Hz$"
+    with pytest.raises(ValueError, match=text):
+        loaded(made("m")[PLUGIN], 27_000_000).gateware_instances()
+
+
+@pytest.mark.parametrize(
+    ("options", "bus", "message"),
+    [
+        (
+            {"position-width": "40"},
+            None,
+            "position_width must be at most 32 for RIO, whose numbers have no more, not 40",
+        ),
+        (
+            {"velocity-width": "33"},
+            None,
+            "velocity_width must be at most 32 for RIO, whose numbers have no more, not 33",
+        ),
+        (
+            {"index": "yes", "index-reset": "yes"},
+            None,
+            "index_reset must not be given for RIO: its pin index-enable resets the position",
+        ),
+        ({}, "spi", "bus must be none for rio, not spi"),
+    ],
+)
+def test_cores_that_do_not_fit_are_refused(options: dict[str, str], bus: str | None, message: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{re.escape(message)}$"):
+        export(of_texts("s", {"ppr": "500"} | options), NAME, bus, target="rio")
+
+
+def test_the_page_has_every_pin_and_its_command_makes_the_plugin(tmp_path: Path) -> None:
+    rows = dict(re.findall(r"^\| `([\w-]+)` \| (\w+)", PAGE, re.MULTILINE))
+    found = {name: pin.kind for method in METHODS for name, pin in hal_pins(core(method)).items()}
+    found |= {"age": "u32", "tick-errors": "u32", "swallowed-edges": "u32"}
+    assert rows == found | {"position-scale": "float", "position-offset": "float"}
+    (command,) = re.findall(r"```sh\n(tachometry .*?)```", PAGE, re.DOTALL)
+    assert command_line(*shlex.split(command.replace("\\\n", ""))[1:-1], tmp_path) == 0
+    (configuration,) = re.findall(r"```json\n(.*?)```", PAGE, re.DOTALL)
+    described = json.loads(configuration)
+    plugin = loaded((tmp_path / described["type"] / "plugin.py").read_text(encoding="utf-8"), 27_000_000)
+    assert described["type"] == plugin.NAME
+    assert described["pins"].keys() == plugin.PINDEFAULTS.keys()
+    assert described["signals"].keys() <= plugin.SIGNALS.keys()
+
+
+def test_other_targets_are_refused() -> None:
+    with pytest.raises(ParameterError, match=r"^target must be one of none, rio, litex, not 'mesa'$"):
+        export(of_texts("s", {"ppr": "500"}), NAME, target="mesa")

@@ -1,0 +1,200 @@
+"""What lies beside the Verilog: it names what is there, and it runs."""
+
+import fnmatch
+import json
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+from support.options import had_by
+
+from tachometry.hdl.export import export
+from tachometry.hdl.export.targets.target import TARGETS
+from tachometry.sim.engines.verilator import home
+from tachometry.spec import METHODS, common_options, of_texts, own_options
+from tachometry.spec.language.provenance import LICENSE, generator, version
+
+BIN = Path(sys.executable).parent
+PAGE = (Path(__file__).parents[2] / "docs" / "integration.md").read_text(encoding="utf-8")
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
+CASES = {
+    "s": {"external-tick": "yes", "index": "yes", "filter": "4", "unit": "rpm", "bounds": "yes", "age": "yes"},
+    "m": {"decoding": "1", "lowpass": "20Hz"},
+    "t": {"decoding": "2", "index": "yes", "index-reset": "yes"},
+    "mt": {"external-tick": "yes", "bounds": "yes"},
+    "rairan": {"filter": "100", "bounds": "yes"},
+    "track": {"external-tick": "yes", "unit": "rad/s"},
+}
+
+
+@cache
+def made(method: str, bus: str = "none") -> dict[str, str]:
+    spec = of_texts(method, had_by(method, BASE | CASES[method]))
+    return export(spec, "spindle", bus, 100_000 if bus == "uart" else None)
+
+
+def run(folder: Path, *command: str | Path, **environment: str) -> str:
+    done = subprocess.run(
+        list(map(str, command)), cwd=folder, env=os.environ | environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def test_every_file_names_version_and_licence() -> None:
+    targets = [export(of_texts("m", BASE), "spindle", target=target) for target in TARGETS]
+    for file, text in [item for files in (made("s"), *targets) for item in files.items()]:
+        assert generator() in text, file
+        assert LICENSE in text, file
+    assert f"name: ::spindle:{version()}\n" in made("s")["spindle.core"]
+
+
+@pytest.mark.parametrize(("method", "bus"), [*((method, "none") for method in METHODS), ("m", "spi"), ("m", "uart")])
+def test_the_smoke_test_includes_the_template_and_passes(method: str, bus: str, tmp_path: Path) -> None:
+    files = made(method, bus)
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    said = run(tmp_path, "iverilog", "-g2012", "-Wall", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
+    assert said == ""
+    counts = 24 * int(CASES[method].get("decoding", "4")) // 4
+    assert re.match(
+        rf"PASS: position {counts}, [1-9]\d* updates, velocity -?\d+\n", run(tmp_path, "vvp", "-n", "x.vvp")
+    )
+    described = json.loads(files["spindle.json"])["ports"]
+    ports = [port["name"] for direction in ("input", "output") for port in described if port["direction"] == direction]
+    assert re.findall(r"^  \.(\w+)\(\1\)", files["spindle_inst.v"], re.MULTILINE) == ports
+
+
+def test_the_smoke_test_fails_on_a_wrong_core(tmp_path: Path) -> None:
+    files = made("m")
+    wrong = files["spindle_inst.v"].replace(".a(a)", ".a(b)").replace(".b(b)", ".b(a)")
+    for file, text in {**files, "spindle_inst.v": wrong}.items():
+        (tmp_path / file).write_text(text)
+    run(tmp_path, "iverilog", "-g2012", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
+    done = subprocess.run(["vvp", "-n", "x.vvp"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "FAIL: position -6 instead of 6, 0 errors" in done.stdout + done.stderr
+
+
+def flip_flops(verilog: str) -> dict[str, str]:
+    """Paths of the synchronisers' flip-flops from the top, with a slash, and their attributes."""
+    modules = dict(re.findall(r"^module (\S+?) ?\(.*?$(.*?)^endmodule", verilog, re.MULTILINE | re.DOTALL))
+
+    def below(module: str, path: str) -> dict[str, str]:
+        text = modules[module]
+        found: dict[str, str] = {}
+        for attributes, name in re.findall(r"((?:^  \(\*.*\*\)\n)*)^  (?:output|reg) (stage\d)\b", text, re.MULTILINE):
+            found[path + name] = found.get(path + name, "") + attributes
+        for inner, name in re.findall(r"^  (\\\S+|\w+) +(\w+) \(", text, re.MULTILINE):
+            found |= below(inner, f"{path}{name}/") if inner in modules else {}
+        return found
+
+    return below("spindle", "spindle_inst/")
+
+
+@pytest.mark.parametrize(
+    ("method", "bus", "more"),
+    [
+        *((method, "none", []) for method in ("s", "mt", "rairan")),
+        ("s", "spi", ["spi_sck", "spi_mosi", "spi_cs_n"]),
+        ("mt", "uart", ["uart_rx"]),
+    ],
+)
+def test_constraints_meet_every_synchroniser_once(method: str, bus: str, more: list[str]) -> None:
+    files = made(method, bus)
+    found = flip_flops(files["spindle.v"])
+    pins = [pin.name for pin in of_texts(method, BASE | CASES[method]).pins] + more
+    assert len(found) == 2 * len(pins)
+    first = [path for path in found if path.endswith("stage0")]
+    # As Vivado, Quartus Standard, and others name them.
+    vivado = [f"{path}_reg/D" for path in first]
+    quartus = [re.sub(r"(\w+)/", r"e.\1:\1|", path) for path in first]
+    kinds = {
+        r"get_pins -hierarchical -filter \{NAME =~ (.*)\}": ("xdc", vivado),
+        r"get_registers \{(.*)\}": ("sdc", quartus),
+        r"get_cells -hierarchical \{(.*)\}": ("sdc", vivado),
+    }
+    for pattern, (suffix, names) in kinds.items():
+        wanted = re.findall(pattern, files[f"spindle.{suffix}"])
+        assert len(wanted) == len(pins)
+        for name in names:
+            assert [bool(fnmatch.fnmatchcase(name, one)) for one in wanted].count(True) == 1, (name, wanted)
+    cells = re.findall(r"get_cells -hierarchical -filter \{NAME =~ (.*)\}", files["spindle.xdc"])
+    for path, attributes in found.items():
+        assert sum(fnmatch.fnmatchcase(f"{path}_reg", one) for one in cells) == 1
+        assert '(* ASYNC_REG = "TRUE" *)' in attributes, path
+
+
+@pytest.mark.parametrize("quartus", [False, True])
+def test_constraints_are_tcl(quartus: bool) -> None:
+    tcl = pytest.importorskip("tkinter").Tcl()
+    tcl.eval("set said {}")
+    known = ["get_pins", "get_cells", *(["get_registers"] if quartus else [])]
+    for name in known:
+        tcl.eval(f"proc {name} args {{return [list {name} {{*}}$args]}}")
+    for name in ("set_false_path", "set_property"):
+        tcl.eval(f"proc {name} args {{lappend ::said [list {name} {{*}}$args]}}")
+    files = made("s")
+    tcl.eval(files["spindle.sdc"])
+    said = tcl.splitlist(tcl.eval("set said"))
+    assert len(said) == 4
+    assert all(("get_registers" if quartus else "get_cells") in line for line in said)
+    tcl.eval("set said {}")
+    tcl.eval(files["spindle.xdc"])
+    assert len(tcl.splitlist(tcl.eval("set said"))) == 8
+
+
+@pytest.mark.parametrize("bus", ["none", "wishbone"])
+def test_fusesoc_runs_every_target(bus: str, tmp_path: Path) -> None:
+    files = made("s", bus)
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    path = f"{home() / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    targets = re.findall(r"^  (\w+):\n    filesets:", files["spindle.core"], re.MULTILINE)
+    assert targets == ["default", "lint", "sim"]
+    for target in targets:
+        command = (BIN / "fusesoc", "--cores-root", ".", "run", "--target", target, "spindle")
+        home_ = {"VERILATOR_ROOT": str(home()), "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
+        said = run(tmp_path, *command, PATH=path, **home_)
+        assert "Warning" not in said, said
+        assert ("PASS: position 24" in said) == (target == "sim")
+
+
+def test_fusesoc_finds_what_programs_need(tmp_path: Path) -> None:
+    """With the flags `driver` and `registers`, and without them not; a core without a bus has neither."""
+    for file, text in made("s", "native").items():
+        (tmp_path / file).write_text(text)
+    home_ = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
+    of_flags = {"driver": ["spindle_driver.h", "spindle_regs.h"], "registers": ["spindle.rdl"]}
+    for flags in ([], ["driver"], ["registers"], ["driver", "registers"]):
+        words = [f"--flag={flag}" for flag in flags]
+        run(tmp_path, BIN / "fusesoc", "--cores-root", ".", "run", "--setup", *words, "spindle", **home_)
+        (edam,) = tmp_path.glob("build/*/default/*.eda.yml")
+        found = {Path(name).name for name in re.findall(r"name: (\S+)", edam.read_text())}
+        for flag, names in of_flags.items():
+            assert (found & {*names} == {*names}) == (flag in flags), (flags, found)
+            assert found.isdisjoint(names) == (flag not in flags), (flags, found)
+    assert "driver" not in made("s")["spindle.core"]
+
+
+def keys(item: object, path: str = "") -> set[str]:
+    """Paths of all keys: `velocity.width`, `ports[].name`."""
+    if isinstance(item, dict):
+        below = [keys(value, f"{path}.{key}" if path else key) for key, value in item.items()]
+        return {f"{path}.{key}" if path else key for key in item}.union(*below)
+    if isinstance(item, list):
+        return set().union(*(keys(value, f"{path}[]") for value in item))
+    return set()
+
+
+@pytest.mark.parametrize(("method", "bus"), [*((method, "none") for method in METHODS), ("s", "native")])
+def test_every_key_of_the_manifest_is_documented(method: str, bus: str) -> None:
+    found = keys(json.loads(made(method, bus)["spindle.json"]))
+    told = set(re.findall(r"^\| `([\w.\[\]]+)` \|", PAGE, re.MULTILINE))
+    assert {key for key in found if not key.startswith("parameters.")} <= told
+    options = {f"parameters.{about.parameter}" for about in (*common_options(), *own_options(method))}
+    assert {key for key in found if key.startswith("parameters.")} - options - {"parameters.method"} <= told

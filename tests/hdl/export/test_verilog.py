@@ -1,0 +1,127 @@
+import importlib.metadata
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tachometry.hdl.export import export
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+
+VERSION = importlib.metadata.version("tachometry")
+
+
+def make_spec(tick: str = "20us", **options: object) -> STachometer:
+    return STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", tick, "10ms"), **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("spec", [make_spec(), make_spec("5us", max_speed=Speed.parse("400rad/s"), cancel=False)])
+def test_files(spec: STachometer) -> None:
+    files = export(spec, "speed_meter")
+    kit = ["speed_meter.core", "speed_meter_inst.v", "speed_meter_tb.sv", "speed_meter.xdc", "speed_meter.sdc"]
+    assert list(files) == ["speed_meter.v", "speed_meter.json", *kit]
+    described = json.loads(files["speed_meter.json"])
+    assert described["module"] == "speed_meter"
+    # The ports of the module are those of the manifest, in width and direction.
+    top = re.search(r"\nmodule speed_meter\(.*?\nendmodule", files["speed_meter.v"], re.DOTALL)
+    assert top is not None
+    found = re.findall(r"^  (input|output) (?:\[(\d+):0\] )?(\w+);", top[0], re.MULTILINE)
+    assert {(name, direction, int(high or 0) + 1) for direction, high, name in found} == {
+        (port["name"], port["direction"], port["width"]) for port in described["ports"]
+    }
+    assert described["generator"] == f"tachometry {VERSION}"
+    assert described["license"] == "BSD-2-Clause"
+
+
+def test_a_reset_that_is_high_from_the_beginning_works_in_systemverilog(tmp_path: Path) -> None:
+    """`reg rst = 1` is no change there, so nothing would wake `always @*`, and all outputs would be x for ever."""
+    text = export(STachometer(encoder=Encoder(8), timing=Timing(10**6, 8, 10)), "core")["core.v"]
+    assert "reg \\$auto" in text
+    (tmp_path / "core.v").write_text(text)
+    (tmp_path / "bench.v").write_text(
+        """module bench;
+          reg clk = 0, rst = 1, a = 0, b = 0;
+          wire tick, velocity_valid;
+          wire [31:0] position, velocity;
+          core core (.clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .position(position), .velocity(velocity),
+            .velocity_valid(velocity_valid));
+          always #5 clk = ~clk;
+          initial begin
+            #52 rst = 0;
+            @(posedge velocity_valid) #1 $display("%b%b", position, velocity);
+            $finish;
+          end
+          initial #9999 $finish;
+        endmodule
+        """
+    )
+    for standard in ("2001", "2012"):
+        command = ["iverilog", f"-g{standard}", "-o", "core.vvp", "core.v", "bench.v"]
+        subprocess.run(command, cwd=tmp_path, check=True, stderr=subprocess.DEVNULL)
+        said = subprocess.run(["vvp", "-n", "core.vvp"], cwd=tmp_path, check=True, capture_output=True, text=True)
+        assert re.fullmatch(r"[0z]+\n", said.stdout), (standard, said.stdout)
+
+
+@pytest.mark.parametrize("tick_cycles", [2, 16, 960])
+def test_no_divider(tick_cycles: int) -> None:
+    spec = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, tick_cycles, 500))
+    text = export(spec)["tachometer.v"]
+    code = re.sub(r"//.*|/\*.*?\*/|\(\*.*?\*\)", "", text)
+    assert " / " not in code
+    assert " % " not in code
+    assert " * " not in code
+    assert "$div" not in code
+    assert "$mod" not in code
+
+
+def test_no_absolute_path_and_no_warning_switched_off_but_five() -> None:
+    text = export(make_spec())["tachometer.v"]
+    assert os.sep + "work" not in text
+    assert "(* src" not in text
+    assert re.findall(r"lint_off (\w+)", text) == [
+        "DECLFILENAME",
+        "PROCASSINIT",
+        "UNUSEDSIGNAL",
+        "WIDTHEXPAND",
+        "WIDTHTRUNC",
+    ]
+
+
+_PROGRAM = """
+from tachometry.hdl.export import export
+from tachometry.spec import Encoder, STachometer, Timing
+files = export(STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms")))
+import hashlib
+print(hashlib.sha256("".join(files.values()).encode()).hexdigest())
+"""
+
+
+def test_equal_specs_give_equal_files_whatever_the_environment() -> None:
+    seen = set()
+    for number, yosys in (("1", "builtin"), ("2", "system")):
+        environment = os.environ | {"PYTHONHASHSEED": number, "AMARANTH_USE_YOSYS": yosys}
+        result = subprocess.run(
+            [sys.executable, "-c", _PROGRAM], env=environment, check=True, capture_output=True, text=True
+        )
+        seen.add(result.stdout)
+    assert len(seen) == 1
+    assert len(seen.pop().strip()) == 64
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("module", "name must not be a Verilog keyword, which 'module' is"),
+        ("wire", "name must not be a Verilog keyword, which 'wire' is"),
+        ("logic", "name must not be a Verilog keyword, which 'logic' is"),  # of the smoke test
+        ("2fast", "name must be a letter or _ and up to 63 letters, digits or _, not '2fast'"),
+        ("a/b", "name must be a letter or _ and up to 63 letters, digits or _, not 'a/b'"),
+        ("", "name must be a letter or _ and up to 63 letters, digits or _, not ''"),
+    ],
+)
+def test_bad_names(name: str, message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        export(make_spec(), name)

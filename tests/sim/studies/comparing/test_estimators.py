@@ -1,0 +1,227 @@
+"""The estimators of textbooks: against what NumPy's fit, Riccati's equation and naive transcriptions give."""
+
+import math
+
+import numpy as np
+import pytest
+from support.lines import record
+
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.studies.comparing.baselines import Steps
+from tachometry.sim.studies.comparing.estimators import (
+    QUANTISATION,
+    adaptive_window,
+    kalman,
+    kalman_gains,
+    least_squares,
+)
+
+PERIOD = 1e-3
+CPR = 400
+COUNT = 2 * math.pi / CPR
+
+
+def random_steps(seed: int) -> Steps:
+    random = np.random.default_rng(seed)
+    speed = random.normal(0, 1, 4) * 10 ** random.uniform(0, 2, 4)
+    motion = "+".join(f"ramp:{a:.3f}:{b:.3f}:60ms" for a, b in zip(speed[:2], speed[2:], strict=True))
+    recording = record(
+        f"{motion}+stop:150ms+sine:{speed[0]:.3f}:20Hz:90ms", pulses_per_rev=CPR // 4, jitter=0.05, seed=seed
+    ).recording
+    return Steps.of_recording(recording, CPR)
+
+
+def counts_of(*per_period: int) -> Steps:
+    """So many counts in each period, in its middle."""
+    time = np.repeat((np.arange(len(per_period)) + 0.5) * PERIOD, np.abs(per_period))
+    step = np.repeat(np.sign(per_period), np.abs(per_period))
+    return Steps(time, step.astype(np.int64), len(per_period) * PERIOD, CPR)
+
+
+# --- least squares
+
+
+def naive_fit(steps: Steps, edges: int, order: int, timeout: float, clock: float) -> list[float]:
+    """One reading after the other, by `numpy.polyfit`, counts/s."""
+    position = np.cumsum(steps.step) - steps.step / 2
+    stamp = np.floor(steps.time / clock + 1e-6) * clock
+    speeds = []
+    for k in range(1, round(steps.duration / PERIOD) + 1):
+        now = math.floor(k * PERIOD / clock + 1e-6) * clock
+        seen = int(np.sum(steps.time <= k * PERIOD))
+        begin = seen
+        while begin > max(0, seen - edges) and (begin == seen or stamp[begin] - stamp[begin - 1] <= timeout):
+            begin -= 1
+        silence = now - stamp[seen - 1] if seen else math.inf
+        degree = min(order, seen - begin - 1)
+        if degree < 1 or silence > timeout:
+            speeds.append(0.0)
+            continue
+        time = (stamp[begin:seen] - stamp[seen - 1]) * 1e3
+        line = np.polyfit(time, position[begin:seen] - position[seen - 1], degree)
+        speed = 1e3 * float(np.polyval(np.polyder(line), silence * 1e3))
+        speeds.append(min(max(speed, -2 / silence), 2 / silence) if silence else speed)
+    return speeds
+
+
+@pytest.mark.parametrize(("edges", "order"), [(2, 1), (7, 1), (8, 2), (24, 3)])
+def test_least_squares_is_the_fit_of_numpy(edges: int, order: int) -> None:
+    for seed in range(3):
+        steps = random_steps(seed)
+        assert len(steps.time) > 30
+        found = least_squares(steps, PERIOD, edges, order, timeout_s=0.03, clock_s=1e-6).velocity / COUNT
+        expected = np.array(naive_fit(steps, edges, order, 0.03, 1e-6))
+        assert np.count_nonzero(expected) > 100
+        np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-3 * np.max(np.abs(expected)) / 100)
+
+
+def test_least_squares_of_an_ideal_ramp_is_exact_with_order_2_and_half_a_window_late_with_order_1() -> None:
+    acceleration = 500 * COUNT
+    edge = np.arange(0.5, 200)
+    steps = Steps(np.sqrt(2 * edge / 500), np.ones(200, dtype=np.int64), 0.895, CPR)
+    estimate = least_squares(steps, PERIOD, edges=16, order=2, clock_s=1e-9)
+    late = estimate.time > 0.4
+    np.testing.assert_allclose(estimate.velocity[late], acceleration * estimate.time[late], rtol=1e-5)
+    estimate = least_squares(steps, PERIOD, edges=16, order=1, clock_s=1e-9)
+    newest, oldest = (np.interp(estimate.time, steps.time, np.arange(200)) // 1 - back for back in (0, 15))
+    middle = [
+        (steps.time[int(one)] + steps.time[int(other)]) / 2
+        for one, other in zip(newest[late], oldest[late], strict=True)
+    ]
+    np.testing.assert_allclose(estimate.velocity[late], acceleration * np.array(middle), rtol=2e-3)
+
+
+def test_least_squares_rests_after_a_stop_and_begins_anew() -> None:
+    steps = counts_of(*[2] * 50, *[0] * 200, *[-1] * 20)
+    speed = least_squares(steps, PERIOD, edges=16, order=1, timeout_s=0.1).velocity / COUNT
+    silence = PERIOD * np.arange(1, 99) + PERIOD / 2
+    np.testing.assert_allclose(speed[50:148], np.minimum(2000, 2 / silence), rtol=2e-3)
+    assert not np.any(speed[150:251])
+    np.testing.assert_allclose(speed[251:], -1000, rtol=1e-6)
+
+
+def test_edges_at_one_instant_tell_no_speed() -> None:
+    steps = Steps(np.full(5, 2.5e-3), np.ones(5, dtype=np.int64), 0.01, CPR)
+    assert not np.any(least_squares(steps, PERIOD, 4, 1).velocity)
+    assert not np.any(least_squares(counts_of(0, 0, 0), PERIOD).velocity)
+
+
+# --- adaptive window
+
+
+def naive_window(steps: Steps, bound: float, longest: int, best_fit: bool) -> list[float]:
+    count = [int(np.sum(steps.step[steps.time <= k * PERIOD])) for k in range(round(steps.duration / PERIOD) + 1)]
+    speeds = []
+    for k in range(1, len(count)):
+        speed = 0.0
+        for n in range(1, min(k, longest) + 1):
+            window = np.array(count[k - n : k + 1], dtype=float)
+            slope = np.polyfit(np.arange(n + 1), window, 1)[0] if best_fit else (window[-1] - window[0]) / n
+            line = window[-1] - slope * np.arange(n, -1, -1)
+            if np.max(np.abs(line - window)) > bound:
+                break
+            speed = slope
+        speeds.append(speed / PERIOD)
+    return speeds
+
+
+@pytest.mark.parametrize("best_fit", [False, True])
+@pytest.mark.parametrize("bound", [0.7712345, 1.0112345, 2.5112345])  # no distance is so by chance
+def test_adaptive_window_is_its_description(bound: float, best_fit: bool) -> None:
+    steps = random_steps(5)
+    found = adaptive_window(steps, PERIOD, bound, 30, best_fit).velocity / COUNT
+    np.testing.assert_allclose(found, naive_window(steps, bound, 30, best_fit), rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("best_fit", [False, True])
+def test_the_window_on_a_noiseless_ramp_is_the_longest_and_after_a_change_of_speed_begins_there(best_fit: bool) -> None:
+    steps = counts_of(*[3] * 40, *[5] * 40)
+    speed = adaptive_window(steps, PERIOD, 0.0, 10, best_fit).velocity * PERIOD / COUNT
+    np.testing.assert_allclose(speed, [3] * 40 + [5] * 40)
+    wide = adaptive_window(steps, PERIOD, 1e6, 10, best_fit=False).velocity * PERIOD / COUNT
+    np.testing.assert_allclose(wide[:40], 3)  # no window begins before time 0
+    np.testing.assert_allclose(wide[39:51], [3 + 0.2 * n for n in range(11)] + [5])
+
+
+# --- Kalman
+
+
+def riccati(index: float, order: int) -> FloatArray:
+    """The gain of the filter of equal noise in a unit of time, after so long that it does not change."""
+    move = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]])[:order, :order]
+    push = np.array([[0.5], [1], [1]])[:order]
+    covariance = np.eye(order)
+    gain = np.zeros(order)
+    for _ in range(3000):
+        covariance = move @ covariance @ move.T + push @ push.T * index**2
+        gain = covariance[:, 0] / (covariance[0, 0] + 1)
+        covariance = covariance - np.outer(gain, covariance[0])
+    return gain
+
+
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize("index", [1e-3, 0.05, 0.7, 20.0])
+def test_gains_solve_the_riccati_equation(index: float, order: int) -> None:
+    np.testing.assert_allclose(kalman_gains(index, order)[:order], riccati(index, order), rtol=1e-5)
+    assert kalman_gains(index, 2)[2] == 0
+
+
+@pytest.mark.parametrize("index", [1e-3, 0.05, 0.7, 20.0])
+def test_gains_are_those_of_the_alpha_beta_filter(index: float) -> None:
+    """Kalata 1984: index^2 = beta^2 / (1 - alpha), beta = 2 (2 - alpha) - 4 sqrt(1 - alpha)."""
+    alpha, beta, _ = kalman_gains(index, 2)
+    assert beta**2 / (1 - alpha) == pytest.approx(index**2, rel=1e-9)
+    assert beta == pytest.approx(2 * (2 - alpha) - 4 * math.sqrt(1 - alpha), rel=1e-6)
+    alpha, beta, gamma = kalman_gains(index, 3)
+    assert gamma**2 / (1 - alpha) == pytest.approx(index**2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("order", "noise"), [(2, 60.0), (3, 2e4)])
+def test_kalman_filter_in_matrices(order: int, noise: float) -> None:
+    steps = random_steps(1)
+    gain = riccati(noise * PERIOD**order / (COUNT * QUANTISATION), order)
+    move = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]])[:order, :order]
+    state, expected = np.zeros(order), []
+    for k in range(1, round(steps.duration / PERIOD) + 1):
+        state = move @ state
+        state = state + gain * (np.sum(steps.step[steps.time <= k * PERIOD]) - state[0])
+        expected.append(state[1] / PERIOD * COUNT)
+    np.testing.assert_allclose(kalman(steps, PERIOD, noise, order).velocity, expected, rtol=1e-4, atol=1e-4)
+
+
+def test_kalman_filter_with_acceleration_does_not_lag_on_a_ramp() -> None:
+    encoding = record("ramp:0:400:500ms", pulses_per_rev=CPR // 4)
+    steps = Steps.of_recording(encoding.recording, CPR)
+    lags = []
+    for order, noise in ((2, 200.0), (3, 4e4)):
+        estimate = kalman(steps, PERIOD, noise, order)
+        late = estimate.time > 0.25
+        lags.append(float(np.mean(encoding.true_speed(estimate.time[late]) - estimate.velocity[late])) / 800)
+    alpha, beta, _ = kalman_gains(200.0 * PERIOD**2 / (COUNT * QUANTISATION), 2)
+    assert lags[0] == pytest.approx(PERIOD * (alpha / beta - 0.5), rel=0.05)
+    assert abs(lags[1]) < 1e-4 < lags[0] / 5
+
+
+# --- what is refused
+
+
+def test_refusals() -> None:
+    steps = counts_of(1, 1, 1)
+    for refused, text in (
+        (lambda: least_squares(steps, PERIOD, 2, 2), "must be more than the order, 2, and at most 10000, not 2"),
+        (lambda: least_squares(steps, PERIOD, 10_001), "must be more than the order, 2, and at most 10000, not 10001"),
+        (lambda: least_squares(steps, PERIOD, 2, 0), "order of the polynomial must be from 1 to 5, not 0"),
+        (lambda: least_squares(steps, PERIOD, 9, 6), "order of the polynomial must be from 1 to 5, not 6"),
+        (lambda: adaptive_window(steps, PERIOD, -0.1), "noise bound must be at least 0 counts, not -0.1"),
+        (lambda: adaptive_window(steps, PERIOD, math.nan), "noise bound must be at least 0 counts, not nan"),
+        (lambda: adaptive_window(steps, PERIOD, longest=0), "longest window must be from 1 to 10000 periods, not 0"),
+        (lambda: adaptive_window(steps, PERIOD, longest=10**5), "must be from 1 to 10000 periods, not 100000"),
+        (lambda: kalman(steps, PERIOD, 0.0), "tracking index must be from 1e-15 to 1e\\+06, not 0"),
+        (lambda: kalman(steps, PERIOD, -5.0), "tracking index must be from 1e-15 to 1e\\+06, not -0.0"),
+        (lambda: kalman(steps, PERIOD, 1e99), "tracking index must be from 1e-15 to 1e\\+06, not 2.2"),
+        (lambda: kalman(steps, PERIOD, order=1), "order of the filter must be 2 or 3, not 1"),
+        (lambda: kalman(steps, PERIOD, order=10**30), "order of the filter must be 2 or 3, not 1000"),
+        (lambda: kalman_gains(math.nan, 2), "tracking index must be from 1e-15 to 1e\\+06, not nan"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            refused()

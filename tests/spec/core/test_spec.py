@@ -1,0 +1,173 @@
+import json
+import math
+import re
+from fractions import Fraction
+
+import pytest
+
+from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec.formats.reciprocal import Reciprocal
+from tachometry.spec.language.units import parse_frequency
+from tachometry.spec.registers.manifest import manifest
+
+TIMING = Timing(48_000_000, 960, 500)
+
+
+@pytest.mark.parametrize(
+    ("clock", "tick", "max_time"),
+    [
+        ("48MHz", "20us", "10ms"),
+        ("48000kHz", "20000ns", "0.01s"),
+        (48_000_000, 960, 480_000),
+        ("48000000Hz", "960", "480000"),
+        ("4.8e7Hz", "2e-5s", "1e4us"),
+    ],
+)
+def test_timing_in_times_or_clocks(clock: str | int, tick: str | int, max_time: str | int) -> None:
+    assert Timing.parse(clock, tick, max_time) == TIMING
+
+
+@pytest.mark.parametrize("decoding", [1, 2, 4])
+def test_the_fewest_and_the_most_counts_of_a_revolution(decoding: int) -> None:
+    assert Encoder(1, decoding).counts_per_rev == decoding
+    assert Encoder(2**24 // decoding, decoding).counts_per_rev == 2**24
+
+
+ERRORS = [
+    (lambda: Encoder(0), "pulses_per_rev must be from 1 to 4194304 with x4 decoding, not 0"),
+    (lambda: Encoder(1 << 24, 2), "pulses_per_rev must be from 1 to 8388608 with x2 decoding, not 16777216"),
+    (lambda: Encoder((1 << 24) + 1, 1), "pulses_per_rev must be from 1 to 16777216 with x1 decoding, not 16777217"),
+    (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, not 3"),
+    (lambda: Timing(0, 2, 2), "clock must be from 1 Hz to 100 GHz, not 0 Hz"),
+    (
+        lambda: Timing.parse("1MHz", "20us", "1us"),
+        "max_time must be a whole number of ticks, not 1us (0.05); nearest: 2 ticks (40us)",
+    ),
+    (
+        lambda: Timing.parse("1MHz", "20us", "45us"),
+        "max_time must be a whole number of ticks, not 45us (2.25); nearest: 2 ticks (40us) and 3 ticks (60us)",
+    ),
+    (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, not 0"),
+    (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 1048576, not 1"),
+    (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, not 1048577"),
+    (
+        lambda: Timing.parse("48 m", "20us", "10ms"),
+        "clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48 m'",
+    ),
+    (lambda: Timing.parse("0.5Hz", "20us", "10ms"), "clock must be a positive whole number of Hz, not '0.5Hz'"),
+    (
+        lambda: Timing.parse("48MHz", "20", "10 m"),
+        "max_time must be a number with one of the units s, ms, us, ns or a whole number of clocks, not '10 m'",
+    ),
+    (
+        lambda: Timing.parse("48MHz", "20.01us", "10ms"),
+        "tick must be a whole number of clocks, not 20.01us (960.48); nearest: "
+        "960 clocks (20us) and 961 clocks (20.0208333us)",
+    ),
+    (
+        lambda: Timing.parse("48MHz", "1ns", "10ms"),
+        "tick must be a whole number of clocks, not 1ns (0.048); nearest: 1 clock (20.8333333ns)",
+    ),
+    (
+        lambda: Timing.parse("48MHz", "20us", "10.01ms"),
+        "max_time must be a whole number of ticks, not 10.01ms (500.5); nearest: "
+        "500 ticks (10ms) and 501 ticks (10.02ms)",
+    ),
+    (lambda: Timing.parse("48MHz", "0us", "10ms"), "tick must be longer than 0, not 0us"),
+    (lambda: Timing.parse("48MHz", "-20us", "10ms"), "tick must be longer than 0, not -20us"),
+    (lambda: Speed.parse("400"), "max_speed must be a number with one of the units rad/s, rev/s, rpm, not '400'"),
+    (lambda: Speed.parse("0rpm"), "max_speed must be greater than 0, not 0rpm"),
+    (lambda: Speed(Fraction(1), "m/s"), "unit of a speed must be one of rad/s, rev/s, rpm, not 'm/s'"),
+    (lambda: STachometer(encoder=Encoder(500), timing=TIMING, frac_bits=3), "frac_bits must be from 4 to 24, not 3"),
+    (lambda: STachometer(encoder=Encoder(500), timing=TIMING, frac_bits=25), "frac_bits must be from 4 to 24, not 25"),
+    (
+        lambda: STachometer(encoder=Encoder(500), timing=TIMING, position_width=7),
+        "position_width must be from 8 to 48, not 7",
+    ),
+    (
+        lambda: STachometer(encoder=Encoder(500), timing=TIMING, filter_clocks=256),
+        "filter_clocks must be from 0 to 255, not 256",
+    ),
+    (lambda: parse_frequency("clock", -5), "clock must be a positive whole number of Hz, not -5"),
+]
+
+
+@pytest.mark.parametrize(("make", "message"), ERRORS, ids=[message[:40] for _, message in ERRORS])
+def test_errors_say_what_is_wrong_and_what_is_allowed(make: object, message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("text", "counts"),
+    [
+        # 2000 counts, 20 µs: ω_u = 50π rad/s = 25 rev/s = 1500 rpm.
+        ("157.07rad/s", 1),
+        ("157.08rad/s", 2),
+        ("25rev/s", 1),
+        ("25.0001rev/s", 2),
+        ("1500rpm", 1),
+        ("1000rad/s", 7),
+        ("1e9rpm", 960),
+    ],
+)
+def test_max_speed_in_counts_per_tick(text: str, counts: int) -> None:
+    spec = STachometer(encoder=Encoder(500), timing=TIMING, max_speed=Speed.parse(text))
+    assert spec.max_count == counts
+
+
+@pytest.mark.parametrize("text", ["12.5rad/s", "1.98943678864869rev/s", "119.366207318922rpm"])
+def test_speed_in_rad_per_s(text: str) -> None:
+    assert Speed.parse(text).rad_per_s == pytest.approx(12.5, rel=1e-14)
+
+
+def test_memory_is_the_table() -> None:
+    assert STachometer(encoder=Encoder(500), timing=TIMING).memory is None  # the reciprocal is divided
+    spec = STachometer(encoder=Encoder(500), timing=TIMING, reciprocal_source="table")
+    assert spec.memory is not None
+    kind, entries, width = spec.memory
+    assert kind == "table"
+    assert isinstance(spec.reciprocal, Reciprocal)
+    assert entries == len(spec.reciprocal.table)
+    assert width == max(spec.reciprocal.table).bit_length()
+
+
+def test_widths_hold_what_they_must() -> None:
+    spec = STachometer(encoder=Encoder(500), timing=TIMING)
+    assert spec.max_count == 960
+    assert (spec.count_width, spec.velocity_width, spec.interval_width) == (11, 27, 9)
+    assert spec.unit_velocity == pytest.approx(50 * math.pi)
+    assert spec.rad_per_s_per_lsb == pytest.approx(50 * math.pi / 65536)
+
+
+def test_manifest_names_every_option_and_survives_json() -> None:
+    spec = STachometer(encoder=Encoder(500), timing=TIMING, max_speed=Speed.parse("400rad/s"), cancel=False)
+    described = manifest(spec)
+    assert json.loads(json.dumps(described)) == described
+    assert described["parameters"] == {
+        "method": "s",
+        "pulses_per_rev": 500,
+        "decoding": 4,
+        "clock_hz": 48_000_000,
+        "tick_cycles": 960,
+        "max_ticks": 500,
+        "unit": "count/tick",
+        "frac_bits": 16,
+        "velocity_width": 19,
+        "max_speed": "400rad/s",
+        "position_width": 32,
+        "filter_clocks": 0,
+        "index": False,
+        "index_reset": False,
+        "max_tick_cycles": None,
+        "age": False,
+        "bounds": False,
+        "edge_error": 0.0,
+        "lowpass": None,
+        "cancel": False,
+        "reciprocal_source": "serial",
+    }
+    assert described["counts_per_rev"] == 2000
+    assert described["interval_unit_cycles"] == 960
+    assert described["velocity"]["unit"] == "count/tick"
+    assert set(described["latency_cycles"]) == {"pin_to_count", "tick_latency", "tick_to_velocity"}

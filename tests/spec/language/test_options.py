@@ -1,0 +1,178 @@
+"""Options are declared once, and every way to a core reads them alike."""
+
+import importlib
+import inspect
+import json
+import pickle
+import pkgutil
+import re
+from fractions import Fraction
+
+import pytest
+from support.options import had_by
+
+import tachometry.spec
+from tachometry.sim.studies.pairs import configurations, spec_of
+from tachometry.spec import (
+    METHODS,
+    TWO_TICKS,
+    Encoder,
+    ParameterError,
+    STachometer,
+    Timing,
+    common_options,
+    of_parameters,
+    of_texts,
+    own_options,
+)
+from tachometry.spec.language.units import Speed
+from tachometry.spec.methods.axes import AxesSpec
+from tachometry.spec.registers.manifest import manifest
+
+PPR = {"ppr": "500"}
+
+
+@pytest.mark.parametrize("made", [*METHODS.values(), AxesSpec])
+def test_parameters_are_given_by_name(made: type) -> None:
+    assert {one.kind for one in inspect.signature(made).parameters.values()} == {inspect.Parameter.KEYWORD_ONLY}
+
+
+def test_what_is_described_does_not_change() -> None:
+    """Every dataclass of spec/ is frozen, so it can be kept in a cache and shared by processes."""
+    for module in pkgutil.walk_packages(tachometry.spec.__path__, "tachometry.spec."):
+        for name, made in vars(importlib.import_module(module.name)).items():
+            params = getattr(made, "__dataclass_params__", None)
+            assert params is None or params.frozen, name
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_defaults_are_those_of_python(method: str) -> None:
+    made = METHODS[method]
+    assert of_texts(method, PPR) == made(encoder=Encoder(500))
+    assert of_texts(method, PPR).timing == Timing() == Timing(48_000_000, 960, 500)
+    assert Timing(10_000_000) == Timing.parse("10MHz", "20us", "10ms") == Timing(10_000_000, 200, 500)
+    for unit in ("count/tick", "rad/s", "rev/s", "rpm"):
+        spec = made(encoder=Encoder(500), unit=unit)
+        assert of_texts(method, PPR | {"unit": unit}) == spec
+        assert spec.frac_bits == (16 if unit == "count/tick" else 10)
+    texts = had_by(method, {"ppr": "20", "clock": "100MHz", "tick": "4", "max-time": "2000", "unit": "rpm"})
+    coarse = Timing(100_000_000, int(texts["tick"]), 500)
+    assert of_texts(method, texts) == made(encoder=Encoder(20), timing=coarse, unit="rpm")
+    assert of_texts(method, texts).frac_bits < 10  # as many as there can be
+    if not made.own_ticks:
+        external = of_texts(method, PPR | {"external-tick": "yes", "clock": "50MHz"})
+        assert external == made(encoder=Encoder(500), timing=Timing(50_000_000), max_tick_cycles=TWO_TICKS)
+        assert external.max_tick_cycles == 2000
+
+
+def test_every_option_does_what_it_says() -> None:
+    texts = """ppr=24 decoding=2 clock=1MHz tick=100us max-time=5ms external-tick=yes max-tick-period=150us unit=rpm
+        lsb=2^-3 velocity-width=20 max-speed=900rpm position-width=20 filter=3 index=yes index-reset=on age=1
+        bounds=true edge-error=0.25 lowpass=50rad/s cancel=no reciprocal=table"""
+    spec = of_texts("s", dict(word.split("=") for word in texts.split()))
+    assert spec == STachometer(
+        encoder=Encoder(24, 2),
+        timing=Timing(1_000_000, 100, 50),
+        max_tick_cycles=150,
+        unit="rpm",
+        frac_bits=3,
+        velocity_width=20,
+        max_speed=Speed.parse("900rpm"),
+        position_width=20,
+        filter_clocks=3,
+        index=True,
+        index_reset=True,
+        age=True,
+        bounds=True,
+        edge_error=Fraction(1, 4),
+        lowpass=Fraction(50),
+        cancel=False,
+        reciprocal_source="table",
+    )
+    assert {about.name for about in (*common_options(), *own_options("s"))} - {"dt", "frac-bits"} == {
+        word.split("=")[0] for word in texts.split()
+    }
+
+
+def test_what_help_shows_and_what_pairwise_tests_take() -> None:
+    """The default where it is a number or a text; both values of a flag, the default left out."""
+    shown = {about.name: about.shown for method in METHODS for about in (*common_options(), *own_options(method))}
+    assert {
+        name: shown[name] for name in ("lowpass", "adaptive", "index", "decoding", "timer", "min-time", "tick")
+    } == {
+        **{"lowpass": None, "adaptive": None, "index": None, "decoding": "4", "timer": "clock"},
+        **{"min-time": "a tick", "tick": "20us"},
+    }
+    options = {about.name: about for method in METHODS for about in (*common_options(), *own_options(method))}
+    assert [options[name].tested for name in ("cancel", "index", "bound-decay", "timer")] == [
+        *(("", "no"), ("", "yes"), ("", "no"), ("", "tick"))
+    ]
+    assert Timing() == Timing.parse()
+    assert [options[name].few for name in ("tick", "max-time", "decoding")] == [3, 3, 2]
+
+
+def test_none_is_leaving_it_out() -> None:
+    assert of_texts("m", PPR | {"average": None, "unit": None, "external-tick": "no"}) == of_texts("m", PPR)
+
+
+@pytest.mark.parametrize(
+    ("method", "texts", "message"),
+    [
+        ("x", {}, "method must be one of s, m, t, mt, rairan, track, not 'x'"),
+        ("s", {}, "ppr must be given"),
+        ("s", PPR | {"average": "2"}, "average must not be given with method s: it is for m"),
+        ("s", PPR | {"min-time": "2"}, "min_time must not be given with method s: it is for mt"),
+        ("m", PPR | {"timer": "tick"}, "timer must not be given with method m: it is for t and mt"),
+        ("m", PPR | {"colour": "red"}, "colour must not be given with method m: there is no such option"),
+        ("m", PPR | {"average": "1e3"}, "average must be a whole number, not '1e3'"),
+        ("s", PPR | {"index": "maybe"}, "index must be yes or no, not 'maybe'"),
+        ("s", PPR | {"dt": "1us"}, "dt must not be given with method s, but tick"),
+        ("rairan", PPR | {"dt": "1us", "tick": "1us"}, "dt must not be given together with --tick"),
+        ("s", PPR | {"lsb": "2^-3", "frac-bits": "3"}, "lsb must not be given together with --frac-bits"),
+        ("s", PPR | {"max-tick-period": "40us"}, "max_tick_period must be given together with --external-tick"),
+        ("s", PPR | {"index-reset": "yes"}, "index_reset must be given together with --index"),
+        ("s", PPR | {"max-time": "30us"}, "max_time must be a whole number of ticks, not 30us (1.5); nearest: "),
+        ("s", PPR | {"tick": "0"}, "tick must be longer than 0, not 0"),
+    ],
+)
+def test_errors_name_the_parameter(method: str, texts: dict[str, str], message: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{re.escape(message)}") as caught:
+        of_texts(method, texts)
+    assert message.startswith(caught.value.parameter)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_every_option_is_explained_in_sentences() -> None:
+    for method in METHODS:
+        for about in (*common_options(), *own_options(method)):
+            assert re.fullmatch(r"[A-Z].{15,}\.", about.help), about.name
+            assert not re.search(r"\b(same|told|flagged)\b", about.help), about.name
+
+
+def test_parameters_name_every_field() -> None:
+    for method in METHODS:
+        spec = of_texts(method, PPR)
+        fields = {about.field for about in (*common_options(), *own_options(method))}
+        assert set(spec.parameters) == fields | {"method"}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_parameters_say_which_core_it_is(method: str) -> None:
+    for words in configurations(method):
+        spec = spec_of(words)
+        described = manifest(spec)
+        assert manifest(of_parameters(json.loads(json.dumps(described["parameters"])))) == described, words
+
+
+def test_parameters_of_another_version_are_refused() -> None:
+    parameters = of_texts("s", {"ppr": "8"}).parameters
+    with pytest.raises(
+        ParameterError, match=r"^parameters must be those that this version of tachometry writes: later is none"
+    ):
+        of_parameters(parameters | {"later": 1})
+    with pytest.raises(ParameterError, match=r": max_ticks is missing$"):
+        of_parameters({name: value for name, value in parameters.items() if name != "max_ticks"})
+    with pytest.raises(ParameterError, match=r"^method must be one of s, m, t, mt, rairan, track, not 'x'$"):
+        of_parameters(parameters | {"method": "x"})
+    with pytest.raises(ParameterError, match="must be"):
+        of_parameters(parameters | {"tick_cycles": 0})

@@ -1,0 +1,200 @@
+"""Cores of many axes: what they are, and what is refused."""
+
+import json
+import pickle
+import re
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, STachometer, Timing
+from tachometry.spec.core.parameters import TWO_TICKS
+from tachometry.spec.registers.manifest import manifest
+
+ALONE = STachometer(
+    encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("1000rad/s")
+)
+
+
+def spec_of(axes: int = 8, *, tick: int = 960, parallel: bool = False, **options: Any) -> AxesSpec:
+    timing = Timing(48_000_000, tick, options.pop("max_ticks", 500))
+    return AxesSpec(tachometer=replace(ALONE, timing=timing, **options), axes=axes, parallel=parallel)
+
+
+@pytest.mark.parametrize(
+    ("axes", "tick", "slots"),
+    [(1, 960, 4), (4, 960, 4), (7, 960, 8), (8, 960, 8), (33, 960, 40), (64, 960, 64), (5, 341, 11)],
+)
+def test_a_round_is_the_least_divisor_of_the_tick_that_has_a_slot_for_every_axis(
+    axes: int, tick: int, slots: int
+) -> None:
+    spec = spec_of(axes, tick=tick)
+    assert (spec.slots, spec.rounds) == (slots, tick // slots)
+
+
+def test_an_axis_is_a_core_whose_clock_is_a_round() -> None:
+    spec = spec_of(8)
+    assert spec.axis.timing.tick_cycles == 120
+    assert spec.axis.timing.max_ticks == 500
+    # The greatest speed is as many counts in a tick as of a core of its own, if it can be looked at so often.
+    assert spec.axis.max_count == ALONE.max_count == 7
+    assert spec_of(8, max_speed=None).axis.max_count == 120
+    assert spec_of(64, tick=2560, max_speed=Speed(Fraction(10**6))).axis.max_count == 40
+    assert spec.axis.velocity_width == ALONE.velocity_width
+
+
+def test_it_is_the_same_in_another_process() -> None:
+    spec = spec_of(5, parallel=True)
+    again = pickle.loads(pickle.dumps(spec))
+    assert (again, again.axis, hash(again)) == (spec, spec.axis, hash(spec))
+
+
+def test_ports() -> None:
+    assert not AxesSpec(tachometer=ALONE, axes=2).parallel
+    strobed = {port.name: port.width for port in spec_of(5, index=True).ports}
+    assert {name: strobed[name] for name in ("a", "b", "z", "axis", "decode_error_axis", "index_axis")} == {
+        **dict.fromkeys(("a", "b", "z"), 5),
+        **dict.fromkeys(("axis", "decode_error_axis", "index_axis"), 3),
+    }
+    widths = [next(port.width for port in spec_of(axes).ports if port.name == "axis") for axes in (1, 2, 8, 9)]
+    assert widths == [1, 1, 3, 4]  # no port has no bits
+    held = spec_of(5, index=True, parallel=True)
+    values = {name for strobe in held.axis.strobes.values() for name in strobe}
+    assert {port.name for port in held.ports} == {
+        *strobed.keys() - values,
+        *(f"{name}_{axis}" for name in values for axis in range(5)),
+    }
+    assert all(port.help.endswith(".") for port in held.ports)
+
+
+def test_manifest() -> None:
+    spec = spec_of(8)
+    told = manifest(spec)
+    assert json.loads(json.dumps(told)) == told
+    assert told["axes"] == {
+        "axes": 8,
+        "parallel": False,
+        "round_cycles": 8,
+        "turn_cycles": spec.turn_cycles,
+        "first_tick": spec.tick_clock(0, 0),
+    }
+    assert told["velocity"] == manifest(ALONE)["velocity"]
+    assert manifest(spec_of(8, max_speed=None))["velocity"]["full_scale"] == 120
+    assert told["parameters"]["axes"] == 8
+    with pytest.raises(ParameterError, match=r"^name must not be that of a port, which 'position_4' is$"):
+        manifest(spec_of(5, parallel=True), "position_4")
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_latencies(parallel: bool) -> None:
+    """An axis is looked at last 8 clocks before the tick ends. Its count is handed over four clocks later.
+
+    A turn takes two clocks more than there are from turn to turn, and holding the values one more.
+    """
+    spec = spec_of(8, parallel=parallel)
+    assert [spec.look(axis, number) for axis, number in ((0, 0), (7, 0), (3, 5))] == [0, 7, 43]
+    first, turn = 960 - 8 + 4, spec.turn_cycles
+    for axis in range(8):
+        for tick in (0, 3):
+            clock = 960 * tick + first + axis * turn + turn + 2 + parallel
+            assert spec.tick_clock(axis, tick) == clock
+    told = manifest(spec)["latency_cycles"]
+    assert told == {"pin_to_count": 2 + 8 - 1, "tick_latency": spec.tick_clock(7, 0) - 959, "tick_to_velocity": 0}
+
+
+def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
+    """In rounds; and two ticks and a round for what all axes share."""
+    for spec in (spec_of(), spec_of(3, tick=1000), spec_of(5, tick=1000)):
+        own = spec.axis.recovery_clocks
+        assert own is not None
+        shared = 2 * spec.timing.tick_cycles + {8: 8, 4: 4, 5: 8}[spec.slots]
+        assert spec.recovery_clocks == manifest(spec, "t")["recovery_cycles"] == spec.slots * own + shared
+
+
+@pytest.mark.parametrize(
+    ("axes", "options", "told"),
+    [
+        (0, {}, "axes must be from 1 to 64, not 0"),
+        (65, {}, "axes must be from 1 to 64, not 65"),
+        (
+            8,
+            {"unit": "rpm"},
+            "unit must not be given together with axes: the conversion of the velocity is for one axis",
+        ),
+        (8, {"filter_clocks": 2}, "filter_clocks must not be given together with axes: "),
+        (8, {"index": True, "index_reset": True}, "index_reset must not be given together with axes: "),
+        (8, {"max_tick_cycles": TWO_TICKS}, "external-tick must not be given together with axes: "),
+        (8, {"age": True}, "age must not be given together with axes: "),
+        (8, {"bounds": True}, "bounds must not be given together with axes: "),
+        (8, {"lowpass": Fraction(100)}, "lowpass must not be given together with axes: "),
+        (8, {"velocity_width": 22}, "velocity_width must not be given together with axes: "),
+        (8, {"max_ticks": 4096}, "max_ticks must be at most 2048 with axes, not 4096: 1/m_s is looked up"),
+        (8, {"max_ticks": 2048}, ""),
+        (8, {"tick": 67 * 16}, ""),
+        (
+            8,
+            {"tick": 997},
+            "tick_cycles must be a multiple of a number from 8 to 64, and long enough for a turn of ",
+        ),
+        (
+            2,
+            {"tick": 998},
+            "tick_cycles must be a multiple of a number from 4 to 64, and long enough for a turn of ",
+        ),
+        (64, {"tick": 1000}, "tick_cycles must be a multiple of 64, and long enough for a turn of "),
+    ],
+)
+def test_what_is_refused(axes: int, options: dict[str, Any], told: str) -> None:
+    if not told:
+        spec_of(axes, **options)
+        return
+    with pytest.raises(ParameterError) as error:
+        spec_of(axes, **options)
+    assert str(error.value).startswith(told)
+
+
+def test_a_tick_has_a_turn_for_every_axis() -> None:
+    """The ticks that a refused one is told to be are the nearest that there are."""
+    fit, told = [], {}
+    for tick in range(8, 200):
+        try:
+            spec = spec_of(8, tick=tick, max_ticks=100)
+        except ParameterError as error:
+            found = re.search(r" with --axes 8: (\d+)(?: or (\d+))?, not (\d+)$", str(error))
+            assert found is not None
+            assert int(found[3]) == tick
+            told[tick] = [int(number) for number in found.groups()[:2] if number]
+        else:
+            assert tick % spec.slots == 0
+            assert 8 * spec.turn_cycles + spec.slots <= tick
+            fit.append(tick)
+    assert len(fit) > 40
+    for tick, near in told.items():
+        if tick < fit[-1]:
+            below = [one for one in fit if one < tick]
+            assert near == [*below[-1:], next(one for one in fit if one > tick)]
+
+
+def test_times_are_in_clocks_of_the_core() -> None:
+    """Though those of an axis are rounds: an LSB of the interval is a tick, as in the manifest."""
+    spec = spec_of(8)
+    (interval,) = (port for port in spec.ports if port.name == "interval")
+    assert interval.unit == "960 clocks"
+    assert manifest(spec)["interval_unit_cycles"] == 960
+    held = spec_of(3, tick=1000, parallel=True)
+    assert {port.unit for port in held.ports if port.name.startswith("interval")} == {"1000 clocks"}
+
+
+def test_a_speed_that_is_looked_at_too_seldom_is_told() -> None:
+    assert spec_of(8).notes == spec_of(8, max_speed=None).notes == ()
+    (note,) = spec_of(8, max_speed=Speed(Fraction(10**6))).notes
+    assert note.startswith("greatest speed: an axis is looked at 120 times in a tick")
+
+
+def test_the_reciprocal_is_that_of_a_table() -> None:
+    for source in ("serial", "table"):
+        spec = spec_of(8, reciprocal_source=source)
+        assert spec.parameters["reciprocal_source"] == "table"
+        assert spec.memory[0] == "table"
