@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 LAYERS := spec hdl sim boards cli
-SOURCES := $(LAYERS) tests
+PIP    := $(BIN)/pip install -q --disable-pip-version-check
 
 export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
@@ -14,42 +14,32 @@ export MPLBACKEND := Agg
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
 
-# An editable install does not show the folder mapping to mypy and editors; the links do.
-$(VENV)/.run: pyproject.toml
+# An editable install links each file, so other files need another one.
+LINKED := build/.linked-$(firstword $(shell find $(LAYERS) package -type f ! -name '*.pyc' | LC_ALL=C sort | cksum))
+
+$(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, not " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install -q --disable-pip-version-check -e .
-	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
-	mkdir -p $$site/tachometry && for item in $(LAYERS) package/*.*; do ln -sfn "$(CURDIR)/$$item" $$site/tachometry/$${item#package/}; done
 	@touch $@
 
-$(VENV)/.test: $(VENV)/.run
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[test]'
-	@command -v c++ g++ clang++ >/dev/null || $(BIN)/pip install -q --disable-pip-version-check ziglang
+$(LINKED): pyproject.toml $(VENV)/.made
+	$(PIP) -e .
+	@rm -f build/.linked-* && touch $@
+
+$(VENV)/.test $(VENV)/.size $(VENV)/.docs: $(VENV)/.%: $(LINKED)
+	$(PIP) -e '.[$*]' $$(command -v c++ g++ clang++ >/dev/null || echo ziglang)
 	@touch $@
 
-$(VENV)/.size: $(VENV)/.run
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[size]'
-	@touch $@
-
-$(VENV)/.boards: $(VENV)/.test
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[boards]'
-	@touch $@
-
-$(VENV)/.formal: $(VENV)/.test
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[formal]'
-	@touch $@
-
-$(VENV)/.docs: $(VENV)/.run
-	$(BIN)/pip install -q --disable-pip-version-check -e '.[docs]'
+$(VENV)/.boards $(VENV)/.formal: $(VENV)/.%: $(VENV)/.test
+	$(PIP) -e '.[$*]'
 	@touch $@
 
 venv: $(VENV)/.test ## the environment in .venv, with all that tests need
 
-demo: $(VENV)/.run ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
+demo: $(LINKED) ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
 	BIN=$(BIN) sh docs/demo.sh
 
-figures: $(VENV)/.run ## the papers' figures anew in build/figures, held against what the papers say, see docs/figures.md
+figures: $(LINKED) ## the papers' figures anew in build/figures, held against what the papers say, see docs/figures.md
 	$(BIN)/tachometry figures -o build/figures
 
 icarus: ## Icarus Verilog, installed with apt-get if it is missing
@@ -90,7 +80,7 @@ verify: $(VENV)/.test ## every method on every engine against the golden models,
 	$(BIN)/tachometry verify --clocks 1000000000 -o build/verify
 	$(BIN)/tachometry verify --engines cxxrtl-every-clock --clocks 1000000000 -o build/verify
 
-compare: $(VENV)/.run ## all methods and what others use in several situations, written to docs/compare.md
+compare: $(LINKED) ## all methods and what others use in several situations, written to docs/compare.md
 	$(BIN)/python bench/compare.py
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
@@ -100,7 +90,7 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 	$(BIN)/python bench/boards.py -o docs/boards.md
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
-docs: $(VENV)/.run ## the pages of options, ports and registers, written to docs/{options,ports,registers}.md
+docs: $(LINKED) ## the pages of options, ports and registers, written to docs/{options,ports,registers}.md
 	$(BIN)/python bench/reference.py
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
