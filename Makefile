@@ -39,7 +39,7 @@ venv: $(VENV)/.test ## the environment in .venv, with all that tests need
 demo: $(LINKED) ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
 	BIN=$(BIN) sh docs/demo.sh
 
-figures: $(LINKED) ## the papers' figures anew in build/figures, held against what the papers say, see docs/figures.md
+figures: $(LINKED) ## the papers' figures anew in build/figures, held against what the papers say, see docs/measured/figures.md
 	$(BIN)/tachometry figures -o build/figures
 
 icarus: ## Icarus Verilog, installed with apt-get if it is missing
@@ -57,40 +57,40 @@ pytest: $(VENV)/.test icarus
 test-all: lint icarus ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
 
-formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/verification.md
+formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/concepts/verification.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.formal
 
 formal-quick: $(VENV)/.formal ## the same of a small core for every checker, and without mutants
 	PYTHONPATH=tests $(BIN)/python -m proofs.formal quick
 
-upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, see docs/verification.md
+upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, see docs/concepts/verification.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.upset
 
-mutate: $(VENV)/.test icarus ## how many wrong cores and wrong lines of Python the tests notice, see docs/verification.md
+mutate: $(VENV)/.test icarus ## how many wrong cores and wrong lines of Python the tests notice, see docs/concepts/verification.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.mutation
 	PYTHONPATH=tests $(BIN)/python -m proofs.python_mutation
 
-bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, in one run, written to docs/bench.md
-	$(BIN)/python bench/golden.py -o docs/bench.md
-	$(BIN)/python bench/engines.py -o docs/bench.md
-	$(BIN)/python bench/sweep.py -o docs/bench.md
-	$(BIN)/python bench/monitor.py -o docs/monitor.svg
+bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, in one run, written to docs/measured/bench.md
+	$(BIN)/python bench/golden.py -o docs/measured/bench.md
+	$(BIN)/python bench/engines.py -o docs/measured/bench.md
+	$(BIN)/python bench/sweep.py -o docs/measured/bench.md
+	$(BIN)/python bench/monitor.py -o docs/guides/monitor.svg
 
 verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks
 	$(BIN)/tachometry verify --clocks 1000000000 -o build/verify
 	$(BIN)/tachometry verify --engines cxxrtl-every-clock --clocks 1000000000 -o build/verify
 
-compare: $(LINKED) ## all methods and what others use in several situations, written to docs/compare.md
+compare: $(LINKED) ## all methods and what others use in several situations, written to docs/measured/compare.md
 	$(BIN)/python bench/compare.py
 
-size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/size.md
-	$(BIN)/python bench/size.py -o docs/size.md
+size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/measured/size.md
+	$(BIN)/python bench/size.py -o docs/measured/size.md
 
-bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/boards.md, and all checks of bitstreams
-	$(BIN)/python bench/boards.py -o docs/boards.md
+bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/guides/boards.md, and all checks of bitstreams
+	$(BIN)/python bench/boards.py -o docs/guides/boards.md
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
-docs: $(LINKED) ## the pages of options, ports and registers, written to docs/{options,ports,registers}.md
+docs: $(LINKED) ## the pages of options, ports and registers, written to docs/reference
 	$(BIN)/python bench/reference.py
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api

@@ -1,4 +1,4 @@
-"""Bitstreams of three boards, as `tachometry build` makes them: writes their figures into docs/boards.md.
+"""Bitstreams of three boards, as `tachometry build` makes them: writes their figures into docs/guides/boards.md.
 
 Exit codes: 0, 2 if a bitstream cannot be made.
 """
@@ -18,7 +18,7 @@ from pages import markdown, write_from
 from tachometry.boards.fpga.boards import BOARDS
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "boards.md"
+PAGE = ROOT / "docs" / "guides" / "boards.md"
 HEADING = "## Figures"
 BUILT = ("tang-nano-9k", "icebreaker", "ulx3s-25f")
 CORE = ("--ppr", "500", "--max-speed", "1000rad/s", "--filter", "4")

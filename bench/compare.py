@@ -1,4 +1,4 @@
-"""All methods and what others use, in several situations: writes docs/compare.md.
+"""All methods and what others use, in several situations: writes docs/measured/compare.md.
 
 First a table of all situations, with rivals tuned for each; then a table and a command for each of some.
 """
@@ -19,7 +19,7 @@ from pages import markdown, write
 
 from tachometry.cli.main import main as tachometry
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "compare.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "measured" / "compare.md"
 FIGURE = PAGE.with_name("compare.png")
 CORE = "--ppr 500 --clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/s"
 
@@ -235,14 +235,14 @@ def section(situation: Situation) -> str:
 
 def figure() -> str:
     """The part of the page with the figure, which is written as well."""
-    command = f"tachometry compare {CORE} {COSTS} --tradeoff docs/{FIGURE.name}"
-    rows(command.replace(f"docs/{FIGURE.name}", shlex.quote(str(FIGURE))))
+    command = f"tachometry compare {CORE} {COSTS} --tradeoff docs/measured/{FIGURE.name}"
+    rows(command.replace(f"docs/measured/{FIGURE.name}", shlex.quote(str(FIGURE))))
     shown = re.sub(" (?=--(methods|jitter|tradeoff))", " \\\\\n        ", command)
     return f"{ABOUT_COSTS}\n    {shown}\n\n![RMS error over equivalent delay of all methods]({FIGURE.name})\n"
 
 
 def page(n_seeds: int, jobs: int) -> str:
-    """The page docs/compare.md."""
+    """The page docs/measured/compare.md."""
     table_of_all = situations.part(n_seeds, jobs)
     models = f"{ABOUT_MODELS}\n{situations.model_table()}"
     return "\n".join([HEAD + table_of_all, figure(), models, SINGLE, *map(section, SITUATIONS)])

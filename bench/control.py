@@ -1,4 +1,4 @@
-"""The tables and the figure of docs/control.md: what a velocity loop about a core can do, mean of seeds."""
+"""The tables and the figure of docs/concepts/control.md: what a velocity loop about a core can do, mean of seeds."""
 
 import argparse
 import functools

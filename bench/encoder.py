@@ -1,7 +1,7 @@
-"""What imperfections of an encoder look like and what the core makes of them: picture and table of docs/encoder.md.
+"""Draws imperfections of an encoder and measures what the core makes of them, for docs/guides/encoder.md.
 
 The lines are drawn and the golden model run at constant speed; everything is exact, so that the files are the same on
-every machine. `python bench/encoder.py` writes docs/encoder.svg and the table in docs/encoder.md anew.
+every machine. `python bench/encoder.py` writes docs/guides/encoder.svg and the table in docs/guides/encoder.md anew.
 """
 
 import math
@@ -23,7 +23,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import HeldVelocity, held_velocity, velocity_error
 from tachometry.spec import Encoder, STachometer, Timing
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "guides"
 TABLE = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end of table -->)", re.DOTALL)
 
 FloatArray = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What is gained if the errors of a disc are learned from its own edges: the tables of docs/encoder-errors.md.
+"""What is gained if the errors of a disc are learned from its own edges: the tables of docs/concepts/encoder-errors.md.
 
 `python bench/encoder_errors.py` writes them anew. To study another method, add its estimator to `METHODS`.
 """
@@ -30,7 +30,7 @@ from tachometry.sim.studies.comparing.encoder_errors import (
 from tachometry.sim.theory.tracking import Tuning
 from tachometry.spec import Encoder, Speed, Timing, TrackTachometer
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "encoder-errors.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "concepts" / "encoder-errors.md"
 LINES = 500
 SEEDS = (1, 2, 3)
 FloatArray = NDArray[np.float64]

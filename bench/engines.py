@@ -1,4 +1,4 @@
-"""Speed of the engines on the same edges in the same run, and what makes the compiled one fast: part of docs/bench.md.
+"""Measures all engines on the same edges in one run, for docs/measured/bench.md.
 
 Times are processor time, so that what else runs on the machine matters little; still only the ratios mean something.
 """
@@ -261,7 +261,7 @@ def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[l
 def main() -> None:
     """Measure, print, and replace this part of the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/bench.md")
+    parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/measured/bench.md")
     parser.add_argument("--alone", nargs=2, metavar=("METHOD", "ENGINE"), help="only simulate, to be measured")
     options = parser.parse_args()
     output = options.output

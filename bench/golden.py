@@ -1,4 +1,4 @@
-"""Speed of the golden models beside the simulator, on the same edges in the same run: writes docs/bench.md.
+"""Speed of the golden models beside the simulator, on the same edges in the same run: writes docs/measured/bench.md.
 
 A golden model is vectorised over a whole recording; the simulator works clock by clock, so that it is given the first
 part of it only. Only the ratios mean something: they are of one machine at one time.
@@ -120,7 +120,7 @@ def cores() -> dict[str, TachometerSpec]:
 def main() -> None:
     """Measure, print, and write the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, help="page to be written, docs/bench.md")
+    parser.add_argument("-o", "--output", type=Path, help="page to be written, docs/measured/bench.md")
     output = parser.parse_args().output
     encoder = VirtualEncoder(500, jitter=0.02, vibration=Vibration(1e-3, 50), seed=1)
     trace = encoder.record(parse_motion(MOTION)).recording.place(48_000_000)

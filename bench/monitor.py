@@ -1,4 +1,4 @@
-"""The picture of the live view, docs/monitor.svg, from a simulated board: speeds, a reversal and a standstill."""
+"""Draws the live view of a simulated board, docs/guides/monitor.svg: speeds, a reversal and a standstill."""
 
 from io import StringIO
 from pathlib import Path
@@ -17,7 +17,7 @@ from tachometry.spec import of_texts
 from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
-PICTURE = Path(__file__).resolve().parent.parent / "docs" / "monitor.svg"
+PICTURE = Path(__file__).resolve().parent.parent / "docs" / "guides" / "monitor.svg"
 CORE = {"ppr": "500", "clock": "12MHz", "max-speed": "1000rad/s", "filter": "4", "age": "yes"}
 STEP = 12_000  # clocks of a look at the line
 # Settings, each with the seconds that it lasts.

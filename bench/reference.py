@@ -1,4 +1,4 @@
-"""The reference pages of the documentation, docs/{options,ports,registers}.md, from what the code declares."""
+"""The reference pages of the documentation, docs/reference, from what the code declares."""
 
 import re
 from dataclasses import replace
@@ -19,7 +19,7 @@ from tachometry.spec.registers.buses import BUSES
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "reference"
 # Cores with all ports that the methods have.
 EVERYTHING: dict[str, str | None] = {
     "ppr": "500",
@@ -30,7 +30,7 @@ EVERYTHING: dict[str, str | None] = {
     "velocity-width": "20",
 }
 EXTERNAL = {"external-tick": "yes"}
-# The core whose registers are shown: that of docs/integration.md.
+# The core whose registers are shown: that of docs/guides/integration.md.
 SPEED = {
     **{"ppr": "2500", "max-speed": "4000rpm", "clock": "100MHz", "tick": "50us", "max-time": "10ms"},
     **{"external-tick": "yes", "unit": "rpm", "lsb": "2^-4", "velocity-width": "18", "age": "yes"},
@@ -49,7 +49,8 @@ With `--loop --gains inputs` these are added: what the loop shows, its commands 
   registers is written so, too. LOOP.enable is never frozen.
 - A value beyond what a register can have is held at the nearest that it can, and is read so. A commanded position
   wraps, as positions do.
-- No value makes the loop overflow. See [integration.md](integration.md#gains-that-can-be-changed) for what gains mean.
+- No value makes the loop overflow. [Integration](../guides/integration.md#gains-that-can-be-changed) says
+  what gains mean.
 - Current, filtered velocity and disturbance are those of the last `current_valid`, what a generator commands that of
   the last `control_tick`.
 
@@ -154,9 +155,9 @@ print(now.velocity_rad_per_s, now["position"], now.flags["stalled"], client.coun
 
 ## An example
 
-The core of [integration](integration.md#an-example-a-servo-drive), with `--age` and `--bus wishbone`. Offsets are in
-bytes, and bits that are not listed read 0. Writing a register without a field that can be written is an error, and so
-is any access where there is no register.
+The core of [integration](../guides/integration.md#an-example-a-servo-drive), with `--age` and `--bus wishbone`.
+Offsets are in bytes, and bits that are not listed read 0. Writing a register without a field that can be written is an
+error, and so is any access where there is no register.
 
 """
 
@@ -218,7 +219,7 @@ def ports() -> str:
             "# Ports\n",
             "Made by `make docs` from `spec.ports`. A *strobe* is high for one clock; an output *with* a strobe is new "
             "in its clocks, and held until the next. Widths depend on the options: the manifest NAME.json has those "
-            "of your core. Those of a core of many axes are in [axes](axes.md#ports).\n",
+            "of your core. Those of a core of many axes are in [axes](../concepts/axes.md#ports).\n",
             markdown(_HEADER, rows, left=range(4)),
             "\nThe manifest states the latencies: a level sampled at clock c is counted in the window of c + "
             "`pin_to_count`, `tick` is high `tick_latency` clocks after the window's last clock, and `velocity_valid` "
@@ -284,7 +285,7 @@ def _cores(method: str) -> list[TachometerSpec]:
 @click.command()
 @click.option("-o", "--output", "folder", type=click.Path(path_type=Path), default=DOCS, help="Folder of the pages.")
 def main(folder: Path) -> None:
-    """Write docs/options.md, docs/ports.md and docs/registers.md."""
+    """Write docs/reference/options.md, docs/reference/ports.md and docs/reference/registers.md."""
     write(folder / "options.md", options())
     write(folder / "ports.md", ports())
     write(folder / "registers.md", registers())

@@ -1,6 +1,6 @@
 """The table of all situations: cores as they are, and every rival with its best setting for the row.
 
-Part of docs/compare.md.
+Part of docs/measured/compare.md.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Size and speed of the cores on three FPGAs, measured with open tools: writes docs/size.md.
+"""Size and speed of the cores on three FPGAs, measured with open tools: writes docs/measured/size.md.
 
 Area is that of the core alone, packed but not placed. Fmax is that of the core in a wrapper of registers, routed, the
 median over nine seeds, or as many as are asked for; without `--only` it is measured where it has a bar. A second run
@@ -35,7 +35,7 @@ from tachometry.sim.studies.size import (
 )
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "size.md"
+PAGE = ROOT / "docs" / "measured" / "size.md"
 Item = TypeVar("Item")
 
 
@@ -80,8 +80,8 @@ class Table:
 # Why a bar is missed, by its core.
 MISSED = {
     "bus-native": "It has some flip-flops more than planned.",
-    "m-10": "Its carry chain of 41 bits is the longest of these cores. Two shorter ones, as [S](s-method.md) has, need "
-    "a reciprocal that is divided, and that of the mean is a constant.",
+    "m-10": "Its carry chain of 41 bits is the longest of these cores. Two shorter ones, as "
+    "[S](../concepts/s-method.md) has, need a reciprocal that is divided, and that of the mean is a constant.",
 }
 PEERS = Table(
     "Peers",
@@ -319,7 +319,7 @@ def tables(results: Results) -> list[Table]:
 
 
 def page(measured: Sequence[Table], tools: Mapping[str, str]) -> str:
-    """The page docs/size.md."""
+    """The page docs/measured/size.md."""
     used = ", ".join(f"{package} {version}" for package, version in tools.items())
     return PAGE_HEAD.format(used=used) + "\n".join(table.markdown() for table in [*measured, PEERS, PEER_SOURCES])
 
@@ -335,7 +335,9 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--targets", nargs="+", choices=TARGETS, default=tuple(TARGETS), help="FPGAs (all)")
     parser.add_argument("--boxes", action="store_true", help="also print the area of each box")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="page (docs/size.md; of a part: none)")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="page (that of docs/measured; of a part: none)"
+    )
     options = parser.parse_args(words)
     if options.jobs < 1:
         parser.error(f"--jobs must be at least 1, not {options.jobs}")

@@ -1,4 +1,4 @@
-"""Points per second of `tachometry sweep`: part of docs/bench.md."""
+"""Points per second of `tachometry sweep`: part of docs/measured/bench.md."""
 
 import argparse
 import os
@@ -16,14 +16,15 @@ from tachometry.cli.sweeping.settings import of_file
 from tachometry.sim.studies.sweeping import cluster
 from tachometry.sim.studies.sweeping.sweep import Point, run_point
 
-FILE = Path(__file__).parents[1] / "docs" / "sweep.toml"
+FILE = Path(__file__).parents[1] / "docs" / "guides" / "sweep.toml"
 COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]
 
 _HEADING = "## Sweeps"
 _PAGE = """
-These are the points of [sweep.toml](sweep.toml), 200 ms each by the golden model. They run one after the other without
-Dask, and then in processes of `tachometry sweep`. The start lasts until the workers have connected; each of them then
-imports numpy. The start is not included in points/s. Processor time includes all of it, and that of the scheduler.
+These are the points of [sweep.toml](../guides/sweep.toml), 200 ms each by the golden model. They run one after
+the other without Dask, and then in processes of `tachometry sweep`. The start lasts until the workers have connected;
+each of them then imports numpy. The start is not included in points/s. Processor time includes all of it, and
+that of the scheduler.
 
 {table}"""
 
@@ -76,7 +77,7 @@ def table(jobs: Iterable[int]) -> list[list[str]]:
 def main() -> None:
     """Measure, print, and replace this part of the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/bench.md")
+    parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/measured/bench.md")
     output = parser.parse_args().output
     rows = table(sorted({1, os.cpu_count() or 1}))
     print_table(COLUMNS, rows)

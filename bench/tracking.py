@@ -1,4 +1,4 @@
-"""The errors of the tracking method when an update appears, for docs/track.md: mean and spread over seeds."""
+"""The errors of the tracking method when an update appears, for docs/concepts/track.md: mean and spread over seeds."""
 
 import argparse
 import math

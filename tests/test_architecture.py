@@ -1,4 +1,4 @@
-"""Which room may import which, and what the project promises of its folders. docs/architecture.md explains them."""
+"""Which room may import which, and what folders promise. docs/concepts/architecture.md explains them."""
 
 import ast
 import sys

@@ -1,13 +1,14 @@
-"""The drive of docs/integration.md, as a user would: the command, one's own Verilog top, and a simulation of it."""
+"""The drive of docs/guides/integration.md, as a user would: the command, one's own Verilog top, its simulation."""
 
 import re
 import subprocess
 from pathlib import Path
 
 import pytest
+from support import docs
 from support.command import run
 
-PAGE = (Path(__file__).parent.parent / "docs" / "integration.md").read_text(encoding="utf-8")
+PAGE = docs.page("guides/integration.md")
 # 3,050 rpm forward, then 1,000 rpm backward: counts of 10,000 a revolution, and clocks of 10 ns, in a quarter period.
 FORWARD, BACKWARD = 100e6 * 60 / (10_000 * 3050), 100e6 * 60 / (10_000 * 1000)
 

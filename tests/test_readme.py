@@ -70,9 +70,9 @@ def test_demo_without_a_compiler(tmp_path: Path) -> None:
 
 
 def test_python_examples(capsys: pytest.CaptureFixture[str]) -> None:
-    """The examples build on each other; the one of docs/testbench.md runs the simulation."""
+    """The examples build on each other; the one of docs/guides/testbench.md runs the simulation."""
     namespace: dict[str, object] = {"__name__": "readme"}
-    page = (ROOT / "docs" / "testbench.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "guides" / "testbench.md").read_text(encoding="utf-8")
     for number, block in enumerate([*blocks("python"), *blocks("python", page)]):
         exec(compile(block, f"<README example {number}>", "exec"), namespace)
     speed = re.search(r"the alarm came at ([\d.]+) rad/s", capsys.readouterr().out)
@@ -98,17 +98,17 @@ def test_numbers_of_the_table_of_methods_are_those_of_the_pages(method: str) -> 
     assert line is not None
     _, _, _, noise, delay, standstill, comb, when = (cell.strip() for cell in line[0].strip("|").split("|"))
     ideal, real = noise.removesuffix(" rad/s").split(" / ")
-    assert alike(ideal, cells("compare.md", "Ramp", method)[3])
-    assert alike(real, cells("compare.md", "Ramp, real encoder", method)[3])
-    assert alike(delay.removesuffix(" ms"), cells("compare.md", "Reversals", method)[5])
+    assert alike(ideal, cells("measured/compare.md", "Ramp", method)[3])
+    assert alike(real, cells("measured/compare.md", "Ramp, real encoder", method)[3])
+    assert alike(delay.removesuffix(" ms"), cells("measured/compare.md", "Reversals", method)[5])
     row = {"s": "reference", "track": "track-20-bits"}.get(method, f"{method}-max-speed")
-    assert comb == cells("size.md", "ECP5 (LFE5U-25F, CABGA256)", row)[2]
+    assert comb == cells("measured/size.md", "ECP5 (LFE5U-25F, CABGA256)", row)[2]
     texts = {"ppr": "500", "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
     spec = of_texts(method, texts)
     rest = float(1000 * spec.standstill_ticks * spec.timing.tick_seconds)
     assert standstill.split(",")[0] == f"{rest:g} ms"
     if "--min-time 1ms" in when:
-        assert f"{float(cells('compare.md', 'Ramp, real encoder', 'mt:min-time=1ms')[3]):.2g} rad/s" in when
+        assert f"{float(cells('measured/compare.md', 'Ramp, real encoder', 'mt:min-time=1ms')[3]):.2g} rad/s" in when
 
 
 def test_pictures_are_there() -> None:
@@ -120,7 +120,7 @@ def test_it_is_short() -> None:
     assert len(TEXT.splitlines()) <= 150
 
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*/*.md"))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -138,5 +138,5 @@ def test_files_that_are_named_are_there(page: Path) -> None:
 
 
 def test_every_page_is_one_step_from_the_readme() -> None:
-    for page in (ROOT / "docs").glob("*.md"):
-        assert f"docs/{page.name}" in TEXT, page.name
+    for page in (ROOT / "docs").glob("*/*.md"):
+        assert page.relative_to(ROOT).as_posix() in TEXT, page.name

@@ -1,4 +1,4 @@
-// The M/T method as textbooks draw it, with a serial divider: a peer of the cores, for docs/size.md.
+// The M/T method as textbooks draw it, with a serial divider: a peer of the cores, for docs/measured/size.md.
 //
 // A window is 960 clocks: 20 us at 48 MHz. Over the windows since the last one with edges, `count` sums the edges of A
 // and B (x4, signed), and the clock timer is read at each edge. At the end of a window with edges

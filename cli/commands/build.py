@@ -93,7 +93,7 @@ def build(
     The tools are Python packages: pip install 'tachometry[boards]'. A design that is too slow for the clock of the
     board is refused. What was built is printed: cells, memories, and the greatest frequency.
 
-    Pins and wiring of every board are in docs/boards.md.
+    Pins and wiring of every board are in docs/guides/boards.md.
     """
     begun = time.monotonic()
     check_module_name(name)

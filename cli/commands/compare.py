@@ -55,7 +55,7 @@ Examples:
     help="Methods to compare: all, or names with commas between. Methods take options, as in m:average=10 or "
     "hostmot2:period=500us. difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use; "
     "least-squares, foaw and kalman are float models of estimators in the literature. "
-    "docs/compare.md has their options.",
+    "docs/measured/compare.md has their options.",
 )
 @option(
     "Methods",

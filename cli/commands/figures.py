@@ -52,7 +52,7 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
     """Draw the papers' figures anew, and tell which agree.
 
     Each is computed from the equations and the golden models, and held against what its paper says of it: the table at
-    the end shows what came out. See docs/figures.md.
+    the end shows what came out. See docs/measured/figures.md.
 
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """

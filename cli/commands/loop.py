@@ -70,7 +70,7 @@ Examples:
     "--scheduler",
     metavar="ADDRESS",
     help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
-    "Whoever can connect to it can run code there and here, see docs/sweep.md.",
+    "Whoever can connect to it can run code there and here, see docs/guides/sweep.md.",
 )
 @output(
     "--plot",
@@ -98,7 +98,7 @@ def loop(
     Pins of the core see the encoder of a motor with friction, load and torque noise. Its velocity and position go to a
     controller with a disturbance observer (Tsuji 2009, Figs. 2 and 11), which commands the motor's current. Core,
     motor and controller run in one compiled program, the core clock by clock, the rest in double precision. --motion
-    is the speed that is commanded, and its integral the angle. docs/control.md has the equations.
+    is the speed that is commanded, and its integral the angle. docs/concepts/control.md has the equations.
 
     The table has the RMS and the greatest error of the true speed, the dip under --load, the commanded current above
     50 Hz (what is heard), and the share of the time in which it is at its limit: means of all seeds, but the greatest
@@ -192,7 +192,7 @@ def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, R
             cluster.cluster(scheduler, jobs) as client,
             progress_bar("running", len(found.points), *columns) as report,
         ):
-            for row in cluster.rows(client, found.points, "loops"):
+            for row in cluster.rows(client, found.points, "loops.loops"):
                 rows[row["point"]] = row
                 if report is not None:
                     report(len(rows))

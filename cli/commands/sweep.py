@@ -43,11 +43,11 @@ METRICS = {
 
 \b
 Examples:
-  tachometry sweep docs/sweep.toml
+  tachometry sweep docs/guides/sweep.toml
   tachometry sweep --ppr 500 --motion "constant:{{speed}}:200ms" \\
       --vary speed=1rad/s..1000rad/s:20log --vary tick=10us,20us,50us \\
       --methods s,mt --results sweep.parquet --plot sweep.png
-  tachometry sweep docs/sweep.toml --vary seed=1..10:10 \\
+  tachometry sweep docs/guides/sweep.toml --vary seed=1..10:10 \\
       --scheduler tcp://host:8786""",
 )
 @click.argument("file", required=False, type=FilePath())
@@ -93,7 +93,7 @@ Examples:
     "--scheduler",
     metavar="ADDRESS",
     help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
-    "Whoever can connect to it can run code there and here, see docs/sweep.md.",
+    "Whoever can connect to it can run code there and here, see docs/guides/sweep.md.",
 )
 @output(
     "--results",

@@ -72,7 +72,7 @@ def print_comparison(
         tried = f"; best of {n_tried[row.name]} settings" if row.name in n_tried else ""
         console.print(Text(f"{row.name}: {row.what}{tried}"))
     if sizes:
-        console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/size.md")
+        console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/measured/size.md")
     for name, spec in named.specs.items():
         for note in spec.notes if spec is not None else ():
             console.print(Text(f"{name}: {note}"))

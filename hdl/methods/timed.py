@@ -13,7 +13,7 @@ from tachometry.spec.methods.timed import TimedTachometer
 
 
 class TimedDatapath(wiring.Component):
-    """From counts to velocities; `_window` of a method says when a measurement ends. docs/timed.md has the rules.
+    """From counts to velocities; `_window` of a method says when a measurement ends (docs/concepts/timed.md).
 
     Latency: an update comes `spec.datapath_latency` clocks after the `step`, or the `tick`, that causes it.
 

@@ -1,4 +1,4 @@
-"""The tracking recursion of docs/track.md in double precision, and in real units: counts, seconds, rad/s.
+"""The tracking recursion of docs/concepts/track.md in double precision, and in real units: counts, seconds, rad/s.
 
 It knows nothing of words, shifts and programs. What it takes from a spec are its options, the length of the ticks, the
 greatest speed and the delay to the port.

@@ -218,8 +218,8 @@ class TachometerSpec(Numbers, HasPorts):
     def recovery_clocks(self) -> int | None:
         """Clocks after which, from any state of the flip-flops, all outputs are right again; position aside.
 
-        docs/verification.md defines when outputs are right. Counters that an upset has set beyond their ends continue
-        until they wrap. None: the core has a low-pass filter, which forgets only gradually.
+        docs/concepts/verification.md defines when outputs are right. Counters that an upset has set beyond their ends
+        continue until they wrap. None: the core has a low-pass filter, which forgets only gradually.
         """
         if self.lowpass is not None:
             return None

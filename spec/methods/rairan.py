@@ -22,7 +22,7 @@ class RairanTachometer(TachometerSpec):
 
     A window begins with a count. It lasts dt, which has Nep1 counts (high speeds, n1 = Nep1), or until the next count,
     Ndt1 whole dt later (low speeds, n1 = 1/Ndt1). Velocity is n1, n2 or n3 in counts per tick, dt being the tick,
-    correctly rounded. What it does at reversals and at rest is in docs/rairan.md.
+    correctly rounded. What it does at reversals and at rest is in docs/concepts/rairan.md.
 
     Parameters
     ----------

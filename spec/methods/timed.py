@@ -14,7 +14,7 @@ _TIMERS = ("clock", "tick")
 
 @dataclass(frozen=True, kw_only=True)
 class TimedTachometer(TachometerSpec):
-    """A quotient of counts and time, by a serial divider; docs/timed.md has the rules of every case.
+    """A quotient of counts and time, by a serial divider; docs/concepts/timed.md has the rules of every case.
 
     Parameters
     ----------

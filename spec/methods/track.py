@@ -28,7 +28,7 @@ class TrackTachometer(TachometerSpec):
     """Tachometer that tracks position, velocity and acceleration with a fading-memory filter of third order.
 
     It predicts in every tick, and corrects in ticks with counts, with gains for the time since the counts before. The
-    velocity is new in every tick; docs/track.md has the rules.
+    velocity is new in every tick; docs/concepts/track.md has the rules.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Frames in which registers are read and written over serial lines; docs/serial.md has pictures of them.
+"""Frames in which registers are read and written over serial lines; docs/guides/serial.md has pictures of them.
 
 SPI, most significant bits and bytes first. Chip select low begins a frame, and high ends it. Byte 0 has the write bit
 and the address of a word. A read goes on with 5 bytes for each word: status, then the word; a write with 5 bytes for

@@ -1,4 +1,4 @@
-"""docs/compare.md: its tables are what is measured now."""
+"""docs/measured/compare.md: its tables are what is measured now."""
 
 import re
 from typing import Any

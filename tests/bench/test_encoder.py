@@ -1,4 +1,4 @@
-"""The picture and the table of docs/encoder.md are those of bench/encoder.py, and tell what the page says."""
+"""The picture and the table of docs/guides/encoder.md are those of bench/encoder.py, and tell what the page says."""
 
 import inspect
 from pathlib import Path

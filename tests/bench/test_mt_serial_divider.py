@@ -1,4 +1,4 @@
-"""bench/peers/mt_serial_divider.v, the textbook circuit of docs/size.md, in Icarus: every velocity and its clock."""
+"""The textbook circuit of docs/measured/size.md, bench/peers/mt_serial_divider.v, in Icarus: velocities and clocks."""
 
 import random
 import subprocess

@@ -8,7 +8,7 @@ pages = load("pages")
 
 
 def test_page_is_replaced_as_a_whole(tmp_path: Path) -> None:
-    file = tmp_path / "docs" / "size.md"
+    file = tmp_path / "docs" / "measured" / "size.md"
     for text in ("old", "new"):
         pages.write(file, text)
     assert file.read_text() == "new"

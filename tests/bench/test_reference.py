@@ -1,11 +1,10 @@
 """The reference pages are those of the code."""
 
-from pathlib import Path
-
 import pytest
+from support import docs
 from support.script import load
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = docs.DOCS / "reference"
 
 
 @pytest.mark.parametrize("page", ["options", "ports", "registers"])

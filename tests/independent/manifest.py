@@ -213,7 +213,7 @@ class Expected:
         return shown if abs(shown - greatest) <= 2 else round(greatest)
 
     def recovery(self) -> int:
-        """docs/verification.md: all counters may have to wrap, one after the other, before all is forgotten."""
+        """docs/concepts/verification.md: all counters may have to wrap one after the other."""
         settings = self.settings
         held = 1 << max(settings.filter - 1, 1).bit_length()
         lines = 2 + (held + settings.filter if settings.filter else 0) + 1
@@ -335,7 +335,7 @@ def check_manifest(settings: Settings, manifest: Manifest, name: str) -> None:
 
 
 def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
-    """Names, directions, signs and widths, as docs/ports.md has them."""
+    """Names, directions, signs and widths, as docs/reference/ports.md has them."""
     settings = expected.settings
     bound = signed(expected.greatest_bound - 1) + settings.frac_bits
     own = settings.own

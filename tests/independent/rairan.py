@@ -1,4 +1,4 @@
-"""The method of Rairán 2013, a clock at a time: Table 1, and what docs/rairan.md makes of it."""
+"""The method of Rairán 2013, a clock at a time: Table 1, and what docs/concepts/rairan.md makes of it."""
 
 import math
 from dataclasses import dataclass, field

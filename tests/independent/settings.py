@@ -250,7 +250,7 @@ class Settings:
 
     @cached_property
     def greatest_shift(self) -> int:
-        """K of an adaptive dt, see docs/rairan.md."""
+        """K of an adaptive dt, see docs/concepts/rairan.md."""
         if self.target is None:
             return 0
         found = 0

@@ -1,4 +1,4 @@
-"""The methods that measure times, T and M/T, by the rules of docs/timed.md, event by event."""
+"""The methods that measure times, T and M/T, by the rules of docs/concepts/timed.md, event by event."""
 
 import math
 from dataclasses import dataclass, field

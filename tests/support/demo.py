@@ -14,7 +14,7 @@ from tachometry.spec.registers.demo import demo_map as map_of
 
 BOARD = "icebreaker"
 CLOCK_HZ = 12_000_000
-# The core of docs/monitor.md.
+# The core of docs/guides/monitor.md.
 TEXTS = {"ppr": "500", "max-speed": "1000rad/s", "filter": "4"}
 WORDS = [word for name, text in TEXTS.items() for word in (f"--{name}", text)]
 

@@ -1,4 +1,4 @@
-"""The method of Rairán a clock at a time, by the words of docs/rairan.md, and its golden model on bare steps."""
+"""The method of Rairán a clock at a time, as docs/concepts/rairan.md says it, and its golden model on bare steps."""
 
 from dataclasses import dataclass
 from fractions import Fraction

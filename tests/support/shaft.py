@@ -142,7 +142,7 @@ def run(spec: LoopSpec, loop: Loop, duration: float, seed: int, noise: float = 0
             edge, m_e = edge + 1, m_e + 1
         while angle < (edge + offset[edge % counts]) * pitch:
             edge, m_e = edge - 1, m_e - 1
-        # Eq. (21), with the alterations of docs/s-method.md and without the kept half.
+        # Eq. (21), with the alterations of docs/concepts/s-method.md and without the kept half.
         total, window = total + m_e, window + 1
         alters = m_e != before and m_e != offset_count
         if alters or window == longest:

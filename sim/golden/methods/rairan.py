@@ -1,4 +1,4 @@
-"""Golden model of Rairán 2013: Table 1, window by window, with what docs/rairan.md adds to it."""
+"""Golden model of Rairán 2013: Table 1, window by window, with what docs/concepts/rairan.md adds to it."""
 
 from dataclasses import dataclass
 from typing import Any

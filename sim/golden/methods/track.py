@@ -1,4 +1,4 @@
-"""Golden tracking method: the recursion of docs/track.md in integers, tick by tick."""
+"""Golden tracking method: the recursion of docs/concepts/track.md in integers, tick by tick."""
 
 from dataclasses import dataclass
 

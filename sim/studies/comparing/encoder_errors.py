@@ -123,7 +123,7 @@ def by_counts(
     whole_cycles: bool = False,
     max_time_s: float = 0.01,
 ) -> Estimate:
-    """M/T of docs/timed.md, without decay, with coordinates for counts: from edge to edge over the time between."""
+    """Estimate by M/T, without decay, with coordinates for counts: from edge to edge over the time between."""
     steps = counts.steps
     time, edge, place, step = steps.time.tolist(), counts.edge.tolist(), coordinate.tolist(), steps.step.tolist()
     at, velocity = [], []
@@ -149,7 +149,7 @@ def by_counts(
 
 
 def by_tracking(counts: Counts, coordinate: FloatArray, tuning: Tuning) -> Estimate:
-    """The tracking recursion of docs/track.md, with coordinates for counts."""
+    """The tracking recursion of docs/concepts/track.md, with coordinates for counts."""
     steps, offset, state = counts.steps, coordinate - counts.edge, Recursion(tuning)
     ends = np.asarray(tuning.tick_seconds * np.arange(1, int(steps.duration / tuning.tick_seconds) + 1))
     until = np.searchsorted(steps.time, ends, side="right").tolist()

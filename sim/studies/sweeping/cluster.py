@@ -114,10 +114,10 @@ def _deaf_to_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweep") -> Iterator[Row]:
+def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweeping.sweep") -> Iterator[Row]:
     """Rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
 
-    They are run by the function `run_packed` of a module of this room, `study`.
+    They are run by the function `run_packed` of a module of sim.studies, `study`.
 
     Raises
     ------

@@ -1,13 +1,13 @@
-"""docs/boards.md says which port is on which pin."""
+"""docs/guides/boards.md says which port is on which pin."""
 
 import re
-from pathlib import Path
 
 import pytest
+from support import docs
 
 from tachometry.boards.fpga.boards import BOARDS
 
-PAGE = (Path(__file__).parents[3] / "docs" / "boards.md").read_text(encoding="utf-8")
+PAGE = docs.page("guides/boards.md")
 
 
 @pytest.mark.parametrize("name", BOARDS)

@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from support import docs
 from support.command import run
 from support.compiled import lint
 
@@ -16,7 +17,7 @@ from tachometry.spec.control.ports import loop_entries
 from tachometry.spec.language.option import options_of
 
 CORE = "--ppr 25 --clock 1MHz --tick 250us --max-time 2ms --max-speed 500rad/s --loop".split()
-PAGE = (Path(__file__).parents[3] / "docs" / "integration.md").read_text(encoding="utf-8")
+PAGE = docs.page("guides/integration.md")
 
 
 def test_files_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

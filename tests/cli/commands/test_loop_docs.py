@@ -1,4 +1,4 @@
-"""docs/control.md: its commands run, and rows of its tables are what comes of them."""
+"""docs/concepts/control.md: its commands run, and rows of its tables are what comes of them."""
 
 import re
 import shlex
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 import pytest
-from support import command
+from support import command, docs
 
 from tachometry.cli.commands.loop import loop
 from tachometry.cli.options.closed_loop import loop_options
@@ -18,7 +18,7 @@ from tachometry.sim.engines.loop import Observer
 from tachometry.sim.studies.loops.control import Outcome, outcome_of, simulation_of
 from tachometry.sim.studies.loops.usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
 
-PAGE = (Path(__file__).parents[3] / "docs" / "control.md").read_text(encoding="utf-8")
+PAGE = docs.page("concepts/control.md")
 COMMANDS = [
     shlex.split(found.replace("\\\n", ""))
     for found in re.findall(r"^    tachometry loop (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from rich.console import Console
+from support import docs
 from support.command import run
 from support.demo import BOARD, CLOCK_HZ, WORDS, ToldBoard, demo_map, manifest_of
 from support.long import only
@@ -28,7 +29,7 @@ from tachometry.cli.reports.monitor import LiveView, State, view
 from tachometry.spec import METHODS
 
 SIM = f"sim:{BOARD}"
-PAGE = Path(__file__).parents[3] / "docs" / "monitor.md"
+PAGE = docs.DOCS / "guides" / "monitor.md"
 
 LINE = re.compile(r"\d+\.\d{3} s, speed -?[\d.e+-]+ rad/s, position -?\d+ counts, ")
 
@@ -337,6 +338,6 @@ def test_the_program_of_the_page(
     with SimulatedBoard(told, CLOCK_HZ) as board:
         shorter = program.replace("/dev/pts/5", board.path).replace("while True:", "for _ in range(100):")
         assert shorter.count("range(100)") == shorter.count(board.path) == 1
-        exec(compile(shorter, "<docs/monitor.md>", "exec"), {})
+        exec(compile(shorter, "<docs/guides/monitor.md>", "exec"), {})
     assert told.word("SPEED") == 14_240_943
     assert capsys.readouterr().out

@@ -138,8 +138,8 @@ def test_what_cannot_be_is_told_in_one_line(
 def test_a_real_shaft_loses_no_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The command of docs/encoder.md, and the net of the edges, found from the file's rows alone."""
-    page = (ROOT / "docs" / "encoder.md").read_text(encoding="utf-8")
+    """The command of docs/guides/encoder.md, and the net of the edges, found from the file's rows alone."""
+    page = (ROOT / "docs" / "guides" / "encoder.md").read_text(encoding="utf-8")
     (command,) = re.findall(r"^tachometry (replay .*mouse.*)$", page, re.MULTILINE)
     (tmp_path / "tests").symlink_to(ROOT / "tests")
     monkeypatch.chdir(tmp_path)

@@ -1,11 +1,11 @@
-"""docs/sweep.md says of every column, and shows the file that is there."""
+"""docs/guides/sweep.md says of every column, and shows the file that is there."""
 
 import math
 import re
 import shlex
-from pathlib import Path
 
 import click
+from support import docs
 
 from tachometry.cli.commands.sweep import sweep
 from tachometry.cli.options.sweep import by_name, point_options
@@ -13,7 +13,7 @@ from tachometry.cli.sweeping.points import points_of
 from tachometry.cli.sweeping.settings import of_command_line, of_file
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, run_point
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = docs.DOCS / "guides"
 PAGE = (DOCS / "sweep.md").read_text()
 
 

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from support import docs
 from support.lockstep import random_case
 from support.mutant import caught
 from support.native import HEADER, NAME, check_golden, library, logged, snapshots, write_trace
@@ -210,7 +211,7 @@ def test_drivers_of_all_methods_are_strict_c(tmp_path: Path) -> None:
 
 def test_the_example_of_the_page_is_strict_c(tmp_path: Path) -> None:
     """Compiled for the core of the page, whose registers the page shows."""
-    page = (Path(__file__).parents[3] / "docs" / "registers.md").read_text(encoding="utf-8")
+    page = docs.page("reference/registers.md")
     (example,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
     files = register_files(RegisterMap(of_texts("s", load("reference").SPEED)), "speed")
     for file, text in {**files, "main.c": example}.items():

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from support import docs
 from support.options import had_by
 
 from tachometry.hdl.export import export
@@ -19,7 +20,7 @@ from tachometry.spec import METHODS, common_options, of_texts, own_options
 from tachometry.spec.language.provenance import LICENSE, generator, version
 
 BIN = Path(sys.executable).parent
-PAGE = (Path(__file__).parents[2] / "docs" / "integration.md").read_text(encoding="utf-8")
+PAGE = docs.page("guides/integration.md")
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
 CASES = {
     "s": {"external-tick": "yes", "index": "yes", "filter": "4", "unit": "rpm", "bounds": "yes", "age": "yes"},

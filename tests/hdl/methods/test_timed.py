@@ -1,4 +1,4 @@
-"""What every method that measures times promises, clock by clock: docs/timed.md."""
+"""What every method that measures times promises, clock by clock: docs/concepts/timed.md."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-// Properties of the method of Rairan: from steps to updates. The reference is the list in docs/rairan.md, with a count
+// Properties of the method of Rairan: from steps to updates. The reference is the list in docs/concepts/rairan.md, with a count
 // of all counts in dt, and Nep1 and Ndt1 themselves. `rst` may come at any time.
 // core_* show signals of the core to the lemmas, and its steps to the reference; prove.py connects them.
 module rairan #(

@@ -1,5 +1,5 @@
 // Properties of the methods that divide counts by time: from the ticks and steps to the updates at the ports, by the
-// rules of docs/timed.md. The reference knows the clocks since the last count, and what was asked of a division, not how
+// rules of docs/concepts/timed.md. The reference knows the clocks since the last count, and what was asked of a division, not how
 // it is done. `rst` may come at any time.
 // core_* show signals of the core to the lemmas, and its steps to the reference; prove.py connects them.
 module timed #(

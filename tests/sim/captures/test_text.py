@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import docs
 from support.captures import MEGAHERTZ, assert_same, make_csv, make_sr, random_trace
 
 from tachometry.sim.captures.file import CaptureError
@@ -307,7 +308,7 @@ def test_column_of_the_times(tmp_path: Path, time: str | int) -> None:
 
 
 def test_examples_of_the_documentation(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[3] / "docs" / "encoder.md").read_text(encoding="utf-8")
+    page = docs.page("guides/encoder.md")
     examples = re.findall(r"```csv\n(.*?)```", page, re.DOTALL)
     assert len(examples) == 3
     for text in examples:

@@ -1,16 +1,16 @@
-"""The papers' figures: what they must show, and that docs/figures.md says what they say."""
+"""The papers' figures: what they must show, and that docs/measured/figures.md says what they say."""
 
 import functools
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import numpy as np
 import pytest
+from support import docs
 
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.figures import FIGURES, tsuji_loops
@@ -21,7 +21,7 @@ from tachometry.sim.theory.performance import Performance
 from tachometry.sim.theory.table1 import Row, table1_rows
 from tachometry.spec import MTachometer, STachometer, TachometerSpec
 
-DOCS = (Path(__file__).parents[3] / "docs" / "figures.md").read_text(encoding="utf-8")
+DOCS = docs.page("measured/figures.md")
 
 # What the papers say and the figures do not bear out, by the beginning of the claim.
 DISAGREE = {

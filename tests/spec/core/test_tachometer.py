@@ -81,8 +81,8 @@ def silence(max_ticks: int, tick: int) -> int:
 
 
 def test_recovery() -> None:
-    """docs/verification.md: the synchroniser, the step, the open window and a whole one, what the method remembers or a
-    silence, and the tick; counters wrap first."""
+    """docs/concepts/verification.md: the synchroniser, the step, the open window and a whole one, what the method
+    remembers or a silence, and the tick; counters wrap first."""
     for tick, begun in ((1, 2), (2, 2), (3, 3), (4, 5), (20, 33)):
         spec = spec_of(tick)
         assert spec.recovery_clocks == 2 + 1 + begun + silence(10, tick) + 2

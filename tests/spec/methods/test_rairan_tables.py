@@ -1,4 +1,4 @@
-"""Tables of Rairán's method: every entry by the table of bounds in docs/rairan.md, in exact fractions."""
+"""Tables of Rairán's method: every entry by the table of bounds in docs/concepts/rairan.md, in exact fractions."""
 
 import math
 from fractions import Fraction
@@ -110,7 +110,7 @@ def test_a_tie_is_half_an_lsb(estimate: str, options: dict[str, Any], max_ticks:
 @pytest.mark.parametrize("max_shift", range(7))
 @pytest.mark.parametrize("one_in", [4, 5, 9, 10, 60])
 def test_the_rule_of_an_adaptive_dt(one_in: int, max_shift: int) -> None:
-    """S and N of docs/rairan.md, and the counts from which and up to which k falls."""
+    """S and N of docs/concepts/rairan.md, and the counts from which and up to which k falls."""
     rule = AdaptiveDt(Fraction(1, one_in), max_shift)
     assert rule.fewest == next(n for n in range(2, 99) if Fraction(1, 2 * n - 1) <= Fraction(1, one_in))
     assert rule.slow == min(rule.fewest - 1, math.floor(math.sqrt(2**max_shift)))

@@ -27,7 +27,7 @@ def s(tick: int = 20, max_ticks: int = 10, **options: Any) -> STachometer:
 
 
 def test_a_division_takes_a_clock_a_digit_its_sign_included_and_one_for_the_dividend() -> None:
-    """By default 28 clocks, as docs/timed.md says: 960 counts a tick are 10 bits, and 16 follow."""
+    """By default 28 clocks, as docs/concepts/timed.md says: 960 counts a tick are 10 bits, and 16 follow."""
     assert [one(encoder=Encoder(500)).division_clocks for one in (TTachometer, MTTachometer)] == [28, 28]
     # Twenty counts have 5 bits; on the lattice T has one count a tick, and M/T twenty.
     assert [t().division_clocks, mt().division_clocks] == [5 + 4 + 2] * 2

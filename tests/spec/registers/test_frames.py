@@ -1,9 +1,9 @@
 """Frames of the serial lines: what is made of them, and what is refused."""
 
 import re
-from pathlib import Path
 
 import pytest
+from support import docs
 
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.registers import frames
@@ -47,7 +47,7 @@ def test_telemetry() -> None:
 
 
 def test_the_examples_of_the_page() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "serial.md").read_text(encoding="utf-8")
+    page = docs.page("guides/serial.md")
     write = frames.write_request(2, 1, 3)
     answer = frames.encode_answer(frames.decode_request(write), Answer((), error=False))
     for frame in (frames.read_request(4, 5, 7), write, answer, frames.spi_write(2, 1)):

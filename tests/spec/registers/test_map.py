@@ -131,7 +131,7 @@ def test_bits_of_a_loop() -> None:
 
 
 def test_bits_of_a_demo() -> None:
-    """As docs/boards.md has them."""
+    """As docs/guides/boards.md has them."""
     demo = DemoMap(of_texts("s", BASE | {"max-speed": "500rad/s"}))
     assert bits(demo, "DEMO") == [("emulated", 0, 1), ("restart", 1, 1), ("jump", 2, 1)]
     assert [field.single for field in demo["DEMO"].fields] == [False, True, True]
@@ -141,7 +141,7 @@ def test_bits_of_a_demo() -> None:
 
 
 def test_numbers_of_the_serial_lines() -> None:
-    """docs/serial.md: seven bits of address and the write bit; marks; a quiet line."""
+    """docs/guides/serial.md: seven bits of address and the write bit; marks; a quiet line."""
     assert (frames.SPI_ADDRESS_WIDTH, frames.SPI_WRITE, frames.MARK, frames.ERROR) == (7, 0x80, 0x80, 1)
     assert (frames.SPI_SCK_CYCLES, frames.QUIET_BITS) == (8, 32)
     assert (frames.SEQUENCES, frames.TYPE_LOW, frames.FROM_CORE) == (16, 4, 7)

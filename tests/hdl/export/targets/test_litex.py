@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from support import docs
 from support.command import run
 from support.mutant import caught
 from support.options import had_by
@@ -19,8 +20,8 @@ from tachometry.sim.engines import build
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
 
-TESTS = Path(__file__).parents[2]
-PAGE = (TESTS.parent / "docs" / "litex.md").read_text(encoding="utf-8")
+TESTS = Path(__file__).parents[3]
+PAGE = docs.page("guides/litex.md")
 (COMMAND,) = re.findall(r"```sh\n(tachometry .*?)```", PAGE, re.DOTALL)
 _, *WORDS, _ = shlex.split(COMMAND.replace("\\\n", ""))  # without the program and its folder
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "20us", "max-time": "400us"}

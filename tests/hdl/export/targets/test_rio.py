@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import docs
 from support.command import run as command_line
 from support.compiled import lint
 from support.lockstep import random_case
@@ -25,7 +26,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 
-PAGE = (Path(__file__).parents[3] / "docs" / "linuxcnc.md").read_text(encoding="utf-8")
+PAGE = docs.page("guides/linuxcnc.md")
 NAME = "spindle"
 PLUGIN, WRAPPER, CORE = rio_files(NAME)
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}

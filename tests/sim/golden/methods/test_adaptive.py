@@ -1,4 +1,4 @@
-"""k of an adaptive dt from window to window, by the table of docs/rairan.md."""
+"""k of an adaptive dt from window to window, by the table of docs/concepts/rairan.md."""
 
 from fractions import Fraction
 

@@ -1,4 +1,4 @@
-"""The golden T method and its decay, clock by clock by the rules of docs/timed.md; and what its model is made of."""
+"""The golden T method and its decay, clock by clock by the rules of docs/concepts/timed.md; and its parts."""
 
 import math
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> T
 
 @dataclass(frozen=True)
 class Row:
-    """An update by the words of docs/timed.md, in counts per tick.
+    """An update by the words of docs/concepts/timed.md, in counts per tick.
 
     `least` and `most` are the bounds, None for none; `known` says whether they are valid.
     """
