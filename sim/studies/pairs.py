@@ -5,6 +5,7 @@ exclude each other are found by trying.
 """
 
 from fractions import Fraction
+from functools import cache
 from itertools import combinations, product
 
 from tachometry.spec import TachometerSpec, common_options, of_texts, own_options, spec_class
@@ -16,6 +17,7 @@ _CLOCK_HZ = 48_000_000
 Texts = dict[str, str]  # values of options by their names
 
 
+@cache
 def factors(method: str) -> dict[str, tuple[str, ...]]:
     """Options of a method with the values that they take; the empty text leaves the option out.
 
@@ -42,18 +44,20 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
     return {name: values for name, values in possible.items() if len(values) > 1}
 
 
-def apart(method: str) -> set[frozenset[tuple[str, str]]]:
-    """Pairs of options with their values that cannot be together."""
+@cache
+def apart(method: str) -> frozenset[frozenset[tuple[str, str]]]:
+    """Pairs of options with their values that cannot be together; an option that is left out goes with all."""
     found = set()
     for (one, its), (other, others) in combinations(factors(method).items(), 2):
-        for pair in product(its, others):
+        for pair in product(filter(None, its), filter(None, others)):
             row = dict(zip((one, other), pair, strict=True))
             if not _possible(method, row):
                 found.add(frozenset(row.items()))
-    return found
+    return frozenset(found)
 
 
-def rows(method: str) -> list[Texts]:
+@cache
+def rows(method: str) -> tuple[Texts, ...]:
     """Values of all factors of a method, one row for each configuration."""
     from covertable import make
 
@@ -68,12 +72,13 @@ def rows(method: str) -> list[Texts]:
         for pair in sorted(apart(method), key=sorted)
     ]
     every = {name: list(values) for name, values in factors(method).items()}
-    return [dict(row) for row in make(every, constraints=never)]
+    return tuple(dict(row) for row in make(every, constraints=never))
 
 
-def configurations(method: str) -> list[tuple[str, ...]]:
+@cache
+def configurations(method: str) -> tuple[tuple[str, ...], ...]:
     """Words of the command line, for each configuration of a method."""
-    return [words_of(method, _texts(method, row)) for row in rows(method)]
+    return tuple(words_of(method, _texts(method, row)) for row in rows(method))
 
 
 def words_of(method: str, texts: Texts) -> tuple[str, ...]:
@@ -112,6 +117,7 @@ def _possible(method: str, row: Texts) -> bool:
     return True
 
 
+@cache
 def _known(method: str) -> dict[str, Option]:
     return {about.name: about for about in (*common_options(), *own_options(method))}
 
