@@ -48,11 +48,11 @@ icarus: ## Icarus Verilog, installed with apt-get if it is missing
 	  $$sudo apt-get install -qq -y iverilog >/dev/null || { $$sudo apt-get update -qq && $$sudo apt-get install -qq -y iverilog >/dev/null; }; \
 	} || { echo "make: Icarus Verilog is needed and could not be installed: see https://github.com/steveicarus/iverilog" >&2; exit 1; }
 
-test: $(VENV)/.test icarus ## lint, types and all tests but the long ones
+test: $(VENV)/.test icarus ## lint, types and all tests but the nightly ones
 	@$(MAKE) --no-print-directory -j2 lint pytest
 
 pytest: $(VENV)/.test icarus
-	$(BIN)/pytest -q -n auto --dist worksteal -m "not long"
+	$(BIN)/pytest -q -n auto --dist worksteal -m "not nightly"
 
 test-all: lint icarus ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal

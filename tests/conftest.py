@@ -1,12 +1,13 @@
 """What all tests share."""
 
 import os
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support.long import is_long, long
+from support.nightly import nightly
 
 # Compiled cores stay in the checkout.
 os.environ.setdefault("TACHOMETRY_CACHE", str(Path(__file__).parent.parent / "build" / "cache"))
@@ -17,10 +18,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark those that break the source on purpose, see `support.long`."""
+    """Mark those that break the source on purpose, see `support.nightly`."""
     for item in items:
-        if is_long(item):
-            item.add_marker(long)
+        if re.search("mutant|_caught$|_noticed$", item.name.partition("[")[0]):
+            item.add_marker(nightly)
+        if item.get_closest_marker("nightly"):
+            item.add_marker("long")  # the mark by its former name
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.long import only
+from support.nightly import only
 from support.verilog import LintingVerilator
 
 from tachometry.sim.encoder.stress import stress

@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 import pytest
-from support.long import only
+from support.nightly import only
 from support.script import load
 
 page = load("compare")

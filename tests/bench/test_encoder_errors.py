@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from support.long import long
+from support.nightly import nightly
 from support.script import load
 
 bench = load("encoder_errors")
@@ -34,7 +34,7 @@ def test_the_table_of_gains_has_all_rows() -> None:
     ]
 
 
-@long
+@nightly
 @pytest.mark.parametrize(("disc", "motion"), [("real", "217 rad/s"), ("phase", "20 rad/s")])
 def test_gains_are_those_of_the_study(disc: str, motion: str) -> None:
     found = bench.gained(disc, *bench.MOTIONS[motion])

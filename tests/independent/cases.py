@@ -34,9 +34,10 @@ class Case:
     seed: str = ""
 
 
-def parameters(cases: Iterable[Case], long: Container[str] = ()) -> list[Any]:
-    """Cases as parameters of a test; those of the names in `long` are only in `make test-all`."""
-    return [pytest.param(case, id=case.name, marks=pytest.mark.long if case.name in long else ()) for case in cases]
+def parameters(cases: Iterable[Case], nightly: Container[str] = ()) -> list[Any]:
+    """Cases as parameters of a test; those of the names in `nightly` are only in `make test-all`."""
+    mark = pytest.mark.nightly
+    return [pytest.param(case, id=case.name, marks=mark if case.name in nightly else ()) for case in cases]
 
 
 def _case(

@@ -136,7 +136,7 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
 
 
 @pytest.mark.parametrize(
-    "case", parameters((case for case in CASES if case not in SILENT), long=("track_rev", "track_rad"))
+    "case", parameters((case for case in CASES if case not in SILENT), nightly=("track_rev", "track_rad"))
 )
 def test_core(case: Case, generated: Generated) -> None:
     check_core(case, *made(generated, case))

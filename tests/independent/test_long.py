@@ -38,7 +38,7 @@ def two_counts(settings: Settings) -> list[Update]:
     ]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_long_ticks_and_long_measurements(generated: Callable[..., Path]) -> None:
     plays, manifests, folder = [], [], Path()
     for case in LONG:

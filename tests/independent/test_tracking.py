@@ -146,7 +146,7 @@ def check_rest(motion: Motion) -> None:
         assert motion.settings.lowpass is not None or row["velocity"] == 0
 
 
-@pytest.mark.parametrize("case", parameters(TRACKING, long=("track_native", "track_rad", "track_rev")))
+@pytest.mark.parametrize("case", parameters(TRACKING, nightly=("track_native", "track_rad", "track_rev")))
 def test_a_known_motion(case: Case, generated: Callable[..., Path]) -> None:
     settings = case.settings
     folder = generated(case.name, "--method", "track", *arguments(settings.words))

@@ -20,7 +20,7 @@ from proofs.mutation.score import hold
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus, ending, steps, stimulus
 from proofs.mutation.track_lemmas import begins
-from support.long import long
+from support.nightly import nightly
 
 from tachometry.sim import golden
 from tachometry.sim.golden.control import Command
@@ -93,7 +93,7 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
     assert sum(line.startswith("  hdl/") for line in survivors) > 10
 
 
-@long
+@nightly
 def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 2)
     monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known([], ["1"]))
@@ -108,7 +108,7 @@ def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch
         assert not any(equivalent(CASE, flat, latest, played.pins, tmp_path, pool))
 
 
-@long
+@nightly
 def test_lemmas_must_be_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One that holds at first only, behind one that always holds."""
     monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known(["wire one = 1;"], ["one", "!{tick}"]))
@@ -125,7 +125,7 @@ def one_of_track(tmp_path: Path) -> None:
         equivalent(case, flat, found, stimulus(case.spec, 100).pins, tmp_path, pool)
 
 
-@long
+@nightly
 def test_lemmas_of_track_are_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 1)
     one_of_track(tmp_path)

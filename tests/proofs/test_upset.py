@@ -4,8 +4,8 @@ import pytest
 from proofs.formal.mutants import RECURSIVE_SUM
 from proofs.upset import axes, loops
 from proofs.upset.campaign import upsets
-from support.long import long, only
 from support.mutant import mutant
+from support.nightly import nightly, only
 
 from tachometry.hdl.control.control_clock import ControlClock
 from tachometry.hdl.methods.m import MovingSum
@@ -35,7 +35,7 @@ def test_sum_that_is_carried_along_is_noticed() -> None:
         assert not upsets("m", 700).fine
 
 
-@long
+@nightly
 def test_many_axes_are_right_again_in_time() -> None:
     """Every second bit."""
     campaign = axes.upsets(450)
@@ -44,7 +44,7 @@ def test_many_axes_are_right_again_in_time() -> None:
     assert campaign.clocks.max() > campaign.spec.timing.tick_cycles
 
 
-@long
+@nightly
 def test_a_control_loop_is_right_again_in_time() -> None:
     """Every sixth bit."""
     campaign = loops.upsets("loop", 110)

@@ -18,7 +18,7 @@ from rich.console import Console
 from support import docs
 from support.command import run
 from support.demo import BOARD, CLOCK_HZ, WORDS, ToldBoard, demo_map, manifest_of
-from support.long import only
+from support.nightly import only
 
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.boards.monitor.columns import columns

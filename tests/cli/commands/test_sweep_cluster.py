@@ -11,7 +11,7 @@ from pathlib import Path
 import dask
 import pyarrow.parquet as pq
 from distributed import Client, LocalCluster
-from support.long import long
+from support.nightly import nightly
 
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "sweep"]
 SWEEP = [
@@ -125,7 +125,7 @@ def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
     assert len(again) <= 5
 
 
-@long
+@nightly
 def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None:
     result = tmp_path / "r.parquet"
     traces = [Trace(tmp_path / name) for name in "123"]

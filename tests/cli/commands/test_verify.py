@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 from support.command import run
-from support.long import long
 from support.mutant import mutant
+from support.nightly import nightly
 
 from tachometry.cli.commands import verify as command
 from tachometry.hdl.methods.m import MovingSum
@@ -36,7 +36,7 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.mark.parametrize(
     ("methods", "engines", "few"),
-    [(["m"], ["pysim", "cxxrtl", "verilator"], 2), pytest.param(list(METHODS), ["pysim"], 1, marks=long)],
+    [(["m"], ["pysim", "cxxrtl", "verilator"], 2), pytest.param(list(METHODS), ["pysim"], 1, marks=nightly)],
     indirect=["few"],
 )
 def test_engines_and_methods(

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.long import long
 from support.mutant import caught, mutant
+from support.nightly import nightly
 from support.quotient import FlatQuotient, every_quotient
 from support.simulate import clock_by_clock
 
@@ -30,7 +30,7 @@ def wanted(spec: STachometer, operands: list[NDArray[np.int64]], towards: int = 
 
 
 @pytest.mark.parametrize(
-    ("frac_bits", "cancel"), [*(pytest.param(bits, True, marks=long) for bits in (16, 24)), (4, True), (16, False)]
+    ("frac_bits", "cancel"), [*(pytest.param(bits, True, marks=nightly) for bits in (16, 24)), (4, True), (16, False)]
 )
 def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bits: int, cancel: bool) -> None:
     """All N that one count per tick can give, and all m_s to the longest."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from support.lockstep import random_case
-from support.long import only
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.bus import bank, tick_position

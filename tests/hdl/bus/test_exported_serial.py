@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.exported_bus import SPEC, START, Simulate, check, in_icarus, in_verilator
-from support.long import long
 from support.mutant import caught, mutant
+from support.nightly import nightly
 from support.serial import Host, SpiHost, UartHost
 
 from tachometry.hdl.bus.bank import RegisterBank
@@ -20,7 +20,7 @@ CONTROL, VELOCITY = (REGISTERS[name].offset // 4 for name in ("CONTROL", "VELOCI
 ALL = (CONTROL, VELOCITY, N_WORDS, N_WORDS - VELOCITY)
 BIT_CYCLES = 8
 BAUD = SPEC.timing.clock_hz // BIT_CYCLES
-SIMULATORS = [pytest.param(in_verilator, 10_000, marks=long), (in_icarus, 250)]
+SIMULATORS = [pytest.param(in_verilator, 10_000, marks=nightly), (in_icarus, 250)]
 
 
 def all_registers_are_read(host: Host) -> None:

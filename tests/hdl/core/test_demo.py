@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.demo import DemoPort, uart
-from support.long import only
+from support.nightly import only
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.loop import LoopClient

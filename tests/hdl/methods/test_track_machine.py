@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support import compiled
-from support.long import only
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.simulate import Player, clock_by_clock
 from support.tracking import CLEARING, Executed, Interpreter, Tick, hostile, ticks_of
 

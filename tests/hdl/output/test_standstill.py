@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from amaranth.lib import wiring
-from support.long import only
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.options import had_by
 from support.simulate import clock_by_clock, ticks
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.lockstep import random_case
-from support.long import long
+from support.nightly import nightly
 
 from tachometry.sim import golden
 from tachometry.sim.engines import build
@@ -36,8 +36,8 @@ def turning(n_clocks: int, spacing: int = 7) -> PinTrace:
     ("name", "method", "seed"),
     [
         ("cxxrtl", "m", 4),
-        *(pytest.param("cxxrtl", *case, marks=long) for case in [("s", 9), ("mt", 2), ("t", 0), ("rairan", 1)]),
-        pytest.param("verilator", "mt", 2, marks=long),  # which plays on many more cores in test_matrix.py
+        *(pytest.param("cxxrtl", *case, marks=nightly) for case in [("s", 9), ("mt", 2), ("t", 0), ("rairan", 1)]),
+        pytest.param("verilator", "mt", 2, marks=nightly),  # which plays on many more cores in test_matrix.py
     ],
 )
 def test_random_cases(name: str, method: str, seed: int) -> None:

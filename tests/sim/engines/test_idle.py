@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.long import only
 from support.mutant import caught, mutant
+from support.nightly import only
 
 from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.core.tachometer import Tachometer

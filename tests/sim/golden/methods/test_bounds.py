@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.ideal_motion import SUBCOUNTS, motion, ticks_of
-from support.long import long
 from support.mutant import caught, mutant
+from support.nightly import nightly
 
 from tachometry.sim.golden import model
 from tachometry.sim.golden.methods import m as m_method
@@ -68,9 +68,9 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
     ("spec", "n_motions"),
     [
         (S, 36),
-        pytest.param(PLAIN, 36, marks=long),
+        pytest.param(PLAIN, 36, marks=nightly),
         (M, 4),
-        *(pytest.param(replace(M, average=of), 4, marks=long) for of in (8, 5)),
+        *(pytest.param(replace(M, average=of), 4, marks=nightly) for of in (8, 5)),
     ],
     ids=["eq. (21)", "eq. (17)", "M", "M of 8", "M of 5"],
 )
@@ -85,7 +85,7 @@ def test_true_mean_speed_is_always_enclosed(spec: TachometerSpec, n_motions: int
     ("spec", "n_motions", "least"),
     [
         (S, 12, 300_000),
-        pytest.param(PLAIN, 12, 300_000, marks=long),
+        pytest.param(PLAIN, 12, 300_000, marks=nightly),
         (M, 2, 490_000),
         (replace(M, average=5), 1, 240_000),
     ],

@@ -1,0 +1,19 @@
+"""The mark `nightly`: a case that takes seconds and shows on more what another shows, left to `make test-all`.
+
+`make test` keeps every kind of check on the smallest case that shows it, as it must end in five minutes. A comment at
+the mark says why the rest is enough. What breaks something on purpose is `nightly`, too: it asks what the tests notice,
+not whether the product is right.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+nightly = pytest.mark.nightly
+
+
+def only(short: Iterable[Any], cases: Iterable[Any]) -> list[Any]:
+    """Parameters of a test: all cases, of which `make test` has only these."""
+    kept = list(short)
+    return [case if case in kept else pytest.param(case, marks=nightly) for case in cases]
