@@ -39,8 +39,9 @@ venv: $(VENV)/.test ## the environment in .venv, with all that tests need
 demo: $(LINKED) ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
 	BIN=$(BIN) sh docs/demo.sh
 
-figures: $(LINKED) ## the papers' figures anew in build/figures, held against what the papers say, see docs/measured/figures.md
+figures: $(LINKED) ## the papers' figures anew in build/figures, and what the papers say of them, written to docs/measured/figures.md
 	$(BIN)/tachometry figures -o build/figures
+	$(BIN)/python bench/figures.py build/figures/claims.csv
 
 icarus: ## Icarus Verilog, installed with apt-get if it is missing
 	@command -v iverilog >/dev/null || { \
@@ -57,28 +58,27 @@ pytest: $(VENV)/.test icarus
 test-all: lint icarus ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
 
-formal: $(VENV)/.formal ## properties of the exported core, proven by induction, see docs/concepts/verification.md
-	PYTHONPATH=tests $(BIN)/python -m proofs.formal
+formal: $(VENV)/.formal ## properties of the exported core, proven by induction, written to docs/measured/formal.md
+	PYTHONPATH=tests $(BIN)/python -m proofs.formal -o docs/measured/formal.md
 
 formal-quick: $(VENV)/.formal ## the same of a small core for every checker, and without mutants
 	PYTHONPATH=tests $(BIN)/python -m proofs.formal quick
 
-upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, see docs/concepts/verification.md
-	PYTHONPATH=tests $(BIN)/python -m proofs.upset
+upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, written to docs/measured/upset.md
+	PYTHONPATH=tests $(BIN)/python -m proofs.upset -o docs/measured/upset.md
 
-mutate: $(VENV)/.test icarus ## how many wrong cores and wrong lines of Python the tests notice, see docs/concepts/verification.md
-	PYTHONPATH=tests $(BIN)/python -m proofs.mutation
-	PYTHONPATH=tests $(BIN)/python -m proofs.python_mutation
+mutate: $(VENV)/.test icarus ## how many wrong cores and wrong lines of Python the tests notice, written to docs/measured/mutation.md
+	PYTHONPATH=tests $(BIN)/python -m proofs.mutation -o docs/measured/mutation.md
+	PYTHONPATH=tests $(BIN)/python -m proofs.python_mutation -o docs/measured/mutation.md
 
-bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, in one run, written to docs/measured/bench.md
+bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, written to docs/measured/bench.md and sweep.md
 	$(BIN)/python bench/golden.py -o docs/measured/bench.md
 	$(BIN)/python bench/engines.py -o docs/measured/bench.md
-	$(BIN)/python bench/sweep.py -o docs/measured/bench.md
+	$(BIN)/python bench/sweep.py -o docs/measured/sweep.md
 	$(BIN)/python bench/monitor.py -o docs/guides/monitor.svg
 
-verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks
-	$(BIN)/tachometry verify --clocks 1000000000 -o build/verify
-	$(BIN)/tachometry verify --engines cxxrtl-every-clock --clocks 1000000000 -o build/verify
+verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks, written to docs/measured/verify.md
+	$(BIN)/python bench/verify.py --clocks 1000000000 -o docs/measured/verify.md
 
 compare: $(LINKED) ## all methods and what others use in several situations, written to docs/measured/compare.md
 	$(BIN)/python bench/compare.py
@@ -86,8 +86,8 @@ compare: $(LINKED) ## all methods and what others use in several situations, wri
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/measured/size.md
 	$(BIN)/python bench/size.py -o docs/measured/size.md
 
-bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/guides/boards.md, and all checks of bitstreams
-	$(BIN)/python bench/boards.py -o docs/guides/boards.md
+bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/measured/boards.md, and all checks of bitstreams
+	$(BIN)/python bench/boards.py
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
 docs: $(LINKED) ## the pages of options, ports and registers, written to docs/reference

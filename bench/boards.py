@@ -1,11 +1,10 @@
-"""Bitstreams of three boards, as `tachometry build` makes them: writes their figures into docs/guides/boards.md.
+"""Makes bitstreams of three boards with `tachometry build`, and writes their figures into docs/measured/boards.md.
 
 Exit codes: 0, 2 if a bitstream cannot be made.
 """
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import sysconfig
@@ -13,13 +12,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from pages import markdown, write_from
+from pages import markdown, write_block
 
 from tachometry.boards.fpga.boards import BOARDS
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "guides" / "boards.md"
-HEADING = "## Figures"
+PAGE = ROOT / "docs" / "measured" / "boards.md"
 BUILT = ("tang-nano-9k", "icebreaker", "ulx3s-25f")
 CORE = ("--ppr", "500", "--max-speed", "1000rad/s", "--filter", "4")
 HEADS = ("board", "cells", "Fmax (MHz)", "clock (MHz)", "time (s)")
@@ -50,13 +48,10 @@ def row(name: str, said: str, seconds: float) -> tuple[str, ...]:
     return BOARDS[name].title, cells, fmax, f"{BOARDS[name].clock_hz / 1e6:g}", f"{seconds:.0f}"
 
 
-def page(rows: Sequence[tuple[str, ...]], tools: dict[str, str]) -> str:
-    """What is below the heading."""
-    words = " ".join(CORE)
+def block(rows: Sequence[tuple[str, ...]], tools: dict[str, str]) -> str:
+    """The table, and the versions of the tools."""
     used = ", ".join(f"{name} {version}" for name, version in sorted(tools.items()))
-    made = f"Made by `make bitstreams` with `tachometry build BOARD {words}`, on {os.cpu_count()} cores."
-    first = "At its first start each tool compiles itself, which takes longer."
-    return f"\n{made}\n{first} Fmax is what nextpnr says.\n\n{markdown(HEADS, rows, left=(0, 1))}\nTools: {used}.\n"
+    return f"{markdown(HEADS, rows, left=(0, 1))}\nTools: {used}.\n"
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -75,7 +70,7 @@ def main(words: Sequence[str] | None = None) -> int:
     except RuntimeError as error:
         print(error, file=sys.stderr)
         return 2
-    write_from(page_of, HEADING, page(rows, tools))
+    write_block(page_of, "boards", block(rows, tools))
     return 0
 
 

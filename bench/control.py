@@ -1,4 +1,4 @@
-"""The tables and the figure of docs/concepts/control.md: what a velocity loop about a core can do, mean of seeds."""
+"""Measures what a velocity loop about a core can do, mean of seeds, for docs/measured/control.md."""
 
 import argparse
 import functools
@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from pages import markdown
+from pages import markdown, write_block
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
@@ -121,31 +121,36 @@ def accelerations(seeds: Sequence[int], jobs: int) -> str:
     return markdown(("k_v", "G", "observer", *HEADS), rows, left=(2,))
 
 
+TABLES = {
+    "weights": weights,
+    "assumptions": assumptions,
+    "solutions": solutions,
+    "acceleration": accelerations,
+    "gates": in_gates,
+}
+
+
 def main() -> None:
-    """Print the tables."""
+    """Print the tables, and put them into the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=6, metavar="N", help="seeds of what is random (%(default)s)")
     parser.add_argument("--jobs", type=int, metavar="N", help="threads (one for each core)")
-    names = ("gains", "weights", "assumptions", "gates", "solutions", "acceleration")
-    parser.add_argument("--only", choices=names, help="one of the tables")
+    parser.add_argument("--only", choices=(*TABLES, "gains"), help="one of the tables")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="figure of the usable gains")
+    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose tables are replaced")
     given = parser.parse_args()
-    seeds = range(given.seeds)
-    if given.only in (None, "weights"):
-        sys.stdout.write(f"{weights(seeds, given.jobs)}\n")
-    if given.only in (None, "assumptions"):
-        sys.stdout.write(f"{assumptions(seeds, given.jobs)}\n")
-    if given.only in (None, "solutions"):
-        sys.stdout.write(f"{solutions(seeds, given.jobs)}\n")
-    if given.only in (None, "acceleration"):
-        sys.stdout.write(f"{accelerations(seeds, given.jobs)}\n")
-    if given.only in (None, "gates"):
-        sys.stdout.write(f"{in_gates(seeds, given.jobs)}\n")
-    if given.only in (None, "gains"):
-        table, found = usable_gains(seeds, given.jobs)
+    for name in (*TABLES, "gains"):
+        if given.only not in (None, name):
+            continue
+        if name == "gains":
+            table, found = usable_gains(range(given.seeds), given.jobs)
+            if given.plot is not None:
+                save_usable_gains(given.plot, found)
+        else:
+            table = TABLES[name](range(given.seeds), given.jobs)
         sys.stdout.write(f"{table}\n")
-        if given.plot is not None:
-            save_usable_gains(given.plot, found)
+        if given.output is not None:
+            write_block(given.output, name, table)
 
 
 if __name__ == "__main__":

@@ -1,18 +1,17 @@
-"""Draws imperfections of an encoder and measures what the core makes of them, for docs/guides/encoder.md.
+"""Draws imperfections of an encoder and measures what the core makes of them, for docs/measured/encoder.md.
 
 The lines are drawn and the golden model run at constant speed; everything is exact, so that the files are the same on
-every machine. `python bench/encoder.py` writes docs/guides/encoder.svg and the table in docs/guides/encoder.md anew.
+every machine. `python bench/encoder.py` writes encoder.svg and the table of encoder.md in docs/measured anew.
 """
 
 import math
-import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pages import markdown, write
+from pages import markdown, write, write_block
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import Bounce
@@ -23,8 +22,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import HeldVelocity, held_velocity, velocity_error
 from tachometry.spec import Encoder, STachometer, Timing
 
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "guides"
-TABLE = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end of table -->)", re.DOTALL)
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "measured"
 
 FloatArray = NDArray[np.float64]
 
@@ -178,8 +176,7 @@ def picture() -> str:
 def main() -> None:
     """Write both."""
     write(DOCS / "encoder.svg", picture())
-    page = DOCS / "encoder.md"
-    write(page, TABLE.sub(lambda _: table(), page.read_text("utf-8")))
+    write_block(DOCS / "encoder.md", "imperfections", table())
 
 
 if __name__ == "__main__":

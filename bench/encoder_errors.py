@@ -1,6 +1,7 @@
-"""What is gained if the errors of a disc are learned from its own edges: the tables of docs/concepts/encoder-errors.md.
+"""Measures what is gained if the errors of a disc are learned from its own edges.
 
-`python bench/encoder_errors.py` writes them anew. To study another method, add its estimator to `METHODS`.
+`python bench/encoder_errors.py` writes docs/measured/encoder-errors.md anew. To study another method,
+add its estimator to `METHODS`.
 """
 
 import sys
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pages import markdown, write
+from pages import markdown, write_block
 
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -30,7 +31,7 @@ from tachometry.sim.studies.comparing.encoder_errors import (
 from tachometry.sim.theory.tracking import Tuning
 from tachometry.spec import Encoder, Speed, Timing, TrackTachometer
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "concepts" / "encoder-errors.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "measured" / "encoder-errors.md"
 LINES = 500
 SEEDS = (1, 2, 3)
 FloatArray = NDArray[np.float64]
@@ -167,12 +168,8 @@ TABLES = {"gains": gains, "speeds": speeds_of_learning, "limits": limits}
 
 def main(words: list[str]) -> None:
     """Write the tables of these names, or all, into the page."""
-    text = PAGE.read_text(encoding="utf-8")
     for name in words or TABLES:
-        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-        before, rest = text.split(begin)
-        text = f"{before}{begin}{TABLES[name]()}{end}{rest.split(end)[1]}"
-    write(PAGE, text)
+        write_block(PAGE, name, TABLES[name]())
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import numpy as np
 from amaranth.back import cxxrtl as amaranth_cxxrtl
 from amaranth.back import rtlil
 from golden import BEGIN, MOTION, part_of
-from pages import markdown, write_from
+from pages import markdown, write_block
 
 from tachometry.cli.reports.terminal import print_table
 from tachometry.sim import golden
@@ -38,48 +38,6 @@ from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
 SLOW = 30_000  # clocks of pysim
 FAST = 12_000_000  # clocks of the others
 REPEATS = 2
-
-_HEADING = "## Engines"
-_PAGE = """
-The same motion is run through `--engine`: {slow:,} clocks of it by pysim, and {fast:,} by the compiled engines and by
-the bare loop. The bare loop is the fastest C++ loop around the same CXXRTL module that this page knows, "model local
-to the loop" in the table of steps below, compiled with -O2 or -O3, whichever is faster. It plays the same changes, adds
-up the outputs at the strobes, and does nothing else. cxxrtl-every-clock evaluates every clock, as the bare loop does;
-cxxrtl skips idle clocks. The table has the fastest of {repeats} runs of the loop alone; that of pysim includes its
-start. Every run is compared with the golden model, bit by bit. Clocks per second, in processor time:
-
-{speeds}
-The next table is of all ten seconds, {clocks:,} clocks, run by cxxrtl and compared with the golden model in every
-bit of every update. *Loop* is the loop alone; *process* is all of a process, from its start to its end, which also
-makes the motion and the golden model:
-
-{whole}
-In an idle clock no strobe is high, and no flip-flop changes but counters on which nothing depends before they come to
-a stop, such as the one that waits for the end of the tick, and the division of S. CXXRTL finds that out by comparing
-all flip-flops with what they would become, and then moves these on to the next stop or to the next change of a pin at
-once. What is gained depends on the motion: with an edge in every hundredth clock there is little to be skipped. The
-program of the tracking method is at work in most clocks of a tick of 20 us.
-
-A golden model's time depends on the numbers of edges, ticks and updates, not on clocks. That of the tracking method
-follows its recursion tick by tick. A process that has freed large arrays before, as the one of the table above, keeps
-memory for the next ones, so golden models are faster there than at the top of this page: two thirds of the time of T
-are page faults of new memory. Glibc returns no memory to the system, and they are gone, with
-`MALLOC_TRIM_THRESHOLD_=4000000000` and `MALLOC_MMAP_THRESHOLD_=1000000000` in the environment.
-
-The next table shows what makes a clock fast, on the S method. Each row includes the changes of the rows above it:
-
-{steps}
-- Debug information keeps every value of every clock in memory. Without it the compiler keeps only what it needs.
-- `step()` on both levels of the clock settles the core twice. All flip-flops take the rising edge, so one evaluation is
-  enough, with the level and the reset as constants.
-- A commit of CXXRTL asks of every flip-flop whether it has changed. Here a commit is a copy, and with a model that is
-  local to the loop there is hardly even a copy.
-- The core has no black boxes, so none has to be called. Values of more than 32 bits remain pairs of words.
-- Memory for rows is requested between clocks, never within one. If a clock could be left half done, the compiler would
-  have to keep its intermediate values, which cost a third of the speed.
-- The engine stores rows, and a call of it ends every 50 ms, for progress and Ctrl-C. Each run needs about a tenth of a
-  second more to elaborate the core and look it up in the cache.
-"""
 
 # The loops that are measured; each counts the clocks with a strobe.
 _LOOPS = """
@@ -259,9 +217,9 @@ def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[l
 
 
 def main() -> None:
-    """Measure, print, and replace this part of the page if asked."""
+    """Measure, print, and replace the tables of the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, help="page to which this part belongs, docs/measured/bench.md")
+    parser.add_argument("-o", "--output", type=Path, help="page whose tables are replaced")
     parser.add_argument("--alone", nargs=2, metavar=("METHOD", "ENGINE"), help="only simulate, to be measured")
     options = parser.parse_args()
     output = options.output
@@ -284,16 +242,9 @@ def main() -> None:
     print()
     if output is None:
         return
-    part = _PAGE.format(
-        slow=SLOW,
-        fast=FAST,
-        repeats=REPEATS,
-        clocks=trace.n_clocks,
-        speeds=markdown(SPEED_COLUMNS, speeds),
-        whole=markdown(WHOLE_COLUMNS, entire),
-        steps=markdown(STEP_COLUMNS, loop),
-    )
-    write_from(output, _HEADING, part)
+    write_block(output, "engines", markdown(SPEED_COLUMNS, speeds))
+    write_block(output, "whole", markdown(WHOLE_COLUMNS, entire))
+    write_block(output, "steps", markdown(STEP_COLUMNS, loop))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Speed of the golden models beside the simulator, on the same edges in the same run: writes docs/measured/bench.md.
+"""Measures the golden models beside the simulator, on the same edges in the same run, for docs/measured/bench.md.
 
 A golden model is vectorised over a whole recording; the simulator works clock by clock, so that it is given the first
 part of it only. Only the ratios mean something: they are of one machine at one time.
@@ -14,7 +14,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from pages import markdown, write
+from pages import markdown, write_block
 from rich.console import Console
 from rich.progress import track
 
@@ -32,19 +32,6 @@ CLOCK = "48MHz"
 SIMULATED = 30_000  # clocks of the simulator
 BEGIN = 48_000_000  # where they begin: at about 75 rad/s
 REPEATS = 3
-
-HEAD = """# Speed
-
-This page compares the speed of the golden models, which the hardware equals bit for bit, with that of Amaranth's
-simulator (pysim), which runs the hardware clock by clock. `make bench` measures both in one run and writes this page.
-The golden models run the
-{seconds:.0f} s of `--motion "{motion}"` (500 PPR x4, 48 MHz, 20 us: {clocks:.2g} clocks, {ticks:,} ticks,
-{edges:,} edges). The simulator runs {simulated:,} clocks of it, in which both agree on every bit.
-
-{table}
-Measured with {python} on {machine}, {cores} cores. A golden model takes time for edges, ticks and updates, and none
-for clocks. The low-pass filter is a recursion, which the model follows update by update. A tick is 960 clocks here.
-"""
 
 
 @dataclass(frozen=True)
@@ -120,7 +107,7 @@ def cores() -> dict[str, TachometerSpec]:
 def main() -> None:
     """Measure, print, and write the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, help="page to be written, docs/measured/bench.md")
+    parser.add_argument("-o", "--output", type=Path, help="page whose table is replaced")
     output = parser.parse_args().output
     encoder = VirtualEncoder(500, jitter=0.02, vibration=Vibration(1e-3, 50), seed=1)
     trace = encoder.record(parse_motion(MOTION)).recording.place(48_000_000)
@@ -132,19 +119,8 @@ def main() -> None:
     print()
     if output is None:
         return
-    page = HEAD.format(
-        seconds=trace.n_clocks / 48e6,
-        motion=MOTION,
-        clocks=trace.n_clocks,
-        ticks=results[0].ticks,
-        edges=len(trace.clock) - 1,
-        simulated=SIMULATED,
-        table=markdown(COLUMNS, rows),
-        python=f"Python {platform.python_version()}",
-        machine=platform.machine(),
-        cores=os.cpu_count(),
-    )
-    write(output, page)
+    machine = f"Python {platform.python_version()} on {platform.machine()}, {os.cpu_count()} cores"
+    write_block(output, "golden", f"{markdown(COLUMNS, rows)}\nMeasured with {machine}.\n")
 
 
 if __name__ == "__main__":

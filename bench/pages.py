@@ -19,7 +19,15 @@ def write(page: Path, text: str) -> None:
         beside.write_text(text, encoding="utf-8")
 
 
-def write_from(page: Path, heading: str, part: str) -> None:
-    """Replace a page from a heading on, or put it at the end."""
-    before = page.read_text(encoding="utf-8").split(f"\n{heading}\n")[0] if page.exists() else "# Speed\n"
-    write(page, f"{before}\n{heading}\n{part}")
+def write_block(page: Path, name: str, part: str) -> None:
+    """Replace what a page has between the marks `<!-- NAME -->` and `<!-- end of NAME -->`.
+
+    Raises
+    ------
+    ValueError
+        If the page does not have these marks once.
+    """
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->\n"
+    before, rest = page.read_text(encoding="utf-8").split(begin)
+    _, after = rest.split(end)
+    write(page, f"{before}{begin}{part}{end}{after}")

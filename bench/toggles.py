@@ -1,4 +1,4 @@
-"""Flip-flop changes per tick of the reference core and of others, box by box: what its dynamic power follows.
+"""Counts flip-flop changes per tick of cores, box by box, as dynamic power follows them: docs/measured/toggles.md.
 
 The shaft turns at a constant speed, and the changes of all flip-flops are counted in every clock (Amaranth's
 simulator), from the third tick on. Clock tree and wires are not counted.
@@ -10,12 +10,13 @@ import argparse
 import math
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from amaranth import Cat, Fragment, Module, Signal
 from amaranth.sim import Simulator
 from cores import CONFIGURATIONS
-from pages import markdown
+from pages import markdown, write_block
 
 from tachometry.hdl import Tachometer
 from tachometry.spec import Speed, TachometerSpec
@@ -76,11 +77,10 @@ def main() -> None:
     """Print a table: a row for each box, a column for each core."""
     names = [configuration.name for configuration in CONFIGURATIONS]
     parser = argparse.ArgumentParser(description="Flip-flop changes per tick, box by box.")
-    parser.add_argument(
-        "--only", nargs="+", choices=names, default=["reference", "table", "m", "t", "mt"], metavar="NAME"
-    )
+    parser.add_argument("--only", nargs="+", choices=names, default=["reference", "table"], metavar="NAME")
     parser.add_argument("--speed", type=Speed.parse, default=Speed.parse("100rad/s"), help="of the shaft (100rad/s)")
     parser.add_argument("--ticks", type=int, default=60, help="in which they are counted (%(default)s)")
+    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose table is replaced")
     options = parser.parse_args()
     if options.ticks < 1:
         parser.error(f"--ticks must be at least 1, not {options.ticks}")
@@ -89,7 +89,10 @@ def main() -> None:
     boxes = sorted({box for column in columns for box in column}, key=lambda box: -max(c[box] for c in columns))
     rows = [[box, *(f"{column[box] / options.ticks:.1f}" for column in columns)] for box in boxes]
     rows.append(["total", *(f"{column.total() / options.ticks:.1f}" for column in columns)])
-    print(markdown(["box", *(one.name for one in chosen)], rows, [0]))
+    table = markdown(["box", *(one.name for one in chosen)], rows, [0])
+    print(table)
+    if options.output is not None:
+        write_block(options.output, "toggles", table)
 
 
 if __name__ == "__main__":

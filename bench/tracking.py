@@ -1,11 +1,12 @@
-"""The errors of the tracking method when an update appears, for docs/concepts/track.md: mean and spread over seeds."""
+"""Measures the errors of the tracking method when an update appears, for docs/measured/track.md."""
 
 import argparse
 import math
 import sys
+from pathlib import Path
 
 import numpy as np
-from pages import markdown
+from pages import markdown, write_block
 from situations import Cell
 
 from tachometry.sim.signals.recording import PinTrace
@@ -34,15 +35,20 @@ def error(situation: Situation, seed: int, tick: str) -> float:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table, and put it into the page if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of what is random (%(default)s)")
-    seeds = range(1, parser.parse_args().seeds + 1)
+    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose table is replaced")
+    given = parser.parse_args()
+    seeds = range(1, given.seeds + 1)
     rows = []
     for situation in (each for each in SITUATIONS if each.name in SHOWN):
         used = seeds if situation.random else (1,)
         rows.append((situation.name, *(str(Cell.of("", [error(situation, n, tick) for n in used])) for tick in TICKS)))
-    sys.stdout.write(markdown(("situation", *(f"ticks of {tick[:-2]} µs" for tick in TICKS)), rows))
+    table = markdown(("situation", *(f"ticks of {tick[:-2]} µs" for tick in TICKS)), rows)
+    sys.stdout.write(table)
+    if given.output is not None:
+        write_block(given.output, "errors", table)
 
 
 if __name__ == "__main__":

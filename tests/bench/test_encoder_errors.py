@@ -1,4 +1,4 @@
-"""The tables of docs/concepts/encoder-errors.md are those of bench/encoder_errors.py, and tell what the page says."""
+"""The tables of docs/measured/encoder-errors.md are those of the bench, and say what docs/concepts says."""
 
 import re
 from pathlib import Path

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from support.script import load
 
 pages = load("pages")
@@ -15,9 +16,13 @@ def test_page_is_replaced_as_a_whole(tmp_path: Path) -> None:
     assert [found.name for found in file.parent.iterdir()] == ["size.md"]
 
 
-def test_part_of_a_page_is_replaced(tmp_path: Path) -> None:
-    file = tmp_path / "bench.md"
-    pages.write(file, "first\n")
-    for text in ("second\n", "third\n"):
-        pages.write_from(file, "## Part", text)
-    assert file.read_text() == "first\n\n## Part\nthird\n"
+def test_a_block_of_a_page_is_replaced(tmp_path: Path) -> None:
+    file = tmp_path / "page.md"
+    file.write_text("words\n<!-- one -->\n<!-- end of one -->\n<!-- two -->\nold\n<!-- end of two -->\nmore\n")
+    pages.write_block(file, "two", "new\n")
+    pages.write_block(file, "one", "first\n")
+    assert file.read_text() == (
+        "words\n<!-- one -->\nfirst\n<!-- end of one -->\n<!-- two -->\nnew\n<!-- end of two -->\nmore\n"
+    )
+    with pytest.raises(ValueError, match="unpack"):
+        pages.write_block(file, "three", "")

@@ -3,6 +3,7 @@
 from itertools import islice
 
 import pytest
+from support import docs
 from support.script import load
 
 bench = load("sweep")
@@ -16,3 +17,12 @@ def test_a_row_for_every_way(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row[:2] for row in rows] == [["this process", "3"]]
     assert float(rows[0][3]) > 0
     assert len(rows[0]) == len(bench.COLUMNS)
+
+
+def test_errors_of_the_page_are_those_of_the_sweep() -> None:
+    """The guide says where S is at its worst."""
+    places = bench.errors()
+    assert len(places) == 80
+    assert f"<!-- errors -->\n{bench.bands(places)}<!-- end" in docs.page("measured/sweep.md")
+    worst = sorted(places, key=lambda counts: places[counts]["s"])[-4:]
+    assert (round(min(worst), 2), round(max(worst), 2)) == (0.35, 0.42)

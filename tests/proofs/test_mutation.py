@@ -50,9 +50,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 
 def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["mt"])
-    total = capsys.readouterr().out.splitlines()[-1]
-    assert total.startswith("| mt | 40 |"), total
-    assert total.endswith("| 100.0 % |"), total
+    assert "| mt, all | 40 |" in (total := capsys.readouterr().out.splitlines()[-1])
+    assert "| 100.0 % |" in total
 
 
 def test_a_motion_that_ends_about_the_first_update_has_a_clock() -> None:

@@ -1,4 +1,4 @@
-"""docs/concepts/control.md: its commands run, and rows of its tables are what comes of them."""
+"""The commands of docs/concepts/control.md run, and rows of docs/measured/control.md are what comes of them."""
 
 import re
 import shlex
@@ -19,6 +19,7 @@ from tachometry.sim.studies.loops.control import Outcome, outcome_of, simulation
 from tachometry.sim.studies.loops.usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
 
 PAGE = docs.page("concepts/control.md")
+MEASURED = docs.page("measured/control.md")
 COMMANDS = [
     shlex.split(found.replace("\\\n", ""))
     for found in re.findall(r"^    tachometry loop (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
@@ -33,7 +34,7 @@ def figures(found: Outcome) -> list[float]:
 
 def row(*begin: str) -> list[float]:
     """The numbers of the only row that begins so."""
-    (line,) = [line for line in PAGE.splitlines() if line.startswith(f"| {' | '.join(begin)} | ")]
+    (line,) = [line for line in MEASURED.splitlines() if line.startswith(f"| {' | '.join(begin)} | ")]
     return [float(cell) for cell in line.strip("| ").split(" | ")[len(begin) :]]
 
 
@@ -76,7 +77,7 @@ def test_rows_of_usable_gains() -> None:
 def test_rows_of_what_was_assumed() -> None:
     base = setting(KINDS[0], 40.0, 1e-3, REAL)
     every = {**dict(variants(base)), "the conventional observer": None}
-    assert len(re.findall(r"^\| 1 ms \| 40 \| ", PAGE, re.MULTILINE)) == len(every)
+    assert len(re.findall(r"^\| 1 ms \| 40 \| ", MEASURED, re.MULTILINE)) == len(every)
     every["the conventional observer"] = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
     for name, varied in list(every.items())[1::3]:
         assert varied is not None

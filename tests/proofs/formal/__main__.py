@@ -12,7 +12,7 @@ from proofs.formal.cases import PROOFS, QUICK
 from proofs.formal.mutants import MUTANTS, Mutant
 from proofs.formal.prove import Proof, Result, prepare, solve
 from support.mutant import mutant
-from support.report import chosen, row
+from support.report import Table, arguments, chosen
 
 _FOLDER = Path("build/formal")
 
@@ -28,17 +28,12 @@ def _properties(result: Result) -> str:
     return ", ".join(f"`{name}`" for name in result.names if name.startswith("p"))
 
 
-def main(words: list[str]) -> bool:
-    """Whether all was as it should be; prints the tables."""
-    quick = words == ["quick"]
-    names = chosen("proof", QUICK if quick else words, (proof.name for proof in PROOFS))
-    prepare(_FOLDER)
-    proofs = {proof.name: proof for proof in PROOFS if proof.name in names}
-    mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs and not quick]
-    fine = True
-    proven: set[str] = set()
+def _prove(proofs: dict[str, Proof], mutants: list[Mutant]) -> tuple[list[Result], list[Result]]:
+    """Solve all proofs, and those of their mutants.
+
+    The solvers run beside the exports. Mutants exist one at a time, and only after the right cores were exported.
+    """
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        # The solvers run beside the exports. Mutants exist one at a time, and only after the right cores were exported.
         right = [
             pool.submit(solve, proof, _exported(proof), _FOLDER, f"proof{number}")
             for number, proof in enumerate(proofs.values())
@@ -48,28 +43,45 @@ def main(words: list[str]) -> bool:
             proof = proofs[wrong.proof]
             text = _exported(proof, wrong)
             refuted.append(pool.submit(solve, proof, text, _FOLDER, f"mutant{number}", wrong.refuted, wrong.steps))
-        row("core", "properties", "induction", "seconds", "verdict")
-        row(*["---"] * 5)
-        for proof, future in zip(proofs.values(), right, strict=True):
-            result = future.result()
-            fine &= result.verdict == "proven"
-            proven.update(name for name in result.names if name.startswith("p"))
-            begin = f"any state, {proof.recovers} clocks" if proof.recovers else f"{result.depth} clocks"
-            begin = f"given, {begin}" if proof.given else begin
-            row(proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict)
-        if mutants:
-            print()
-            row("core", "property", "mutant", "refuted in", "seconds", "verdict")
-            row(*["---"] * 6)
-        for wrong, future in zip(mutants, refuted, strict=True):
-            result = future.result()
-            fine &= result.verdict == "refuted"
-            before, after = (" ".join(text.split()) for text in (wrong.right, wrong.wrong))
-            change = f"{wrong.box.__name__}: `{before}` → `{after}`"
-            row(wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict)
-    without = set() if words else proven - {wrong.refuted for wrong in mutants}
+        return [future.result() for future in right], [future.result() for future in refuted]
+
+
+def _proof_row(proof: Proof, result: Result) -> tuple[str, ...]:
+    begin = f"any state, {proof.recovers} clocks" if proof.recovers else f"{result.depth} clocks"
+    begin = f"given, {begin}" if proof.given else begin
+    return proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict
+
+
+def _mutant_row(wrong: Mutant, result: Result) -> tuple[str, ...]:
+    before, after = (" ".join(text.split()) for text in (wrong.right, wrong.wrong))
+    change = f"{wrong.box.__name__}: `{before}` → `{after}`"
+    return wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict
+
+
+def main(words: list[str]) -> bool:
+    """Whether all was as it should be; prints the tables."""
+    given = arguments(__doc__ or "", "PROOF").parse_args(words)
+    quick = given.names == ["quick"]
+    names = chosen("proof", QUICK if quick else given.names, (proof.name for proof in PROOFS))
+    prepare(_FOLDER)
+    proofs = {proof.name: proof for proof in PROOFS if proof.name in names}
+    mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs and not quick]
+    right, refuted = _prove(proofs, mutants)
+    table = Table("core", "properties", "induction", "seconds", "verdict", left=range(5))
+    for proof, result in zip(proofs.values(), right, strict=True):
+        table.add(*_proof_row(proof, result))
+    table.write(given.output, "proofs")
+    if mutants:
+        print()
+        table = Table("core", "property", "mutant", "refuted in", "seconds", "verdict", left=range(6))
+        for wrong, result in zip(mutants, refuted, strict=True):
+            table.add(*_mutant_row(wrong, result))
+        table.write(given.output, "mutants")
+    proven = {name for result in right for name in result.names if name.startswith("p")}
+    without = set() if given.names else proven - {wrong.refuted for wrong in mutants}
     if without:
         print(f"\nwithout a mutant: {', '.join(sorted(without))}")
+    fine = all(result.verdict == "proven" for result in right) and all(one.verdict == "refuted" for one in refuted)
     return fine and not without
 
 

@@ -6,13 +6,13 @@ loops.
 
 import os
 import sys
-import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
 
 from proofs.mutation.boxes import BOXES
 from proofs.mutation.cases import CASES
 from proofs.mutation.score import Score, judge
-from support.report import chosen, row
+from support.report import Table, arguments, chosen
 
 from tachometry.spec import METHODS
 
@@ -20,43 +20,43 @@ GROUPS = (*METHODS, "registers", "axes", "loop")
 LEAST = 0.99  # of the mutants that are not equivalent
 
 
-def main(words: list[str]) -> bool:
-    """Whether enough mutants of every method were killed; prints the tables."""
-    groups = chosen("group", words, GROUPS)
+def _cells(scores: list[Score]) -> tuple[int, ...]:
+    """Numbers of all mutants, and of those that were killed, are equivalent, were argued, and survive."""
+    numbers = [(one.mutants, one.killed, one.equivalent, one.argued, len(one.survivors)) for one in scores]
+    return tuple(sum(column) for column in zip(*numbers, strict=True))
+
+
+def _share(scores: list[Score]) -> float:
+    """How many were killed of those that are not equivalent."""
+    mutants, killed, equivalent, argued, _ = _cells(scores)
+    return killed / (mutants - equivalent - argued)
+
+
+def _judge_group(group: str, pool: Executor, page: Path | None) -> list[Score]:
+    """Judge and print the cores of a group."""
     scores: list[Score] = []
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        row("core", "mutants", "killed", "equivalent", "argued by hand", "survivors", "seconds")
-        row("---", *["---:"] * 6)
-        for case in (*CASES, *BOXES):
-            if case.group in groups:
-                start = time.monotonic()
-                score = judge(case, pool)
-                scores.append(score)
-                seconds = f"{time.monotonic() - start:.0f}"
-                row(
-                    *(case.name, score.mutants, score.killed, score.equivalent),
-                    *(score.argued, len(score.survivors), seconds),
-                )
     print()
-    row("group", "mutants", "killed", "equivalent", "argued by hand", "survivors", "score")
-    row("---", *["---:"] * 6)
-    fine = True
-    for group in groups:
-        of_method = [score for score in scores if score.case.group == group]
-        if not of_method:
-            continue
-        mutants, killed, equivalent, argued = (
-            sum(getattr(score, name) for score in of_method) for name in ("mutants", "killed", "equivalent", "argued")
-        )
-        wrong = mutants - equivalent - argued
-        fine &= killed >= LEAST * wrong
-        row(group, mutants, killed, equivalent, argued, wrong - killed, f"{100 * killed / wrong:.1f} %")
+    table = Table("core", "mutants", "killed", "equivalent", "argued by hand", "survivors", "score")
+    for case in (case for case in (*CASES, *BOXES) if case.group == group):
+        scores.append(judge(case, pool))
+        table.add(case.name, *_cells(scores[-1:]), f"{100 * _share(scores[-1:]):.1f} %")
+    table.add(f"{group}, all", *_cells(scores), f"{100 * _share(scores):.1f} %")
+    table.write(page, group)
     for score in scores:
         if score.survivors:
             print(f"\nsurvivors of {score.case.name}:")
         for mutant in score.survivors:
             print(f"  {', '.join(mutant.lines)}: {mutant.place}")
-    return fine
+    return scores
+
+
+def main(words: list[str]) -> bool:
+    """Whether enough mutants of every group were killed; prints the tables."""
+    given = arguments(__doc__ or "", "GROUP").parse_args(words)
+    known = [group for group in GROUPS if any(case.group == group for case in (*CASES, *BOXES))]
+    groups = chosen("group", given.names, known)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return all([_share(_judge_group(group, pool, given.output)) >= LEAST for group in groups])
 
 
 if __name__ == "__main__":

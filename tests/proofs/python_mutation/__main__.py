@@ -11,7 +11,7 @@ from proofs.python_mutation.covered import chosen_for, covered, with_imports
 from proofs.python_mutation.equivalent import ARGUED
 from proofs.python_mutation.judge import Verdict, judge_all
 from proofs.python_mutation.mutants import ROOMS, files, sample
-from support.report import row
+from support.report import Table
 
 ROOT = Path(__file__).parents[3]
 LEAST = 0.95  # of the mutants that are not equivalent
@@ -33,6 +33,7 @@ def main(words: list[str]) -> bool:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--budget", type=float, default=30.0, metavar="S", help="seconds of tests for a mutant")
     parser.add_argument("--only", default="", metavar="PATH", help="of these, those of files whose path begins so")
+    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose table is replaced")
     parser.add_argument("tests", nargs="*", help="paths in tests/ [default: all that matter]")
     given = parser.parse_args(words)
     folder = ROOT / "build" / "python_mutation"
@@ -56,13 +57,12 @@ def main(words: list[str]) -> bool:
     verdicts = judge_all(ROOT, jobs, given.jobs, folder, told)
     for left in folder.glob("tmp-*"):
         shutil.rmtree(left, ignore_errors=True)
-    return report(verdicts)
+    return report(verdicts, given.output)
 
 
-def report(verdicts: list[Verdict]) -> bool:
+def report(verdicts: list[Verdict], page: Path | None = None) -> bool:
     """Whether enough were killed, after the table and the survivors."""
-    row("room", "mutants", "killed", "of these by timeout", "argued by hand", "survivors", "score")
-    row("---", *["---:"] * 6)
+    table = Table("room", "mutants", "killed", "of these by timeout", "argued by hand", "survivors", "score")
     fine = True
     for room in ROOMS:
         those = [verdict for verdict in verdicts if verdict.mutant.room == room]
@@ -71,7 +71,8 @@ def report(verdicts: list[Verdict]) -> bool:
         argued = sum(verdict.what not in ("killed", "timeout") and verdict.mutant.name in ARGUED for verdict in those)
         wrong = len(those) - argued
         fine &= killed >= LEAST * wrong
-        row(room, len(those), killed, late, argued, wrong - killed, f"{100 * killed / max(wrong, 1):.1f} %")
+        table.add(room, len(those), killed, late, argued, wrong - killed, f"{100 * killed / max(wrong, 1):.1f} %")
+    table.write(page, "python")
     left = [v.mutant for v in verdicts if v.what not in ("killed", "timeout") and v.mutant.name not in ARGUED]
     for mutant in left:
         print(f"  {mutant.line}: {mutant.name}")

@@ -4,7 +4,6 @@ Names of methods as arguments choose those, `axes` a core of many, and `loop` th
 says how many of each.
 """
 
-import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -14,7 +13,7 @@ from proofs.upset import axes, loops
 from proofs.upset.campaign import Campaign, by_register, upsets
 from rich.console import Console
 from rich.progress import track
-from support.report import chosen, row
+from support.report import Table, arguments, chosen
 
 from tachometry.spec import METHODS
 
@@ -32,25 +31,24 @@ def _ticks(campaign: Campaign, clocks: int) -> str:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Print the table; 1 if an upset was seen for longer than the bound."""
-    parser = argparse.ArgumentParser(prog="upset", description="Upset flip-flops of every method's core.")
-    parser.add_argument("methods", nargs="*", metavar="METHOD", help=f"some of: {', '.join(GROUPS)}")
+    parser = arguments(__doc__ or "", "METHOD")
     parser.add_argument("--upsets", type=int, default=12_000, metavar="N", help="of each method (%(default)s)")
     options = parser.parse_args(words)
     if options.upsets < 1:
         parser.error(f"--upsets must be at least 1, not {options.upsets}")
     console, done = Console(stderr=True), []
-    groups = chosen("method", options.methods, GROUPS)
+    groups = chosen("method", options.names, GROUPS)
     subjects = [name for name in SUBJECTS if name.split(",")[0] in groups]
     for name in track(subjects, "upsets", console=console, transient=True, disable=not console.is_terminal):
         start = time.monotonic()
         done.append((SUBJECTS[name](options.upsets), time.monotonic() - start))
-    row("core", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
-    row("---", *["---:"] * 8, "---")
+    heads = ("core", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
+    table = Table(*heads, left=(0, 9))
     for campaign, seconds in done:
         seen = sorted(campaign.clocks[campaign.clocks > 0].tolist()) or [0]
         bits = f"{campaign.bits.n_flip_flops}"
         memory = len(campaign.bits) - campaign.bits.n_flip_flops
-        row(
+        table.add(
             campaign.name,
             f"{bits} and {memory} of memory" if memory else bits,
             len(campaign.clocks),
@@ -62,6 +60,7 @@ def main(words: Sequence[str] | None = None) -> int:
             f"{seconds:.0f}",
             "within it" if campaign.fine else "exceeded",
         )
+    table.write(options.output, "upsets")
     print("\nmean, 99 %, worst: ticks until the outputs were right again, of those that were seen")
     for campaign, _ in done:
         worst = [f"{name} {_ticks(campaign, clocks)}" for name, clocks in list(by_register(campaign))[:5]]
