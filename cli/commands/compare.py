@@ -72,7 +72,7 @@ Examples:
     "capture",
     metavar="CAPTURE",
     type=FilePath(),
-    help="Captured lines instead of a --motion: .sr, .csv or .vcd, as `tachometry replay` takes them.",
+    help="Captured lines instead of a --motion: .sr, .csv, .csv.gz or .vcd, as `tachometry replay` takes them.",
 )
 @capture_options
 @option(

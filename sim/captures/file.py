@@ -1,6 +1,7 @@
 """What every kind of capture shares: its error, the choice of channels, and files written whole or not at all."""
 
 import itertools
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,8 +30,8 @@ def reading(path: Path) -> Iterator[None]:
         yield
     except FileNotFoundError:
         raise CaptureError(f"{path} does not exist") from None
-    except OSError as error:
-        raise CaptureError(f"cannot read {path}: {error.strerror or error}") from error
+    except (OSError, EOFError, zlib.error) as error:
+        raise CaptureError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
 
 
 def check_edges(path: Path, n: int) -> None:

@@ -1,4 +1,4 @@
-"""Captures of any kind: sigrok sessions (`.sr`), text (`.csv`), waveforms (`.vcd`)."""
+"""Captures of any kind: sigrok sessions (`.sr`), text (`.csv`, `.csv.gz`), waveforms (`.vcd`)."""
 
 import functools
 import os
@@ -29,7 +29,7 @@ class Reader(Protocol):
     ) -> Recording: ...
 
 
-READERS: dict[str, Reader] = {".sr": read_sr, ".csv": read_csv, ".vcd": read_vcd}
+READERS: dict[str, Reader] = {".sr": read_sr, ".csv": read_csv, ".csv.gz": read_csv, ".vcd": read_vcd}
 
 
 def read_capture(
@@ -46,7 +46,8 @@ def read_capture(
     Parameters
     ----------
     path : path
-        A sigrok session `.sr` (see `read_sr`), a text `.csv` (see `read_csv`) or a waveform `.vcd` (see `read_vcd`).
+        A sigrok session `.sr` (see `read_sr`), a text `.csv` or `.csv.gz` (see `read_csv`) or a waveform `.vcd` (see
+        `read_vcd`).
     a, b : str, int or None
         Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named A and B
         (in any case) if there are both, else the first two.
@@ -63,9 +64,9 @@ def read_capture(
         If the suffix is another one, or as the reader of that kind says.
     """
     path = Path(path)
-    reader = READERS.get(path.suffix.lower())
+    reader = next((reader for suffix, reader in READERS.items() if path.name.lower().endswith(suffix)), None)
     if reader is None:
-        raise CaptureError(f"a capture must be a .sr, .csv or .vcd file, not {path}")
+        raise CaptureError(f"a capture must be a .sr, .csv, .csv.gz or .vcd file, not {path}")
     if time is not None:
         if reader is not read_csv:
             raise OptionError("time", f"must not be given for {path}: it has its times")

@@ -1,11 +1,12 @@
 """Text (`.csv`) as a capture: read as a `Recording`, and written."""
 
+import gzip
 import io
 import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO, NoReturn
+from typing import BinaryIO, NoReturn, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,7 @@ def read_csv(
     Parameters
     ----------
     path : path
+        What ends in `.gz` is compressed by gzip.
     a, b : str, int or None
         Name of the column, else its number, from 0, the time left out. When not given: the columns named A and B (in
         any case) if there are both, else the first two.
@@ -68,7 +70,7 @@ def read_csv(
     level: list[NDArray[np.uint8]] = []
     start = last_time = float("nan")
     last_level, n_rows = 255, 0
-    with reading(path), path.open("rb") as file:
+    with reading(path), _opened(path) as file:
         header = read_header(path, file, time, samplerate_hz)
         columns = tuple(header.column(number) for number in choose_channels(path, header.channels, a, b, others))
         for line, block in _blocks(file, header.lines + 1, _block):
@@ -95,6 +97,10 @@ def read_csv(
     return Recording.of_level(
         header.seconds(np.concatenate(times)), np.concatenate(level), duration, ("a", "b", *others)
     )
+
+
+def _opened(path: Path) -> BinaryIO:
+    return cast(BinaryIO, gzip.open(path)) if path.suffix.lower() == ".gz" else path.open("rb")
 
 
 def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:

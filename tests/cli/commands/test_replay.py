@@ -1,5 +1,6 @@
 """`tachometry replay`."""
 
+import gzip
 import itertools
 import re
 from pathlib import Path
@@ -14,6 +15,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import Recording
 
 ROOT = Path(__file__).parents[3]
+WHEEL = ROOT / "tests/captures/wheel_turned_by_a_mouse.csv.gz"
 CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
 
 
@@ -85,7 +87,7 @@ def test_samplerate(tmp_path: Path) -> None:
     ("name", "options", "message"),
     [
         ("none.sr", "", "none.sr does not exist"),
-        ("c.txt", "", "a capture must be a .sr, .csv or .vcd file, not"),
+        ("c.txt", "", "a capture must be a .sr, .csv, .csv.gz or .vcd file, not"),
         ("empty.csv", "", "header of"),
         ("text.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
         ("cut.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
@@ -144,7 +146,7 @@ def test_a_real_shaft_loses_no_count(
     (tmp_path / "tests").symlink_to(ROOT / "tests")
     monkeypatch.chdir(tmp_path)
     assert run(*command.split()) == 0
-    rows = [line.split(",") for line in (ROOT / "tests/captures/wheel_turned_by_a_mouse.csv").read_text().split()[1:]]
+    rows = [line.split(",") for line in gzip.decompress(WHEEL.read_bytes()).decode().split()[1:]]
     quarters = ["00,10,11,01".split(",").index(a + b) for _, a, b in rows]
     steps = [(after - before + 1) % 4 - 1 for before, after in itertools.pairwise(quarters)]
     assert set(steps) <= {-1, 1}

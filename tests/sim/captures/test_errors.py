@@ -1,5 +1,6 @@
 """What is said of captures that are wrong."""
 
+import gzip
 import re
 import zipfile
 from pathlib import Path
@@ -16,7 +17,7 @@ from tachometry.sim.captures.text import read_csv
 
 @pytest.mark.parametrize("name", ["x.txt", "x", "x.sr.gz"])
 def test_suffix(tmp_path: Path, name: str) -> None:
-    assert_error(tmp_path / name, "a capture must be a .sr, .csv or .vcd file, not PATH")
+    assert_error(tmp_path / name, "a capture must be a .sr, .csv, .csv.gz or .vcd file, not PATH")
 
 
 @pytest.mark.parametrize("name", ["x.sr", "x.csv", "X.SR"])
@@ -25,6 +26,22 @@ def test_missing_or_unreadable_file(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
     with pytest.raises(CaptureError, match=f"^cannot read .*{re.escape(name)}: [^\n]+$"):
         read_capture(tmp_path / name)
+
+
+def test_cut_compressed_text(tmp_path: Path) -> None:
+    content = gzip.compress(b"time,a,b\n0,0,0\n1,1,0\n")
+    (tmp_path / "x.csv.gz").write_bytes(content)
+    assert read_capture(tmp_path / "x.csv.gz").a.tolist() == [0, 1]
+    (tmp_path / "x.csv.gz").write_bytes(content[:-9])
+    assert_error(
+        tmp_path / "x.csv.gz",
+        "cannot read PATH: Compressed file ended before the end-of-stream marker was reached",
+    )
+
+
+def test_text_that_is_not_compressed(tmp_path: Path) -> None:
+    (tmp_path / "x.csv.gz").write_text("time,a,b\n0,0,0\n")
+    assert_error(tmp_path / "x.csv.gz", "cannot read PATH: Not a gzipped file (b'ti')")
 
 
 @pytest.mark.parametrize("keep", [0, 1, 100, -1, -22])
