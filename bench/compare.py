@@ -71,51 +71,11 @@ as it does at constant speed, so it has a twentieth of their error.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),
     Situation(
-        "Slow",
-        """The speed is 0.04 counts per tick. All methods that measure the time between counts are alike. A filter
-of 5 ms removes the jitter at the price of its delay; so does the tracking method, without a delay.""",
-        "--motion constant:1.3rad/s:4s --from 500ms --jitter 0.05 --seed 1",
-    ),
-    Situation(
-        "Fast",
-        """The speed is 7 counts per tick, with 5 % jitter. The longest average has the least error, because at
-constant speed delay costs nothing: that of the tracking method, whose memory has grown. In the same time
-of 1 ms, M/T has half the error of S. Rairán's estimate is nearly constant, and off by up to eq. (13), 1/13
-of the speed.""",
-        f"--methods {WITH_LONG_MT} --motion constant:217rad/s:1s --from 100ms --jitter 0.05 --seed 1",
-    ),
-    Situation(
-        "Fast, ideal encoder",
-        """This is the previous situation without jitter. M/T with a timer and a tenth of the time is as good as S,
-whose error is within eq. (18). Methods that average over 1 ms have a finer resolution.""",
-        "--motion constant:217rad/s:1s --from 100ms",
-    ),
-    Situation(
-        "At the unit velocity, with vibration",
-        """This is the case of Tsuji's Fig. 9(b). S cancels alternate alterations, and has the least error of the
-cores but tracking. Filters and tracking loops average the vibration out, and have less.""",
-        "--motion ramp:31rad/s:32rad/s:1s --from 100ms --vibration 0.2mrad:170Hz --nonuniformity 0.1 --seed 1",
-    ),
-    Situation(
         "Reversals",
         """Here delay matters: filters of 5 ms are worse than all others but M. The tracking method has less than
 half of the error of least squares, which is second. LinuxCNC's timestamps and M/T follow with eight and ten times its
 error.""",
         "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
-    ),
-    Situation(
-        "At rest on an edge",
-        """The line dithers. T, M/T, Rairán (with what this project added to it) and LinuxCNC recognise that both
-edges are the same one, and show 0. Their error is the vibration itself. S and the tracking loops show
-the part of the vibration that they see.""",
-        "--motion stop:1s --vibration 0.3mrad:40Hz --from 100ms",
-    ),
-    Situation(
-        "Stop",
-        """The shaft goes from 20 rad/s to rest at once. T, M/T and Rairán decay with the time since the last count.
-S holds its last value until its maximum time of 10 ms forces an update, and reads 0 after 15 ms. A
-shorter `--max-time` reduces this time.""",
-        "--motion constant:20rad/s:200ms+stop:100ms --from 100ms",
     ),
 )
 

@@ -1,4 +1,4 @@
-"""The reference pages of the documentation, docs/reference, from what the code declares."""
+"""Writes the pages of docs/reference from what the code declares."""
 
 import re
 from dataclasses import replace
@@ -9,6 +9,7 @@ from typing import Any
 import click
 from pages import markdown, write
 
+from tachometry.boards.fpga.boards import BOARDS
 from tachometry.cli.group import cli
 from tachometry.cli.options.option import Option
 from tachometry.hdl.export.registers.page import tables
@@ -163,7 +164,7 @@ error, and so is any access where there is no register.
 
 
 def options() -> str:
-    """The page of all options: a section for each group, under the first command that has it."""
+    """The page of all options: a table for each command, and each group under the first command that has it."""
     parts = [
         "# Options\n",
         "Made by `make docs` from what the code declares; `tachometry COMMAND --help` prints the same. Options of the "
@@ -178,10 +179,9 @@ def options() -> str:
                 if isinstance(parameter, Option) and (record := parameter.get_help_record(context)) is not None:
                     groups.setdefault(parameter.group, []).append([_code(record[0]), _cell(record[1])])
         known = [group for group, rows in groups.items() if _key(group, rows) in seen]
-        for group, rows in groups.items():
-            if group not in known:
-                parts.append(f"### {group}\n\n{markdown(['option', 'meaning'], rows, left=(0, 1))}\n")
-                seen.add(_key(group, rows))
+        table = [row for group, rows in groups.items() if group not in known for row in ([f"**{group}**", ""], *rows)]
+        parts.append(markdown(["option", "meaning"], table, left=(0, 1)))
+        seen |= {_key(group, rows) for group, rows in groups.items()}
         if known:
             parts.append(f"And, as above: {', '.join(known)}.\n")
     return "\n".join(parts)
@@ -236,6 +236,28 @@ def ports() -> str:
     )
 
 
+def boards() -> str:
+    """The page of the boards and of their pins."""
+    rows = []
+    for name, board in BOARDS.items():
+        made = "project for the vendor's tools" if board.flow is None else "bitstream"
+        rows.append([f"`{name}`", board.title, f"{board.clock_hz // 10**6} MHz", made])
+    pins = {board.title.split(",")[0]: board.pins for board in BOARDS.values()}
+    ports = dict.fromkeys(port for each in pins.values() for port in each)
+    return "\n".join(
+        [
+            "# Boards and their pins\n",
+            "Made by `make docs` from `boards/fpga`. [Boards](../guides/boards.md) says how to use them.\n",
+            markdown(["name", "board", "clock", "what is made"], rows, left=range(4)),
+            markdown(
+                ["port", *pins],
+                [[f"`{port}`", *(each.get(port, "") for each in pins.values())] for port in ports],
+                left=range(len(pins) + 1),
+            ),
+        ]
+    )
+
+
 def _beyond(**options: Any) -> list[Port]:
     """Ports that options of a loop add, or make of others."""
     there = {port.name: port.direction for port in loop_ports(_LOOP)}
@@ -285,10 +307,9 @@ def _cores(method: str) -> list[TachometerSpec]:
 @click.command()
 @click.option("-o", "--output", "folder", type=click.Path(path_type=Path), default=DOCS, help="Folder of the pages.")
 def main(folder: Path) -> None:
-    """Write docs/reference/options.md, docs/reference/ports.md and docs/reference/registers.md."""
-    write(folder / "options.md", options())
-    write(folder / "ports.md", ports())
-    write(folder / "registers.md", registers())
+    """Write the pages."""
+    for page in (options, ports, registers, boards):
+        write(folder / f"{page.__name__}.md", page())
 
 
 if __name__ == "__main__":
