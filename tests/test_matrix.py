@@ -19,7 +19,8 @@ CORES = [words for method in METHODS for words in configurations(method)]
 MOTIONS, CLOCKS, EDGES = 50, 2_000_000, 50
 
 
-@pytest.mark.parametrize("words", only(CORES[3::4], CORES), ids=" ".join)
+# A build takes seconds. Each method has two cores among these; their options meet in `make test-all`.
+@pytest.mark.parametrize("words", only(CORES[3::9], CORES), ids=" ".join)
 def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     spec = spec_of(words)
     trace = stress(spec, 1, 300 if spec.timing.tick_cycles < 100 else 200)

@@ -36,7 +36,7 @@ def cells(heading: str, name: str) -> list[str]:
 NOT_RANDOM = [situation for situation in situations.SITUATIONS if not situation.random]
 
 
-@pytest.mark.parametrize("situation", only(NOT_RANDOM[::2], NOT_RANDOM), ids=lambda situation: situation.name)
+@pytest.mark.parametrize("situation", only(NOT_RANDOM[:1], NOT_RANDOM), ids=lambda situation: situation.name)
 def test_row_of_all_situations(situation: Any) -> None:
     """Of those that take one seed; some errors are nothing but rounding, which is that of the machine."""
     columns = (*situations.OURS, *situations.RIVALS)

@@ -13,7 +13,7 @@ from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.spec import METHODS
 
 
-@pytest.mark.parametrize("method", only(["s"], METHODS))
+@pytest.mark.parametrize("method", only(["m"], METHODS))  # the fewest flip-flops
 def test_outputs_are_right_again_in_time(method: str) -> None:
     """Every bit once; of `track`, which takes longer, every third."""
     n = 330 if method == "track" else 700

@@ -36,7 +36,7 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.mark.parametrize(
     ("methods", "engines", "few"),
-    [(["m"], ["pysim", "cxxrtl", "verilator"], 2), pytest.param(list(METHODS), ["pysim"], 1, marks=nightly)],
+    [(["m"], ["pysim", "cxxrtl", "verilator"], 1), pytest.param(list(METHODS), ["pysim"], 1, marks=nightly)],
     indirect=["few"],
 )
 def test_engines_and_methods(

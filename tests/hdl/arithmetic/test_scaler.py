@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from amaranth.lib import data
 from support.mutant import caught, mutant
+from support.nightly import only, only_rows
 from support.quotient import FlatQuotient, every_quotient
 from support.sequences import rounded
 from support.simulate import clock_by_clock
@@ -25,7 +26,8 @@ def default_spec(frac_bits: int = 16, **options: object) -> STachometer:
 
 
 @pytest.mark.parametrize("source", ["serial", "table"])
-@pytest.mark.parametrize(("frac_bits", "cancel"), [(16, True), (4, True), (4, False)])
+# One count in each table of reciprocals would do; 4 fraction bits have ties.
+@pytest.mark.parametrize(("frac_bits", "cancel"), only_rows([(4, True)], [(16, True), (4, True), (4, False)]))
 def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bool, source: str) -> None:
     spec = default_spec(frac_bits, cancel=cancel, reciprocal_source=source)
     assert type(spec.reciprocal) is (
@@ -45,7 +47,7 @@ def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bo
 
 
 @pytest.mark.parametrize("source", ["serial", "table"])
-@pytest.mark.parametrize("max_speed", ["1000rad/s", "150rad/s", "2000rad/s"])
+@pytest.mark.parametrize("max_speed", only(["150rad/s"], ["1000rad/s", "150rad/s", "2000rad/s"]))
 def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source: str) -> None:
     """All m_s and N, which have 6 bits, 3 and 7: an odd number of bits is a digit more."""
     spec = default_spec(max_speed=Speed.parse(max_speed), reciprocal_source=source)
@@ -56,7 +58,7 @@ def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source:
 
 
 @pytest.mark.parametrize("source", ["serial", "table"])
-@pytest.mark.parametrize("towards", [-1, 1])
+@pytest.mark.parametrize("towards", only([-1], [-1, 1]))  # up is the mirror of down
 def test_every_bound(tmp_path: Path, source: str, towards: int) -> None:
     """Rounded down and up: at 4 fraction bits many quotients need no rounding at all."""
     spec = default_spec(4, reciprocal_source=source, bounds=True, max_speed=Speed.parse("2000rad/s"))

@@ -90,7 +90,8 @@ def test_mutants_are_caught(name: str) -> None:
             check(method, seed)
 
 
-@pytest.mark.parametrize("seed", only([0, 1], SEEDS))
+# One motion has every register of a method in it; more motions have other widths.
+@pytest.mark.parametrize("seed", only([1], SEEDS))
 @pytest.mark.parametrize("method", METHODS)
 def test_registers_are_those_of_the_golden_model(method: str, seed: int) -> None:
     check(method, seed)

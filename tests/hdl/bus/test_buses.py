@@ -21,7 +21,7 @@ from support import bus_bench
 from support.compiled import lint
 from support.lockstep import random_ticks
 from support.mutant import mutant
-from support.nightly import nightly
+from support.nightly import only_rows
 
 from tachometry.hdl.bus.apb import ApbBridge
 from tachometry.hdl.bus.axi_lite import AxiLiteBridge
@@ -228,7 +228,9 @@ def test_verilog_of_every_bus_has_no_warnings(bus: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("simulator", "seed", "number"), [("icarus", 3, 4000), pytest.param("verilator", 1, 6000, marks=nightly)]
+    ("simulator", "seed", "number"),
+    # So few that each register of each bus shows two values; the rest is more of the same.
+    only_rows([("icarus", 6, 1500)], [("icarus", 6, 1500), ("icarus", 3, 4000), ("verilator", 1, 6000)]),
 )
 def test_buses_read_what_the_golden_model_says(simulator: str, seed: int, number: int, tmp_path: Path) -> None:
     write_design(tmp_path)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.bus import telemetry
@@ -85,6 +86,6 @@ def test_mutants_are_caught(name: str) -> None:
             check(seed)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", only(SEEDS[:1], SEEDS))  # one has frames of every kind
 def test_frames_show_what_was_captured(seed: int) -> None:
     check(seed)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.bridge import check
 from support.mutant import caught, mutant
+from support.nightly import only_rows
 from support.serial import UartHost
 
 from tachometry.hdl.bus import uart
@@ -69,7 +70,8 @@ DAMAGE: dict[str, Callable[[UartHost], None]] = {
 }
 
 
-@pytest.mark.parametrize(("seed", "bit_cycles"), [(0, 8), (1, 15)])
+# Bits of 15 clocks take twice as many.
+@pytest.mark.parametrize(("seed", "bit_cycles"), only_rows([(0, 8)], [(0, 8), (1, 15)]))
 def test_accesses_and_answers(seed: int, bit_cycles: int) -> None:
     run(seed, bit_cycles)
 

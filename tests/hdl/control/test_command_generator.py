@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.control import GENERATED, OFTEN, random_demands
 from support.mutant import caught, mutant
+from support.nightly import nightly, only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.control import command_generator
@@ -46,11 +47,14 @@ def check(spec: LoopSpec, n_ticks: int, seed: int = 1, *, fast: bool = False) ->
     ]
 
 
-def test_as_the_golden_model() -> None:
-    check(GENERATED, 600)
+# A hundred demands have every mode several times.
+@pytest.mark.parametrize("n_ticks", only([100], [100, 600]))
+def test_as_the_golden_model(n_ticks: int) -> None:
+    check(GENERATED, n_ticks)
     check(GENERATED, 80, fast=True)
 
 
+@nightly  # tests/hdl/control/test_controller.py has the serial multiplier, too
 def test_with_a_serial_multiplier() -> None:
     """And with other units."""
     tachometer = replace(GENERATED.tachometer, unit="rad/s", frac_bits=4)
@@ -60,7 +64,7 @@ def test_with_a_serial_multiplier() -> None:
 def test_with_control_ticks_in_2_microseconds() -> None:
     """An LSB of the acceleration is less than one of the port there."""
     assert OFTEN.generator.acceleration.shift < 0
-    check(OFTEN, 300)
+    check(OFTEN, 60)
 
 
 MUTANTS: dict[str, tuple[Any, str, str]] = {

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.demo import DemoPort, uart
-from support.nightly import only
+from support.nightly import nightly, only
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.loop import LoopClient
@@ -111,6 +111,8 @@ def test_the_index_is_high_in_a_quarter_of_each_revolution() -> None:
     assert len(seen) == 1
 
 
+# Amaranth's simulator takes ten seconds; tests/hdl/bus/test_loop_registers.py has the same registers, without a board.
+@nightly
 def test_a_control_loop_on_a_board() -> None:
     """The emulated shaft turns faster than is commanded, so the current brakes it; a restart keeps what was set."""
     tachometer = of_texts("s", {"ppr": "500", "clock": "12MHz", "max-speed": "1000rad/s"})

@@ -11,6 +11,7 @@ import pytest
 from amaranth import Module, ResetInserter, Signal
 from support.control import GENERATED, SERIAL, SMALL, check_core, core_case
 from support.mutant import caught, mutant
+from support.nightly import nightly
 from support.simulate import clock_by_clock
 from support.verilog import play_in_icarus
 
@@ -69,6 +70,7 @@ def test_mutants_are_caught(box: Any, right: str, wrong: str) -> None:
         check_core(OTHERS.get(right.split(".")[0], CORE), n_edges=1)
 
 
+@nightly  # the period in which both meet is one of many in tests/hdl/control
 def test_the_first_control_tick_has_the_first_update() -> None:
     """A period of a tick meets each update a clock after it has come."""
     spec = replace(GENERATED, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), period=50)

@@ -8,6 +8,7 @@ import pytest
 from amaranth import Module, ResetInserter, Signal
 from amaranth.lib.wiring import Component, In, Out
 from amaranth.sim import Simulator
+from support.nightly import only
 
 from tachometry.hdl import Tachometer
 from tachometry.sim.engines.pysim import PySim
@@ -28,7 +29,7 @@ def trace_of(changes: list[tuple[int, int]], n_clocks: int, start: int = 0) -> P
     return PinTrace(np.array([0] + [clock for clock, _ in changes]), a, b, n_clocks)
 
 
-@pytest.mark.parametrize("tick_cycles", [2, 3, 8])
+@pytest.mark.parametrize("tick_cycles", only([3], [2, 3, 8]))
 def test_an_edge_is_counted_in_the_window_of_its_clock_and_pin_to_count(tick_cycles: int) -> None:
     spec = make_spec(tick_cycles)
     for clock in range(1, 3 * tick_cycles + 2):

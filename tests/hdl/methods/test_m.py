@@ -8,6 +8,7 @@ import pytest
 from amaranth import Module, ResetInserter, Signal
 from amaranth.sim import Simulator
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.sequences import rounded
 from support.simulate import clock_by_clock
 
@@ -39,7 +40,8 @@ def check(average: int, *, tick_cycles: int = 3, frac_bits: int = 4, n: int = 30
     assert got == wanted
 
 
-@pytest.mark.parametrize("average", [1, 2, 3, 4, 5, 8, 16, 31, 32, 48])
+# None, the least, one that is no power of two, and one with ties.
+@pytest.mark.parametrize("average", only([1, 2, 5, 32], [1, 2, 3, 4, 5, 8, 16, 31, 32, 48]))
 @pytest.mark.parametrize("tick_cycles", [1, 3])
 def test_mean_of_the_last_ticks(average: int, tick_cycles: int) -> None:
     """With 4 fraction bits a mean over 32 or 48 has ties."""

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.methods import tick_counts
@@ -171,7 +172,8 @@ def test_external() -> None:
     check_external()
 
 
-@pytest.mark.parametrize("seed", range(20))
+# Odd seeds have external ticks; each has 40 stretches of other counts.
+@pytest.mark.parametrize("seed", only(range(4), range(20)))
 def test_random_counts(seed: int) -> None:
     rng = np.random.default_rng(seed)
     external = bool(seed % 2)

@@ -12,6 +12,7 @@ from amaranth import Elaboratable, ResetInserter, Signal
 from numpy.typing import NDArray
 from support import compiled
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.simulate import Player, clock_by_clock
 from support.tracking import hostile
 
@@ -164,7 +165,7 @@ def check_reset(seed: int) -> None:
     assert [(clock - len(before) - 1, *rest) for clock, *rest in found] == golden(SPEC, steps, last)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", only(range(2), range(6)))  # each is at another place of the program
 def test_reset(seed: int) -> None:
     check_reset(seed)
 

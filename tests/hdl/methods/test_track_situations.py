@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.nightly import only, only_rows
 
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.signals.recording import PinTrace, quadrature
@@ -78,7 +79,8 @@ def settled(found: Shown, velocity: float, share: float) -> int:
     return int(found.tick[wrong[-1]] - found.tick[0]) if len(wrong) else 0
 
 
-@pytest.mark.parametrize("speed", [0.02, 0.5, -3])
+# Of every situation one speed is about a count per tick; the rest shows how the bounds grow with the speed.
+@pytest.mark.parametrize("speed", only([0.5], [0.02, 0.5, -3]))
 def test_standstill(speed: float) -> None:
     """The speed falls as 1 + 1.5·E counts over the silence, and is 0 when the maximum time is over, as is p."""
     found = shown(SPEC, *at((speed, 300), (0, 500)), 800).after(301)
@@ -90,8 +92,11 @@ def test_standstill(speed: float) -> None:
     assert not rest.beyond.any()
 
 
-@pytest.mark.parametrize("rhythm", [(10, 10), (1.3, 7.2), (0.1, 0.1), (50, 3), (0.02, 30), (0.3, 190)])
-@pytest.mark.parametrize("sign", [1, -1])
+RHYTHMS = [(10, 10), (1.3, 7.2), (0.1, 0.1), (50, 3), (0.02, 30), (0.3, 190)]
+
+
+@pytest.mark.parametrize("rhythm", only([(1.3, 7.2), (0.02, 30)], RHYTHMS))
+@pytest.mark.parametrize("sign", only([-1], [1, -1]))
 def test_dithering_on_one_edge(rhythm: tuple[float, float], sign: int) -> None:
     """It reads 0 for ever, and the fine position is where the edge is."""
     times = np.cumsum(np.tile(rhythm, 100)) + 5
@@ -113,8 +118,8 @@ def test_start(speed: float) -> None:
     assert np.abs(moving.velocity / speed - 1).max() < 1e-3
 
 
-@pytest.mark.parametrize("speed", [0.05, 0.5, 2, 3.1])
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("speed", only([0.5, 2], [0.05, 0.5, 2, 3.1]))
+@pytest.mark.parametrize("sign", only([-1], [1, -1]))
 def test_reversal(speed: float, sign: int) -> None:
     """The sign is right after 2 counts and ¼/λ0, and stays so; the speed is within 5 % after 4/λ0 and 25 counts.
 
@@ -127,7 +132,10 @@ def test_reversal(speed: float, sign: int) -> None:
     assert settled(found, -sign * speed, 0.05) < max(4 * MEMORY, 25 / speed)
 
 
-@pytest.mark.parametrize(("before", "then"), [(0.5, 1), (1, 0.5), (2, 3), (1, 3), (3, 0.3), (0.05, 0.1), (0.1, 0.05)])
+STEPS = [(0.5, 1), (1, 0.5), (2, 3), (1, 3), (3, 0.3), (0.05, 0.1), (0.1, 0.05)]
+
+
+@pytest.mark.parametrize(("before", "then"), only_rows([(1, 0.5), (1, 3)], STEPS))
 def test_step_of_speed(before: float, then: float) -> None:
     """Within a tenth after 1.5/λ0, within 1 % after 6/λ0, if this is the time of 20 and of 40 counts.
 
@@ -152,8 +160,8 @@ def check_lost(found: Shown, speed: float, longer: float = 1) -> None:
     assert settled(after, speed, 0.01) < longer * max(6 * MEMORY, 75 / speed)
 
 
-@pytest.mark.parametrize("speed", [0.3, 1, 3])
-@pytest.mark.parametrize("number", [1, 3, 10])
+@pytest.mark.parametrize("speed", only([1], [0.3, 1, 3]))
+@pytest.mark.parametrize("number", only([1, 10], [1, 3, 10]))
 def test_lost_pulses(speed: float, number: int) -> None:
     """The lines stand still while the shaft goes on; ten counts below a count per tick take a quarter longer."""
     times, ways = at((speed, 900))
@@ -171,7 +179,7 @@ def test_illegal_transition(speed: float) -> None:
     check_lost(shown(SPEC, times, ways, 900), speed)
 
 
-@pytest.mark.parametrize("speed", [0.05, 0.3, 1, 2.5])
+@pytest.mark.parametrize("speed", only([1], [0.05, 0.3, 1, 2.5]))
 def test_external_ticks_that_fluctuate(speed: float) -> None:
     """By ±10 %: a constant speed stays constant, within an LSB or 0.1 per mille."""
     spec = replace(SPEC, max_tick_cycles=1200)

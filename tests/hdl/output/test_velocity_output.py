@@ -7,6 +7,7 @@ import pytest
 from amaranth import signed
 from amaranth.lib import data
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.output import velocity_output
@@ -61,7 +62,7 @@ def test_serial(ratio: Fraction, width: int) -> None:
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-@pytest.mark.parametrize("towards", [-1, 1])
+@pytest.mark.parametrize("towards", only([-1], [-1, 1]))  # up is the mirror of down
 @pytest.mark.parametrize("serial", [False, True])
 def test_bounds_are_rounded_outward(ratio: Fraction, towards: int, serial: bool) -> None:
     if len(VelocityOutput(ratio, MAX_NATIVE, 40).digits) > 2 or not serial:

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.mutant import caught
+from support.nightly import nightly
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -40,6 +41,7 @@ SPEC = LoopSpec(
 
 @functools.cache
 def through_gates() -> tuple[Log, Through]:
+    """Run 0.4 s of a loop, for nightly tests; the last one below holds 80 ms against the golden models."""
     course = DOUBLE.task.course(MOTOR, 2)
     return GateLoop(SPEC).run(MOTOR, edges_of(replace(REAL, seed=2)), course, feed_forward=True)
 
@@ -55,6 +57,7 @@ def agrees(spec: LoopSpec) -> None:
     assert len(through.currents) == 19_999
 
 
+@nightly
 def test_gates_and_golden_models_agree_in_every_bit() -> None:
     agrees(SPEC)
     current = through_gates()[1].currents[:, 1] * float(SPEC.amperes)
@@ -62,11 +65,13 @@ def test_gates_and_golden_models_agree_in_every_bit() -> None:
     assert current.max() > 6
 
 
+@nightly
 def test_other_gains_are_noticed() -> None:
     with caught():
         agrees(replace(SPEC, velocity_gain=Fraction(80.1)))
 
 
+@nightly
 def test_the_log_is_that_of_the_ports() -> None:
     log, through = through_gates()
     clock = np.round(log["time"] * SPEC.timing.clock_hz).astype(np.int64)
@@ -78,6 +83,7 @@ def test_the_log_is_that_of_the_ports() -> None:
     assert np.abs(log["disturbance"][-400:]).max() > 0.05  # the load
 
 
+@nightly
 def test_the_loop_does_what_one_in_double_precision_does() -> None:
     gains = replace(DOUBLE.gains, feed_forward=True)
     double = replace(DOUBLE, gains=gains)

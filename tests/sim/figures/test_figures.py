@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import docs
+from support.nightly import only
 
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.figures import FIGURES, tsuji_loops
@@ -43,7 +44,8 @@ def computed(name: str) -> Result:
     return FIGURES[name].compute(Lab(hdl=False, whole=False))
 
 
-@pytest.mark.parametrize("name", FIGURES)
+# Of the three that run a control loop one is enough, as they differ in what is drawn.
+@pytest.mark.parametrize("name", only(FIGURES.keys() - {"tsuji13", "tsuji14"}, FIGURES))
 def test_figure_agrees_with_what_its_paper_says(name: str) -> None:
     result = computed(name)
     assert result.claims
@@ -136,7 +138,8 @@ def test_every_claim_can_be_refuted(name: str, monkeypatch: pytest.MonkeyPatch) 
     assert not left
 
 
-@pytest.mark.parametrize("name", LOOPS)
+# The last has claims of both kinds; each is computed again for every wrong part.
+@pytest.mark.parametrize("name", only(LOOPS[-1:], LOOPS))
 def test_every_claim_of_a_loop_can_be_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """By M and S in each other's place, by an observer that is synchronised where it should not be, by other gains."""
     left = {claim.paper for claim in computed(name).claims}

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
+from support.nightly import only_rows
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -71,8 +72,12 @@ def check_faithful(spec: STachometer) -> float:
     return worst / (1 << FINE)
 
 
+FORMS = [(500, 16), (500, 4), (5000, 16), (500, 24)]
+
+
 @pytest.mark.parametrize("lowpass", [Fraction(1, 10), Fraction(20), Fraction(200), Fraction(20_000), Fraction(10**7)])
-@pytest.mark.parametrize(("max_ticks", "frac_bits"), [(500, 16), (500, 4), (5000, 16), (500, 24)])
+# The fewest bits, where rounding is the most.
+@pytest.mark.parametrize(("max_ticks", "frac_bits"), only_rows([(500, 4)], FORMS))
 def test_less_than_an_lsb_from_the_exact_recursion(lowpass: Fraction, max_ticks: int, frac_bits: int) -> None:
     worst = check_faithful(spec_of(lowpass, max_ticks, frac_bits))
     assert worst < 1

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.nightly import nightly
 from support.verilog import LintingVerilator
 
 from tachometry.sim import golden
@@ -42,6 +43,7 @@ def test_sixty_four_axes() -> None:
     check(4, Cxxrtl(), 3)
 
 
+@nightly  # tests/hdl/axes lints it, and the 64 axes above are those of its gates
 def test_the_exported_verilog(tmp_path: Path) -> None:
     check(1, LintingVerilator(tmp_path, few=True), 1)
 

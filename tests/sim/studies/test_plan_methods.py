@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.nightly import only
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -39,7 +40,8 @@ def speeds() -> list[float]:
     return [*(10 ** np.random.default_rng(5).uniform(-2, 1.3, 40)).tolist(), *near]
 
 
-@pytest.mark.parametrize("method", [*METHODS, *OF_METHOD])
+# Tracking and adaptive dt take ten times as many ticks to settle, and their plan uses the equations of the others.
+@pytest.mark.parametrize("method", only(["s", "m", "t", "mt", "rairan"], [*METHODS, *OF_METHOD]))
 def test_no_error_is_greater_than_the_resolution(method: str) -> None:
     spec = spec_of(method)
     tick = float(spec.timing.tick_seconds)

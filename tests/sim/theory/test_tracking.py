@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.nightly import only
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
@@ -108,7 +109,8 @@ def greatest_deviation(spec: TrackTachometer, trace: PinTrace) -> tuple[float, i
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-@pytest.mark.parametrize("tick", ["20us", "100us"])
+# Shorter ticks have fewer counts each and are five times as many; the recursion is the same.
+@pytest.mark.parametrize("tick", only(["100us"], ["20us", "100us"]))
 def test_within_one_lsb(name: str, tick: str) -> None:
     motion, faults, edge_error = MOTIONS[name]
     number = 2 * list(MOTIONS).index(name) + (tick == "20us")

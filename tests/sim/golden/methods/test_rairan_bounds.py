@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
+from support.nightly import only
 from support.rairan import golden_updates, make_spec, random_steps
 
 from tachometry.sim.golden.methods import rairan
@@ -82,7 +83,8 @@ def test_discs_and_lines_within_the_edge_error(options: dict[str, object]) -> No
         enclosed(8, 500_000, seed=4, edge_error=Fraction(1), **options)
 
 
-@pytest.mark.parametrize("dt", [1, 2, 8])
+# The longer dt is, the fewer updates there are to be looked at.
+@pytest.mark.parametrize("dt", only([8], [1, 2, 8]))
 def test_they_enclose_it_where_dt_is_adaptive(dt: int) -> None:
     looked_at, _, _ = enclosed(dt, 10**6, seed=2, adaptive=Fraction(1, 7))
     assert looked_at > 10**5 // dt

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.mutant import caught, mutant
+from support.nightly import only
 
 from tachometry.hdl.methods.mt import MTMethod
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
@@ -86,7 +87,8 @@ def check_short_ticks(method: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("method", ["t", "mt"])
-@pytest.mark.parametrize("seed", range(3))
+# A seed is another rhythm of the ticks; that of the first is the shortest.
+@pytest.mark.parametrize("seed", only([0], range(3)))
 def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
     check_short_ticks(method, seed)
 
