@@ -13,6 +13,7 @@ from tachometry.boards.fpga.boards import BOARDS
 from tachometry.cli.group import cli
 from tachometry.cli.options.option import Option
 from tachometry.hdl.export.registers.page import tables
+from tachometry.sim.studies.sweeping.sweep import COLUMNS
 from tachometry.spec import METHODS, Encoder, Port, TachometerSpec, Timing, of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_ports
@@ -258,6 +259,21 @@ def boards() -> str:
     )
 
 
+def columns() -> str:
+    """The page of the columns of a sweep's results."""
+    same = [name for name, (_, about) in COLUMNS.items() if about == "as the option"]
+    rows = [[f"`{name}`", kind, about] for name, (kind, about) in COLUMNS.items() if name not in same]
+    rows.append([", ".join(f"`{name}`" for name in same), "", "as the options of these names"])
+    return "\n".join(
+        [
+            "# Columns of a sweep\n",
+            "Made by `make docs` from `sim/studies/sweeping`. A row of what a [sweep](../guides/sweep.md) gives has "
+            "these columns, and one of numbers for each name in braces, in rad/s, s and Hz.\n",
+            markdown(["column", "kind", "what it is, unit"], rows, left=range(3)),
+        ]
+    )
+
+
 def _beyond(**options: Any) -> list[Port]:
     """Ports that options of a loop add, or make of others."""
     there = {port.name: port.direction for port in loop_ports(_LOOP)}
@@ -308,7 +324,7 @@ def _cores(method: str) -> list[TachometerSpec]:
 @click.option("-o", "--output", "folder", type=click.Path(path_type=Path), default=DOCS, help="Folder of the pages.")
 def main(folder: Path) -> None:
     """Write the pages."""
-    for page in (options, ports, registers, boards):
+    for page in (options, ports, registers, boards, columns):
         write(folder / f"{page.__name__}.md", page())
 
 
