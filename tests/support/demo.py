@@ -1,5 +1,6 @@
 """Demos for tests of hosts: compiled, or told what to do."""
 
+from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any
 
@@ -103,6 +104,36 @@ class ToldBoard:
         self._sequence = (self._sequence + 1) % frames.SEQUENCES
         body = b"".join(word.to_bytes(4, "little") for word in words)
         return frames.with_check(bytes([frames.TELEMETRY_HEADER | self._sequence]) + body + b"\0")
+
+
+class ToldPort(AbstractContextManager["ToldPort"]):
+    """The serial port of a board that tests tell what to do, and a clock of which time passes with each read.
+
+    Parameters
+    ----------
+    board : ToldBoard
+    """
+
+    def __init__(self, board: ToldBoard) -> None:
+        self._board, self._waiting, self._now = board, b"", 0.0
+
+    def monotonic(self) -> float:
+        """Take the place of `time.monotonic`."""
+        return self._now
+
+    def write(self, data: bytes) -> None:
+        self._waiting += data
+
+    def read(self, size: int = 1) -> bytes:
+        self._now += 0.02
+        found, self._waiting = self._board.run(CLOCK_HZ // 50, self._waiting)
+        return found
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
 
 class DemoPort:

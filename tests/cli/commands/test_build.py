@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from support.command import run
 from support.fake_tools import FakeTools
+from support.nightly import nightly
 
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.hdl.core.bus_tachometer import BusTachometer
@@ -57,8 +58,19 @@ def refused(capsys: pytest.CaptureFixture[str], folder: Path, *words: object) ->
             ".bin",
             ["logic cells 700 of 1,400", "block RAMs 4 of 8", "Fmax 99.5 MHz, the clock has 12 MHz"],
         ),
-        ("ulx3s-85f", ".bit", ["LUTs 650 of 1,300", "flip-flops 450 of 900", "Fmax 99.5 MHz, the clock has 25 MHz"]),
-        ("tang-nano-9k", ".fs", ["LUTs 600 of 1,200", "adder bits 230 of 460", "Fmax 99.5 MHz, the clock has 27 MHz"]),
+        # Other tools, run in the same way.
+        pytest.param(
+            "ulx3s-85f",
+            ".bit",
+            ["LUTs 650 of 1,300", "flip-flops 450 of 900", "Fmax 99.5 MHz, the clock has 25 MHz"],
+            marks=nightly,
+        ),
+        pytest.param(
+            "tang-nano-9k",
+            ".fs",
+            ["LUTs 600 of 1,200", "adder bits 230 of 460", "Fmax 99.5 MHz, the clock has 27 MHz"],
+            marks=nightly,
+        ),
     ],
 )
 def test_a_bitstream(

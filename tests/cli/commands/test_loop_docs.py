@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 import pytest
 from support import command, docs
+from support.nightly import nightly
 
 from tachometry.cli.commands.loop import loop
 from tachometry.cli.options.closed_loop import loop_options
@@ -64,6 +65,7 @@ def test_rows_of_what_synchronising_does(name: str, place: int) -> None:
     ]
 
 
+@nightly  # twelve loops; the rows below are of the same simulation
 def test_rows_of_usable_gains() -> None:
     """Ticks of 1 ms, S: the gain of the table is usable, and the next one is not."""
     gain, *rest = row("real disc", "S, synchronised", "1 ms")

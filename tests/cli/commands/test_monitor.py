@@ -17,8 +17,8 @@ import pytest
 from rich.console import Console
 from support import docs
 from support.command import run
-from support.demo import BOARD, CLOCK_HZ, WORDS, ToldBoard, demo_map, manifest_of
-from support.nightly import only
+from support.demo import BOARD, CLOCK_HZ, WORDS, ToldBoard, ToldPort, demo_map, manifest_of
+from support.nightly import nightly
 
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.boards.monitor.columns import columns
@@ -50,7 +50,8 @@ def error(capsys: pytest.CaptureFixture[str], *words: object) -> str:
     return told.removeprefix("tachometry: error: ")
 
 
-@pytest.mark.parametrize("method", only(["s"], METHODS))
+@nightly  # that of the page runs below, and tests/boards/monitor/test_selftest.py has its steps
+@pytest.mark.parametrize("method", METHODS)
 def test_the_selftest_passes(method: str, capsys: pytest.CaptureFixture[str]) -> None:
     long = ("--tick", "100us") if method == "track" else ()  # whose program takes most of a tick
     assert run("monitor", SIM, *WORDS, *long, "--method", method, "--selftest") == 0
@@ -166,6 +167,13 @@ def test_an_unplugged_board_is_waited_for(tmp_path: Path, manifest: Path) -> Non
     assert times == sorted(times)
 
 
+def plug_in(told: ToldBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every port be that of this board, which waits for no real time."""
+    port = ToldPort(told)
+    monkeypatch.setattr("tachometry.boards.monitor.serial_port.SerialPort", lambda name, baud: port)
+    monkeypatch.setattr("tachometry.boards.host.link.time", port)
+
+
 @pytest.mark.parametrize("mode", [(), ("--selftest",)], ids=["view", "selftest"])
 @pytest.mark.parametrize(
     ("noise", "message"),
@@ -175,12 +183,17 @@ def test_an_unplugged_board_is_waited_for(tmp_path: Path, manifest: Path) -> Non
     ],
 )
 def test_a_foreign_device(
-    noise: bytes, message: str, mode: tuple[str, ...], manifest: Path, capsys: pytest.CaptureFixture[str]
+    noise: bytes,
+    message: str,
+    mode: tuple[str, ...],
+    manifest: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told = ToldBoard(demo_map())
     told.noise = noise
-    with SimulatedBoard(told, CLOCK_HZ) as board:
-        assert message in error(capsys, board.path, "--manifest", manifest, *mode)
+    plug_in(told, monkeypatch)
+    assert message in error(capsys, "cable", "--manifest", manifest, *mode)
 
 
 def test_another_configuration(manifest: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -194,11 +207,11 @@ def test_a_port_that_is_used(manifest: Path, capsys: pytest.CaptureFixture[str])
         assert error(capsys, board.path, "--manifest", manifest) == f"{board.path} is used by another program"
 
 
-def test_a_silent_port(manifest: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_silent_port(manifest: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     told = ToldBoard(demo_map())
     told.silent = True
-    with SimulatedBoard(told, CLOCK_HZ) as board:
-        assert error(capsys, board.path, "--manifest", manifest, "--selftest") == f"nothing answers at {board.path}"
+    plug_in(told, monkeypatch)
+    assert error(capsys, "cable", "--manifest", manifest, "--selftest") == "nothing answers at cable"
 
 
 MANIFESTS = {

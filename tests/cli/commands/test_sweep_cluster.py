@@ -97,6 +97,7 @@ def points_in(rows: list[str]) -> list[str]:
     return [row.split('"point": "')[1].split('"')[0] for row in rows]
 
 
+@nightly  # the dead workers of the test below take the same way
 def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
     result, trace = tmp_path / "r.parquet", Trace(tmp_path)
     with (

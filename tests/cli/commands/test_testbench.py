@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from support.mutant import mutant
-from support.nightly import only
+from support.nightly import nightly, only
 
 from tachometry.cli.main import main
 from tachometry.hdl.control.controller import Controller
@@ -76,6 +76,7 @@ def test_passes_in_icarus(case: str, tmp_path: Path) -> None:
     assert play(tmp_path) == ""
 
 
+@nightly  # that of a wrong sign runs as far, and tests/hdl/core/test_loop_core.py has the exported loop
 def test_a_loop_passes_in_icarus(tmp_path: Path) -> None:
     assert generate(tmp_path, *LOOP.split(), *LOOPS["generator"].split()) == 0
     vectors = json.loads((tmp_path / "spindle_vectors.json").read_text())
@@ -153,7 +154,7 @@ def ports_width(ports: list[dict[str, Any]], name: str) -> int:
     return next(port["width"] for port in ports if port["name"] == name)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", only(["s", "mt", "rairan"], CASES))  # all ports that there are
 def test_every_output_and_situation_is_in_the_vectors(case: str, tmp_path: Path) -> None:
     assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
     ports = json.loads((tmp_path / "spindle.json").read_text())["ports"]
