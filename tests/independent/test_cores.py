@@ -135,8 +135,12 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
     assert any(row.get("velocity_overflow") for row in shown) == case.settings.narrow
 
 
-@pytest.mark.parametrize(
-    "case", parameters((case for case in CASES if case not in SILENT), nightly=("track_rev", "track_rad"))
-)
+# One core of each method has most of its options, two the timer of ticks and the greatest width; the rest are ends of
+# ranges.
+SHORT = {"s_rpm", "s_two", "m_rpm", "t_lattice", "mt_rpm", "rairan_rpm", "track_rpm"}
+NIGHTLY = [case.name for case in CASES if case.name not in SHORT]
+
+
+@pytest.mark.parametrize("case", parameters((case for case in CASES if case not in SILENT), nightly=NIGHTLY))
 def test_core(case: Case, generated: Generated) -> None:
     check_core(case, *made(generated, case))

@@ -15,7 +15,7 @@ TICK, MOST = 50, 10
 Generated = Callable[..., Path]
 
 
-@pytest.mark.parametrize("case", parameters(SILENT, nightly=("track_native",)))
+@pytest.mark.parametrize("case", parameters(SILENT, nightly=("track_native", "m_native", "t_native", "mt_native")))
 def test_core_and_its_silences(case: Case, generated: Generated) -> None:
     folder, manifest = made(generated, case)
     check_core(case, folder, manifest)

@@ -80,6 +80,7 @@ def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -
             proofs.mutation.score.judge(replace(case, mutants=12), pool, replace(played, traces=parts))
 
 
+@nightly
 def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     small.setattr(Case, "play", lambda case, n_clocks: standstill(case.spec, n_clocks))
     small.setattr(proofs.mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
@@ -130,6 +131,7 @@ def test_lemmas_of_track_are_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     one_of_track(tmp_path)
 
 
+@nightly  # it makes a netlist of the tracking core
 def test_all_registers_of_lemmas_are_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(proofs.mutation.equivalent, "proven", lambda *arguments: [True])
     one_of_track(tmp_path)

@@ -12,6 +12,7 @@ from proofs.python_mutation.covered import chosen_for, with_imports
 from proofs.python_mutation.equivalent import ARGUED
 from proofs.python_mutation.judge import Verdict
 from proofs.python_mutation.mutants import ROOMS, Mutant, files, mutants_of, mutated, sample
+from support.nightly import nightly
 
 ROOT = Path(__file__).parents[2]
 FILE = "spec/methods/adaptive.py"
@@ -111,6 +112,7 @@ for verdict in sorted(judge_all(root, jobs, 2, folder, lambda verdict: None), ke
 """
 
 
+@nightly  # it runs tests anew for each of four wrong lines
 def test_a_wrong_line_is_noticed_by_its_tests_alone(tmp_path: Path) -> None:
     command = [sys.executable, "-c", SCRIPT, str(ROOT), str(tmp_path)]
     env = {**os.environ, "PYTHONPATH": str(ROOT / "tests")}
