@@ -9,7 +9,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test test-all pytest verify formal formal-quick mutate upset bench size bitstreams docs api lint clean
+.PHONY: help venv demo figures compare icarus test test-all pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
@@ -82,6 +82,13 @@ verify: $(VENV)/.test ## every method on every engine against the golden models,
 
 compare: $(LINKED) ## all methods and what others use in several situations, written to docs/measured/compare.md
 	$(BIN)/python bench/compare.py
+
+studies: $(VENV)/.test ## control loops, tracking, encoders, changes of flip-flops, written to docs/measured
+	$(BIN)/python bench/encoder.py
+	$(BIN)/python bench/encoder_errors.py
+	$(BIN)/python bench/toggles.py -o docs/measured/toggles.md
+	$(BIN)/python bench/tracking.py -o docs/measured/track.md
+	$(BIN)/python bench/control.py -o docs/measured/control.md --plot docs/measured/control.png
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/measured/size.md
 	$(BIN)/python bench/size.py -o docs/measured/size.md

@@ -81,7 +81,7 @@ error.""",
 
 HEAD = """# Methods beside each other
 
-This page is made by `python bench/compare.py`. It shows the golden models of the cores, which the hardware equals bit
+`make compare` writes this page. It shows the golden models of the cores, which the hardware equals bit
 for bit, and float models of what other projects use and of estimators in the literature:
 
 - [all situations](#all-situations), where every rival has its best setting for each, and then
@@ -112,20 +112,11 @@ for bit, and float models of what other projects use and of estimators in the li
 - *Tracking loops* (ODrive, moteus): they are smooth, with a delay that is constant and known, 2 ms with their defaults.
 - *Filtered differences, SimpleFOC*: they are good at constant speed, and have 5 ms of delay everywhere else.
 - *Least squares over edges* (float, with a matrix solved for each value): tuned for each situation it has the least
-  error of all in most rows. With one setting for all it is as good as tracking on sines and reversals, and 9 to 500
-  times worse on a ramp and at speed with a real disc.
-
-Where another one beats tracking that is set for all situations: least squares tuned per row, as said; Kalman filters
-tuned per row for sines, a bad disc and an ideal trapezoid; loops and filters tuned for slow constant speeds, where
-50 ms of delay cost nothing; ODrive's loop on an ideal slow sine, 0.11 against 0.13 rad/s; FOAW and LinuxCNC's
-timestamps on a sudden stop, 0.76 and 0.81 against 0.89; M/T and LinuxCNC's timestamps on an ideal trapezoid, 0.49 and
-0.55 against 0.62.
+  error of all in most rows. With one setting for all it is as good as tracking on sines and reversals, and far
+  worse on a ramp and at speed with a real disc.
 
 Without `--method`, `generate` makes S all the same: it is the only one that every clock, tick and option suits, so what
 is generated does not depend on whether a tick is long enough.
-
-Tsuji 2009, Fig. 8, agrees for M/T with a timer of 200 ns and S with ticks of 20 µs: M/T is better below about
-130 rad/s with an encoder of 81,000 counts, and S is better above ([figures.md](figures.md)).
 
 """
 

@@ -71,7 +71,7 @@ client.enable(True)
 _REGISTERS = """\
 # Registers
 
-Made by `make docs` from `spec/registers`.
+`make docs` writes this page from `spec/registers`.
 
 With `--bus` a core has registers: an identification, a control register, counters, and everything that its
 [ports](ports.md) show. `tachometry generate` then also writes files that describe them and programs that read them, all
@@ -168,7 +168,8 @@ def options() -> str:
     """The page of all options: a table for each command, and each group under the first command that has it."""
     parts = [
         "# Options\n",
-        "Made by `make docs` from what the code declares; `tachometry COMMAND --help` prints the same. Options of the "
+        "`make docs` writes this page from what the code declares. "
+        "`tachometry COMMAND --help` prints the same. Options of the "
         "groups Encoder, Timing, Core, Method, Motion and Encoder faults mean the same in every command.\n",
     ]
     seen: set[str] = set()
@@ -218,9 +219,9 @@ def ports() -> str:
     return "\n".join(
         [
             "# Ports\n",
-            "Made by `make docs` from `spec.ports`. A *strobe* is high for one clock; an output *with* a strobe is new "
-            "in its clocks, and held until the next. Widths depend on the options: the manifest NAME.json has those "
-            "of your core. Those of a core of many axes are in [axes](../concepts/axes.md#ports).\n",
+            "`make docs` writes this page from `spec.ports`. A *strobe* is high for one clock; an output *with* a "
+            "strobe is new in its clocks, and held until the next. Widths depend on the options: the manifest "
+            "NAME.json has those of your core. Those of many axes are in [axes](../concepts/axes.md#ports).\n",
             markdown(_HEADER, rows, left=range(4)),
             "\nThe manifest states the latencies: a level sampled at clock c is counted in the window of c + "
             "`pin_to_count`, `tick` is high `tick_latency` clocks after the window's last clock, and `velocity_valid` "
@@ -248,7 +249,7 @@ def boards() -> str:
     return "\n".join(
         [
             "# Boards and their pins\n",
-            "Made by `make docs` from `boards/fpga`. [Boards](../guides/boards.md) says how to use them.\n",
+            "`make docs` writes this page from `boards/fpga`. [Boards](../guides/boards.md) says how to use them.\n",
             markdown(["name", "board", "clock", "what is made"], rows, left=range(4)),
             markdown(
                 ["port", *pins],
@@ -267,7 +268,8 @@ def columns() -> str:
     return "\n".join(
         [
             "# Columns of a sweep\n",
-            "Made by `make docs` from `sim/studies/sweeping`. A row of what a [sweep](../guides/sweep.md) gives has "
+            "`make docs` writes this page from `sim/studies/sweeping`. "
+            "A row of what a [sweep](../guides/sweep.md) gives has "
             "these columns, and one of numbers for each name in braces, in rad/s, s and Hz.\n",
             markdown(["column", "kind", "what it is, unit"], rows, left=range(3)),
         ]

@@ -161,7 +161,7 @@ again; other files and words measure any other core. ADI removed its file in the
 PAGE_HEAD = """\
 # Size and speed
 
-This page is made by `make size` (`python bench/size.py`) with {used}.
+`make size` (`python bench/size.py`) wrote this page with {used}.
 
 - Area is that of the core alone, as nextpnr packs it. COMB, FF, DP16KD and MULT are the ECP5 cells TRELLIS_COMB,
   TRELLIS_FF, DP16KD (block RAM) and MULT18X18D. LC, RAM and DSP are the iCE40 cells ICESTORM_LC, ICESTORM_RAM and

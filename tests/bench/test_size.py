@@ -288,7 +288,7 @@ def test_cost_is_the_difference_from_the_reference() -> None:
 
 def test_page() -> None:
     text = size.page(size.tables(results()), {"yosys": "0.70"})
-    assert "`make size` (`python bench/size.py`) with yosys 0.70" in text
+    assert "`make size` (`python bench/size.py`) wrote this page with yosys 0.70" in text
     assert "\n## HX8K (iCE40HX8K, CT256)\n\n| configuration | what | LC (cells) |" in text
     assert "| M/T, serial divider | speed | 300 | 217 |  | 203.5 (185–218) | 378 | 135.2 (122–135) | 39 |" in text
     assert "What each option costs" not in text  # none was measured
