@@ -147,6 +147,13 @@ def test_golden_models_need_only_numpy() -> None:
         assert top <= {"tachometry", "numpy", "typing", "collections", "dataclasses", "bisect"}, file
 
 
+def test_naive_models_of_tests_import_nothing_that_is_tested() -> None:
+    """They are read from papers and pages alone."""
+    for file in (ROOT / "tests" / "reference").glob("*.py"):
+        top = {name.split(".")[0] for name in imports(file)}
+        assert top <= {*sys.stdlib_module_names, "numpy", "reference"}, file
+
+
 @pytest.mark.parametrize("layer", LAYERS)
 def test_files_can_be_read_on_a_few_screens(layer: str) -> None:
     for file in (ROOT / layer).rglob("*.py"):

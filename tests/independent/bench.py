@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from independent.front import Play, wrapped
+from reference.front import Play, wrapped
 
 Manifest = dict[str, Any]
 Row = dict[str, int]  # outputs by name, and "clock"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from independent.settings import Settings
+from reference.settings import Settings
 
 _PLAIN = {"ppr": "500", "clock": "1000000Hz"}
 

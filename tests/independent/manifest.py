@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from independent.bench import Manifest
-from independent.settings import Settings
+from reference.settings import Settings
 
 # What a method can be asked for: the entry of the manifest's `parameters`, and the word of the command line.
 _SHARED = {

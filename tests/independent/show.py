@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from independent.bench import Manifest, Row
-from independent.front import Tick
-from independent.methods import Bound, Update
-from independent.settings import Settings
+from reference.front import Tick
+from reference.settings import Settings
+from reference.tsuji import Bound, Update
 
 
 def nearest(number: Fraction) -> int:

@@ -4,7 +4,7 @@ import random
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from independent.front import CYCLE, Play
+from reference.front import CYCLE, Play
 
 
 @dataclass

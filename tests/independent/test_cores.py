@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 from independent.bench import Manifest, Row, in_icarus
 from independent.cases import CASES, SILENT, Case, parameters
-from independent.front import Front, Tick, conditioned, external_ends, index_positions, ticks_of
 from independent.manifest import check_manifest
-from independent.methods import Update, m_updates, s_updates
-from independent.rairan import rairan_updates
-from independent.settings import arguments
 from independent.show import check_age, check_updates
 from independent.stimulus import Lines, external, motion
-from independent.timed import timed_updates
 from independent.track import check_tracking, track_updates
+from reference.front import Front, Tick, conditioned, external_ends, index_positions, ticks_of
+from reference.rairan import rairan_updates
+from reference.settings import arguments
+from reference.timed import timed_updates
+from reference.tsuji import Update, m_updates, s_updates
 
 # Cores that show `bounds.none` at some time, because there is no bound.
 ABSENT = {"t_native": {"velocity_upper"}, "rairan_rpm": {"velocity_lower", "velocity_upper"}}

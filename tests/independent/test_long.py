@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from independent.bench import in_verilator
 from independent.cases import LONG
-from independent.front import conditioned, ticks_of
 from independent.manifest import check_manifest
-from independent.methods import Update, s_updates
-from independent.settings import Settings, arguments
 from independent.show import check_updates
 from independent.stimulus import Lines, steady
+from reference.front import conditioned, ticks_of
+from reference.settings import Settings, arguments
+from reference.tsuji import Update, s_updates
 
 TICK = 1 << 20
 # A count, another after half of the longest measurement, and then none.

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from independent.cases import DESCRIBED, Case
 from independent.manifest import check_manifest
-from independent.settings import arguments
+from reference.settings import arguments
 
 
 @pytest.mark.parametrize("case", DESCRIBED, ids=[case.name for case in DESCRIBED])

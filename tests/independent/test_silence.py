@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from independent.bench import Row, in_icarus
 from independent.cases import SILENT, Case, parameters
-from independent.settings import Settings
 from independent.stimulus import Lines, steady
 from independent.test_cores import check_core, made
+from reference.settings import Settings
 
 TICK, MOST = 50, 10
 Generated = Callable[..., Path]

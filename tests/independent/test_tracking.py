@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from independent.bench import Manifest, Row, in_verilator
 from independent.cases import CASES, Case, parameters
-from independent.front import conditioned, wrapped
-from independent.settings import Settings, arguments
 from independent.show import check_velocity
 from independent.stimulus import Lines, steady
+from reference.front import conditioned, wrapped
+from reference.settings import Settings, arguments
 
 TRACKING = [case for case in CASES if case.settings.method == "track"]
 FIRST = 5  # ticks before the motion

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from independent.bench import Manifest, Row
-from independent.front import Tick, wrapped
-from independent.methods import Update
-from independent.settings import Settings
 from independent.show import check_velocity, limit_of
+from reference.front import Tick, wrapped
+from reference.settings import Settings
+from reference.tsuji import Update
 
 
 def track_updates(settings: Settings, ticks: Sequence[Tick]) -> list[Update]:

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from support.sequences import rounded
+from reference.sequences import rounded
+
 from support.simulate import clock_by_clock
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.spec import METHODS, Encoder, Timing

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from amaranth.lib import data
+from reference.sequences import rounded
 from support.mutant import caught, mutant
 from support.nightly import only, only_rows
 from support.quotient import FlatQuotient, every_quotient
-from support.sequences import rounded
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic import scaler

@@ -5,8 +5,8 @@ import pytest
 from amaranth import Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+from reference.sequences import PAPER
 from support.mutant import caught, mutant
-from support.sequences import PAPER
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.axes import axis_window

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
+from reference.sequences import PAPER
 from support.mutant import caught, mutant
-from support.sequences import PAPER
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.methods.alteration import AlterationDetector

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from amaranth import Module, ResetInserter, Signal
 from amaranth.sim import Simulator
+from reference.sequences import rounded
 from support.mutant import caught, mutant
 from support.nightly import only
-from support.sequences import rounded
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.methods import m as m_method

@@ -3,8 +3,8 @@
 from fractions import Fraction
 
 import pytest
+from reference.sequences import MAX_TICKS, PAPER, rounded
 from support.mutant import caught, mutant
-from support.sequences import MAX_TICKS, PAPER, rounded
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.methods.interval import IntervalAccumulator

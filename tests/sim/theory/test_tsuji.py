@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from support.ideal_counts import Windows, mt_windows, positions, s_windows, speeds
+from reference.ideal_counts import Windows, mt_windows, positions, s_windows, speeds
 
 from tachometry.sim.theory import tsuji
 

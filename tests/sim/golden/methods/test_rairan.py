@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reference.sequences import rounded
 from support.nightly import only, only_rows
 from support.rairan import clock_by_clock, golden_updates, make_spec, random_steps, steps_of
-from support.sequences import rounded
 from support.table1 import every_ts
 
 from tachometry.sim.golden.methods.rairan import Model, orbit

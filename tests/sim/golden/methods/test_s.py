@@ -5,7 +5,7 @@ from math import ceil, floor
 
 import numpy as np
 import pytest
-from support.sequences import MAX_TICKS, PAPER, rounded
+from reference.sequences import MAX_TICKS, PAPER, rounded
 
 from tachometry.sim.golden.methods.s import Model
 from tachometry.sim.golden.quotient import round_quotient

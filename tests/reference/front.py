@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from independent.settings import Settings
+from reference.settings import Settings
 
 # Levels of (A, B) in the order of forward motion: A leads B.
 CYCLE = [(0, 0), (1, 0), (1, 1), (0, 1)]

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from independent.front import Front
-from independent.methods import Bound, Update
-from independent.settings import Settings
+from reference.front import Front
+from reference.settings import Settings
+from reference.tsuji import Bound, Update
 
 
 def estimate(kind: str, n_ep: int, n_dt: int) -> Fraction:

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from independent.front import Front, Tick
-from independent.methods import Bound, Update
-from independent.settings import Settings
+from reference.front import Front, Tick
+from reference.settings import Settings
+from reference.tsuji import Bound, Update
 
 
 @dataclass(frozen=True)

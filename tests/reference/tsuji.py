@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from independent.front import Tick
-from independent.settings import Settings
+from reference.front import Tick
+from reference.settings import Settings
 
 Bound = Fraction | None  # None: there is none
 
