@@ -104,18 +104,15 @@ def gained(disc: str, motion: str, begin: float) -> dict[str, list[float]]:
 
 
 def gains() -> str:
-    """The table of what is gained."""
+    """The errors as they are, and the parts that are left with a cycle, with a disc, and with whole cycles."""
     rows = []
     for disc in DISCS:
         for motion, (text, begin) in MOTIONS.items():
-            for method, (none, cycle, lines, *whole) in gained(disc, text, begin).items():
-                show = [f"{none:.3g}", f"{cycle:.3g} ({cycle / none:.2f})", f"{lines:.3g} ({lines / none:.2f})"]
-                rows.append(
-                    [disc, motion, method, *show, *([f"{one:.3g} ({one / none:.2f})" for one in whole] or ["–"])]
-                )
-                print(*rows[-1], sep="  ", flush=True)
-    columns = ["disc", "motion", "method", "as it is", "cycle learned", "disc learned", "`--whole-cycles`"]
-    return markdown(columns, rows, (0, 1, 2))
+            found = gained(disc, text, begin).values()
+            cells = [f"{none:.3g}: {', '.join(f'{one / none:.2f}' for one in others)}" for none, *others in found]
+            rows.append([disc, motion, *cells])
+            print(*rows[-1], sep="  ", flush=True)
+    return markdown(["disc", "motion", *METHODS], rows, range(len(METHODS) + 2))
 
 
 def speeds_of_learning() -> str:

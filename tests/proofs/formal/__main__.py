@@ -46,20 +46,15 @@ def _prove(proofs: dict[str, Proof], mutants: list[Mutant]) -> tuple[list[Result
         return [future.result() for future in right], [future.result() for future in refuted]
 
 
-def _proof_row(proof: Proof, result: Result) -> tuple[str, ...]:
+def _row(proof: Proof, result: Result, refuted: list[tuple[Mutant, Result]]) -> tuple[str, ...]:
     begin = f"any state, {proof.recovers} clocks" if proof.recovers else f"{result.depth} clocks"
     begin = f"given, {begin}" if proof.given else begin
-    return proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict
-
-
-def _mutant_row(wrong: Mutant, result: Result) -> tuple[str, ...]:
-    before, after = (" ".join(text.split()) for text in (wrong.right, wrong.wrong))
-    change = f"{wrong.box.__name__}: `{before}` → `{after}`"
-    return wrong.proof, wrong.refuted, change, f"{result.depth} clocks", f"{result.seconds:.0f}", result.verdict
+    wrong = ", ".join(f"`{mutant.refuted}` {found.depth}" for mutant, found in refuted)
+    return proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict, wrong
 
 
 def main(words: list[str]) -> bool:
-    """Whether all was as it should be; prints the tables."""
+    """Whether all was as it should be; prints the table."""
     given = arguments(__doc__ or "", "PROOF").parse_args(words)
     quick = given.names == ["quick"]
     names = chosen("proof", QUICK if quick else given.names, (proof.name for proof in PROOFS))
@@ -67,16 +62,14 @@ def main(words: list[str]) -> bool:
     proofs = {proof.name: proof for proof in PROOFS if proof.name in names}
     mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs and not quick]
     right, refuted = _prove(proofs, mutants)
-    table = Table("core", "properties", "induction", "seconds", "verdict", left=range(5))
+    judged = list(zip(mutants, refuted, strict=True))
+    table = Table("core", "properties", "induction", "seconds", "verdict", "wrong cores refuted in", left=range(6))
     for proof, result in zip(proofs.values(), right, strict=True):
-        table.add(*_proof_row(proof, result))
+        table.add(*_row(proof, result, [(wrong, found) for wrong, found in judged if wrong.proof == proof.name]))
     table.write(given.output, "proofs")
-    if mutants:
-        print()
-        table = Table("core", "property", "mutant", "refuted in", "seconds", "verdict", left=range(6))
-        for wrong, result in zip(mutants, refuted, strict=True):
-            table.add(*_mutant_row(wrong, result))
-        table.write(given.output, "mutants")
+    for wrong, found in judged:
+        if found.verdict != "refuted":
+            print(f"\n{wrong.refuted} of {wrong.proof} is {found.verdict} with {wrong.box.__name__}: {wrong.wrong}")
     proven = {name for result in right for name in result.names if name.startswith("p")}
     without = set() if given.names else proven - {wrong.refuted for wrong in mutants}
     if without:
