@@ -1,6 +1,7 @@
 """The method of Rairán 2013, a clock at a time: Table 1, and what docs/concepts/rairan.md makes of it."""
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -19,33 +20,76 @@ def estimate(kind: str, n_ep: int, n_dt: int) -> Fraction:
     return {"n1": n1, "n2": n2, "n3": 2 * n1 * n2 / (n1 + n2)}[kind]
 
 
-def table_1(settings: Settings, front: Front) -> tuple[list[Update], list[int]]:
-    """Table 1 to the letter, line by line: every assignment is an update; and the ends of dt."""
-    dt, most = settings.tick, settings.max_ticks
-    c_ep = c_dt = n_ep1 = clock = 0
-    n_dt1, shown, found, ends = 1, (0, 1), [], []
-    for now in range(front.n_clocks):
-        iep = now in front.steps
+@dataclass(frozen=True)
+class Lines:
+    """What Table 1 holds after a ts.
+
+    Parameters
+    ----------
+    c_ep, c_dt, n_ep1, n_dt1 : int
+        Cep, Cdt, Nep1, Ndt1.
+    assigned : bool
+        Nep1 or Ndt1 was.
+    ends : bool
+        dt ended.
+    """
+
+    c_ep: int
+    c_dt: int
+    n_ep1: int
+    n_dt1: int
+    assigned: bool
+    ends: bool
+
+
+def table_1(pulses: Iterable[bool], dt: int, most_ep: float = math.inf, most_dt: float = math.inf) -> Iterator[Lines]:
+    """Table 1 to the letter, its lines by their numbers; counts of a core that is no paper end at the most."""
+    c_ep = c_dt = n_ep1 = clock = 0  # 1 and 2
+    n_dt1 = 1
+    for lep in pulses:  # 3
         assigned = False
-        clock += 1  # line 4
-        if iep and c_dt:  # lines 5 to 7
-            n_dt1, clock, assigned = c_dt, 0, True
-            if n_dt1 > 1 or shown[0] <= 1:
-                shown = (1, n_dt1)
-        if clock == dt and c_ep:  # lines 8 and 9
-            n_ep1, assigned = min(c_ep, settings.max_count), True
-            if n_ep1 > 1 or shown[1] == 1:
-                shown = (n_ep1, 1)
-        if iep:  # lines 10 and 11
-            c_ep, c_dt = c_ep + 1, 0
-        if clock == dt:  # lines 12 to 14
-            c_dt, c_ep, clock = min(c_dt + 1, most), 0, 0
-            ends.append(now)
-        if assigned:
-            others = {"n_ep1": n_ep1, "n_dt1": n_dt1}
-            interval = shown[1]
-            found.append(Update(now, estimate(settings.estimate, *shown), interval, others=others))
-    return found, ends
+        clock += 1  # 4
+        if lep and c_dt != 0:  # 5
+            n_dt1, assigned = c_dt, True  # 6
+            clock = 0  # 7
+        if clock == dt and c_ep != 0:  # 8
+            n_ep1, assigned = int(min(c_ep, most_ep)), True  # 9
+        if lep:  # 10
+            c_ep, c_dt = c_ep + 1, 0  # 11
+        ends = clock == dt  # 12
+        if ends:
+            c_dt, c_ep = int(min(c_dt + 1, most_dt)), 0  # 13
+            clock = 0  # 14
+        yield Lines(c_ep, c_dt, n_ep1, n_dt1, assigned, ends)  # 15
+
+
+def table_1_updates(settings: Settings, front: Front) -> tuple[list[Update], list[int]]:
+    """Each assignment of Table 1 is an update; and the ends of dt."""
+    pulses = (now in front.steps for now in range(front.n_clocks))
+    rows = [*table_1(pulses, settings.tick, settings.max_count, settings.max_ticks)]
+    shown, found = (0, 1), []
+    for now, row in enumerate(rows):
+        if not row.assigned:
+            continue
+        if not row.ends and (row.n_dt1 > 1 or shown[0] <= 1):
+            shown = (1, row.n_dt1)
+        elif row.ends and (row.n_ep1 > 1 or shown[1] == 1):
+            shown = (row.n_ep1, 1)
+        others = {"n_ep1": row.n_ep1, "n_dt1": row.n_dt1}
+        found.append(Update(now, estimate(settings.estimate, *shown), shown[1], others=others))
+    return found, [now for now, row in enumerate(rows) if row.ends]
+
+
+def next_k(k: int, falling: bool, n: tuple[int, int], target: Fraction, greatest: int) -> tuple[int, bool]:
+    """k after a window of dt·2^k that measured Nep1 and Ndt1; and whether it falls to 0."""
+    n_ep, n_dt = n
+    least = next(n for n in range(1, 10**6) if Fraction(1, 2 * n - 1) <= target)  # eq. (13)
+    slow = min(least - 1, math.isqrt(1 << greatest)) + (k > 0)
+    if n_dt << k >= slow * n_ep or (falling and n_ep < least):
+        return max(0, k - 1), k > 1
+    if n_ep < least:
+        return min(k + 1, greatest), False
+    return (max(0, k - 1) if n_ep >= 2 * least else k), False
 
 
 @dataclass
@@ -107,19 +151,7 @@ class Rairan:
         target = self.settings.target
         if target is None:
             return
-        n_ep, n_dt = self.n
-        least = next(n for n in range(1, 10**6) if Fraction(1, 2 * n - 1) <= target)
-        slow = min(least - 1, math.isqrt(1 << self.settings.greatest_shift)) + (self.k > 0)
-        rare = n_dt << self.k >= slow * n_ep
-        if rare or (self.falling and n_ep < least):
-            self.falling = self.k > 1
-            self.k = max(0, self.k - 1)
-            return
-        self.falling = False
-        if n_ep < least:
-            self.k = min(self.k + 1, self.settings.greatest_shift)
-        elif n_ep >= 2 * least:
-            self.k = max(0, self.k - 1)
+        self.k, self.falling = next_k(self.k, self.falling, self.n, target, self.settings.greatest_shift)
 
     def step(self, now: int, count: int) -> None:
         """One clock."""
@@ -156,7 +188,7 @@ class Rairan:
             self.show(now, (1, 1))
         elif counted == 1 and self.n[0] > 1:
             self.show(now, (1, 1), least=Fraction(0))
-        elif not count and not self.resting:
+        elif not count:
             self.quiet(now, before)
         if count and not self.resting:
             self.adapt()
@@ -177,7 +209,7 @@ class Rairan:
 def rairan_updates(settings: Settings, front: Front) -> tuple[list[Update], list[int]]:
     """All updates, and the ends of all dt."""
     if settings.paper_exact:
-        return table_1(settings, front)
+        return table_1_updates(settings, front)
     core = Rairan(settings)
     for now in range(front.n_clocks):
         core.step(now, front.steps.get(now, 0))

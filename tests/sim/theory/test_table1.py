@@ -1,36 +1,14 @@
 """Table 1 of Rairán 2013: the lines themselves, at every ts, against `table1_rows`, and the flaw that they have."""
 
 import math
-from collections.abc import Collection
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from reference.rairan import table_1
 
 from tachometry.sim.theory import rairan
 from tachometry.sim.theory.table1 import table1_rows
-
-
-def printed(pulses: Collection[int], dt: int, duration: int) -> list[tuple[int, int, int, int]]:
-    """(Cep, Cdt, Nep1, Ndt1) after every ts from the first on, line by line."""
-    cep, cdt, nep1, ndt1 = 0, 0, 0, 1  # 1
-    clock = 0  # 2
-    after = []
-    for now in range(1, duration + 1):  # 3
-        lep = now in pulses
-        clock = clock + 1  # 4
-        if lep and cdt != 0:  # 5
-            ndt1 = cdt  # 6
-            clock = 0  # 7
-        if clock == dt and cep != 0:  # 8
-            nep1 = cep  # 9
-        if lep:  # 10
-            cep, cdt = cep + 1, 0  # 11
-        if clock == dt:  # 12
-            cdt, cep = cdt + 1, 0  # 13
-            clock = 0  # 14
-        after.append((cep, cdt, nep1, ndt1))  # 15
-    return after
 
 
 @pytest.mark.parametrize("dt", [1, 2, 7, 20])
@@ -38,13 +16,13 @@ def printed(pulses: Collection[int], dt: int, duration: int) -> list[tuple[int, 
 def test_events_are_the_lines_of_the_table(dt: int, rate: float) -> None:
     duration = 2000
     pulses = (np.flatnonzero(np.random.default_rng(dt).random(duration) < rate) + 1).tolist()
-    lines = printed(set(pulses), dt, duration)
+    lines = table_1([now in pulses for now in range(1, duration + 1)], dt)
     rows = table1_rows(pulses, dt, duration)
     held = {row.time: (row.c_ep, row.c_dt, row.n_ep1, row.n_dt1) for row in rows}
     now = held[0]
     for time, line in enumerate(lines, 1):
         now = held.get(time, now)
-        assert now == line, time
+        assert now == (line.c_ep, line.c_dt, line.n_ep1, line.n_dt1), time
     assert {row.time for row in rows if row.pulse} == set(pulses)
     for before, row in pairwise(rows):
         assert row.new_n_dt1 or row.n_dt1 == before.n_dt1

@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 import pytest
-from support.rairan import next_k
+from reference.rairan import next_k
 
 from tachometry.sim.golden.methods.adaptive import next_shift
 from tachometry.spec.methods.adaptive import AdaptiveDt
@@ -19,5 +19,5 @@ def test_the_next_k(one_in: int, max_shift: int, falling: bool) -> None:
         for n in range(1, 4 * rule.fewest):
             for high in (False, True):
                 counts = (n, 1) if high and n > 1 else (1, 1 if high else n)
-                wanted = next_k(k, falling, *counts, target, max_shift)
+                wanted = next_k(k, falling, counts, target, max_shift)
                 assert next_shift(rule, k, n, high=high, falling=falling) == wanted, (k, n, high)

@@ -5,10 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reference.front import Front
+from reference.rairan import estimate, rairan_updates, table_1
 from reference.sequences import rounded
+from reference.settings import Settings
+from reference.tsuji import Update
 from support.nightly import only, only_rows
-from support.rairan import clock_by_clock, golden_updates, make_spec, random_steps, steps_of
-from support.table1 import every_ts
+from support.rairan import golden_updates, make_spec, random_steps, steps_of
 
 from tachometry.sim.golden.methods.rairan import Model, orbit
 from tachometry.sim.signals.run import Table
@@ -31,7 +34,7 @@ def test_to_the_letter_it_is_table_1_at_every_ts(dt: int) -> None:
     spec = make_spec(dt, max_ticks=2000, paper_exact=True)
     step = random_steps(np.random.default_rng(dt), n, dt)
     updates = golden_updates(spec, step)
-    wanted = np.array(every_ts(np.abs(step).tolist(), dt))
+    wanted = np.array([(row.n_ep1, row.n_dt1) for row in table_1(step != 0, dt)])
     assert np.array_equal(held(updates, "n_ep1", n, 0), wanted[:, 0])
     assert np.array_equal(held(updates, "n_dt1", n, 1), wanted[:, 1])
     assert len(updates.clock) > n / dt / 20
@@ -39,34 +42,37 @@ def test_to_the_letter_it_is_table_1_at_every_ts(dt: int) -> None:
     assert not updates.forced.any()
 
 
-def exact(estimate: str, n_ep1: int, n_dt1: int) -> Fraction:
-    """Eqs. (6) and (11)."""
-    n1 = Fraction(n_ep1, n_dt1)
-    if n1 == 0:
-        return n1
-    n2 = Fraction(n_ep1, n_dt1 + 1) if n_ep1 == 1 else Fraction(n_ep1 - 1, n_dt1)
-    return {"n1": n1, "n2": n2, "n3": 2 / (1 / n1 + 1 / n2)}[estimate]
+def check_description(spec: RairanTachometer, step: np.ndarray) -> list[Update]:
+    """Hold every update and every end of dt against the description; these updates."""
+    words = {"dt": str(spec.timing.tick_cycles), "max-time": str(spec.timing.tick_cycles * spec.timing.max_ticks)}
+    words |= {"estimate": spec.estimate, "frac-bits": str(spec.frac_bits)}
+    words |= {"bound-decay": "yes" if spec.bound_decay else "no"}
+    words |= {} if spec.adaptive is None else {"adaptive": str(spec.adaptive)}
+    settings = Settings("rairan", words)
+    assert settings.greatest_shift == spec.max_shift
+    steps = {int(clock): int(step[clock]) for clock in np.flatnonzero(step)}
+    found, ends = rairan_updates(settings, Front(len(step), steps))
+    updates = golden_updates(spec, step)
+    assert updates.clock.tolist() == [one.cause for one in found]
+    assert updates.forced.tolist() == [one.forced for one in found]
+    assert updates.rests.tolist() == [one.forced and not one.speed for one in found]
+    assert updates.interval.tolist() == [one.interval for one in found]
+    for name in found[0].others:
+        assert updates[name].tolist() == [one.others[name] for one in found], name
+    assert updates.velocity.tolist() == [rounded(one.speed, spec.frac_bits) for one in found]
+    assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
+    return found
 
 
 # The shorter dt is, the more updates there are: with 1 clock there is nothing within it that could be wrong.
 @pytest.mark.parametrize("dt", only([2, 7], [1, 2, 3, 7, 40]))
 @pytest.mark.parametrize("bound_decay", [True, False])
 def test_it_does_what_is_described_clock_by_clock(dt: int, bound_decay: bool) -> None:
-    for seed, estimate in enumerate(("n1", "n2", "n3")):
-        spec = make_spec(dt, max_ticks=12, bound_decay=bound_decay, estimate=estimate, frac_bits=4 + 8 * (seed > 0))
+    for seed, kind in enumerate(("n1", "n2", "n3")):
+        spec = make_spec(dt, max_ticks=12, bound_decay=bound_decay, estimate=kind, frac_bits=4 + 8 * (seed > 0))
         step = random_steps(np.random.default_rng([dt, seed]), 40_000, dt)
-        updates = golden_updates(spec, step)
-        rows, ends = clock_by_clock(step.tolist(), dt, 12, bound_decay=bound_decay)
-        assert updates.clock.tolist() == [row.clock for row in rows]
-        assert updates["n_ep1"].tolist() == [row.n_ep1 for row in rows]
-        assert updates["n_dt1"].tolist() == [row.n_dt1 for row in rows]
-        assert updates.forced.tolist() == [row.forced for row in rows]
-        assert updates.rests.tolist() == [row.rests for row in rows]
-        assert updates.interval.tolist() == [row.n_dt1 for row in rows]
-        wanted = [rounded(row.sign * exact(estimate, row.n_ep1, row.n_dt1), spec.frac_bits) for row in rows]
-        assert updates.velocity.tolist() == wanted
-        assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
-        assert any(row.forced for row in rows) == (bound_decay or any(row.rests for row in rows))
+        found = check_description(spec, step)
+        assert any(one.forced for one in found) == (bound_decay or any(one.forced and not one.speed for one in found))
 
 
 def steady_steps(rng: np.random.Generator, n: int, dt: int) -> np.ndarray:
@@ -87,30 +93,14 @@ ADAPTIVE = [(1, 12, "0.2"), (3, 40, "0.1"), (7, 70, "0.04"), (40, 33, "5%")]
 @pytest.mark.parametrize(("dt", "max_ticks", "target"), only_rows(ADAPTIVE[2:], ADAPTIVE))
 @pytest.mark.parametrize("bound_decay", [True, False])
 def test_adaptive_dt_clock_by_clock(dt: int, max_ticks: int, target: str, bound_decay: bool) -> None:
-    for seed, estimate in enumerate(("n1", "n2", "n3", "n3")):
+    for seed, kind in enumerate(("n1", "n2", "n3", "n3")):
         goal = parse_target("adaptive", target)
-        options = {"adaptive": goal, "bound_decay": bound_decay, "estimate": estimate}
+        options = {"adaptive": goal, "bound_decay": bound_decay, "estimate": kind}
         spec = make_spec(dt, max_ticks, **options, frac_bits=5 + 7 * (seed > 0))
         rng = np.random.default_rng([dt, seed])
         step = steady_steps(rng, 60_000, dt) if seed < 3 else random_steps(rng, 60_000, dt)
-        updates = golden_updates(spec, step)
-        rows, ends = clock_by_clock(
-            step.tolist(), dt, max_ticks, bound_decay=bound_decay, adaptive=(goal, spec.max_shift)
-        )
-        for name, wanted in (
-            ("clock", [row.clock for row in rows]),
-            ("forced", [row.forced for row in rows]),
-            ("rests", [row.rests for row in rows]),
-            ("interval", [row.n_dt1 << row.k for row in rows]),
-            ("n_ep1", [row.n_ep1 for row in rows]),
-            ("n_dt1", [row.n_dt1 for row in rows]),
-            ("dt_shift", [row.k for row in rows]),
-        ):
-            assert updates[name].tolist() == wanted, name
-        exactly = [row.sign * exact(estimate, row.n_ep1, row.n_dt1) / 2**row.k for row in rows]
-        assert updates.velocity.tolist() == [rounded(value, spec.frac_bits) for value in exactly]
-        assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
-        assert set(updates["dt_shift"].tolist()) == set(range(spec.max_shift + 1))
+        found = check_description(spec, step)
+        assert {one.others["dt_shift"] for one in found} == set(range(spec.max_shift + 1))
 
 
 def test_orbit_follows_to_the_end() -> None:
@@ -133,7 +123,7 @@ def test_table_1_locks_just_below_the_speed_limit_and_the_default_does_not(sign:
     """At 0.9995 ω_lim, a count every 1000.5 ts: n1 = ½ for ever, though the speed is outside [n2, n1] = [⅓, ½]."""
     step = pulses(Fraction(2001, 2), 1_000_000, sign)
     letter = golden_updates(make_spec(1000, paper_exact=True, estimate="n1"), step)
-    locked = np.array(every_ts(np.abs(step).tolist(), 1000))
+    locked = np.array([(row.n_ep1, row.n_dt1) for row in table_1(step != 0, 1000)])
     assert {tuple(row) for row in locked[100_000:].tolist()} == {(1, 2)}
     assert set((letter.velocity / 2**16)[10:]) == {0.5}
     default = golden_updates(make_spec(1000, estimate="n1"), step)
@@ -146,11 +136,11 @@ def test_to_the_letter_the_time_from_reset_is_a_measurement(clock: int) -> None:
     step = np.zeros(400, dtype=np.int64)
     step[clock] = 1
     updates = golden_updates(make_spec(40, paper_exact=True), step)
-    wanted = np.array(every_ts(step.tolist(), 40))
+    wanted = np.array([(row.n_ep1, row.n_dt1) for row in table_1(step != 0, 40)])
     assert np.array_equal(held(updates, "n_dt1", 400, 1), wanted[:, 1])
     whole = (clock + 1) // 40
     assert updates.clock[0] == (clock if whole else 39)
-    assert updates.velocity[0] == rounded(exact("n3", 1, max(whole, 1)) if whole else exact("n3", 1, 1), 16)
+    assert updates.velocity[0] == rounded(estimate("n3", 1, max(whole, 1)) if whole else estimate("n3", 1, 1), 16)
 
 
 def test_a_bound_that_would_divide_by_0_is_absent() -> None:
