@@ -181,20 +181,14 @@ def error_table(heads: Sequence[str], cells: Cells) -> str:
 
 
 def setting_table(cells: Cells) -> str:
-    """The best settings in Markdown: the options that follow the name of the method."""
+    """The situations as options of the command, and the best settings behind the names of the methods, in Markdown."""
+    options = {situation.name: f"`{situation.options}`" for situation in SITUATIONS}
 
     def shown(cell: Cell) -> str:
-        return f"`{options}`" if (options := cell.name.partition(":")[2]) else "as it comes"
+        return f"`{text}`" if (text := cell.name.partition(":")[2]) else "as it comes"
 
-    body = [[situation, *map(shown, row)] for situation, row in cells.items()]
-    return markdown(["situation", *RIVALS], body, left=range(len(RIVALS) + 1))
-
-
-def motion_table() -> str:
-    """What the situations are, in Markdown."""
-    return markdown(
-        ["situation", "options"], [[situation.name, f"`{situation.options}`"] for situation in SITUATIONS], left=(0, 1)
-    )
+    body = [[name, options.get(name, ""), *map(shown, row)] for name, row in cells.items()]
+    return markdown(["situation", "options", *RIVALS], body, left=range(len(RIVALS) + 2))
 
 
 def model_table() -> str:
@@ -229,12 +223,10 @@ def part(n_seeds: int, jobs: int) -> str:
 - {_filled(_ENCODERS.format(lines=PULSES_PER_REV), "  ")}
 
 {error_table([*ours, *RIVALS], best(table, (*OURS, *RIVALS)))}
-The best settings, which `tachometry compare --methods` takes behind the name and a colon:
+The situations as options of `tachometry compare`, and the best settings, which `--methods` takes behind the name and a
+colon. With `--tune` the command finds them for one seed:
 
 {setting_table(best(table, RIVALS))}
-The motions and encoders, as options of `tachometry compare`. With `--tune` it finds the best settings for one seed:
-
-{motion_table()}
 ## One setting for all situations
 
 {_filled(_ABOUT_SINGLE.format(small=_SMALL))}
