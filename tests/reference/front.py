@@ -53,9 +53,9 @@ def believed(changes: list[tuple[int, int]], n_clocks: int, clocks: int) -> tupl
 
 
 def count_of(decoding: int, old: tuple[int, int], new: tuple[int, int]) -> int:
-    """±1 or 0 of a change of one line."""
+    """±1 or 0; a change of both lines or of none counts nothing."""
     turn = (CYCLE.index(new) - CYCLE.index(old)) % 4
-    step = {1: 1, 3: -1}[turn]
+    step = {1: 1, 3: -1}.get(turn, 0)
     of_a = new[0] != old[0]
     counted = {4: True, 2: of_a, 1: of_a and new[1] == 0}[decoding]
     return step if counted else 0

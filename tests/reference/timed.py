@@ -55,9 +55,13 @@ class Timed:
     asked: int = -(10**9)  # and that of what a silence allows
     last: int | None = None  # period of the last count
     last_sign: int = 0
-    quiet: int = -1  # period from which a silence is timed
+    quiet: int = field(init=False)  # period from which a silence is timed
     opened: int | None = None  # period in which the window was opened
     sum: int = 0  # counts since then
+
+    def __post_init__(self) -> None:
+        # Reset stands for a count just before the first one that can be seen: an edge is two clocks on its way.
+        self.quiet = -1 if self.settings.lattice else -3
 
     @property
     def scale(self) -> int:

@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+from reference.front import believed
 from support.mutant import caught, mutant
 from support.nightly import nightly, only
 from support.simulate import clock_by_clock
@@ -16,25 +17,16 @@ from tachometry.spec import Encoder, STachometer, Timing
 
 
 def definition(levels: list[int], clocks: int) -> tuple[list[int], int]:
-    """Clock by clock, in plain words: what is believed in the clock after each, and how many levels went back.
+    """What is believed in the clock after each, and how many levels went back.
 
     −1 stands for nothing: no level has held long enough yet.
     """
-    believed, held, gone = -1, 0, 0
-    shown: list[int] = []
-    for clock, level in enumerate(levels):
-        if believed < 0:
-            if clock + 1 >= clocks and len({*levels[clock + 1 - clocks : clock + 1]}) == 1:
-                believed = level
-        elif level == believed:
-            gone += held > 0
-            held = 0
-        else:
-            held += 1
-            if held == clocks:
-                believed, held = level, 0
-        shown.append(believed)
-    return shown, gone
+    changes = [(clock, level) for clock, level in enumerate(levels) if not clock or level != levels[clock - 1]]
+    passed, gone = believed(changes, len(levels), clocks)
+    shown = [-1]
+    for clock in range(len(levels)):
+        shown.append(passed.get(clock + 1 - clocks, shown[-1]))
+    return shown[1:], len(gone)
 
 
 def random_levels(seed: int) -> list[int]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from reference.front import CYCLE
 
 from tachometry.sim.golden.front_end import Steps, count, decode, decoded, filter_line, first_beyond
 from tachometry.sim.golden.sampling import external_windows, windows
@@ -116,9 +117,8 @@ def test_ticks_of_a_method_that_ends_them_itself_stay_saturated() -> None:
 @pytest.mark.parametrize(("decoding", "steps"), [(4, "+++++ ---- +++"), (2, "+0+0+ -0-0 0+0"), (1, "+000+ -000 000")])
 def test_decoding(decoding: int, steps: str) -> None:
     """Forward is 00, 10, 11, 01: A leads. x2 counts the edges of A, x1 those with B low."""
-    cycle = [(0, 0), (1, 0), (1, 1), (0, 1)]
     quarters = np.array([0, 1, 2, 3, 4, 5, 4, 3, 2, 1, 2, 3, 4])
-    a, b = np.array([cycle[quarter % 4] for quarter in quarters.tolist()], dtype=np.uint8).T
+    a, b = np.array([CYCLE[quarter % 4] for quarter in quarters.tolist()], dtype=np.uint8).T
     found, illegal = decode(a, b, decoding)
     wanted = [{"+": 1, "-": -1, "0": 0}[sign] for sign in steps.replace(" ", "")]
     assert found.tolist() == wanted

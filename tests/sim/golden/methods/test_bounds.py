@@ -6,14 +6,22 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.ideal_motion import SUBCOUNTS, motion, ticks_of
+from reference.ideal_motion import SUBCOUNTS, motion
 from support.mutant import caught, mutant
 from support.nightly import nightly
 
 from tachometry.sim.golden import model
 from tachometry.sim.golden.methods import m as m_method
 from tachometry.sim.golden.methods import s as s_method
+from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
+
+
+def ticks_of(angle: NDArray[np.int64]) -> Table:
+    """What an ideal encoder shows of it, a tick in every clock."""
+    m_e = np.diff(angle // SUBCOUNTS)
+    return Table(np.arange(len(m_e)), {"pulse_count": m_e})
+
 
 S = STachometer(encoder=Encoder(500), timing=Timing(1_000_000, 32, 500), bounds=True)
 PLAIN = replace(S, cancel=False, frac_bits=8)

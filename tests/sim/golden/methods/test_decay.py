@@ -1,13 +1,15 @@
 """The golden T method and its decay, clock by clock by the rules of docs/concepts/timed.md; and its parts."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
+from reference.front import Front, ticks_of
+from reference.settings import Settings
+from reference.timed import timed_updates
+from reference.tsuji import Update
 
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps, count
@@ -33,65 +35,14 @@ def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> T
     return updates.having(clock=updates.clock - spec.datapath_latency - spec.tick_latency)
 
 
-@dataclass(frozen=True)
-class Row:
-    """An update by the words of docs/concepts/timed.md, in counts per tick.
-
-    `least` and `most` are the bounds, None for none; `known` says whether they are valid.
-    """
-
-    clock: int
-    velocity: Fraction
-    interval: int
-    forced: bool
-    least: Fraction | None
-    most: Fraction | None
-    known: bool = True
-
-
-def bound(distance: Fraction, time: int, spec: TTachometer) -> Fraction | None:
-    return distance * spec.timer_periods / time if time else None
-
-
-def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> Iterator[Row]:
-    """Ticks are longer than a division, and counts farther apart than it takes."""
-    f, off, per_tick = spec.native_frac_bits, spec.edge_error, spec.timer_periods
-    scale = TICK if spec.on_lattice else 1  # clocks of a period
-    longest = MAX_TICKS * TICK // scale
-    # Reset stands for a count in the last period before the datapath begins; it sees steps two clocks late.
-    last, opened, sign, velocity = -1 if spec.on_lattice else -3, False, 0, Fraction(0)
-    for clock in range(n_clocks):
-        ends = clock % TICK == TICK - 1
-        if spec.on_lattice and not ends:
-            continue
-        now = clock // scale
-        window = range(clock - TICK + 1, clock + 1)
-        came = counts.get(clock, 0) if scale == 1 else sum(counts.get(at, 0) for at in window)
-        age = now - last
-        if came:
-            if opened:
-                distance = Fraction(came if came == sign else 0)
-                velocity = rounded(distance * per_tick / age, f)
-                low, high = distance - off, distance + off
-                least = bound(low, age - 1 if low < 0 else age + 1, spec)
-                most = bound(high, age - 1 if high > 0 else age + 1, spec)
-                yield Row(clock, velocity, age, False, least, most)
-            last, opened, sign = now, True, came
-        elif age % longest == 0:
-            velocity, opened = Fraction(0), False
-            ends_of = (bound(-1 - off, longest, spec), bound(1 + off, longest, spec))
-            # The very first period was not seen completely, unless a count came since.
-            yield Row(clock, velocity, longest, True, *ends_of, known=bool(sign) or age > longest)
-        elif ends and sign and spec.decays and not any(at in counts for at in window):
-            way = 1 if velocity > 0 else -1
-            greatest = rounded(Fraction(3 * per_tick, 2 * age) * way, f)
-            # A count that is measured takes the divider from a decay; so does a forced 0.
-            taken = scale == 1 and any(clock < at < clock + spec.division_clocks for at in (*counts, last + longest))
-            if abs(greatest) < abs(velocity) and not taken:
-                velocity = greatest
-                # The shaft has not come back over its last edge.
-                least, most = bound(min(way, 0) - off, age, spec), bound(max(way, 0) + off, age, spec)
-                yield Row(clock, velocity, age, True, least, most)
+def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> list[Update]:
+    """Those of the naive model."""
+    words = {"clock": str(100 * TICK), "tick": str(TICK), "max-time": str(TICK * MAX_TICKS), "ppr": "25"}
+    words |= {"timer": spec.timer, "frac-bits": str(spec.frac_bits), "edge-error": str(spec.edge_error)}
+    settings = Settings("t", words | {"bound-decay": "yes" if spec.bound_decay else "no"})
+    front = Front(n_clocks, counts)
+    ticks = ticks_of(settings, front, [*range(TICK - 1, n_clocks, TICK)], settings.max_count)
+    return timed_updates(settings, front, ticks, spec.division_clocks)
 
 
 @pytest.mark.parametrize("timer", ["clock", "tick"])
@@ -137,23 +88,22 @@ def test_every_update_is_by_the_rules(timer: str, frac_bits: int, bound_decay: b
         n_clocks = 60 * MAX_TICKS * TICK
         counts = random_counts(seed, spec, n_clocks)
         updates = updates_of(spec, counts, n_clocks)
-        rows = list(by_the_rules(spec, counts, n_clocks))
+        rows = by_the_rules(spec, counts, n_clocks)
         ended = updates.clock < n_clocks - TICK  # counts beyond the end may take the divider
-        rows = [row for row in rows if row.clock < n_clocks - TICK]
-        one = 2**frac_bits
-        none = spec.absent_bound
+        rows = [row for row in rows if row.cause < n_clocks - TICK]
+        one, none = 2**frac_bits, spec.absent_bound
         for name, wanted in (
-            ("clock", [row.clock for row in rows]),
+            ("clock", [row.cause for row in rows]),
             ("interval", [row.interval for row in rows]),
             ("forced", [row.forced for row in rows]),
-            ("velocity", [row.velocity * one for row in rows]),
+            ("velocity", [rounded(row.speed, frac_bits) * one for row in rows]),
             ("bounds_valid", [row.known for row in rows]),
-            ("velocity_lower", [-none if row.least is None else math.floor(row.least * one) for row in rows]),
-            ("velocity_upper", [none if row.most is None else math.ceil(row.most * one) for row in rows]),
+            ("velocity_lower", [-none if row.lower is None else math.floor(row.lower * one) for row in rows]),
+            ("velocity_upper", [none if row.upper is None else math.ceil(row.upper * one) for row in rows]),
         ):
             assert updates[name][ended].tolist() == wanted, (name, seed)
         assert not updates.get("out_of_range").any()
-        decays += sum(row.forced and row.velocity != 0 for row in rows)
+        decays += sum(row.forced and row.speed != 0 for row in rows)
     assert (decays > 50) == bound_decay
 
 

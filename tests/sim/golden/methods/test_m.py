@@ -5,6 +5,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from reference.front import Tick
+from reference.sequences import rounded
+from reference.settings import Settings
+from reference.tsuji import m_updates
 
 from tachometry.sim.golden.methods.m import Model
 from tachometry.sim.signals.run import Table
@@ -24,14 +28,14 @@ def test_means_are_correctly_rounded_and_enclosed(n: int, frac_bits: int, edge_e
     )
     clock = 21 + 20 * np.arange(len(NUMBERS))
     found = Model(spec).updates(Table(clock, {"pulse_count": np.array(NUMBERS)}), None, 10_000)
-    padded = [0] * (n - 1) + NUMBERS
-    sums = [sum(padded[k : k + n]) for k in range(len(NUMBERS))]
-    one, off = 2**frac_bits, 1 + edge_error
+    ticks = [Tick(k, number, False, 0, not number) for k, number in enumerate(NUMBERS)]
+    wanted = m_updates(Settings("m", {"average": str(n), "edge-error": str(edge_error)}), ticks)
+    one = 2**frac_bits
     assert found.clock.tolist() == (clock + spec.datapath_latency).tolist()
-    assert found.velocity.tolist() == [math.floor(Fraction(total * one, n) + Fraction(1, 2)) for total in sums]
-    assert found["velocity_lower"].tolist() == [math.floor((total - off) * one / n) for total in sums]
-    assert found["velocity_upper"].tolist() == [math.ceil((total + off) * one / n) for total in sums]
+    assert found.velocity.tolist() == [rounded(update.speed, frac_bits) for update in wanted]
+    assert found["velocity_lower"].tolist() == [math.floor((update.lower or 0) * one) for update in wanted]
+    assert found["velocity_upper"].tolist() == [math.ceil((update.upper or 0) * one) for update in wanted]
+    # The line before the first tick is not known: this is a tick that a window may not contain.
+    assert found["bounds_valid"].tolist() == [update.known for update in wanted]
     assert set(found.interval.tolist()) == {n}
     assert not found.forced.any()
-    # The line before the first tick is not known: this is a tick that a window may not contain.
-    assert found["bounds_valid"].tolist() == [k >= n for k in range(len(NUMBERS))]

@@ -5,7 +5,10 @@ from math import ceil, floor
 
 import numpy as np
 import pytest
+from reference.front import Tick
 from reference.sequences import MAX_TICKS, PAPER, rounded
+from reference.settings import Settings
+from reference.tsuji import s_updates
 
 from tachometry.sim.golden.methods.s import Model
 from tachometry.sim.golden.quotient import round_quotient
@@ -46,28 +49,14 @@ def test_the_papers_sequences(name: str, cancel: bool) -> None:
 
 
 def definition(m_e: list[int], max_ticks: int, cancel: bool) -> list[tuple[int, int, bool, bool, int]]:
-    """The semantics in plain words, tick by tick, with fractions; S rests if nothing was counted in a forced window."""
-
-    def number(tick: int) -> int:
-        return 0 if tick < 0 else m_e[tick]
-
-    found, offset, opening = [], 0, -1
-    for i in range(len(m_e)):
-        alters = number(i) != number(i - 1) and number(i) != offset
-        if not alters:
-            offset = number(i)
-        m_s = i - opening
-        forced = not alters and m_s == max_ticks
-        if not (alters or forced):
-            continue
-        if cancel:
-            total = Fraction(number(opening) + number(i), 2) + sum(number(i - j) for j in range(1, m_s))
-        else:
-            total = Fraction(sum(number(i - j) for j in range(m_s)))
-        quiet = not any(number(k) for k in range(opening, i + 1))
-        found.append((i, m_s, forced, forced and quiet, rounded(total / m_s, 16)))
-        opening = i if alters else i - max_ticks // 2
-    return found
+    """Those of the naive model; S rests if nothing was counted in a forced window."""
+    words = {"tick": "16", "max-time": str(16 * max_ticks), "cancel": "yes" if cancel else "no"}
+    found = s_updates(Settings("s", words), [Tick(i, number, False, 0, not number) for i, number in enumerate(m_e)])
+    quiet = [not any(m_e[max(one.cause - one.interval, 0) : one.cause + 1]) for one in found]
+    return [
+        (one.cause, one.interval, one.forced, one.forced and rests, rounded(one.speed, 16))
+        for one, rests in zip(found, quiet, strict=True)
+    ]
 
 
 @pytest.mark.parametrize("cancel", [True, False])

@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.signals.run import Table
-
 SUBCOUNTS = 1 << 20  # in a count
 
 
@@ -32,9 +30,3 @@ def motion(n_ticks: int, max_count: int, seed: int) -> NDArray[np.int64]:
         parts.append(steps.astype(np.int64))
         left -= n
     return np.append(0, np.cumsum(np.concatenate(parts))) + int(rng.integers(SUBCOUNTS))
-
-
-def ticks_of(angle: NDArray[np.int64]) -> Table:
-    """What an ideal encoder shows of it, a tick in every clock."""
-    m_e = np.diff(angle // SUBCOUNTS)
-    return Table(np.arange(len(m_e)), {"pulse_count": m_e})
