@@ -12,7 +12,7 @@ from pages import markdown, write
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.cli.group import cli
 from tachometry.cli.options.option import Option
-from tachometry.hdl.export.registers.page import tables
+from tachometry.hdl.export.registers.files import tables
 from tachometry.sim.studies.sweeping.sweep import COLUMNS
 from tachometry.spec import METHODS, Encoder, Port, TachometerSpec, Timing, of_texts
 from tachometry.spec.control import LoopSpec

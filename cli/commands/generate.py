@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,8 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.hdl.export import export
+from tachometry.hdl.export.files import CORE_FILES
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.spec import AxesSpec, TachometerSpec
@@ -25,8 +27,30 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding
 
 
+def _listed(files: Mapping[str, str]) -> str:
+    width = max(map(len, files))
+    return "\n".join(f"DIR/{file:<{width}}  {help}" for file, help in files.items())
+
+
+_HELP = f"""Write a core as Verilog, with its manifest and all that it takes to build it into a design.
+
+\b
+{_listed(CORE_FILES)}
+with --testbench cocotb also DIR/test_NAME.py and DIR/NAME_vectors.json
+
+\b
+with a --bus also
+{_listed(REGISTER_FILES)}
+
+What was built is printed: full scale, LSB, resolution, widths and latencies, and the number of registers.
+
+Equal options give equal files, byte for byte, on every machine.
+"""
+
+
 @click.command(
     cls=GroupedCommand,
+    help=_HELP,
     short_help="Write a core as Verilog, with its manifest, constraints and FuseSoC file.",
     epilog=f"""{FORMS}
 
@@ -102,63 +126,37 @@ def generate(
     record: Callable[[TachometerSpec], Encoding] | None,
     tables: list[Path],
 ) -> int:
-    """Write a core as Verilog, with its manifest and all that it takes to build it into a design.
-
-    \b
-    DIR/NAME.v       Verilog-2001 for any tool
-    DIR/NAME.json    manifest: ports, widths, units, latencies, every option
-    DIR/NAME.core    FuseSoC core file (CAPI2): targets default, lint and sim
-    DIR/NAME_inst.v  instantiation template
-    DIR/NAME_tb.sv   smoke test, for the target sim
-    DIR/NAME.xdc     constraints for Vivado
-    DIR/NAME.sdc     constraints for Quartus and others
-    with --testbench cocotb also DIR/test_NAME.py and DIR/NAME_vectors.json
-
-    \b
-    with a --bus also
-    DIR/NAME.rdl           registers in SystemRDL 2.0
-    DIR/NAME_regs.h        registers as macros of C99
-    DIR/NAME_driver.h      driver in C99
-    DIR/NAME_registers.md  registers as a page of Markdown
-
-    \b
-    with --for rio    also the plugin DIR/NAME_rio/
-    with --for litex  also DIR/NAME_litex.py, and what a --bus wishbone adds
-
-    What was built is printed: full scale, LSB, resolution, widths and latencies, and the number of registers.
-
-    Equal options give equal files, byte for byte, on every machine.
-    """
+    """Write a core as Verilog, with its manifest and all that it takes to build it into a design."""
     check_module_name(name)
     bus = bus_for(target, bus)
-    if record is not None and testbench is None:
+    bench: dict[str, str] = {}
+    if testbench is not None:  # first: what is wrong with a motion is found at once
+        bench = _bench(spec, name, bus, record)
+    elif record is not None:
         raise ValueError("--motion must be given together with --testbench")
-    if testbench is not None and isinstance(spec, AxesSpec):
-        raise ValueError("--testbench must not be given together with --axes: it is of one axis")
-    if testbench is not None and isinstance(spec, LoopSpec) and bus != "none":
-        raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
-    files = [name + suffix for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")]
-    if bus != "none":
-        files += [name + suffix for suffix in REGISTER_FILES]
-    if target in TARGETS:
-        files += TARGETS[target].files(name)
-    if testbench:
-        files += [f"test_{name}.py", f"{name}_vectors.json"]
-    with Outputs({file: directory / file for file in files}, inputs=tables) as outputs:
-        bench: dict[str, str] = {}
-        if testbench and not isinstance(spec, AxesSpec):  # first: what is wrong with a motion is found at once
-            from tachometry.sim.testbench.vectors import cocotb_bench
-
-            alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
-            bench = cocotb_bench(spec, name, None if record is None else record(alone).recording)
-        from tachometry.hdl.export import export
-
-        texts = export(spec, name, bus, baud, target) | bench
+    texts = export(spec, name, bus, baud, target) | bench
+    with Outputs({file: directory / file for file in texts}, inputs=tables) as outputs:
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
-    for file in files:
+    for file in texts:
         click.echo(click.format_filename(directory / file))
     click.echo()
+    _print(spec, bus)
+    return 0
+
+
+def _bench(spec: AnySpec, name: str, bus: str, record: Callable[[TachometerSpec], Encoding] | None) -> dict[str, str]:
+    if isinstance(spec, AxesSpec):
+        raise ValueError("--testbench must not be given together with --axes: it is of one axis")
+    if isinstance(spec, LoopSpec) and bus != "none":
+        raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
+    from tachometry.sim.testbench.vectors import cocotb_bench
+
+    alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
+    return cocotb_bench(spec, name, None if record is None else record(alone).recording)
+
+
+def _print(spec: AnySpec, bus: str) -> None:
     if isinstance(spec, AxesSpec):
         from tachometry.cli.reports.axes import print_axes_core
 
@@ -171,4 +169,3 @@ def generate(
         from tachometry.cli.reports.core import print_core
 
         print_core(spec, bus)
-    return 0

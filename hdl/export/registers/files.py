@@ -1,23 +1,63 @@
 """Files that describe the registers, and the programs in C that read them."""
 
-from tachometry.hdl.export.registers.c_driver import c_driver
-from tachometry.hdl.export.registers.c_header import c_header
-from tachometry.hdl.export.registers.page import page
-from tachometry.hdl.export.registers.rdl import rdl
-from tachometry.spec.registers.map import RegisterMap
+import math
+from collections.abc import Iterable
 
-# What makes them, by what stands behind NAME in the names of the files.
-_MAKERS = {".rdl": rdl, "_regs.h": c_header, "_driver.h": c_driver, "_registers.md": page}
-REGISTER_FILES = tuple(_MAKERS)
+from tachometry.hdl.export.registers import rdl
+from tachometry.hdl.export.registers.values import captured_values, in_unit, is_whole, sentences
+from tachometry.hdl.export.render import render, render_files
+from tachometry.spec.registers.map import Field, Register, RegisterMap
+
+# The files, and what --help says of them.
+REGISTER_FILES = {
+    "NAME.rdl": "registers in SystemRDL 2.0",
+    "NAME_regs.h": "registers as macros of C99",
+    "NAME_driver.h": "driver in C99",
+    "NAME_registers.md": "registers as a page of Markdown",
+}
 
 
 def register_files(registers: RegisterMap, name: str) -> dict[str, str]:
-    """Texts by file name: `NAME.rdl`, `NAME_regs.h`, `NAME_driver.h`, `NAME_registers.md`.
+    """Return texts by file name, those of `REGISTER_FILES`.
 
     Parameters
     ----------
     registers : RegisterMap
     name : str
-        Of the Verilog module.
+        Of the Verilog module; functions and types in C begin with it, macros with its capitals.
     """
-    return {f"{name}{suffix}": make(registers, name) for suffix, make in _MAKERS.items()}
+    return render_files(
+        REGISTER_FILES,
+        name,
+        PREFIX=name.upper(),
+        registers=registers,
+        spec=registers.spec,
+        values=captured_values(registers),
+        in_unit=in_unit,
+        word=lambda value: f"UINT32_C(0x{value:08X})",
+        pi=math.pi,
+        identifier=rdl.identifier,
+        described=rdl.described,
+        access=rdl.ACCESS,
+        **_MEANING,
+    )
+
+
+def tables(registers: Iterable[Register]) -> str:
+    """Return the tables of registers and of their fields in Markdown."""
+    return render("register_tables.md", registers=list(registers), **_MEANING)
+
+
+def _kind(register: Register) -> str:
+    if register.constant:
+        return "constant"
+    if register.captures:
+        return "captures"
+    return "captured" if register.captured else "live"
+
+
+def _bits(field: Field) -> str:
+    return f"{field.low}" if field.width == 1 else f"{field.low + field.width - 1}:{field.low}"
+
+
+_MEANING = {"is_whole": is_whole, "sentences": sentences, "kind": _kind, "bits": _bits}

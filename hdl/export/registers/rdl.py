@@ -1,14 +1,14 @@
-"""The registers in SystemRDL 2.0 (Accellera, 2018)."""
+"""How SystemRDL 2.0 (Accellera, 2018) writes names, texts, and what software and hardware may do with a field."""
 
 import textwrap
 
-from tachometry.hdl.export.registers.values import is_whole, sentences
-from tachometry.spec.language.provenance import notice
-from tachometry.spec.registers.map import WORD, Field, Register, RegisterMap
-
-# A field by its access: what software and what hardware may do.
-_ACCESS = {"ro": ["sw = r;", "hw = w;"], "rw": ["sw = rw;", "hw = r;"], "wo": ["sw = w;", "hw = r;", "singlepulse;"]}
-_CONSTANT = ["sw = r;", "hw = na;"]
+# Properties of a field by its access; a field of a constant register is never written.
+ACCESS = {
+    "ro": "sw = r; hw = w;",
+    "rw": "sw = rw; hw = r;",
+    "wo": "sw = w; hw = r; singlepulse;",
+    "constant": "sw = r; hw = na;",
+}
 # Words that are no names unless a backslash stands before them: those of tables 3 and 4 of the standard.
 _KEYWORDS = frozenset(
     """
@@ -21,56 +21,14 @@ _KEYWORDS = frozenset(
 )
 
 
-def rdl(registers: RegisterMap, name: str) -> str:
-    """The text of `NAME.rdl`: an address map of this name.
-
-    Parameters
-    ----------
-    registers : RegisterMap
-    name : str
-        Of the Verilog module.
-    """
-    lines = [
-        f"// Registers of {name} in SystemRDL 2.0; offsets are in bytes.",
-        *notice("//").splitlines(),
-        "",
-        f"addrmap {_identifier(name)} {{",
-        f'  name = "{name}";',
-        f'  desc = "Registers of a tachometer, method {registers.spec.method}.";',
-        f"  default regwidth = {WORD};",
-        f"  default accesswidth = {WORD};",
-        "  littleendian;",
-        "  lsb0;",
-    ]
-    for register in registers:
-        lines += ["", *_register(register)]
-    return "\n".join([*lines, "};"]) + "\n"
-
-
-def _register(register: Register) -> list[str]:
-    lines = ["reg {", f'  name = "{register.name}";', *_text("  desc = ", sentences(register))]
-    for field in register.fields:
-        lines += [f"  {line}" for line in _field(field, "" if is_whole(register) else field.help, register.constant)]
-    lines.append(f"}} {_identifier(register.name)} @ 0x{register.offset:02x};")
-    return [f"  {line}" for line in lines]
-
-
-def _field(field: Field, told: str, constant: bool) -> list[str]:
-    return [
-        "field {",
-        *(_text("  desc = ", told) if told else ()),
-        f"  {' '.join(_CONSTANT if constant else _ACCESS[field.access])}",
-        f"}} {_identifier(field.name)}[{field.low + field.width - 1}:{field.low}] = 0x{field.reset:x};",
-    ]
-
-
-def _text(what: str, text: str) -> list[str]:
-    """A property whose value is a string, which may go over several lines."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return textwrap.wrap(
-        f'{what}"{escaped}";', 110, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
-    )
-
-
-def _identifier(name: str) -> str:
+def identifier(name: str) -> str:
+    """Return a name as the language takes it."""
     return f"\\{name}" if name in _KEYWORDS else name
+
+
+def described(text: str) -> str:
+    """Return the property `desc`, whose text may go over several lines."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return textwrap.fill(
+        f'desc = "{escaped}";', 108, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )

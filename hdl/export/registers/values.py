@@ -31,6 +31,18 @@ class CapturedValue:
         """Bits of all its registers."""
         return WORD * len(self.words)
 
+    @property
+    def c_type(self) -> str:
+        """Its type in C."""
+        return f"{'' if self.field.signed else 'u'}int{self.bits}_t"
+
+    def joined(self, name: str) -> str:
+        """Return the value in C, of what was read of its registers; functions begin with `name`."""
+        words = [word.name.lower() for word in self.words]
+        if self.field.signed:
+            return f"{name}_signed_{self.bits}({', '.join(words)})"
+        return words[0] if len(words) == 1 else f"(uint64_t){words[1]} << 32 | {words[0]}"
+
 
 def captured_values(registers: RegisterMap) -> tuple[CapturedValue, ...]:
     """Values that a capture takes, the first of them that whose first register captures."""
@@ -42,32 +54,28 @@ def captured_values(registers: RegisterMap) -> tuple[CapturedValue, ...]:
     return tuple(CapturedValue(name, tuple(words)) for name, words in found.items())
 
 
-def captured_flags(registers: RegisterMap) -> tuple[Field, ...]:
-    """Flags that a capture takes."""
-    return registers["STATUS"].fields
-
-
 def is_whole(register: Register) -> bool:
     """Whether a register has one field, of all of its bits; then the texts speak of the register alone."""
     return [field.width for field in register.fields] == [WORD]
 
 
-def in_unit(field: Field) -> Iterator[str]:
-    """A sentence about the unit of a field that has one."""
-    if field.unit:
-        yield f"One LSB is {field.unit}." if field.unit[0].isdigit() else f"The unit is {field.unit}."
+def in_unit(field: Field) -> str:
+    """Return a sentence about the unit of a field; an empty one if it has none."""
+    if not field.unit:
+        return ""
+    return f"One LSB is {field.unit}." if field.unit[0].isdigit() else f"The unit is {field.unit}."
 
 
 def sentences(register: Register) -> str:
-    """What a register means, when it captures, its unit, and how it is read."""
-    return " ".join(_sentences(register))
+    """Return what a register means, when it captures, its unit, and how it is read."""
+    return " ".join(filter(None, _sentences(register)))
 
 
 def _sentences(register: Register) -> Iterator[str]:
     yield register.help
     if is_whole(register):
         (field,) = register.fields
-        yield from in_unit(field)
+        yield in_unit(field)
         if field.signed:
             yield "It is in two's complement."
         if field.most is not None:

@@ -1,11 +1,12 @@
 """Frameworks into which a core goes with files of their own."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from tachometry.hdl.export.targets.litex import litex, litex_files
-from tachometry.hdl.export.targets.rio import rio, rio_files
-from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.hdl.export.targets.litex import litex
+from tachometry.hdl.export.targets.rio import rio
+from tachometry.spec import TachometerSpec
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.language.option import ParameterError
 
 
@@ -20,25 +21,22 @@ class Target:
     bus : str
         The bus that the core has for it.
     files : callable
-        Names of its files, of the name of the core.
-    texts : callable
         Texts by file name, of the spec, the name and the Verilog of the core.
     """
 
     help: str
     bus: str
-    files: Callable[[str], tuple[str, ...]]
-    texts: Callable[[TachometerSpec, str, str], Mapping[str, str]]
+    files: Callable[[TachometerSpec, str, str], dict[str, str]]
 
 
 TARGETS = {
-    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", "none", rio_files, rio),
-    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", "wishbone", litex_files, litex),
+    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", "none", rio),
+    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", "wishbone", litex),
 }
 
 
 def bus_for(target: str, bus: str | None) -> str:
-    """The bus of a core for this target, which may be `none`; a bus of None stands for whatever the target needs.
+    """Return the bus of a core for this target, which may be `none`; None stands for whatever the target needs.
 
     Raises
     ------
@@ -51,3 +49,15 @@ def bus_for(target: str, bus: str | None) -> str:
     if bus not in (None, needed):
         raise ParameterError("bus", f"must be {needed} for {target}, not {bus}")
     return needed
+
+
+def check_core(target: str, spec: AnySpec) -> None:
+    """Refuse a core that is not for this target, with a ParameterError."""
+    if target in TARGETS and not isinstance(spec, TachometerSpec):
+        other, whom = ("loop", "a tachometer alone") if isinstance(spec, LoopSpec) else ("axes", "one axis")
+        raise ParameterError("target", f"must not be given together with {other}: targets are for {whom}")
+
+
+def target_files(target: str, spec: AnySpec, name: str, verilog: str) -> dict[str, str]:
+    """Return texts by file name, of the name and the Verilog of the core; none without a target."""
+    return TARGETS[target].files(spec, name, verilog) if isinstance(spec, TachometerSpec) and target in TARGETS else {}

@@ -11,7 +11,7 @@ import pytest
 from support.command import run
 from support.nightly import only_rows
 
-from tachometry.hdl.export.verilog import export
+from tachometry.hdl.export import export
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
 
@@ -276,7 +276,7 @@ def test_ctrl_c(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tachometry.hdl.export.verilog", interrupted)
+    monkeypatch.setattr("tachometry.hdl.export.files.verilog_of", interrupted)
     assert run("generate", "--ppr", "9", "-o", tmp_path / "new") == 130
     assert capsys.readouterr() == ("", "tachometry: interrupted\n")
     assert not list(tmp_path.iterdir())

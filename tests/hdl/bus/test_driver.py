@@ -13,8 +13,7 @@ from support.mutant import caught
 from support.native import HEADER, NAME, check_golden, library, logged, snapshots, write_trace
 from support.script import load
 
-from tachometry.hdl.export.registers.files import register_files
-from tachometry.hdl.export.registers.page import tables
+from tachometry.hdl.export.registers.files import register_files, tables
 from tachometry.sim.engines import build
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts

@@ -306,8 +306,8 @@ _argue(
     *("1 → 2", "8 → 9"),
 )
 _argue("spec/registers/buses.py: ", "32 // 7 is 4, as 32 // 8 is.", *("8 → 7 #2", "8 → 7 #3"))
-_argue("hdl/export/registers/c_driver.py: _joined", "Of one word the last is the first.", "0 → -1")
-_argue("hdl/export/registers/rdl.py: _text", "No word of a text is as long as a line.", "False → True")
+_argue("hdl/export/registers/values.py: CapturedValue.joined", "Of one word the last is the first.", "0 → -1")
+_argue("hdl/export/registers/rdl.py: described", "No word of a text is as long as a line.", "False → True")
 _argue(
     "sim/golden/output.py: in_unit",
     "Products of 61 and 62 bits fit 64 bits, and Python's integers give the same.",
@@ -390,10 +390,12 @@ _argue(
     "1 → 0",
 )
 _argue(
-    "hdl/export/registers/rdl.py: _text", "The end of a line is a space to who reads it.", *("110 → 111", "110 → 109")
+    "hdl/export/registers/rdl.py: described",
+    "The end of a line is a space to who reads it.",
+    *("108 → 109", "108 → 107"),
 )
 _argue(
-    "hdl/export/registers/c_header.py: comment",
+    "hdl/export/render.py: _comment",
     "Compilers do not read where the lines of a comment end.",
     *("110 → 111", "110 → 109"),
 )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.options import had_by
 
-from tachometry.hdl.export.registers import c_driver
+from tachometry.hdl.export.registers.files import register_files
 from tachometry.hdl.export.registers.values import captured_values
 from tachometry.sim import golden
 from tachometry.sim.golden.registers import Access, GoldenBank
@@ -34,7 +34,7 @@ def used() -> None:
         GoldenBank(registers, trace).answers([Access(250, 4)])
         assert manifest.manifest(spec)
         assert captured_values(registers)[0].bits == 32
-        assert c_driver.c_driver(registers, "core")
+        assert register_files(registers, "core")
     of_texts("s", {"ppr": "8", "max-time": "1s", "unit": "rpm"})
     of_texts("rairan", {"ppr": "8", "adaptive": "10%", "max-speed": "100rpm"})
     assert bus_of("spi") is not None

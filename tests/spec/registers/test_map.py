@@ -33,10 +33,10 @@ def test_values_are_told_with_their_units() -> None:
     assert (position.bits, position.field.shift, [word.name for word in position.words]) == (
         *(64, 0, ["POSITION_LOW", "POSITION_HIGH"]),
     )
-    assert [*in_unit(Field("x", 1, unit="960 clocks"))] == ["One LSB is 960 clocks."]
-    assert [*in_unit(Field("x", 1, unit="2^-16 rad/s"))] == ["One LSB is 2^-16 rad/s."]
-    assert [*in_unit(Field("x", 1, unit="x2"))] == ["The unit is x2."]
-    assert [*in_unit(Field("x", 1))] == []
+    assert in_unit(Field("x", 1, unit="960 clocks")) == "One LSB is 960 clocks."
+    assert in_unit(Field("x", 1, unit="2^-16 rad/s")) == "One LSB is 2^-16 rad/s."
+    assert in_unit(Field("x", 1, unit="x2")) == "The unit is x2."
+    assert in_unit(Field("x", 1)) == ""
 
 
 def test_masks() -> None:

@@ -14,11 +14,8 @@ from support.rdl import read_rdl
 
 from tachometry.boards.host.client import Client
 from tachometry.hdl.export import export
-from tachometry.hdl.export.registers.c_driver import c_driver
-from tachometry.hdl.export.registers.c_header import c_header
 from tachometry.hdl.export.registers.files import REGISTER_FILES, register_files
-from tachometry.hdl.export.registers.page import page
-from tachometry.hdl.export.registers.rdl import _text, rdl
+from tachometry.hdl.export.registers.rdl import described
 from tachometry.spec import METHODS, TachometerSpec, of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.provenance import LICENSE, generator
@@ -169,31 +166,32 @@ def flags(spec: TachometerSpec) -> set[str]:
 
 
 Check = Callable[[RegisterMap, str, Path], None]
-Make = Callable[[RegisterMap, str], str]
-TEXTS: dict[str, tuple[Make, Check]] = {
-    "RDL": (rdl, check_rdl),
-    "header": (c_header, check_header),
-    "driver": (c_driver, check_driver),
-    "page": (page, check_page),
-    "client": (lambda registers, name: "", check_client),
+TEXTS: dict[str, Check] = {
+    "spindle.rdl": check_rdl,
+    "spindle_regs.h": check_header,
+    "spindle_driver.h": check_driver,
+    "spindle_registers.md": check_page,
+    "": check_client,
 }
 
 
+def text_of(registers: RegisterMap, file: str) -> str:
+    return register_files(registers, "spindle")[file] if file else ""
+
+
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("text", TEXTS)
-def test_every_register_and_field_is_there(text: str, method: str, tmp_path: Path) -> None:
-    make, check = TEXTS[text]
+@pytest.mark.parametrize("file", TEXTS)
+def test_every_register_and_field_is_there(file: str, method: str, tmp_path: Path) -> None:
     for registers in maps(method):
-        check(registers, make(registers, "spindle"), tmp_path)
+        TEXTS[file](registers, text_of(registers, file), tmp_path)
 
 
 @pytest.mark.parametrize("command", ["ports", "generator"])
-@pytest.mark.parametrize("text", ["RDL", "header", "page"])
-def test_every_register_of_a_control_loop_is_there(text: str, command: str, tmp_path: Path) -> None:
-    make, check = TEXTS[text]
+@pytest.mark.parametrize("file", ["spindle.rdl", "spindle_regs.h", "spindle_registers.md"])
+def test_every_register_of_a_control_loop_is_there(file: str, command: str, tmp_path: Path) -> None:
     core = of_texts("s", BASE | {"max-speed": "500rad/s"})
     spec = LoopSpec(tachometer=core, gains="inputs", command=command, multiplier="parallel")
-    check(registers_of(spec), make(registers_of(spec), "spindle"), tmp_path)
+    TEXTS[file](registers_of(spec), text_of(registers_of(spec), file), tmp_path)
 
 
 def test_the_configurations_have_all_kinds() -> None:
@@ -214,31 +212,31 @@ class Fewer(RegisterMap):
         return tuple(one for one in RegisterMap(self.spec).registers if one.name != self.lost)
 
 
-@pytest.mark.parametrize("text", TEXTS)
-def test_a_text_without_a_register_is_noticed(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    make, check = TEXTS[text]
+@pytest.mark.parametrize("file", TEXTS)
+def test_a_text_without_a_register_is_noticed(file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     registers = maps("s")[0]
     captured = [one.name for one in registers if one.captured and not one.captures and one.name != "STATUS"]
     for lost in captured:
         monkeypatch.setattr(Fewer, "lost", lost)
         fewer = Fewer(registers.spec)
         with caught():
-            check(fewer if text == "client" else registers, make(fewer, "spindle"), tmp_path)
+            TEXTS[file](registers if file else fewer, text_of(fewer, file), tmp_path)
 
 
 def test_words_with_hyphens_are_not_parted() -> None:
     """Where a text of RDL goes on in the next line, there is a space."""
     text = " ".join(["of-many-parts"] * 40)
-    lines = _text("desc = ", text)
-    assert max(map(len, lines)) <= 110
+    lines = described(text).splitlines()
+    assert max(map(len, lines)) <= 108
     assert " ".join(line.strip() for line in lines) == f'desc = "{text}";'
 
 
 @pytest.mark.parametrize("name", ["field", "mem", "property", "NAME", "PREFIX", "real", "abstract", "ref"])
 def test_names_that_have_a_meaning_elsewhere(name: str, tmp_path: Path) -> None:
-    top = read_rdl(rdl(maps("s")[0], name), tmp_path)
+    files = register_files(maps("s")[0], name)
+    top = read_rdl(files[f"{name}.rdl"], tmp_path)
     assert top.inst_name == name
-    driver = c_driver(maps("s")[0], name)
+    driver = files[f"{name}_driver.h"]
     assert f"static inline enum {name}_status {name}_init(const struct {name}_bus *bus)" in driver
     assert f"#ifndef {name.upper()}_DRIVER_H" in driver
 
@@ -247,7 +245,7 @@ def test_they_lie_beside_the_verilog_of_a_core_on_a_bus() -> None:
     spec = of_texts("s", BASE)
     without, with_bus = export(spec, "spindle"), export(spec, "spindle", "wishbone")
     texts = register_files(RegisterMap(spec), "spindle")
-    assert [*texts] == [f"spindle{suffix}" for suffix in REGISTER_FILES]
+    assert [*texts] == [file.replace("NAME", "spindle") for file in REGISTER_FILES]
     assert {file: text for file, text in with_bus.items() if file not in without} == texts
     for file, text in texts.items():
         assert generator() in text, file

@@ -17,7 +17,7 @@ from support.simulate import clock_by_clock
 from systemrdl.node import RegNode
 
 from tachometry.hdl.core import register_core
-from tachometry.hdl.export.registers.rdl import rdl
+from tachometry.hdl.export.registers.files import register_files
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.registers.map import RegisterMap
@@ -59,7 +59,7 @@ def check(method: str, seed: int, folder: Path, right: str = "", wrong: str = ""
     In the text a pattern, `right`, may be replaced by `wrong`.
     """
     registers, trace, pins = case(method, seed)
-    text = rdl(registers, "core")
+    text = register_files(registers, "core")["core.rdl"]
     assert not right or len(re.findall(right, text)) == 1
     top = read_rdl(re.sub(right, wrong, text) if right else text, folder)
     accesses = plan(list(top.registers()), len(pins))

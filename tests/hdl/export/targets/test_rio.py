@@ -19,7 +19,7 @@ from support.options import had_by
 from support.rio import component, hal_type, loaded
 
 from tachometry.hdl.export import export
-from tachometry.hdl.export.targets.rio import hal_pins, rio_files
+from tachometry.hdl.export.targets.rio import hal_pins
 from tachometry.sim import golden
 from tachometry.sim.engines import build
 from tachometry.sim.signals.recording import PinTrace
@@ -28,7 +28,7 @@ from tachometry.spec.language.port import INDEX, TICK, UPDATE
 
 PAGE = docs.page("guides/linuxcnc.md")
 NAME = "spindle"
-PLUGIN, WRAPPER, CORE = rio_files(NAME)
+PLUGIN, WRAPPER, CORE = (f"spindle_rio/{file}" for file in ("plugin.py", "spindle_rio.v", "spindle.v"))
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
 EVERY = {
     "s": {"external-tick": "yes", "index": "yes", "filter": "4", "unit": "rpm", "bounds": "yes", "age": "yes"},

@@ -1,0 +1,73 @@
+"""All files of a core: Verilog, manifest, kit, and those for its registers and for a framework."""
+
+import json
+from typing import Any
+
+from amaranth.lib import wiring
+
+from tachometry.hdl.core.bus_tachometer import BusTachometer
+from tachometry.hdl.core.core import core_of
+from tachometry.hdl.export.kit import KIT, kit
+from tachometry.hdl.export.registers.files import register_files
+from tachometry.hdl.export.targets.target import bus_for, check_core, target_files
+from tachometry.hdl.export.verilog import verilog_of
+from tachometry.spec.control import AnySpec
+from tachometry.spec.language.provenance import LICENSE, generator
+from tachometry.spec.registers.buses import bus_of, manifest_on
+from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.manifest import manifest
+
+# The files of every core, and what --help says of them.
+CORE_FILES = {
+    "NAME.v": "Verilog-2001 for any tool",
+    "NAME.json": "manifest: ports, widths, units, latencies, every option",
+    **KIT,
+}
+
+
+def export(
+    spec: AnySpec,
+    name: str = "tachometer",
+    bus: str | None = None,
+    baud: int | None = None,
+    target: str = "none",
+) -> dict[str, str]:
+    """Return all files of a core as texts by file name: those of `CORE_FILES`, of `REGISTER_FILES`, and of the target.
+
+    Equal specs and names give equal texts on every machine: the bundled Yosys writes the Verilog, whatever else is
+    installed. All texts name the version of tachometry that made them, and their licence.
+
+    Parameters
+    ----------
+    spec : TachometerSpec, AxesSpec or LoopSpec
+    name : str
+        Name of the module and of the files.
+    bus : str or None
+        The bus for its registers, one of `spec.registers.buses.BUSES`, or `none`; None: `none`, or what the target
+        needs.
+    baud : int or None
+        Bits a second of a bus that has them; None: its default.
+    target : str
+        The framework into which it goes, one of `hdl.export.targets.target.TARGETS`, or `none`.
+
+    Raises
+    ------
+    ValueError
+        If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
+        the target needs another bus or another core; if a core of many axes is to have either.
+    """
+    on = bus_of(bus_for(target, bus), baud)
+    check_core(target, spec)
+    described: dict[str, Any] = {"generator": generator(), "license": LICENSE}
+    files: dict[str, str] = {}
+    top: wiring.Component
+    if on is None:
+        described |= manifest(spec, name)
+        top = core_of(spec)
+    else:
+        registers = registers_of(spec)
+        described |= manifest_on(registers, on, name)
+        top = BusTachometer(registers, on)
+        files = register_files(registers, name)
+    core = {f"{name}.v": verilog_of(top, described), f"{name}.json": json.dumps(described, indent=2) + "\n"}
+    return core | kit(spec, name, on) | files | target_files(target, spec, name, core[f"{name}.v"])

@@ -1,0 +1,49 @@
+"""Fills the holes of the templates in `templates/`; each is named as the file that is made of it."""
+
+import json
+import textwrap
+from collections.abc import Iterable
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from tachometry.spec.language.port import Port
+from tachometry.spec.language.provenance import notice, version
+
+
+def render(template: str, /, **holes: object) -> str:
+    """Return the text of a template with its holes filled: `@{name}`, `{% if … %}`, `{% for … %}`."""
+    return _TEMPLATES.get_template(f"{template}.j2").render(holes)
+
+
+def render_files(templates: Iterable[str], name: str, **holes: object) -> dict[str, str]:
+    """Return texts by file name; NAME in the name of a template stands for the name of the module."""
+    return {file.replace("NAME", name): render(file, name=name, **holes) for file in templates}
+
+
+def _comment(text: str) -> str:
+    return "\n".join(f"// {line}" for line in textwrap.wrap(text, 110, break_on_hyphens=False))
+
+
+def _literal(value: object) -> str:
+    """Return a string as Python and JSON write it."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _shape(port: Port) -> str:
+    """Return what stands in Verilog between the kind of a signal and its name."""
+    return "signed " * port.signed + f"[{port.width - 1}:0] " * (port.width > 1)
+
+
+# Doubled braces stand in Verilog and Python as they are, so a hole has other marks than Jinja's own.
+_TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).with_name("templates")),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+    variable_start_string="@{",
+    variable_end_string="}",
+)
+_TEMPLATES.globals |= {"notice": lambda mark: notice(mark).rstrip("\n"), "version": version}
+_TEMPLATES.filters |= {"comment": _comment, "literal": _literal, "shape": _shape}
