@@ -22,30 +22,30 @@ DISCS = {"ideal disc": IDEAL, "real disc": REAL}
 SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}
 
 
-def cells(outcome: Outcome) -> tuple[str, ...]:
-    """What tables say of an outcome."""
+def cell(outcome: Outcome) -> str:
+    """RMS error, greatest error, dip, current above 50 Hz."""
     assert outcome.dip is not None
-    return tuple(f"{value:.3g}" for value in (outcome.rms, outcome.largest, outcome.dip, outcome.sound))
-
-
-HEADS = ("RMS error", "greatest", "dip", "current above 50 Hz")
+    return ", ".join(f"{value:.3g}" for value in (outcome.rms, outcome.largest, outcome.dip, outcome.sound))
 
 
 def usable_gains(seeds: Sequence[int], jobs: int) -> tuple[str, list[Found]]:
-    """A row per disc, method and tick: the usable gain, and what comes of it; and the same for the figure."""
+    """A row per disc and method: at each tick the usable gain and what comes of it; and the same for the figure."""
     rows, found = [], []
     for disc, encoder in DISCS.items():
         for kind in KINDS:
+            row = [disc, kind.name]
             for seconds in TICKS:
                 if kind.method == "track" and seconds < kind.shortest:
-                    continue  # the core has a new velocity every 20 µs
+                    row.append("")  # the core has a new velocity every 20 µs
+                    continue
                 best = usable(lambda kv: setting(kind, kv, seconds, encoder), seeds, jobs)  # noqa: B023
                 print(disc, kind.name, seconds, best, file=sys.stderr, flush=True)
-                name = (disc, kind.name, SHOWN_TICKS[seconds])
-                rows.append((*name, f"{best[0]:g}", *cells(best[1])) if best else (*name, *"-----"))
+                row.append(f"{best[0]:g}: {cell(best[1])}" if best else "-")
                 if best is not None:
                     found.append(Found(disc, kind.name, seconds, *best))
-    return markdown(("disc", "method", "T_s", "usable k_v", *HEADS), rows, left=(0, 1, 2)), found
+            rows.append(row)
+    heads = ["disc", "method", *(SHOWN_TICKS[seconds] for seconds in TICKS)]
+    return markdown(heads, rows, left=range(len(heads))), found
 
 
 def weights(seeds: Sequence[int], jobs: int) -> str:
@@ -53,23 +53,20 @@ def weights(seeds: Sequence[int], jobs: int) -> str:
     rows = []
     for disc, encoder in DISCS.items():
         for kv in (40.0, 80.0, 160.0):
-            for kind in KINDS:
-                found = outcome_of(setting(kind, kv, 20e-6, encoder), seeds, jobs)
-                rows.append((disc, f"{kv:g}", kind.name, *cells(found)))
-    return markdown(("disc", "k_v", "method", *HEADS), rows, left=(0, 2))
+            found = [cell(outcome_of(setting(kind, kv, 20e-6, encoder), seeds, jobs)) for kind in KINDS]
+            rows.append((disc, f"{kv:g}", *found))
+    return markdown(("disc", "k_v", *(kind.name for kind in KINDS)), rows, left=range(len(KINDS) + 2))
 
 
 def assumptions(seeds: Sequence[int], jobs: int) -> str:
-    """What is changed against the real disc, ticks of 20 µs and 1 ms, k_v = 80 and 40."""
-    rows = []
+    """What is changed against the real disc, ticks of 1 ms and 20 µs, k_v = 40 and 80."""
+    rows: dict[str, list[str]] = {}
     for kv, seconds in ((40.0, 1e-3), (80.0, 20e-6)):
         base = setting(KINDS[0], kv, seconds, REAL)
-        for name, varied in variants(base):
-            rows.append((SHOWN_TICKS[seconds], f"{kv:g}", name, *cells(outcome_of(varied, seeds, jobs))))
         conventional = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
-        found = outcome_of(conventional, seeds, jobs)
-        rows.append((SHOWN_TICKS[seconds], f"{kv:g}", "the conventional observer", *cells(found)))
-    return markdown(("T_s", "k_v", "what is changed", *HEADS), rows, left=(0, 2))
+        for name, varied in (*variants(base), ("the conventional observer", conventional)):
+            rows.setdefault(name, [name]).append(cell(outcome_of(varied, seeds, jobs)))
+    return markdown(("what is changed", "1 ms, k_v = 40", "20 µs, k_v = 80"), list(rows.values()), left=range(3))
 
 
 def in_gates(seeds: Sequence[int], jobs: int) -> str:
@@ -117,8 +114,8 @@ def accelerations(seeds: Sequence[int], jobs: int) -> str:
         for name, way in ways.items():
             gains = replace(base.gains, way=way, observer=times * kv)
             found = outcome_of(replace(base, gains=gains), seeds, jobs)
-            rows.append((f"{kv:g}", f"{times * kv:g}", name, *cells(found)))
-    return markdown(("k_v", "G", "observer", *HEADS), rows, left=(2,))
+            rows.append((f"{kv:g}", f"{times * kv:g}", name, cell(found)))
+    return markdown(("k_v", "G", "observer", "errors, dip, current"), rows, left=(2, 3))
 
 
 TABLES = {
