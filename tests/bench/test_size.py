@@ -265,8 +265,7 @@ def test_what_a_greatest_speed_changes() -> None:
     for target, changed in changes.items():
         found["default", target] = size.Measurement({**found["reference", target].figures, **changed}, "")
     assert size.speed_table(found).rows == [
-        ["reference", "default", "ECP5", "+1", "-13", "+0.0"],
-        ["reference", "default", "HX8K", "+10", "", "-5.5"],
+        ["reference", "default", "+1", "-13", "+0.0", "+10", "-5.5", "", ""],
     ]
 
 
