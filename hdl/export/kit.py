@@ -78,7 +78,7 @@ def _bench_of_axes(tacho: AxesSpec) -> dict[str, object]:
     """Return how the smoke test turns many encoders: every other one backward, its lines exchanged."""
     lines = ["quarter[1] ^ quarter[0]", "quarter[1]"]
     a, b = ([lines[(axis + line) % 2] for axis in reversed(range(tacho.axes))] for line in range(2))
-    positions = " ".join(f"found[{axis}] <= position_{axis};" for axis in range(tacho.axes))
+    stores = " ".join(f"positions[{axis}] <= position_{axis};" for axis in range(tacho.axes))
     return {
         "axes": tacho,
         # Before the first edge there are rounds in which no axis is counted.
@@ -86,7 +86,7 @@ def _bench_of_axes(tacho: AxesSpec) -> dict[str, object]:
         "a": f"{{{', '.join(a)}}}",
         "b": f"{{{', '.join(b)}}}",
         "velocity": "velocity_0" if tacho.parallel else "velocity",
-        "found": f"begin {positions} end" if tacho.parallel else "found[axis] <= position;",
+        "store": f"begin {stores} end" if tacho.parallel else "positions[axis] <= position;",
         "compared": f"simulate --axes {tacho.axes}",
         "expected": _MOVED * tacho.axis.encoder.decoding // 4,
     }
