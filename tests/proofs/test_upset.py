@@ -2,9 +2,9 @@
 
 import pytest
 from proofs.formal.mutants import RECURSIVE_SUM
+from proofs.source import mutant
 from proofs.upset import axes, loops
 from proofs.upset.campaign import upsets
-from support.mutant import mutant
 from support.nightly import nightly, only
 
 from tachometry.hdl.control.control_clock import ControlClock

@@ -55,7 +55,6 @@ class Beside(wiring.Component):
     """Window and controller, joined as in the core."""
 
     def __init__(self, form: ControlForm, multiplier: str) -> None:
-        # By the names in their modules, where a mutant takes their place.
         self.window = update_window.UpdateWindow(form)
         self.controller = controller.Controller(form, multiplier)
         commands = ["enable", "position", "command_position", "command_velocity", "command_acceleration"]

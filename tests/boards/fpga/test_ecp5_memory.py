@@ -70,7 +70,8 @@ OTHERS = {
 }
 
 
-def check_stays(name: str) -> None:
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_is_no_output_register_stays(name: str) -> None:
     found = netlist()
     top = found["modules"]["top"]
     top["cells"]["gate"]["port_directions"]["D"] = "input"
@@ -78,11 +79,6 @@ def check_stays(name: str) -> None:
     before = deepcopy(found)
     assert use_output_registers(found) == 0
     assert found == before
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_what_is_no_output_register_stays(name: str) -> None:
-    check_stays(name)
 
 
 def test_boards_of_ecp5_use_it() -> None:

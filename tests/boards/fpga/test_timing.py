@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support.mutant import caught, mutant
 
 from tachometry.boards.fpga.timing import TimingError, check_hold, slowest_clock
 
@@ -27,24 +26,6 @@ def refused(check: Callable[..., object], *args: object) -> str:
     except ValueError as error:
         return str(error)
     return ""
-
-
-def check_clocks() -> None:
-    for fine, clock_hz in [
-        (report(126.1), 27_000_000),
-        (report(27.0), 27_000_000),
-        (report(40.2, 11.99999), 12_000_000),  # nextpnr keeps the period in picoseconds
-    ]:
-        assert refused(slowest_clock, fine, clock_hz) == ""
-    assert slowest_clock(report(126.1, other=30.0), 27_000_000) == 30
-    for wrong, message in [
-        (report(26.99), "timing is not met: cd_sync.clk is good for 26.99 MHz, not 27 MHz"),
-        (report(126.1, other=20.5), "timing is not met: other is good for 20.50 MHz, not 27 MHz"),
-        (report(126.1, 12.0), "cd_sync.clk must be checked at 27 MHz, not 12 MHz"),
-        ({"fmax": {}}, "nextpnr must have checked a clock, and has checked none"),
-        ({}, "nextpnr must have checked a clock, and has checked none"),
-    ]:
-        assert refused(slowest_clock, wrong, 27_000_000) == message
 
 
 def check_holds() -> None:
@@ -71,7 +52,21 @@ def check_holds() -> None:
 
 
 def test_clocks_are_held_against_the_one_of_the_board() -> None:
-    check_clocks()
+    for fine, clock_hz in [
+        (report(126.1), 27_000_000),
+        (report(27.0), 27_000_000),
+        (report(40.2, 11.99999), 12_000_000),  # nextpnr keeps the period in picoseconds
+    ]:
+        assert refused(slowest_clock, fine, clock_hz) == ""
+    assert slowest_clock(report(126.1, other=30.0), 27_000_000) == 30
+    for wrong, message in [
+        (report(26.99), "timing is not met: cd_sync.clk is good for 26.99 MHz, not 27 MHz"),
+        (report(126.1, other=20.5), "timing is not met: other is good for 20.50 MHz, not 27 MHz"),
+        (report(126.1, 12.0), "cd_sync.clk must be checked at 27 MHz, not 12 MHz"),
+        ({"fmax": {}}, "nextpnr must have checked a clock, and has checked none"),
+        ({}, "nextpnr must have checked a clock, and has checked none"),
+    ]:
+        assert refused(slowest_clock, wrong, 27_000_000) == message
 
 
 def test_only_hold_times_that_are_violated_are_violations() -> None:
@@ -87,24 +82,3 @@ def test_a_recorded_design_that_is_too_slow() -> None:
     check_hold(log)
     with pytest.raises(TimingError, match=r"^timing is not met: cd_sync.clk is good for 123.73 MHz, not 200 MHz$"):
         slowest_clock(report(123.73, 200.0), 200_000_000)
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong", "check"),
-    [
-        ('clock["achieved"] < wanted', 'clock["achieved"] < wanted - 0.1', check_clocks),
-        ('clock["achieved"] < wanted', 'clock["achieved"] <= wanted', check_clocks),
-        ('clock["constraint"] < wanted', 'clock["constraint"] > wanted', check_clocks),
-        ("wanted * (1 - _NEAR)", "wanted", check_clocks),
-        ("    if not clocks:", "    if clocks is None:", check_clocks),
-        ("return min(", "return max(", check_clocks),
-        ("float(end[1]) < 0", "float(end[1]) < -1", check_holds),
-        ("float(end[1]) < 0", "float(end[1]) <= 0", check_holds),
-        ("if judged < counted", "if judged > counted", check_holds),
-        ("(?:Warning|ERROR): Hold", "(?:ERROR): Hold", check_holds),
-        ("(?:Warning|ERROR): Hold", "(?:Warning): Hold", check_holds),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str, check: Callable[[], None]) -> None:
-    with mutant(slowest_clock if check is check_clocks else check_hold, right, wrong), caught():
-        check()

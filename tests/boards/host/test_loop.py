@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 import pytest
-from support.mutant import caught, mutant
 
 from tachometry.boards.host import loop
 from tachometry.spec import of_texts
@@ -35,7 +34,7 @@ class Registers:
         self.written.append((next(one.name for one in self.map if one.offset == offset), value))
 
 
-def check() -> None:
+def test_settings() -> None:
     """What is written while frozen, and what is refused before anything is."""
     there = Registers()
     client, form = there.client, there.spec.form
@@ -60,10 +59,6 @@ def check() -> None:
     assert not there.written
 
 
-def test_settings() -> None:
-    check()
-
-
 def test_a_generator() -> None:
     there = Registers(command="generator")
     assert "command_position" not in there.client.settings
@@ -82,16 +77,3 @@ def test_a_core_without_a_loop_is_refused() -> None:
     there = Registers()
     with pytest.raises(ValueError, match=r"^manifest must be that of a core with a control loop, which --loop makes$"):
         loop.LoopClient(there.words.__getitem__, there.write, {"registers": {}})
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ('frozen = {"freeze": 1}', 'frozen = {"freeze": 0}'),
-        ('raw >> field["shift"] & self', "raw & self"),
-        ('{"enable": int(on)}', '{"enable": 0}'),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(loop.LoopClient, right, wrong), caught():
-        check()

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from support.demo import CLOCK_HZ, ToldBoard, demo_map, manifest_of
-from support.mutant import caught, mutant
 
 from tachometry.boards.host.client import WrongBoard
 from tachometry.boards.monitor import session
@@ -81,7 +80,7 @@ def until(watched: session.Session, fine: Callable[[list[Frame]], bool]) -> list
     raise AssertionError("it did not come")
 
 
-def check_frames() -> None:
+def test_frames_and_their_times() -> None:
     """Every frame comes with its time, and settings are set before."""
     board = ToldBoard(demo_map())
     board.shown = {"VELOCITY": 0xFFFF_FFFF, "POSITION": 5}
@@ -99,7 +98,8 @@ def check_frames() -> None:
     assert cable.opened == cable.closed == 1
 
 
-def check_unplugged() -> None:
+@pytest.mark.usefixtures("quick")
+def test_an_unplugged_board_is_waited_for() -> None:
     """It goes on when the cable is in again, with the same settings; the time goes on, too."""
     board, told = ToldBoard(demo_map()), list[str]()
     cable = Cable(board)
@@ -127,45 +127,6 @@ def check_unplugged() -> None:
     assert watched.counts.lost == 0
     watched.close()
     assert cable.opened == cable.closed
-
-
-def test_frames_and_their_times() -> None:
-    check_frames()
-
-
-@pytest.mark.usefixtures("quick")
-def test_an_unplugged_board_is_waited_for() -> None:
-    check_unplugged()
-
-
-@pytest.mark.parametrize(
-    ("check", "right", "wrong"),
-    [
-        (check_frames, "            board.set(**self._settings)\n", ""),
-        (check_frames, "/ self._clock_hz\n\n\n", "/ 2 / self._clock_hz\n\n\n"),
-        (check_frames, "                self._board.stream(0)\n", "                pass\n"),
-        (check_frames, "            self._port.close()\n", ""),
-        (check_unplugged, "        self._before, self._board = self.counts, None\n", "        self._board = None\n"),
-        (
-            check_unplugged,
-            "            self._clocks += round((now - self._heard) * self._clock_hz)\n",
-            "            pass\n",
-        ),
-        (check_unplugged, "self._board, self._latest = board, None", "self._board = board"),
-        (
-            check_unplugged,
-            "        if why != self._waits_for:\n            self._told",
-            "        if why:\n            self._told",
-        ),
-        (check_unplugged, '            self._waits_for = ""\n', "            pass\n"),
-    ],
-)
-def test_mutants_are_caught(check: Callable[[], None], right: str, wrong: str) -> None:
-    with mutant(session.Session, right, wrong), pytest.MonkeyPatch.context() as patch:
-        for name in ("_PAUSE", "_SILENCE"):
-            patch.setitem(session.Session.poll.__globals__, name, 0.0)
-        with caught():
-            check()
 
 
 @pytest.mark.usefixtures("quick")

@@ -9,17 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.mutant import mutant
 from support.nightly import nightly, only
 
 from tachometry.cli.main import main
-from tachometry.hdl.control.controller import Controller
-from tachometry.hdl.front_end.decoder import QuadratureDecoder
-from tachometry.hdl.front_end.glitch_filter import GlitchFilter
-from tachometry.hdl.front_end.position_counter import PositionCounter
-from tachometry.hdl.front_end.pulse_counter import PulseCounter
-from tachometry.hdl.methods import count_way
-from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.sim.testbench.vectors import usual_motion
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.language.provenance import notice
@@ -84,12 +76,6 @@ def test_a_loop_passes_in_icarus(tmp_path: Path) -> None:
     assert play(tmp_path) == ""
 
 
-def test_a_loop_with_a_wrong_sign_fails(tmp_path: Path) -> None:
-    with mutant(Controller, "minus.eq(term != Term.CURRENT)", "minus.eq(1)"):
-        assert generate(tmp_path, *LOOP.split(), *LOOPS["commands"].split()) == 0
-    assert "with current_valid" in play(tmp_path)
-
-
 def test_unknown_simulator_is_told_in_a_line(tmp_path: Path) -> None:
     assert generate(tmp_path, *SMALL.split()) == 0
     done = run(tmp_path, "modelsim")
@@ -100,36 +86,6 @@ def test_unknown_simulator_is_told_in_a_line(tmp_path: Path) -> None:
 def test_passes_in_pytest(tmp_path: Path) -> None:
     assert generate(tmp_path, *SMALL.split()) == 0
     assert play(tmp_path, "icarus", "-m", "pytest", "-s") == ""
-
-
-MUTANTS: dict[str, tuple[Any, str, str, str]] = {
-    "every alteration": (AlterationDetector, " & differs)", ")", "s"),
-    "count lost": (PulseCounter, "raised.eq(fresh)", "raised.eq(start)", "s"),
-    "tick lost": (PulseCounter, "self.tick.eq(self.coming)", "self.tick.eq(self.coming & ~self.step[0])", "m"),
-    "glitch believed": (GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2", "s"),
-    "index forgotten": (PositionCounter, "self.position.eq(0)", "self.position.eq(1)", "s"),
-    "no error": (QuadratureDecoder, "self.ready & illegal", "0", "s in rpm"),
-    "error too often": (QuadratureDecoder, "self.ready & illegal", "counted & past_b", "s in rpm"),
-    "no sign rule": (count_way.CountWay, "negative == last if self._reversals else 1", "1", "mt"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_fail(name: str, tmp_path: Path) -> None:
-    box, right, wrong, case = MUTANTS[name]
-    with mutant(box, right, wrong):
-        assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
-    assert play(tmp_path).startswith("clock ")
-
-
-def test_verilator_passes_the_core_and_not_a_mutant(tmp_path: Path) -> None:
-    """In one folder, where the simulator's own code is compiled once."""
-    assert generate(tmp_path, *SMALL.split(), *CASES["mt"].split()) == 0
-    assert play(tmp_path, "verilator") == ""
-    box, right, wrong, _ = MUTANTS["count lost"]
-    with mutant(box, right, wrong):
-        assert generate(tmp_path, *SMALL.split(), *CASES["mt"].split()) == 0
-    assert play(tmp_path, "verilator").startswith("clock ")
 
 
 def test_an_output_that_is_not_held_fails(tmp_path: Path) -> None:

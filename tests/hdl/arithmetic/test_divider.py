@@ -4,11 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic import divider
-from tachometry.hdl.arithmetic.divider import Divider
 
 OUTPUTS = ["done", "quotient", "by", "running", "digit"]
 
@@ -100,32 +98,3 @@ def test_the_second_digit_tells_a_quotient_of_too_many(
     seen = [row["digit"] for row in clock_by_clock(dut, [*rows, {"start": 0}, {"start": 0}], ["digit"])]
     positive = [int(dividend >= 0) for dividend, _ in cases]
     assert (len(cases) > 90, seen[1:-2:2], seen[2:-1:2]) == (True, positive, positive)
-
-
-MUTANTS = {
-    "restoring nothing": ("(~negative).replicate", "Const(1).replicate"),
-    "no digit of the dividend": ("Cat(1, digits[-1], remainder)", "Cat(1, 0, remainder)"),
-    "first sign inverted": ("~digits[-1])", "digits[-1])"),
-    "digits inverted": ("self.digit.eq(~negative)", "self.digit.eq(negative)"),
-    "a step too many": ("left.eq(self._steps - 1)", "left.eq(self._steps)"),
-    "not stopped": ("running.eq(0)", "running.eq(1)"),
-    "done though it starts again": (" & ~self.start)", ")"),
-}
-NEAREST_MUTANTS = {
-    "not rounded": ("half = Cat(self.divisor[1:], ", "half = Cat(Const(0, len(self.divisor) - 1), ", 0),
-    "a part of the half lost": ("whole: Value = self.dividend + above", "whole: Value = self.dividend", 0),
-    "a part of it lost in zeros": ("Cat(above, Const(0, zeros - len(above))", "Cat(Const(0, zeros)", 2),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(Divider, *MUTANTS[name]), caught():
-        check(2, 3, 3, [(dividend, by) for by in (1, 3, 7) for dividend in range(1 - 4 * by, 4 * by)])
-
-
-@pytest.mark.parametrize("name", NEAREST_MUTANTS)
-def test_mutants_of_rounding_are_caught(name: str) -> None:
-    *change, zeros = NEAREST_MUTANTS[name]
-    with mutant(Divider, *change), caught():
-        check(3, 1, 4, [(dividend, by) for by in (1, 7, 15) for dividend in range(-4 * by, 4 * by, 1 << zeros)], zeros)

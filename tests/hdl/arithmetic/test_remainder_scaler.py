@@ -5,12 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.mutant import caught, mutant
 from support.nightly import nightly, only, only_rows
 from support.quotient import FlatQuotient, every_quotient
 from support.simulate import clock_by_clock
 
-from tachometry.hdl.arithmetic import carried_reciprocal, remainder_scaler
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.core.timing import MAX_TICKS
@@ -95,39 +93,3 @@ def check_starts_over(*, frac_bits: int) -> None:
 @pytest.mark.parametrize("frac_bits", [TIES, CARRIED])
 def test_m_starts_over(frac_bits: int) -> None:
     check_starts_over(frac_bits=frac_bits)
-
-
-MUTANTS = {
-    "quotient never corrected": (carried_reciprocal.CarriedReciprocal, "q.eq(q - borrow)", "q.eq(q)"),
-    "remainder corrected by m + 1": (
-        carried_reciprocal.CarriedReciprocal,
-        "Mux(borrow, self.m, 0)",
-        "Mux(borrow, self.m + 1, 0)",
-    ),
-    "no preset at the kept half": (
-        carried_reciprocal.CarriedReciprocal,
-        "with m.If(self.m == spec.entry):",
-        "with m.If(0):",
-    ),
-    "table read one m too far": (
-        carried_reciprocal.CarriedReciprocal,
-        "carried.eq(self.m[address_bits:].any())",
-        "carried.eq(self.m[address_bits + 1:].any())",
-    ),
-    "the sign bit counts positive": (
-        remainder_scaler.RemainderScaler,
-        "total - (step_q << step)",
-        "total + (step_q << step)",
-    ),
-    "half down": (
-        remainder_scaler.RemainderScaler,
-        "_rounded(total, quotient.as_signed(), up)",
-        "_rounded(total, quotient.as_signed(), 0)",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(*MUTANTS[name]), caught():
-        check_starts_over(frac_bits=CARRIED if "kept half" in name else TIES)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from amaranth.lib import data
 from reference.sequences import rounded
-from support.mutant import caught, mutant
 from support.nightly import only, only_rows
 from support.quotient import FlatQuotient, every_quotient
 from support.simulate import clock_by_clock
@@ -72,7 +71,7 @@ def base(n: Any) -> Any:
     return n % 5 - 3
 
 
-def check_ties() -> None:
+def test_ties_base_and_tag() -> None:
     """Ties of both signs, between other values, at 4 fraction bits."""
     spec = default_spec(4, reciprocal_source="table")
     pairs = [(n, m) for m in (32, 96, 160, 480) for n in range(-18, 19)] + [(7, 3), (-7, 3), (1920, 1), (-3840, 500)]
@@ -92,40 +91,11 @@ def check_ties() -> None:
     ]
 
 
-def test_ties_base_and_tag() -> None:
-    check_ties()
+SERIAL = [(scaler.SerialScaler, "1000rad/s"), (scaler.WideSerialScaler, None)]
 
 
-MUTANTS = {
-    "half-even rounding": (
-        "total >> self._scale_bits",
-        "(total >> self._scale_bits) & ~~total[: self._scale_bits - 1].any()",
-    ),
-    "no negative digit": ("^ high.replicate(len(self.q) + 1)", ""),
-    "twice is once": ("Mux(twice, self.q << 1, self.q)", "Cat(self.q, Const(0, 1))"),
-    "the digit 0 is −1 after another": ("(high == low) & (low == below)", "~(high | low | below)"),
-    "half down": ("shifted_in = self._rounding & 2", "shifted_in, self._rounding = 0, self._rounding >> 13 << 13"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(scaler.SerialScaler, *MUTANTS[name]), caught():
-        check_ties()
-
-
-def check_reference(tmp_path: Path, source: str) -> None:
-    spec = default_spec(max_speed=Speed.parse("1000rad/s"), reciprocal_source=source)
-    base, n, m, got = every_quotient(spec, range(-28, 29), tmp_path)
-    assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
-
-
-def test_without_slack_the_mutant_whose_negative_is_the_complement_is_caught(tmp_path: Path) -> None:
-    with mutant(scaler.SerialScaler, "carry.eq(0 if self._is_odd else high)", "carry.eq(0)"), caught():
-        check_reference(tmp_path, "table")
-
-
-def check_ends(kind: type[scaler.SerialScaler | scaler.WideSerialScaler], max_speed: str | None) -> None:
+@pytest.mark.parametrize(("kind", "max_speed"), SERIAL)
+def test_every_bit_of_the_sum_counts(kind: Any, max_speed: str | None) -> None:
     """The sum for odd q that are no reciprocals: those with which it is as near to the next result as it can be."""
     spec = default_spec(max_speed=max_speed and Speed.parse(max_speed))
     form = spec.reciprocal
@@ -149,25 +119,6 @@ def check_ends(kind: type[scaler.SerialScaler | scaler.WideSerialScaler], max_sp
     assert found == [(base(n) << 16) + ((n * q + form.rounding()) >> form.scale_bits) for n, q in pairs]
 
 
-SERIAL = [(scaler.SerialScaler, "1000rad/s"), (scaler.WideSerialScaler, None)]
-
-
-@pytest.mark.parametrize(("kind", "max_speed"), SERIAL)
-def test_every_bit_of_the_sum_counts(kind: Any, max_speed: str | None) -> None:
-    check_ends(kind, max_speed)
-
-
-@pytest.mark.parametrize(("kind", "max_speed"), SERIAL)
-@pytest.mark.parametrize(
-    ("right", "wrong"), [("Cat(Mux(twice, 0, 1)", "Cat(1"), ("(high & ~twice)", "high"), ("~(low ^ below)", "~below")]
-)
-def test_a_mutant_with_an_odd_reciprocal_is_caught(kind: Any, max_speed: str | None, right: str, wrong: str) -> None:
-    with mutant(kind, right, wrong):
-        changed = getattr(scaler, kind.__name__)
-        with caught():
-            check_ends(changed, max_speed)
-
-
 def check_wide(tmp_path: Path) -> None:
     """N at the ends of all digits, with every m."""
     spec = default_spec()
@@ -185,22 +136,6 @@ def test_what_is_wide(tmp_path: Path) -> None:
         one.reciprocal.is_wide(one.velocity_width)  # type: ignore[union-attr]
         for one in (default_spec(max_speed=Speed.parse("1000rad/s")), default_spec(reciprocal_source="table"))
     )
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("waits.eq(lower_sum[-1])", "waits.eq(0)"),
-        ("bits[1] ^ (bits[0] & by)", "bits[1]"),
-        ("bits[0] & bits[1] & by", "bits[0] & by"),
-        ("Cat(carried, upper[2:])", "Cat(0, upper[2:])"),
-        ("_increment(upper_sum[:2], lower_sum[-1])", "(upper_sum[:2], 0)"),
-        ("self.numerator << 1)", "self.numerator)"),
-    ],
-)
-def test_a_mutant_of_the_wide_sum_is_caught(tmp_path: Path, right: str, wrong: str) -> None:
-    with mutant(scaler.WideSerialScaler, right, wrong), caught():
-        check_wide(tmp_path)
 
 
 @pytest.mark.parametrize("towards", [-1, 0, 1])

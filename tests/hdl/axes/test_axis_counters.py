@@ -1,8 +1,6 @@
 """Counters of three axes with four slots, in a round that is followed level by level."""
 
 import numpy as np
-import pytest
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.axes.axis_counters import AxisCounters
@@ -12,7 +10,7 @@ PHASE = {(0, 0): 0, (1, 0): 1, (1, 1): 2, (0, 1): 3}
 OUTPUTS = ["axis", "step", "decode_error", "complete", "count"]
 
 
-def check() -> None:
+def test_every_axis_counts_its_own_lines() -> None:
     rng = np.random.default_rng(3)
     n_rounds = ROUNDS * TICKS
     # The levels of an axis in its slots; in all other clocks they are anything.
@@ -50,27 +48,3 @@ def check() -> None:
         step = {0: 0, 1: 1, 2: 0, 3: -1}[turned]
         counts[slot] = step if round_ % ROUNDS == 0 else counts[slot] + step
         assert (row["step"], row["decode_error"], row["count"]) == (step, turned == 2, counts[slot]), (round_, slot)
-
-
-def test_every_axis_counts_its_own_lines() -> None:
-    check()
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("Mux(first, 0, before.count)", "before.count"),
-        ("Mux(first, 0, before.count)", "Mux(last, 0, before.count)"),
-        ("write.addr.eq(self.axis)", "write.addr.eq(slot)"),
-        ("read.addr.eq(self.slot)", "read.addr.eq(slot)"),
-        ("write.data.a.eq(new_a)", "write.data.a.eq(a)"),
-        ("self.complete.eq(last)", "self.complete.eq(first)"),
-        ("count.eq(ready & counted)", "count.eq(counted)"),
-        ("self.decode_error.eq(ready & illegal)", "self.decode_error.eq(illegal)"),
-        ("(self.level_a, self.level_b))", "(self.level_b, self.level_a))"),
-        ("Const(0, 1 << len(slot))", "lines"),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(AxisCounters, right, wrong), caught():
-        check()

@@ -6,11 +6,9 @@ from amaranth import Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from reference.sequences import PAPER
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.axes import axis_window
-from tachometry.hdl.axes.axis_window import AxisWindow
 from tachometry.sim.golden.methods.s import alterations, windows
 
 OUTPUTS = ["m_s", "base", "numerator", "update", "forced", "stalled"]
@@ -21,7 +19,6 @@ class Followed(wiring.Component):
 
     def __init__(self, max_ticks: int, cancel: bool) -> None:
         given = {"max_ticks": max_ticks, "kept_ticks": max_ticks // 2, "count_width": 4, "numerator_width": 6}
-        # By the name in its module, where a mutant takes its place.
         self.window = axis_window.AxisWindow(**given, cancel=cancel)
         super().__init__({"clears": In(1), "m_e": In(signed(4)), **{name: Out(signed(12)) for name in OUTPUTS}})
 
@@ -80,22 +77,3 @@ def test_windows_of_the_paper_and_of_random_numbers(max_ticks: int, cancel: bool
     for m_e, _ in PAPER.values():
         check([max(-7, min(7, number)) for number in m_e], max_ticks=max_ticks, cancel=cancel)
     check(random(max_ticks), max_ticks=max_ticks, cancel=cancel)
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        (" & (m_e != state.offset)", ""),
-        ("state.opening - state.previous + d1 if", "d1 + d1 if"),
-        ("Mux(restarts, 1, goes_on)", "Mux(restarts, 2, goes_on)"),
-        ("self._kept_ticks + 1", "1"),
-        ("longest & ~restarts", "longest"),
-        ("Mux(alteration | longest | self.clears", "Mux(alteration | self.clears"),
-        ("Mux(alteration, state.offset, m_e)", "m_e"),
-        ("state.rests | state.nearly |", "state.rests |"),
-        ("state.opening | state.previous", "state.previous"),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(AxisWindow, right, wrong), caught():
-        check(random(1))

@@ -1,5 +1,4 @@
 import pytest
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.axes.rounds import Rounds
@@ -7,7 +6,8 @@ from tachometry.hdl.axes.rounds import Rounds
 OUTPUTS = ["slot", "first", "last", "ready"]
 
 
-def check(slots: int, rounds: int) -> None:
+@pytest.mark.parametrize(("slots", "rounds"), [(3, 1), (3, 2), (5, 4), (8, 7)])
+def test_slots_and_rounds(slots: int, rounds: int) -> None:
     seen = clock_by_clock(Rounds(slots, rounds, 3), [{}] * (slots * (2 * rounds + 5)), OUTPUTS)
     for clock, row in enumerate(seen):
         round_ = clock // slots
@@ -17,21 +17,3 @@ def check(slots: int, rounds: int) -> None:
             "last": round_ % rounds == rounds - 1,
             "ready": round_ >= 3,
         }, clock
-
-
-@pytest.mark.parametrize(("slots", "rounds"), [(3, 1), (3, 2), (5, 4), (8, 7)])
-def test_slots_and_rounds(slots: int, rounds: int) -> None:
-    check(slots, rounds)
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("self.slot == self._slots - 1", "self.slot == self._slots - 2"),
-        ("self.first.eq(self.last)", "self.first.eq(0)"),
-        ("(warmed << 1) | 1", "warmed << 1"),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(Rounds, right, wrong), caught():
-        check(5, 4)

@@ -1,11 +1,11 @@
 import pytest
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.axes.turns import Turns
 
 
-def check(axes: int, cycles: int) -> None:
+@pytest.mark.parametrize(("axes", "cycles"), [(1, 3), (2, 4), (3, 7), (8, 3)])
+def test_each_axis_has_its_turn(axes: int, cycles: int) -> None:
     """Turns after reset, and of two ticks, the second as early as it may be and the third later."""
     whole = axes * cycles
     begins = [whole - 1, 2 * whole - 1, 3 * whole + 4]
@@ -18,24 +18,6 @@ def check(axes: int, cycles: int) -> None:
         assert row["step"] == step, clock
         assert not step or row["axis"] == since // cycles, clock
         assert row["clears"] == (clock < whole), clock
-
-
-@pytest.mark.parametrize(("axes", "cycles"), [(1, 3), (2, 4), (3, 7), (8, 3)])
-def test_each_axis_has_its_turn(axes: int, cycles: int) -> None:
-    check(axes, cycles)
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("self.axis == self._axes - 1", "self.axis == self._axes - 2"),
-        ("self.clears.eq(0)", "self.clears.eq(1)"),
-        ("ends & ~final", "ends & final"),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(Turns, right, wrong), caught():
-        check(3, 7)
 
 
 def test_what_an_upset_leaves_ends_with_the_next_tick() -> None:

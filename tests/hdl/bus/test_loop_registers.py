@@ -2,16 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from support.control import SMALL
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 from support.verilog import play
 
-from tachometry.hdl.bus import bank
 from tachometry.hdl.core import register_core
 from tachometry.hdl.export import export
 from tachometry.sim.encoder.stress import stress
@@ -135,20 +132,3 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", SPECS)
 def test_registers_are_those_of_the_golden_model(name: str) -> None:
     check(SPECS[name], 1)
-
-
-BANK, CORE_BOX = bank.RegisterBank, register_core.RegisterCore
-MUTANTS: dict[str, tuple[Any, str, str]] = {
-    "a value beyond its range wraps": (BANK, "given if field.most is None else _held(m, field, given)", "given"),
-    "a value without its sign": (BANK, "given.as_signed() if field.signed else given", "given"),
-    "both words are one": (BANK, "value[field.shift : field.shift + field.kept]", "value[: field.kept]"),
-    "registers begin with 0": (BANK, "Out(shape, init=init) for", "Out(shape) for"),
-    "enabled by its input alone": (CORE_BOX, "given & bank.loop_enable", "given | bank.loop_enable"),
-    "what a program changes is shown": (CORE_BOX, "m.d.sync += kept.eq(shown)", "m.d.comb += kept.eq(value)"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(*MUTANTS[name]), caught():
-        check(CORE, 1, 700)

@@ -1,17 +1,14 @@
 """The command generator against the golden one, with demands at random."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from support.control import GENERATED, OFTEN, random_demands
-from support.mutant import caught, mutant
 from support.nightly import nightly, only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.control import command_generator
-from tachometry.hdl.control.command_generator import CommandGenerator
 from tachometry.sim.golden.command_generator import Demand, generated
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.generator import AMPLITUDE_WIDTH, SINE, WORD, generator_clocks
@@ -65,27 +62,3 @@ def test_with_control_ticks_in_2_microseconds() -> None:
     """An LSB of the acceleration is less than one of the port there."""
     assert OFTEN.generator.acceleration.shift < 0
     check(OFTEN, 60)
-
-
-MUTANTS: dict[str, tuple[Any, str, str]] = {
-    "a sine goes on from the one before": (CommandGenerator, "swings.eq(sine & self.enable)", "swings.eq(sine)"),
-    "a sine begins in its middle": (CommandGenerator, "toward.eq(self.amplitude", "toward.eq(0 & self.amplitude"),
-    "every step is one of a sine": (CommandGenerator, "swinging.eq(sine & swings & self.enable)", "swinging.eq(sine)"),
-    "a sine from its middle outward": (CommandGenerator, "change.eq(product.product)", "change.eq(-product.product)"),
-    "a ramp without a bound": (CommandGenerator, "ramp & above", "ramp & 0"),
-    "a ramp downward without a bound": (CommandGenerator, "ramp & below", "ramp & 0"),
-    "ramps only": (CommandGenerator, "ramp.eq(self.mode == RAMP)", "ramp.eq(1)"),
-    "disabled, the position is not that of the shaft": (CommandGenerator, "place.eq(self.position", "place.eq(0"),
-    "disabled, it moves": (CommandGenerator, "speed.eq(0)]", "speed.eq(speed)]"),
-    "the velocity wraps": (CommandGenerator, "speed.eq(held)", "speed.eq(total)"),
-    "the way to the middle wraps": (CommandGenerator, "toward.eq(held)", "toward.eq(total)"),
-    "the position follows the change": (CommandGenerator, "place.eq(place + speed)", "place.eq(place + change)"),
-    "a command wraps": (CommandGenerator, "command.eq(held)", "command.eq(product.product)"),
-    "the bound of the latest clock": (CommandGenerator, "bound.eq(self.acceleration)", "bound.eq(bound)"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(*MUTANTS[name]), caught():
-        check(GENERATED, 300, fast=name == "the way to the middle wraps")

@@ -1,17 +1,11 @@
 """The whole core for many axes against its golden model, and what each of its boxes could do wrong."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from amaranth import Module, ResetInserter, Signal
 from support.axes import TICK_CYCLES, check, motions, small
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
-from tachometry.hdl.axes.axes_datapath import AxesDatapath
-from tachometry.hdl.axes.axis_index import AxisIndex
-from tachometry.hdl.axes.held_outputs import HeldOutputs
 from tachometry.hdl.core.axes_tachometer import AxesTachometer
 from tachometry.sim import golden
 from tachometry.sim.signals.axes import AxesTrace
@@ -77,43 +71,6 @@ def test_a_run_that_ends_earlier_has_the_same_rows_until_then() -> None:
                 assert found[name].tolist() == before[name].tolist(), (strobe, name)
 
 
-MUTANTS: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
-    "begins with the wrong axis": (AxesDatapath, "(self.slot == 0)", "(self.slot == 1)", {}),
-    "handed over to another": (
-        AxesDatapath,
-        "write_count.addr.eq(self.slot)",
-        "write_count.addr.eq(self.slot + 1)",
-        {},
-    ),
-    "counts of another": (AxesDatapath, "read_count.addr.eq(turns.axis)", "read_count.addr.eq(0)", {}),
-    "state of another": (AxesDatapath, "read.addr.eq(self.turns.axis)", "read.addr.eq(0)", {}),
-    "state kept for another": (AxesDatapath, "write.addr.eq(self.turns.axis)", "write.addr.eq(0)", {}),
-    "state never kept": (AxesDatapath, "write.en.eq(decides)", "write.en.eq(0)", {}),
-    "state of the only axis never kept": (AxesDatapath, "m.d.sync += only.eq(after)", "pass", {"axes": 1}),
-    "named as another": (AxesDatapath, "self.axis.eq(turns.axis)", "self.axis.eq(turns.axis + 1)", {}),
-    "position of saturated counts": (AxesDatapath, "before.position + count", "before.position + m_e", {}),
-    "tick after reset": (AxesDatapath, "turns.step[-1] & ~turns.clears", "turns.step[-1]", {}),
-    "no saturation": (AxesDatapath, "spec.axis.max_count < spec.rounds", "False", {}),
-    "velocity upon this count": (AxesDatapath, "base.eq(window.state.previous)", "base.eq(self.pulse_count)", {}),
-    "always forced": (AxesDatapath, "tag.forced.eq(forced)", "tag.forced.eq(1)", {}),
-    "stalled for ever": (AxesDatapath, "stalled.eq(window.next.rests)", "stalled.eq(1)", {}),
-    "index of a level": (AxisIndex, "ready & level & ~before.z", "ready & level", {"index": True}),
-    "index before there are levels": (AxisIndex, "ready & level & ~before.z", "level & ~before.z", {"index": True}),
-    "index of another axis": (AxisIndex, "write.addr.eq(self.axis)", "write.addr.eq(slot)", {"index": True}),
-    "index without this step": (AxisIndex, "before.position, 0) + self.step", "before.position, 0)", {"index": True}),
-    "held for another": (HeldOutputs, "self.axis == axis", "self.axis != axis", {"parallel": True}),
-    "held without a strobe": (HeldOutputs, "self.strobe &", "1 &", {"parallel": True}),
-    "strobe before what is held": (AxesTachometer, "delay(m, strobe, axis)", "(strobe, axis)", {"parallel": True}),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    box, right, wrong, options = MUTANTS[name]
-    with mutant(box, right, wrong), caught():
-        check(small(**{"axes": 2, **options}))
-
-
 class Restarted(AxesTachometer):
     """A core with a reset of its own."""
 
@@ -127,7 +84,7 @@ class Restarted(AxesTachometer):
         return m
 
 
-def check_reset() -> None:
+def test_a_reset_clears_what_is_in_memory() -> None:
     """What is in the memories when a reset comes does not matter."""
     spec = small(2, index=True)
     trace, names = motions(spec, 900), [port.name for port in spec.outputs]
@@ -144,23 +101,6 @@ def check_reset() -> None:
         for name, strobe in strobes.items():
             assert not wanted[strobe] or after[name] == wanted[name], (clock, name)
             assert name != strobe or after[name] == wanted[name], (clock, name)
-
-
-def test_a_reset_clears_what_is_in_memory() -> None:
-    check_reset()
-
-
-@pytest.mark.parametrize(
-    ("box", "right", "wrong"),
-    [
-        (AxesDatapath, "self.overflow.eq(0), self.position.eq(0)", "self.overflow.eq(0)"),
-        (AxesDatapath, "window.clears.eq(turns.clears)", "window.clears.eq(0)"),
-        (AxisIndex, "Mux(ready, before.position, 0)", "before.position"),
-    ],
-)
-def test_mutants_that_remember_are_caught(box: Any, right: str, wrong: str) -> None:
-    with mutant(box, right, wrong), caught():
-        check_reset()
 
 
 def test_all_ticks_come_in_step() -> None:

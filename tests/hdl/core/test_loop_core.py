@@ -10,13 +10,10 @@ import numpy as np
 import pytest
 from amaranth import Module, ResetInserter, Signal
 from support.control import GENERATED, SERIAL, SMALL, check_core, core_case
-from support.mutant import caught, mutant
 from support.nightly import nightly
 from support.simulate import clock_by_clock
 from support.verilog import play_in_icarus
 
-from tachometry.hdl.control.control_clock import ControlClock
-from tachometry.hdl.control.held_inputs import HeldInputs
 from tachometry.hdl.control.sigma_delta import SigmaDelta
 from tachometry.hdl.core.loop_core import LoopCore
 from tachometry.sim import golden
@@ -26,12 +23,6 @@ from tachometry.spec import Encoder, ParameterError, Timing, TTachometer
 from tachometry.spec.control import LoopSpec
 
 CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)))
-
-
-OTHERS = {
-    "generator": replace(CORE, command="generator"),
-    **dict.fromkeys(("given", "self"), replace(CORE, gains="inputs")),
-}
 
 
 def test_as_the_golden_model() -> None:
@@ -52,22 +43,6 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     assert len(wanted.tables["current_valid"]) > 20
     count, first = compare(wanted, play_in_icarus(spec, tmp_path, changes, trace.n_clocks))
     assert not count, first
-
-
-@pytest.mark.parametrize(
-    ("box", "right", "wrong"),
-    [
-        (ControlClock, "left.eq(self._period - 1)", "left.eq(self._period)"),
-        (ControlClock, "init=self._first - 1", "init=self._first - 2"),
-        (LoopCore, "window.update.eq(tachometer.velocity_valid)", "window.update.eq(tachometer.tick)"),
-        (LoopCore, "generator.position.eq(tachometer.position)", "generator.position.eq(0)"),
-        (LoopCore, "given.coming.eq(clock.coming)", "given.coming.eq(clock.tick)"),
-        (HeldInputs, "self.coming & ~self.freeze", "self.coming"),
-    ],
-)
-def test_mutants_are_caught(box: Any, right: str, wrong: str) -> None:
-    with mutant(box, right, wrong), caught():
-        check_core(OTHERS.get(right.split(".")[0], CORE), n_edges=1)
 
 
 @nightly  # the period in which both meet is one of many in tests/hdl/control
@@ -125,11 +100,6 @@ def check_drive(width: int) -> None:
 
 def test_the_stream_of_bits() -> None:
     check_drive(8)
-
-
-def test_a_stream_of_the_wrong_sign_is_caught() -> None:
-    with mutant(SigmaDelta, "~self.value[-1]", "self.value[-1]"), caught():
-        check_drive(8)
 
 
 def test_what_is_refused() -> None:

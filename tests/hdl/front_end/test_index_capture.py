@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 
-from tachometry.hdl.front_end.index_capture import IndexCapture
 from tachometry.sim import golden
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
@@ -63,16 +61,3 @@ def test_a_glitch_on_the_index_is_swallowed_and_counted() -> None:
     assert compare(golden.run(spec, trace), run) == (0, [])
     assert len(run.index.clock) == 0
     assert run.ticks.swallowed_edges[-1] == 2
-
-
-MUTANTS = {
-    "falling edge": ("level & ~past_z", "~level & past_z"),
-    "before it is real": ("& ready", ""),
-    "captured a clock late": ("with m.If(self.rises)", "with m.If(self.index_valid)"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(IndexCapture, *MUTANTS[name]), caught():
-        check(reset=False, z=np.array([1, 1, 0, 0, 0, 0, 0, 1, 1, 1], dtype=np.uint8))

@@ -4,11 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 from support.nightly import only_rows
 
-from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
-from tachometry.hdl.methods.rairan import RairanMethod
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.studies.lockstep import lockstep
@@ -55,17 +52,3 @@ def test_gates_have_the_bounds_of_the_golden_model(method: str, options: dict[st
 
 def test_it_is_rounded_up_to_eighths() -> None:
     assert [spec_of("s", {}, text).edge_error * 8 for text in ("0.01", "0.125", "12.6%", "1")] == [1, 1, 2, 8]
-
-
-@pytest.mark.parametrize(
-    ("box", "right", "wrong", "method"),
-    [
-        (QuotientVelocity, "(distance << finer) - off", "(distance << finer) + off", "t"),
-        (QuotientVelocity, "Mux(still, -off, -greatest)", "Mux(still, 0, -greatest)", "t"),
-        (RairanMethod, "Mux(negative[0], -entries", "Mux(negative[0], entries", "rairan"),
-    ],
-)
-def test_mutants_are_caught(box: type, right: str, wrong: str, method: str) -> None:
-    with mutant(box, right, wrong), caught():
-        for seed in range(1, 4):
-            check(spec_of(method, {}, "0.5"), seed)

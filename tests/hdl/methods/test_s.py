@@ -4,10 +4,8 @@ from fractions import Fraction
 
 import pytest
 from reference.sequences import MAX_TICKS, PAPER, rounded
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
-from tachometry.hdl.methods.interval import IntervalAccumulator
 from tachometry.hdl.methods.s import SMethod
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
@@ -68,26 +66,3 @@ def test_outputs_are_held_from_update_to_update(serial: bool) -> None:
         if row["velocity_valid"]:
             held = row
         assert {**row, "velocity_valid": 0} == {**held, "velocity_valid": 0}
-
-
-MUTANTS = {
-    "eq. (17) for eq. (21)": (
-        IntervalAccumulator,
-        "- (last << 1) if self._cancel else -last",
-        "- last if self._cancel else -last",
-    ),
-    "m_s off by one": (IntervalAccumulator, "self.m_s.eq(1)", "self.m_s.eq(2)"),
-    "window opened afresh after a forced update": (IntervalAccumulator, "self._kept_ticks + 1", "1"),
-    "forced beats an alteration": (IntervalAccumulator, "longest & ~self.alteration", "longest"),
-    "opening number kept over a forced update": (
-        IntervalAccumulator,
-        "Mux(self.update, last, opening)",
-        "Mux(self.tick & self.alteration, last, opening)",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(*MUTANTS[name]), caught():
-        check_paper_sequences()

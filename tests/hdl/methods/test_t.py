@@ -1,10 +1,6 @@
 """What only the T method does."""
 
-import pytest
-from support.mutant import caught, mutant
 from support.timed import TICK, run, spec_of, speed
-
-from tachometry.hdl.methods import t as t_method
 
 
 def test_a_count_while_the_divider_runs_opens_the_next_window() -> None:
@@ -18,7 +14,7 @@ def test_a_count_while_the_divider_runs_opens_the_next_window() -> None:
     assert got[-1] == (45 + busy, speed(1, busy), busy, False)
 
 
-def check_lattice() -> None:
+def test_lattice() -> None:
     """Ticks are the periods; more than one count in a tick is out of range: a count per tick, and flagged."""
     spec = spec_of("t", timer="tick", bound_decay=False)
     assert spec.interval_unit_cycles == TICK
@@ -34,23 +30,6 @@ def check_lattice() -> None:
     ]
 
 
-def test_lattice() -> None:
-    check_lattice()
-
-
 def test_paper_exact_has_no_sign_rule_and_no_decay() -> None:
     got = run(spec_of("t", paper_exact=True), {5: 1, 45: 1, 95: -1, 125: -1}, 300)
     assert [row[:2] for row in got] == [(45, speed(1, 40)), (95, speed(-1, 50)), (125, speed(-1, 30))]
-
-
-MUTANTS = {
-    "no sign rule": ("Mux(self._same | many,", "Mux(1,"),
-    "as if there were one": ("self._same | many", "self._same"),
-    "time of many": ("Mux(many, 1, timer.age)", "timer.age"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(t_method.TMethod, *MUTANTS[name]), caught():
-        check_lattice()

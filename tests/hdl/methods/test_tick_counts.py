@@ -1,12 +1,11 @@
 """The counts of a tick, with injected steps: number, times and places, held against sums over a list."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 from support.nightly import only
 from support.simulate import clock_by_clock
 
@@ -85,7 +84,7 @@ def begun(*counts: tuple[int, int]) -> dict[int, int]:
     return {3: 1, T + 3: 1} | {2 * T + clock: step for clock, step in counts}
 
 
-def check_times() -> None:
+def test_times() -> None:
     """A count in the last clock of a tick has time 0, and the next clock belongs to the next tick."""
     for clock in range(T):
         row = run(FORM, begun((clock, 1)), [T] * 3)[2]
@@ -94,33 +93,21 @@ def check_times() -> None:
     assert [(row["number"], row["times"]) for row in rows[2:]] == [(3, 19 + 12), (1, 19)]
 
 
-def test_times() -> None:
-    check_times()
-
-
-def check_places() -> None:
+def test_places() -> None:
     """In half counts: forward the last is −1, the one before −3; backward 1 and 3."""
     for step in (1, -1):
         rows = [run(FORM, begun(*((2 * k, step) for k in range(n))), [T] * 3)[2] for n in range(1, MAX_COUNT + 1)]
         assert [row["places"] for row in rows] == [-step * n * n for n in range(1, MAX_COUNT + 1)]
 
 
-def test_places() -> None:
-    check_places()
-
-
-def check_turning() -> None:
+def test_turning() -> None:
     """Counts that cancel: an edge that is met twice has the same place both times, and both are counts."""
     row = run(FORM, begun((4, 1), (9, -1)), [T] * 3)[2]
     assert (row["number"], row["times"], row["places"]) == (2, 15 + 10, 2)
     check(begun((4, -1), (9, 1), (11, 1), (12, -1)), [T] * 3)
 
 
-def test_turning() -> None:
-    check_turning()
-
-
-def check_many() -> None:
+def test_more_than_max_count() -> None:
     """Of more than `max_count` only the last is used, and the tick after it is as any other."""
     for extra in range(1, 5):
         crowd = begun(*((k, 1) for k in range(MAX_COUNT + extra)), (T + 5, -1), (T + 9, -1))
@@ -130,11 +117,7 @@ def check_many() -> None:
     check(begun(*((T - k, 1) for k in range(1, MAX_COUNT + 1)), (T, 1), (T + 1, 1)), [T] * 4)
 
 
-def test_more_than_max_count() -> None:
-    check_many()
-
-
-def check_alone() -> None:
+def test_alone() -> None:
     """Behind an empty tick, and without a speed, only the last count of a tick is used."""
     counts = {3: 1, 2 * T + 3: 1, 2 * T + 8: 1, 3 * T + 3: 1, 3 * T + 8: 1}
     for tracks in ([True] * 4, [False] * 4, [True, True, False, True]):
@@ -142,11 +125,7 @@ def check_alone() -> None:
     assert [row["number"] for row in run(FORM, counts, [T] * 4)] == [1, 0, 1, 2]
 
 
-def test_alone() -> None:
-    check_alone()
-
-
-def check_silence() -> None:
+def test_silence() -> None:
     """Ticks since the last one with counts, until they are `max_ticks`; so at first."""
     counts = {T + 3: 1, 4 * T + 3: 1, 5 * T: -1, 12 * T: 1}
     seen = run(FORM, counts, [T] * 14)
@@ -155,21 +134,13 @@ def check_silence() -> None:
     check(counts, [T] * 14)
 
 
-def test_silence() -> None:
-    check_silence()
-
-
-def check_external() -> None:
+def test_external() -> None:
     """Ticks of other lengths."""
     form = replace(FORM, external=True, longest_tick=2 * T)
     lengths = [T, 7, 2 * T, 12, 39, 2]
     seen = run(form, {3: 1, 30: 1, 60: -1, 61: -1, 80: 1}, lengths)
     assert [row["length"] for row in seen] == lengths
     check({3: 1, 30: 1, 60: -1, 61: -1, 80: 1}, lengths, form=form)
-
-
-def test_external() -> None:
-    check_external()
 
 
 # Odd seeds have external ticks; each has 40 stretches of other counts.
@@ -185,29 +156,3 @@ def test_random_counts(seed: int) -> None:
     steps = np.where(rng.random(len(at)) < way[at], 1, -1)
     tracks = (rng.random(len(lengths)) < 0.9).tolist()
     check(dict(zip(at.tolist(), steps.tolist(), strict=True)), lengths, tracks, form)
-
-
-MUTANTS: dict[str, tuple[str, str, Callable[[], None]]] = {
-    "the last count kept": ("number.eq(counts), times.eq(0)", "number.eq(0), times.eq(0)", check_times),
-    "no tick begins": ("fresh.eq(self.tick)", "fresh.eq(fresh)", check_times),
-    "places do not move": ("Cat(Const(1, 1), number, Const(0, 1))", "Const(1, len(number) + 2)", check_places),
-    "no sign": ("minus.eq(~backward)", "minus.eq(1)", check_turning),
-    "backward first": ("Mux(backward, 1, -1)", "Mux(backward, -1, 1)", check_places),
-    "one more": ("counts & (alone | (number == form.max_count))", "counts & alone", check_many),
-    "not alone again": ("            m.d.sync += alone.eq(1)\n", "            m.d.sync += alone.eq(0)\n", check_many),
-    "alone without rest": ("~number.any() | ~self.tracks", "~number.any()", check_alone),
-    "never alone": ("~number.any() | ~self.tracks", "~self.tracks", check_alone),
-    "silence for ever": ("self.elapsed + ~quiet", "self.elapsed + 1", check_silence),
-    "length of one less": (
-        "self.length.eq(length), length.eq(1)",
-        "self.length.eq(length), length.eq(0)",
-        check_external,
-    ),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    right, wrong, check_of_it = MUTANTS[name]
-    with mutant(tick_counts.TickCounts, right, wrong), caught():
-        check_of_it()

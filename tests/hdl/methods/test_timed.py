@@ -3,10 +3,8 @@
 from typing import Any
 
 import pytest
-from support.mutant import caught, mutant
 from support.timed import FRAC_BITS, SILENCE, TICK, decay, run, silence, spec_of, speed
 
-from tachometry.hdl.methods import count_way, gap_timer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.spec import MTTachometer, Speed, Timing
 from tachometry.spec.methods.timed import TimedTachometer
@@ -28,17 +26,13 @@ def test_steady_speed(method: str, sign: int) -> None:
     assert got == [(clock, sign * speed(1, 45), 45, False) for clock in at[1:]]
 
 
-def check_reversal(method: str) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_reversal(method: str) -> None:
     """An edge that is met twice adds no distance."""
     steps = {5: 1, 45: 1, 95: -1, 125: -1, 175: -1}
     got = run(timed(method, bound_decay=False), steps, 180)
     ways = [(45, 1, 40), (95, 0, 50), (125, -1, 30), (175, -1, 50)]
     assert [row[:3] for row in got] == [(clock, speed(way, time), time) for clock, way, time in ways]
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_reversal(method: str) -> None:
-    check_reversal(method)
 
 
 def check_standstill(method: str, sign: int = 1) -> None:
@@ -79,7 +73,7 @@ def test_greatest_speed(method: str, sign: int) -> None:
     check_greatest_speed(method, sign)
 
 
-def check_too_far() -> None:
+def test_too_far() -> None:
     """A window so long and so fast that the divider does not take its distance is held there, too."""
     for time in (205, 400):
         spec = spec_of("mt", min_time=time - 1, bound_decay=False, max_speed=Speed.parse("2rev/s"))
@@ -92,11 +86,8 @@ def check_too_far() -> None:
             assert [row[1:3] for row in got] == [(sign * 2 << FRAC_BITS, time)]
 
 
-def test_too_far() -> None:
-    check_too_far()
-
-
-def check_one_count(method: str) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_one_count_then_silence(method: str) -> None:
     """One count is no speed."""
     n = 100 + 3 * SILENCE
     assert run(timed(method), {100: 1}, n) == silence(100, n)
@@ -106,20 +97,11 @@ def check_one_count(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_one_count_then_silence(method: str) -> None:
-    check_one_count(method)
-
-
-def check_counts_in_a_row(method: str) -> None:
+def test_counts_in_a_row(method: str) -> None:
     """The sign of the first counts for the second, which comes in the next clock."""
     got = run(timed(method, bound_decay=False), {5: -1, 6: -1, 60: -1}, 61)
     expected = [(6, speed(-1, 1), 1), (60, speed(-1, 54), 54)] if method == "t" else [(60, speed(-2, 55), 55)]
     assert [row[:3] for row in got] == expected
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_counts_in_a_row(method: str) -> None:
-    check_counts_in_a_row(method)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -147,7 +129,8 @@ def test_burst_after_standstill(method: str) -> None:
     assert len(moving) > 5
 
 
-def check_count_at_the_maximum_time(method: str) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_count_at_the_maximum_time(method: str) -> None:
     """It is a count, and the silence of a clock more is one."""
     got = run(timed(method, bound_decay=False), {5: 1, 5 + SILENCE: 1, 6 + 2 * SILENCE: 1}, 7 + 2 * SILENCE)
     assert got == [
@@ -156,11 +139,6 @@ def check_count_at_the_maximum_time(method: str) -> None:
     ]
     # Where a second 0 would be forced, it is the first after a silence.
     assert run(timed(method), {5: 1, 5 + 2 * SILENCE: 1}, 6 + 2 * SILENCE) == silence(5, 5 + 2 * SILENCE)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_count_at_the_maximum_time(method: str) -> None:
-    check_count_at_the_maximum_time(method)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -174,7 +152,8 @@ def test_a_measurement_takes_the_divider_from_a_decay(method: str) -> None:
         assert (decayed in got) == (clock >= tick + spec.division_clocks)
 
 
-def check_turning_tail(method: str) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_turning_tail(method: str) -> None:
     """A decay looks at the sign of the velocity, not of that before it; ticks here are shorter than a division."""
     for late in range(20):
         steps = {5: 1, 45: 1, 65: -1, 72 + late: -1}
@@ -183,87 +162,9 @@ def check_turning_tail(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_turning_tail(method: str) -> None:
-    check_turning_tail(method)
-
-
-def check_only_silence_decays(method: str) -> None:
+def test_only_silence_decays(method: str) -> None:
     """Counts come late, 19 clocks after 10 that lay 10 apart, but the tick is not empty: nothing decays."""
     steps = {clock: 1 for clock in (*range(100, 201, 10), 201 + 19 + 18)}
     got = run(timed(method), steps, 220)
     assert len(got) > 3
     assert not any(forced and velocity for _, velocity, _, forced in got)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_only_silence_decays(method: str) -> None:
-    check_only_silence_decays(method)
-
-
-MUTANTS = {
-    "an age too short": (gap_timer.GapTimer, "self.age.eq(1)", "self.age.eq(0)", check_standstill),
-    "forced a period late": (
-        gap_timer.GapTimer,
-        "self.age == self._max_periods - 1",
-        "self.age == self._max_periods",
-        check_count_at_the_maximum_time,
-    ),
-    "forced in spite of a count": (gap_timer.GapTimer, " & ~self.count)", ")", check_count_at_the_maximum_time),
-    "open after a silence": (
-        gap_timer.GapTimer,
-        "self.opened.eq(self.count)",
-        "self.opened.eq(1)",
-        check_count_at_the_maximum_time,
-    ),
-    "no sign kept": (gap_timer.GapTimer, "was_negative.eq(self.negative)", "was_negative.eq(0)", check_reversal),
-    "no sign rule": (count_way.CountWay, "negative == last if self._reversals else 1", "1", check_reversal),
-    "not the sign of the count just before": (
-        count_way.CountWay,
-        "Mux(self.step[0], self.step[1], self.was_negative)",
-        "self.was_negative",
-        check_counts_in_a_row,
-    ),
-    "never nearer": (QuotientVelocity, "measuring | nearer", "measuring", check_standstill),
-    "always nearer": (QuotientVelocity, "measuring | nearer", "1", check_standstill),
-    "compared with what was shown before": (
-        QuotientVelocity,
-        "Cat(Mux(passes, bound, divider.digit), copy)",
-        "Cat(copy[-1], copy)",
-        check_standstill,
-    ),
-    "down and not to the nearest": (
-        QuotientVelocity,
-        "nearest=True",
-        "nearest=False",
-        check_standstill,
-    ),
-    "forced as it was before": (
-        QuotientVelocity,
-        "forced.eq(self.forced_in)",
-        "forced.eq(forced)",
-        check_standstill,
-    ),
-    "beyond the greatest speed": (
-        QuotientVelocity,
-        "bounded & (farther",
-        "~measuring & (farther",
-        check_greatest_speed,
-    ),
-    "too far for the divider": (QuotientVelocity, "farther | too_far", "farther", lambda _: check_too_far()),
-    "too far to be doubled": (QuotientVelocity, "taken - 2", "taken - 1", lambda _: check_too_far()),
-    "asked in a tick with counts": (gap_timer.GapTimer, " & ~earlier)", ")", check_only_silence_decays),
-    "decaying too early": (
-        QuotientVelocity,
-        " & ~divider.done",
-        "",
-        check_turning_tail,
-    ),
-}
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str, method: str) -> None:
-    box, right, wrong, check = MUTANTS[name]
-    with mutant(box, right, wrong), caught():
-        check(method)

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 from support.timed import OUTPUTS, TICK, spec_of
 
-from tachometry.hdl.methods import DATAPATHS, quotient_velocity
+from tachometry.hdl.methods import DATAPATHS
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.signals.run import Table
@@ -72,28 +71,3 @@ KINDS = [("t", "clock"), ("t", "tick"), ("mt", "clock"), ("mt", "tick")]
 @pytest.mark.parametrize(("method", "timer"), KINDS)
 def test_bounds(method: str, timer: str) -> None:
     check(method, timer)
-
-
-MUTANTS = {
-    "upper as the lower": ("-self.dividend if upper", "self.dividend if upper"),
-    "the time is not widened": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "0"),
-    "it is widened on one side": ("Mux(end[-1], -1, 1), 0)", "1, 0)"),
-    "it is widened in silence": ("Mux(counted, Mux(end[-1], -1, 1), 0)", "Mux(end[-1], -1, 1)"),
-    "over its last edge": ("Mux(still, -off, -greatest)", "-greatest"),
-    "not over it after a reversal": ("~(signs[0] | signs[1])", "~signs[0]"),
-    "still in a forced 0": ("still = decays & (", "still = ("),
-    "none is a number": ("Mux(none, limit, box.quotient)", "box.quotient"),
-    "none after two": ("(self.divisor == 1)", "(self.divisor <= 2)"),
-    "always known": ("new.bounds_valid.eq(known)", "new.bounds_valid.eq(1)"),
-}
-
-
-def check_all() -> None:
-    for method, timer in KINDS[::-1]:
-        check(method, timer)
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_of_the_quotients_are_caught(name: str) -> None:
-    with mutant(quotient_velocity.QuotientVelocity, *MUTANTS[name]), caught():
-        check_all()

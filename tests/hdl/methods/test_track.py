@@ -11,13 +11,11 @@ import pytest
 from amaranth import Elaboratable, ResetInserter, Signal
 from numpy.typing import NDArray
 from support import compiled
-from support.mutant import caught, mutant
 from support.nightly import only
 from support.simulate import Player, clock_by_clock
 from support.tracking import hostile
 
 from tachometry.hdl.methods import track
-from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.track import Model
 from tachometry.sim.signals.run import Table
@@ -128,7 +126,7 @@ def test_hostile_counts() -> None:
     check_hostile()
 
 
-def check_latency() -> None:
+def test_latency() -> None:
     """An update comes `datapath_latency` clocks after every tick, whatever was in it, and with the next one."""
     steps, last = hostile(EXTERNAL, np.random.default_rng(5), 40)
     last = (np.arange(40) + 1) * EXTERNAL.min_tick_cycles - 1
@@ -137,11 +135,7 @@ def check_latency() -> None:
     check(EXTERNAL, steps, last)
 
 
-def test_latency() -> None:
-    check_latency()
-
-
-def check_wrap() -> None:
+def test_position_wraps() -> None:
     """The fine position wraps as the position does."""
     narrow = replace(SPEC, position_width=8)
     steps, last = regular(narrow, 3, 50)
@@ -149,11 +143,8 @@ def check_wrap() -> None:
     assert golden(narrow, steps, last) != golden(SPEC, steps, last)
 
 
-def test_position_wraps() -> None:
-    check_wrap()
-
-
-def check_reset(seed: int) -> None:
+@pytest.mark.parametrize("seed", only(range(2), range(6)))  # each is at another place of the program
+def test_reset(seed: int) -> None:
     """A reset leaves nothing behind, wherever the program is."""
     rng = np.random.default_rng(seed)
     before = rows_of(SPEC, *hostile(SPEC, rng, 10))
@@ -165,12 +156,7 @@ def check_reset(seed: int) -> None:
     assert [(clock - len(before) - 1, *rest) for clock, *rest in found] == golden(SPEC, steps, last)
 
 
-@pytest.mark.parametrize("seed", only(range(2), range(6)))  # each is at another place of the program
-def test_reset(seed: int) -> None:
-    check_reset(seed)
-
-
-def check_reset_about_update() -> None:
+def test_reset_about_update() -> None:
     """A reset in each of the last clocks before an update: it does not come."""
     nothing = {"step": 0, "tick": 0, "rst": 0}
     rows: list[dict[str, int]] = []
@@ -179,16 +165,6 @@ def check_reset_about_update() -> None:
         rows += [nothing] * 6
     # The first one is shown in the clock of the reset.
     assert [clock for clock, *_ in updates_of(SPEC, rows, clock_by_clock)] == [SPEC.datapath_latency]
-
-
-def test_reset_about_update() -> None:
-    check_reset_about_update()
-
-
-@pytest.mark.parametrize("stage", ["held", "active"])
-def test_stages_without_reset_are_caught(stage: str) -> None:
-    with mutant(TrackMachine, f"        {stage} = Signal()", f"        {stage} = Signal(reset_less=True)"), caught():
-        check_reset_about_update()
 
 
 def test_stamp() -> None:
@@ -203,26 +179,3 @@ def test_stamp() -> None:
         row["stamp"] = ticks & mask
     stamps = [update[-1] for update in updates_of(spec, rows)]
     assert stamps == [(1 + k) & mask for k in range(12)]
-
-
-def check_all() -> None:
-    check_hostile(clock_by_clock)
-    check_speeds(clock_by_clock)
-
-
-MUTANTS = {
-    "position of now": ("(position << spec.fine_bits)", "(self.position << spec.fine_bits + 1)"),
-    "down and not to the nearest": (" + machine.p[shift - 1]", ""),
-    "forced with counts": ("new.forced.eq(~counts.counted)", "new.forced.eq(counts.counted)"),
-    "never beyond": ("machine.beyond.eq(self.overflow)", "machine.beyond.eq(0)"),
-    "always a speed": ("counts.tracks.eq(machine.tracks)", "counts.tracks.eq(1)"),
-    "never quiet": ("machine.quiet.eq(counts.quiet)", "machine.quiet.eq(0)"),
-    "in every clock": ("self.updates.valid.eq(machine.out)", "self.updates.valid.eq(machine.out | self.tick)"),
-    "nominal lengths": ("machine.length.eq(counts.length)", "machine.length.eq(spec.timing.tick_cycles)"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(track.TrackMethod, *MUTANTS[name]), caught():
-        check_all()

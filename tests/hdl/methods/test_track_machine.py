@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 from support import compiled
-from support.mutant import caught, mutant
 from support.nightly import only
 from support.simulate import Player, clock_by_clock
 from support.tracking import CLEARING, Executed, Interpreter, Tick, hostile, ticks_of
@@ -222,39 +221,3 @@ def test_program(options: dict[str, Any]) -> None:
     one_way = check_program(True, 150, 1, **options) & check_program(True, 150, 4, **options)
     assert {Condition(jump.steps) for jump in one_way} == ({Condition.FLAG} if "agile" in options else set())
     check_program(False, **options)
-
-
-def check_all() -> None:
-    """Random programs, and the program itself."""
-    for seed in range(6):
-        check_random(seed)
-    check_program(play=clock_by_clock)
-
-
-MUTANTS = {
-    "a product is not rounded": ("Mux(now.multiply, done & ac[0], minus)", "Mux(now.multiply, 0, minus)"),
-    "rounded on the way": ("Mux(now.multiply, done & ac[0], minus)", "Mux(now.multiply, ac[0], minus)"),
-    "quotients the other way": ("Cat(~total[-1], mq)", "Cat(total[-1], mq)"),
-    "only subtracts": ("(now.divide & ~negative)", "now.divide"),
-    "no sign is kept": ("(now.by_sign & sign)", "0"),
-    "a sign in any case": ("sign.eq(negative)", "sign.eq(1)"),
-    "no leading bit": ("Cat(mq[-1], ac)[", "Cat(0, ac)["),
-    "shifts without sign": ("ac >> 1, ac)", "ac.as_unsigned() >> 1, ac)"),
-    "or instead of and": ("flag.eq(flag & ~negative)", "flag.eq(flag | ~negative)"),
-    "and instead of or": ("flag.eq(flag | ~negative)", "flag.eq(flag & ~negative)"),
-    "the tables' first": ("Mux(tables, level, 0)", "Mux(tables, 0, 0)"),
-    "beyond the last level": ("Mux(level == LEVELS - 1, level, level + 1)", "level + 1"),
-    "back below the first": ("Mux(level >= STEP_BACK, level - STEP_BACK, 0)", "level - STEP_BACK"),
-    "what was fetched is used": ("held.eq(fetched & valid)", "held.eq(fetched)"),
-    "what was read is used": ("active.eq(held & valid)", "active.eq(held)"),
-    "cleared at a jump": ("(done & following.clear & ~taken)", "(done & following.clear)"),
-    "positive ones": ("(work & now.positive & negative)", "(work & now.positive)"),
-    "negative ones": ("(work & now.negative & ~negative)", "(work & now.negative)"),
-    "not at the first instruction": ("stop | (~fetched & ~self.begin)", "~fetched & ~self.begin"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(track_machine.TrackMachine, *MUTANTS[name]), caught():
-        check_all()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from amaranth import signed
 from amaranth.lib import data
-from support.mutant import caught, mutant
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.output import low_pass
@@ -65,20 +64,3 @@ def check(spec: STachometer, n: int = 150) -> None:
 def test_as_the_golden_one(spec: STachometer) -> None:
     assert len(spec.low_pass.tables) == (2 if spec is TWO_TABLES else 1)
     check(spec)
-
-
-MUTANTS = {
-    "not rounded": ("Cat(step == bits, total).as_signed()", "Cat(0, total).as_signed()"),
-    "intervals of the first alone": ("Mux(waiting & ~take, interval, 0)", "0"),
-    "taken too early": ("waiting & ~working & ~adding", "waiting & ~working"),
-    "not cleared": ("Mux(clear, 0, y - (following.velocity << extra))", "y - (following.velocity << extra)"),
-    "one factor": ("working & last & (second if high else 1)", "working & last"),
-    "no rounding of the output": ("(y + (1 << (extra - 1)))", "y"),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(low_pass.LowPass, *MUTANTS[name]), caught():
-        # Few bits below the LSB, so that roundings show.
-        check(replace(ONE_TABLE, lowpass=Fraction(2_400_000)) if name == "not rounded" else TWO_TABLES)

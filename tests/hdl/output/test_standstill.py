@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from amaranth.lib import wiring
-from support.mutant import caught, mutant
 from support.nightly import only
 from support.options import had_by
 from support.simulate import clock_by_clock, ticks
 
-from tachometry.hdl.methods.interval import IntervalAccumulator
 from tachometry.hdl.methods.s import SMethod
 from tachometry.hdl.output.standstill import Standstill
 from tachometry.sim.encoder.stress import stress
@@ -92,31 +90,3 @@ def test_every_method(method: str) -> None:
             ones = [1] * len(ticks)
             assert ticks.stalled.astype(int).tolist() == expected(ticks.pulse_count.tolist(), 6, ones)
         assert np.count_nonzero(np.diff(ticks.stalled.astype(int))) > 2
-
-
-MUTANTS = {
-    "a tick early after reset": (Standstill, "init=most)", "init=most - 1)", check_box),
-    "a tick early": (Standstill, "left.eq(most)", "left.eq(most - 1)", check_box),
-    "in spite of a count": (Standstill, "silent & was_silent", "was_silent", check_box),
-    "at once after a count": (Standstill, "silent & was_silent", "silent", check_box),
-    "in spite of many counts": (Standstill, "self.m_e[:-1]", "self.m_e[:-2]", check_box),
-    "not held": (Standstill, "none, shown)", "none, 0)", check_box),
-    "long ticks: early after reset": (Standstill, "init=most - 1)", "init=most - 3)", check_long_ticks),
-    "long ticks: a tick early": (Standstill, "less), most)", "less), most - 1)", check_long_ticks),
-    "long ticks: in spite of a count": (Standstill, "silent & (shown", "(shown", check_long_ticks),
-    "S: without the opening tick": (
-        IntervalAccumulator,
-        "longest & ~opening.any() & was_silent",
-        "longest & was_silent",
-        check_s,
-    ),
-    "S: only with a forced update": (IntervalAccumulator, "rests | nearly |", "rests |", check_s),
-    "S: in spite of a count": (IntervalAccumulator, "self.forced & silent", "self.forced", check_s),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    box, right, wrong, check = MUTANTS[name]
-    with mutant(box, right, wrong), caught():
-        check()

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 from support.nightly import only_rows
 from support.simulate import clock_by_clock
 
@@ -31,24 +30,6 @@ def check(fresh_width: int = 0) -> None:
 def test_counts_ticks_since_the_update() -> None:
     check()
     check(3)
-
-
-MUTANTS = {
-    "wraps": ("(self.tick & (self.age != self._max_age))", "self.tick"),
-    "goes on at an update": ("Mux(self.update, fresh, self.before)", "self.before"),
-    "begins beyond its end": ("Mux(self.fresh > most, most, self.fresh)", "self.fresh"),
-    "a tick with the update is lost": (
-        "after.eq(self.age + (self.tick &",
-        "after.eq(self.age + (self.tick & ~self.update &",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(update_age.UpdateAge, *MUTANTS[name]), caught():
-        check()
-        check(3)
 
 
 def check_age(method: str, **texts: str) -> None:

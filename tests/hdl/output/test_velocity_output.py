@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from amaranth import signed
 from amaranth.lib import data
-from support.mutant import caught, mutant
 from support.nightly import only
 from support.simulate import clock_by_clock
 
@@ -67,22 +66,3 @@ def test_serial(ratio: Fraction, width: int) -> None:
 def test_bounds_are_rounded_outward(ratio: Fraction, towards: int, serial: bool) -> None:
     if len(VelocityOutput(ratio, MAX_NATIVE, 40).digits) > 2 or not serial:
         check(serial, ratio, 8, towards=towards)
-
-
-MUTANTS = {
-    "serial, not rounded": (SERIAL, "Mux(rounding, high, ", "Mux(rounding, 0, "),
-    "serial, a bit late": (SERIAL, "Const(output.multiplier >> 1, bits + 1)", "Const(output.multiplier, bits + 1)"),
-    "pipelined, not rounded": (PIPELINED, "(half >> place)", "0"),
-    "pipelined, digits all positive": (PIPELINED, "else total - (native << gap)", "else total + (native << gap)"),
-    "pipelined, no flag": (
-        PIPELINED,
-        "shown.velocity_overflow.eq(overflow)",
-        "shown.velocity_overflow.eq(0)",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", MUTANTS)
-def test_mutants_are_caught(name: str) -> None:
-    with mutant(*MUTANTS[name]), caught():
-        check(name.startswith("serial"), RATIOS[0] if "serial" in name else RATIOS[1], 8)

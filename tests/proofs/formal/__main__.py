@@ -11,7 +11,7 @@ from pathlib import Path
 from proofs.formal.cases import PROOFS, QUICK
 from proofs.formal.mutants import MUTANTS, Mutant
 from proofs.formal.prove import Proof, Result, prepare, solve
-from support.mutant import mutant
+from proofs.source import mutant
 from support.report import Table, arguments, chosen
 
 _FOLDER = Path("build/formal")

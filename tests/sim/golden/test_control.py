@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 from support.shaft import Double, Fixed, run
 
 from tachometry.sim.golden import control
@@ -56,7 +55,7 @@ def check_side_by_side(spec: LoopSpec) -> None:
 
 
 def control_of(spec: LoopSpec) -> Fixed:
-    """The golden model, by its name in its module, where a mutant takes its place."""
+    """Make the golden model."""
     fixed = Fixed(spec)
     fixed.control = control.Control(spec.form)
     return fixed
@@ -74,22 +73,6 @@ SPECS = {
 @pytest.mark.parametrize("name", SPECS)
 def test_the_same_as_in_double_precision(name: str) -> None:
     check_side_by_side(SPECS[name])
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("self._observe(self._n)", "self._observe(1)"),
-        ("self._sum += self.current", "self._sum += wanted"),
-        ("z - self.y, n)", "z, n)"),
-        ("z + self._product(Term.CURRENT", "z - self._product(Term.CURRENT"),
-        ("(1 << (GUARD_BITS - 1))) >> GUARD_BITS", "0) >> GUARD_BITS + 1"),
-        ("_product(Term.DISTURBANCE, self.w)", "_product(Term.DISTURBANCE, self.z)"),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(control.Control, right, wrong), caught():
-        check_side_by_side(SPECS["synchronised"])
 
 
 def test_an_update_takes_part_after_its_clock() -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from support.lockstep import random_case
-from support.mutant import caught
 from support.options import had_by
 from support.rdl import read_rdl
 
@@ -21,7 +20,7 @@ from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.provenance import LICENSE, generator
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.manifest import manifest
-from tachometry.spec.registers.map import Register, RegisterMap
+from tachometry.spec.registers.map import RegisterMap
 
 SEEDS = range(8)
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
@@ -200,27 +199,6 @@ def test_the_configurations_have_all_kinds() -> None:
     assert {"VELOCITY_HIGH", "POSITION_HIGH", "INDEX_POSITION", "AGE", "VELOCITY_LOWER", "SWALLOWED_EDGES"} <= names
     assert {"N_EP1", "DT_SHIFT", "ACCELERATION", "ACCELERATION_HIGH", "POSITION_FINE", "POSITION_FINE_HIGH"} <= names
     assert any("tick_errors" in registers.counted for registers in maps("s"))
-
-
-class Fewer(RegisterMap):
-    """A map that has lost a register."""
-
-    lost = ""
-
-    @property
-    def registers(self) -> tuple[Register, ...]:
-        return tuple(one for one in RegisterMap(self.spec).registers if one.name != self.lost)
-
-
-@pytest.mark.parametrize("file", TEXTS)
-def test_a_text_without_a_register_is_noticed(file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    registers = maps("s")[0]
-    captured = [one.name for one in registers if one.captured and not one.captures and one.name != "STATUS"]
-    for lost in captured:
-        monkeypatch.setattr(Fewer, "lost", lost)
-        fewer = Fewer(registers.spec)
-        with caught():
-            TEXTS[file](registers if file else fewer, text_of(fewer, file), tmp_path)
 
 
 def test_words_with_hyphens_are_not_parted() -> None:

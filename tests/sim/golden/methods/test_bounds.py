@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from reference.ideal_motion import SUBCOUNTS, motion
-from support.mutant import caught, mutant
 from support.nightly import nightly
 
 from tachometry.sim.golden import model
-from tachometry.sim.golden.methods import m as m_method
-from tachometry.sim.golden.methods import s as s_method
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, Timing
 
@@ -104,18 +101,3 @@ def test_discs_and_lines_within_the_edge_error(spec: TachometerSpec, n_motions: 
         assert windows > least // 2
         assert nearest < 0.5
     # Bounds of an ideal disc do not enclose it.
-    with mutant(type(model(spec)), "1 + ", "1 + 0 * "), caught():
-        check_enclosure(replace(spec, edge_error=Fraction(1)), 2, 20_000)
-
-
-@pytest.mark.parametrize(
-    ("module", "right", "wrong", "spec"),
-    [
-        (s_method, "+ whole * more", "+ more", S),
-        (s_method, "np.arange(len(i)) > 0", "np.arange(len(i)) >= 0", replace(S, frac_bits=20)),
-        (m_method, "8 * total + more", "8 * total + 0 * more", M),
-    ],
-)
-def test_mutants_are_caught(module: object, right: str, wrong: str, spec: TachometerSpec) -> None:
-    with mutant(module.Model, right, wrong), caught():  # type: ignore[attr-defined]
-        check_enclosure(spec, 100, 1000)

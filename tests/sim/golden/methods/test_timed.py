@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 from support.nightly import only
 
-from tachometry.hdl.methods.mt import MTMethod
-from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.stress import stress
@@ -72,7 +69,10 @@ def test_a_short_maximum_time_in_external_ticks_is_no_longer() -> None:
     assert set(updates.interval.tolist()) == {2}
 
 
-def check_short_ticks(method: str, seed: int) -> None:
+@pytest.mark.parametrize("method", ["t", "mt"])
+# A seed is another rhythm of the ticks; that of the first is the shortest.
+@pytest.mark.parametrize("seed", only([0], range(3)))
+def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
     """They come at every second to twentieth clock: windows stay open, and zeros take the divider."""
     spec = of_texts(method, EXTERNAL | {"tick": "40", "max-time": "120", "bounds": "yes", "frac-bits": "4"})
     rng = np.random.default_rng(seed)
@@ -84,23 +84,3 @@ def check_short_ticks(method: str, seed: int) -> None:
     updates = found.actual.updates
     assert np.count_nonzero(updates.velocity) > 20
     assert np.diff(updates.clock).min() >= spec.division_clocks
-
-
-@pytest.mark.parametrize("method", ["t", "mt"])
-# A seed is another rhythm of the ticks; that of the first is the shortest.
-@pytest.mark.parametrize("seed", only([0], range(3)))
-def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
-    check_short_ticks(method, seed)
-
-
-@pytest.mark.parametrize(
-    ("method", "box", "right", "wrong"),
-    [
-        ("mt", MTMethod, "self.quotient_velocity.free if spec.may_be_late else 1", "1"),
-        ("t", QuotientVelocity, "divider.start.eq(self.measure |", "divider.start.eq(self.measure & self.free |"),
-    ],
-)
-def test_mutants_are_caught(method: str, box: type, right: str, wrong: str) -> None:
-    with mutant(box, right, wrong), caught():
-        for seed in range(3):
-            check_short_ticks(method, seed)

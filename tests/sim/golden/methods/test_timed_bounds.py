@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.mutant import caught, mutant
 from support.nightly import nightly
 
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.methods import timed
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTTachometer, Timing, TTachometer
 from tachometry.spec.core.tachometer import BOUNDS
@@ -140,14 +138,3 @@ def test_discs_and_lines_within_the_edge_error(method: TimedTachometer, timer: s
     assert checked > 25_000
     assert nearest < 1 << 8
     # Bounds of an ideal disc do not enclose it.
-    with mutant(timed.eighths, "side * int(8 * spec.edge_error)", "0"), caught():
-        check_enclosure(spec, 100_000)
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [("np.where(low < 0, time - 1, time + 1)", "time"), ("np.where(high > 0, time - 1, time + 1)", "time")],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(timed.enclosure, right, wrong), caught():
-        check_enclosure(MT, 20_000)

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.mutant import caught, mutant
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -110,19 +109,3 @@ def test_phase_and_duty_errors_cancel(decoding: str) -> None:
         (resolution,) = plan_at(spec, np.array([speed])).resolution
         assert np.abs(errors(speed, decoding=decoding, **{"whole-cycles": "yes"})).max() < resolution
         assert np.abs(errors(speed, decoding=decoding)).max() > 10 * resolution
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("-(-through // cycle)", "(through // cycle)"),
-        ("through < cycle", "through <= 0"),
-        ("np.minimum(whole, turn)", "whole"),
-        ("np.minimum(np.minimum(whole, turn), latest)", "np.minimum(whole, turn)"),
-        ("2 * spec.min_periods", "2 * spec.min_periods - 1"),
-        ("counts.size[1:] != counts.size[:-1]) + 1", "counts.size[1:] != counts.size[:-1])"),
-    ],
-)
-def test_mutants_are_caught(right: str, wrong: str) -> None:
-    with mutant(mt.Model, right, wrong), caught():
-        check_windows(4, 4)

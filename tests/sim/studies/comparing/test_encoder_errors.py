@@ -4,12 +4,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.mutant import caught, mutant
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
-from tachometry.sim.studies.comparing import encoder_errors
 from tachometry.sim.studies.comparing.encoder_errors import (
     CYCLE,
     Counts,
@@ -43,27 +41,19 @@ def test_edges_are_those_of_the_disc(direction: str, start: float) -> None:
     assert np.ptp(perfect_offsets(encoding, CYCLE)) > 0.4
 
 
-def check_lines() -> None:
+def test_lines_are_learned_too() -> None:
     encoding = recorded("constant:100rad/s:1s", 20, nonuniformity=0.1, phase_error_deg=10, seed=3)
     found = learn(Counts.of(encoding), 4 * 20)
     np.testing.assert_allclose(found.offsets, perfect_offsets(encoding, 4 * 20), atol=1e-6)
 
 
-def test_lines_are_learned_too() -> None:
-    check_lines()
-
-
-def check_acceleration() -> None:
+def test_acceleration() -> None:
     """It takes no part, and neither does a reversal."""
     encoding = recorded("ramp:30rad/s:90rad/s:100ms+ramp:90rad/s:-90rad/s:100ms", **PHASE)
     found = learn(Counts.of(encoding)).history
     error = np.abs(found - perfect_offsets(encoding, CYCLE)).max(axis=1)
     assert len(error) > 3000
     assert error[1000:].max() < 5e-3
-
-
-def test_acceleration() -> None:
-    check_acceleration()
 
 
 def test_jitter_is_averaged() -> None:
@@ -76,15 +66,11 @@ def test_jitter_is_averaged() -> None:
     assert not learn(counts).history[:CYCLE].any()
 
 
-def check_vibration() -> None:
+def test_vibration() -> None:
     """A shaft that never turns a cycle in one direction teaches nothing."""
     counts = Counts.of(recorded("sine:1.2rad/s:50Hz:100ms", start_angle_rad=1.0, **PHASE))
     assert len(counts.edge) == 20
     assert not learn(counts).history.any()
-
-
-def test_vibration() -> None:
-    check_vibration()
 
 
 def test_what_is_slow_teaches_nothing() -> None:
@@ -95,7 +81,8 @@ def test_what_is_slow_teaches_nothing() -> None:
     assert not learn(counts, slowest_s=2e-3).history.any()
 
 
-def check_as_the_golden_model(option: str) -> None:
+@pytest.mark.parametrize("option", ["yes", "no"])
+def test_without_offsets_it_is_the_golden_model(option: str) -> None:
     """By positions alone it is the M/T of the golden model, but for the clock."""
     encoding = recorded("sine:50rad/s:20Hz:100ms", jitter=0.1)
     texts = {"ppr": "500", "clock": "100MHz", "tick": "100us", "min-time": "300us", "bound-decay": "no"}
@@ -105,11 +92,6 @@ def check_as_the_golden_model(option: str) -> None:
     found = by_counts(counts, counts.coordinate(np.zeros(1)), 300e-6, option == "yes")
     assert len(found.velocity) == len(updates.clock) > 100
     np.testing.assert_allclose(found.velocity, updates.velocity * spec.rad_per_s_per_lsb, atol=0.02)
-
-
-@pytest.mark.parametrize("option", ["yes", "no"])
-def test_without_offsets_it_is_the_golden_model(option: str) -> None:
-    check_as_the_golden_model(option)
 
 
 def test_offsets_take_phase_and_duty_errors_out() -> None:
@@ -127,7 +109,7 @@ def test_offsets_take_phase_and_duty_errors_out() -> None:
 TRACK = TrackTachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
 
 
-def check_tracking() -> None:
+def test_tracking() -> None:
     """By positions alone it is the golden model, but for the clock and the words; offsets take a phase error out."""
     encoding = recorded("sine:50rad/s:5Hz:200ms", **PHASE)
     updates = golden.run(TRACK, encoding.recording.place(TRACK.timing.clock_hz)).updates
@@ -147,10 +129,6 @@ def check_tracking() -> None:
     assert rms(by_tracking(counts, counts.coordinate(np.zeros(1)), tuning), truth, instants) > 0.1
 
 
-def test_tracking() -> None:
-    check_tracking()
-
-
 def test_hysteresis_that_is_alike_is_not_learned() -> None:
     """All edges come later in either direction; where those of A come later than those of B, a sign depends on it."""
     counts = Counts.of(recorded("constant:50rad/s:100ms+constant:-50rad/s:100ms"))
@@ -161,25 +139,3 @@ def test_hysteresis_that_is_alike_is_not_learned() -> None:
     found = learn(lines).history
     assert found[half - 10] == pytest.approx([-0.05, 0.05] * 2, abs=1e-3)
     assert found[-1] == pytest.approx([0.05, -0.05] * 2, abs=5e-3)
-
-
-@pytest.mark.parametrize(
-    ("box", "right", "wrong", "check"),
-    [
-        ("learn", "run >= classes", "run >= 1", check_vibration),
-        ("learn", "time[j - classes]", "time[j - classes + 1]", check_lines),
-        ("learn", "- (counts.steps.step > 0)", "- 1", check_acceleration),
-        ("by_counts", "way % CYCLE and", "", lambda: check_as_the_golden_model("yes")),
-        (
-            "by_counts",
-            "opening, turned = j, False\n            continue",
-            "pass",
-            lambda: check_as_the_golden_model("no"),
-        ),
-        ("by_tracking", "coordinate - counts.edge", "counts.edge - coordinate", check_tracking),
-        ("by_tracking", "velocity.append(state.shown_velocity)", "velocity.append(state.velocity / 2)", check_tracking),
-    ],
-)
-def test_mutants_are_caught(box: str, right: str, wrong: str, check: Any) -> None:
-    with mutant(getattr(encoder_errors, box), right, wrong), caught():
-        check()

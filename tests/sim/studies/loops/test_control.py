@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.mutant import caught
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Log, LoopSimulation, Observer
@@ -104,11 +103,6 @@ def synchronising_helps(way: Observer) -> None:
 
 def test_synchronising_helps_threefold() -> None:
     synchronising_helps(Observer.SYNCHRONISED)
-
-
-def test_an_observer_at_every_tick_instead_is_caught() -> None:
-    with caught():
-        synchronising_helps(Observer.CONVENTIONAL)
 
 
 def test_the_acceleration_needs_a_method_that_measures_it() -> None:

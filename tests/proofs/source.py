@@ -42,10 +42,3 @@ def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
                 if used is box:
                     patch.setitem(table, method, getattr(changed, box.__name__))
         yield
-
-
-@contextmanager
-def caught() -> Iterator[None]:
-    """The code within must fail an assertion."""
-    with pytest.raises(AssertionError):
-        yield
