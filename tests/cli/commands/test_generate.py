@@ -2,17 +2,15 @@
 
 import json
 import math
-import os
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.command import run
 from support.nightly import only_rows
 
 from tachometry.hdl.export import export
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import Encoder, Speed, STachometer, Timing, of_texts
 
 
 def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -36,46 +34,28 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
     ]
 
 
-def test_a_bus_adds_files_and_says_how_many_registers_there_are(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run("generate", "--ppr", "500", "--name", "spindle", "-o", tmp_path / "without") == 0
-    assert "registers" not in capsys.readouterr().out
-    assert run("generate", "--ppr", "500", "--name", "spindle", "--bus", "native", "-o", tmp_path / "native") == 0
-    names = {folder: {path.name for path in (tmp_path / folder).iterdir()} for folder in ("without", "native")}
-    added = ["spindle.rdl", "spindle_regs.h", "spindle_driver.h", "spindle_registers.md"]
-    assert names["native"] == names["without"] | {*added}
-    told, rows = capsys.readouterr().out.split("\n\n")
-    assert [Path(line).name for line in told.splitlines()][-4:] == added
-    described = json.loads((tmp_path / "native" / "spindle.json").read_text())["registers"]
-    number, configuration = len(described["map"]), described["configuration"]
-    assert rows.split("registers")[-1].strip() == (
-        f"{number} of 32 bits on native, configuration 0x{configuration:08x}"
-    )
-
-
 @pytest.mark.parametrize(
-    ("target", "bus", "added"),
+    ("words", "more"),
     [
-        ("rio", "none", ["spindle_rio/plugin.py", "spindle_rio/spindle_rio.v", "spindle_rio/spindle.v"]),
-        ("litex", "wishbone", ["spindle_litex.py"]),
+        ("--bus uart --baud 115200", {"bus": "uart", "baud": 115_200}),
+        ("--for rio", {"target": "rio"}),
+        ("--for litex", {"target": "litex"}),
     ],
 )
-def test_a_target_adds_files_and_chooses_the_bus(
-    target: str, bus: str, added: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_it_writes_and_lists_the_files_of_export(
+    words: str, more: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    core = ("generate", "--ppr", "500", "--name", "spindle")
-    assert run(*core, "--bus", bus, "-o", tmp_path / "without") == 0
-    capsys.readouterr()
-    assert run(*core, "--for", target, "-o", tmp_path / "with") == 0
-    told = capsys.readouterr().out.split("\n\n")[0].splitlines()
-    texts = [
-        {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*.*") if path.is_file()}
-        for folder in (tmp_path / "without", tmp_path / "with")
-    ]
-    assert set(texts[1]) - set(texts[0]) == {*added}
-    assert {file: texts[1][file] for file in texts[0]} == texts[0]
-    assert {Path(line).relative_to(tmp_path / "with").as_posix() for line in told} == set(texts[1])
+    assert run("generate", "--ppr", "500", "--name", "spindle", *words.split(), "-o", tmp_path) == 0
+    texts = export(of_texts("s", {"ppr": "500"}), "spindle", **more)
+    listed, rows = capsys.readouterr().out.split("\n\n")
+    assert listed.splitlines() == [str(tmp_path / file) for file in texts]
+    assert {file: (tmp_path / file).read_text() for file in texts} == texts
+    assert len([path for path in tmp_path.rglob("*.*") if path.is_file()]) == len(texts)
+    described = json.loads(texts["spindle.json"])
+    if "registers" in described:
+        number, configuration = len(described["registers"]["map"]), described["registers"]["configuration"]
+        said = f"{number} of 32 bits on {described['bus']}, configuration 0x{configuration:08x}"
+        assert rows.split("registers")[-1].strip() == said
 
 
 @pytest.mark.parametrize(
@@ -162,24 +142,9 @@ BAUDS = [("", 1_000_000, 48), ("--baud 115200", 115_200, 417)]
 @pytest.mark.parametrize(("words", "baud", "cycles"), only_rows(BAUDS[1:], BAUDS))
 def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path) -> None:
     assert run("generate", "--ppr", "500", "--bus", "uart", *words.split(), "-o", tmp_path) == 0
-    spec = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"))
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == export(spec, bus="uart", baud=baud)
     manifest = json.loads((tmp_path / "tachometer.json").read_text())
     assert [manifest[key] for key in ("bus", "baud", "bit_cycles")] == ["uart", baud, cycles]
     assert {"uart_rx", "uart_tx"} < {port["name"] for port in manifest["ports"]}
-
-
-def test_equal_options_give_equal_files(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "generate", "--ppr", "100"]
-    for seed in ("1", "2"):
-        subprocess.run(
-            [*command, "--max-speed", "10rev/s", "-o", str(tmp_path / seed)],
-            env={**os.environ, "PYTHONHASHSEED": seed},
-            stdout=subprocess.DEVNULL,
-            check=True,
-        )
-    for name in ("tachometer.v", "tachometer.json", "tachometer.core"):
-        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
 
 
 @pytest.mark.parametrize(

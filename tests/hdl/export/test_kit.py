@@ -52,6 +52,7 @@ def test_every_file_names_version_and_licence() -> None:
     for file, text in [item for files in (made("s"), *targets) for item in files.items()]:
         assert generator() in text, file
         assert LICENSE in text, file
+        assert text.endswith("\n"), file
     assert f"name: ::spindle:{version()}\n" in made("s")["spindle.core"]
 
 

@@ -17,7 +17,6 @@ from tachometry.hdl.export.registers.files import REGISTER_FILES, register_files
 from tachometry.hdl.export.registers.rdl import described
 from tachometry.spec import METHODS, TachometerSpec, of_texts
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.language.provenance import LICENSE, generator
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import RegisterMap
@@ -226,7 +225,4 @@ def test_they_lie_beside_the_verilog_of_a_core_on_a_bus() -> None:
     assert [*texts] == [file.replace("NAME", "spindle") for file in REGISTER_FILES]
     assert {file: text for file, text in with_bus.items() if file not in without} == texts
     for file, text in texts.items():
-        assert generator() in text, file
-        assert LICENSE in text, file
-        assert text.endswith("\n"), file
         assert max(map(len, text.splitlines())) <= 120 or file.endswith(".md"), file
