@@ -23,38 +23,42 @@ IntArray = NDArray[np.int64]
 
 
 def loop_inputs(spec: LoopSpec, trace: PinTrace) -> tuple[dict[str, IntArray], Run]:
-    """Levels of all inputs of the loop by control tick, as bits without a sign, and what the core must show."""
+    """Return the levels of all inputs of the loop by control tick, without a sign, and what the core must show."""
     clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
-    rng = np.random.default_rng(1)
-    own = {port.name for port in spec.tachometer.ports}
-    inputs = {port.name: _levels(port, rng, len(clock)) for port in spec.pins if port.name not in own}
-    if "command_position" in inputs:
-        # About the shaft, so that the current is not always at its limit.
-        alone = spec.tachometer
-        places, _ = count(alone, decoded(alone, trace), clock - alone.tick_latency)
-        here = (places.position << POSITION_FRAC_BITS) + (inputs["command_position"] >> alone.position_width)
-        inputs["command_position"] = np.where(rng.random(len(clock)) < 0.9, here, inputs["command_position"])
-    form = spec.form
-    if form.gain_bits:
-        options = {GAIN_PORTS[term]: raw for term, raw in form.reset_gains.items()}
-        for name, raw in (options | {"current_limit": form.current_limit}).items():
-            inputs[name] = np.where(rng.random(len(clock)) < 0.7, raw, inputs[name])
-    inputs["enable"] = (rng.random(len(clock)) < 1 - _CHANGES).astype(np.int64)
-    taken = inputs | _held(inputs)
-    columns = {name: values.tolist() for name, values in taken.items()}
+    inputs = _inputs(spec, trace, clock)
+    widths = {port.name: port.width for port in spec.pins}
+    bits = {name: values & ((1 << widths[name]) - 1) for name, values in inputs.items()}
+    columns = {name: values.tolist() for name, values in (inputs | _held(inputs)).items()}
 
     def rows(*names: str) -> Any:
         return zip(*(columns[name] for name in names), strict=True)
 
-    told: list[Command] | list[Demand]
+    commands: list[Command] | list[Demand]
     if spec.command == "generator":
-        told = [Demand(*row) for row in rows(*_DEMANDS, "enable")]
+        commands = [Demand(*row) for row in rows(*_DEMANDS, "enable")]
     else:
-        told = [Command(*row) for row in rows(*_COMMANDS, "enable")]
-    gains = [Gains(*row) for row in rows(*GAIN_PORTS.values(), "current_limit")] if form.gain_bits else None
-    widths = {port.name: port.width for port in spec.pins}
-    bits = {name: values & ((1 << widths[name]) - 1) for name, values in inputs.items()}
-    return bits, run_loop(spec, trace, told, golden.tables, gains)
+        commands = [Command(*row) for row in rows(*_COMMANDS, "enable")]
+    gains = [Gains(*row) for row in rows(*GAIN_PORTS.values(), "current_limit")] if spec.form.gain_bits else None
+    return bits, run_loop(spec, trace, commands, golden.tables, gains)
+
+
+def _inputs(spec: LoopSpec, trace: PinTrace, clock: IntArray) -> dict[str, IntArray]:
+    """Return the numbers on the inputs of the loop at its control ticks."""
+    rng = np.random.default_rng(1)
+    alone = spec.tachometer
+    own = {port.name for port in alone.ports}
+    inputs = {port.name: _levels(port, rng, len(clock)) for port in spec.pins if port.name not in own}
+    if "command_position" in inputs:
+        # About the shaft, so that the current is not always at its limit.
+        places, _ = count(alone, decoded(alone, trace), clock - alone.tick_latency)
+        here = (places.position << POSITION_FRAC_BITS) + (inputs["command_position"] >> alone.position_width)
+        inputs["command_position"] = np.where(rng.random(len(clock)) < 0.9, here, inputs["command_position"])
+    if spec.form.gain_bits:
+        options = {GAIN_PORTS[term]: raw for term, raw in spec.form.reset_gains.items()}
+        for name, raw in (options | {"current_limit": spec.form.current_limit}).items():
+            inputs[name] = np.where(rng.random(len(clock)) < 0.7, raw, inputs[name])
+    inputs["enable"] = (rng.random(len(clock)) < 1 - _CHANGES).astype(np.int64)
+    return inputs
 
 
 def _levels(port: Port, rng: np.random.Generator, n: int) -> IntArray:
@@ -62,9 +66,9 @@ def _levels(port: Port, rng: np.random.Generator, n: int) -> IntArray:
     bits = port.width - port.signed
     most, least = (1 << bits) - 1, -(1 << bits) if port.signed else 0
     size = np.exp2(rng.uniform(0, 1, n) ** 2 * bits).astype(np.int64)
-    found = rng.integers(-size if port.signed else np.zeros_like(size), size + 1).clip(least, most)
-    found = np.where(rng.random(n) < _CHANGES, rng.choice([least, most], n), found)
-    return found[np.maximum.accumulate(np.where(rng.random(n) < 4 * _CHANGES, np.arange(n), 0))]
+    numbers = rng.integers(-size if port.signed else np.zeros_like(size), size + 1).clip(least, most)
+    numbers = np.where(rng.random(n) < _CHANGES, rng.choice([least, most], n), numbers)
+    return numbers[np.maximum.accumulate(np.where(rng.random(n) < 4 * _CHANGES, np.arange(n), 0))]
 
 
 def _held(inputs: dict[str, IntArray]) -> dict[str, IntArray]:

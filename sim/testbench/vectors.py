@@ -11,7 +11,7 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.signals.recording import Recording, check_ticks
+from tachometry.sim.signals.recording import PinTrace, Recording, check_ticks
 from tachometry.sim.signals.run import Run
 from tachometry.sim.testbench.loop_inputs import changes as loop_changes
 from tachometry.sim.testbench.loop_inputs import loop_inputs
@@ -51,16 +51,23 @@ def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recordin
     trace = recording.place(spec.timing.clock_hz)
     if spec.max_tick_cycles:
         trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
-    pins = list(trace.lines)
+    vectors = _vectors(core, trace)
+    text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
+    return {f"test_{name}.py": notice("#") + _BENCH.read_text(encoding="utf-8"), f"{name}_vectors.json": text}
+
+
+def _vectors(core: TachometerSpec | LoopSpec, trace: PinTrace) -> dict[str, Any]:
+    """Return the content of `NAME_vectors.json`; test_NAME.py says what stands where."""
+    pins = [*trace.lines]
     changes: list[NDArray[Any]] = [trace.clock, *trace.lines.values()]
     if isinstance(core, LoopSpec):
         inputs, run = loop_inputs(core, trace)
         pins, changes = [*pins, *inputs], [*loop_changes(core, trace, inputs)]
     else:
-        run = golden.run(spec, trace)
+        run = golden.run(core, trace)
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {trace.n_clocks} clocks")
-    vectors = {
+    return {
         "generator": generator(),
         "license": LICENSE,
         "clocks": trace.n_clocks,
@@ -68,8 +75,6 @@ def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recordin
         "changes": _rows(*changes),
         "strobes": strobe_rows(run),
     }
-    text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
-    return {f"test_{name}.py": notice("#") + _BENCH.read_text(encoding="utf-8"), f"{name}_vectors.json": text}
 
 
 def usual_motion(spec: TachometerSpec) -> Recording:
@@ -77,6 +82,20 @@ def usual_motion(spec: TachometerSpec) -> Recording:
 
     The rest outlasts the maximum time, so that the core reads zero, unless that takes a million clocks or more.
     """
+    encoder = VirtualEncoder(
+        spec.encoder.pulses_per_rev,
+        jitter=0.1,
+        illegal=0.01,
+        bounce=Bounce(1, spec.filter_clocks / spec.timing.clock_hz) if spec.filter_clocks else None,
+        start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
+        seed=1,
+        index=spec.index,
+    )
+    return encoder.record(parse_motion(_usual_form(spec))).recording
+
+
+def _usual_form(spec: TachometerSpec) -> str:
+    """Return the segments of `usual_motion`."""
     cycles, clock_hz = spec.timing.tick_cycles, spec.timing.clock_hz
     moving = max(min(_MOVING, _MOST_TICKS * cycles), _FEWEST_TICKS * cycles)
     standing = min(_STANDING, cycles * (8 * spec.timing.max_ticks // 5 + 10))
@@ -88,23 +107,13 @@ def usual_motion(spec: TachometerSpec) -> Recording:
         return f"{spec.unit_velocity * counts_per_tick}rad/s"
 
     brisk, fast = min(3.3, most), min(1.5 * spec.max_count, most)
-    motion = (
+    return (
         f"ramp:0:{speed(brisk)}:{part}s+constant:{speed(min(1.25, most))}:{part}s+constant:{speed(fast)}:{part / 20}s"
         f"+constant:{speed(-fast)}:{part / 20}s+constant:{speed(-min(1.25, most))}:{part}s"
         f"+ramp:{speed(-brisk)}:0:{part}s+sine:{speed(brisk / 2)}:{3 / part}Hz:{part}s"
         f"+constant:{speed(min(0.3, most))}:{part}s+constant:{speed(-min(0.04, most))}:{2 * part}s"
         f"+stop:{standing / clock_hz}s"
     )
-    encoder = VirtualEncoder(
-        spec.encoder.pulses_per_rev,
-        jitter=0.1,
-        illegal=0.01,
-        bounce=Bounce(1, spec.filter_clocks / clock_hz) if spec.filter_clocks else None,
-        start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
-        seed=1,
-        index=spec.index,
-    )
-    return encoder.record(parse_motion(motion)).recording
 
 
 def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
