@@ -40,7 +40,7 @@ def figures(name: str, folder: Path) -> tuple[str, ...]:
 
 
 def row(name: str, said: str, seconds: float) -> tuple[str, ...]:
-    """A row of the table from what the command has printed."""
+    """Return a row of the table from what the command has printed."""
     rows = [line.split("  ", 1) for line in said.split("\n\n")[1].splitlines()]
     told = {key.strip(): value.strip() for key, value in rows}
     cells = ", ".join(f"{value} {key}" for key, value in told.items() if " of " in value and value[0] != "0")
@@ -49,13 +49,13 @@ def row(name: str, said: str, seconds: float) -> tuple[str, ...]:
 
 
 def block(rows: Sequence[tuple[str, ...]], tools: dict[str, str]) -> str:
-    """The table, and the versions of the tools."""
+    """Return the table, and the versions of the tools."""
     used = ", ".join(f"{name} {version}" for name, version in sorted(tools.items()))
     return f"{markdown(HEADS, rows, left=(0, 1))}\nTools: {used}.\n"
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """The command; returns its exit code."""
+    """Run the command; return its exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=PAGE, help="page whose figures are replaced")
     page_of = parser.parse_args(words).output

@@ -30,7 +30,7 @@ WITH_LONG_MT = "s,m,t,mt,mt:min-time=1ms,rairan,track,difference,hostmot2,simple
 
 @dataclass(frozen=True)
 class Situation:
-    """What is compared: a title, what is seen in the table, the options of the command, those of the core first."""
+    """Describes a comparison: its title, its remark, and the options of the command, those of the core first."""
 
     title: str
     text: str
@@ -153,7 +153,7 @@ offset looks like a delay.
 
 
 def rows(command: str) -> list[dict[str, str]]:
-    """The table of a command, by method."""
+    """Return the table of a command, by method."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "table.csv"
         try:
@@ -166,7 +166,7 @@ def rows(command: str) -> list[dict[str, str]]:
 
 
 def table(found: list[dict[str, str]]) -> str:
-    """The same in Markdown."""
+    """Return the same in Markdown."""
 
     def cell(row: dict[str, str], name: str, scale: float = 1) -> str:
         return f"{scale * float(row[name]):.3g}" if row[name] else ""
@@ -177,7 +177,7 @@ def table(found: list[dict[str, str]]) -> str:
 
 
 def section(situation: Situation) -> str:
-    """A situation's part of the page."""
+    """Return a situation's part of the page."""
     options = situation.options.replace(" --motion", " \\\n        --motion")
     shown = f"    tachometry compare {situation.core} \\\n        {options}"
     text = textwrap.fill(" ".join(situation.text.split()), 120)
@@ -185,7 +185,7 @@ def section(situation: Situation) -> str:
 
 
 def figure() -> str:
-    """The part of the page with the figure, which is written as well."""
+    """Return the part of the page with the figure, which is written as well."""
     command = f"tachometry compare {CORE} {COSTS} --tradeoff docs/measured/{FIGURE.name}"
     rows(command.replace(f"docs/measured/{FIGURE.name}", shlex.quote(str(FIGURE))))
     shown = re.sub(" (?=--(methods|jitter|tradeoff))", " \\\\\n        ", command)
@@ -193,7 +193,7 @@ def figure() -> str:
 
 
 def page(n_seeds: int, jobs: int) -> str:
-    """The page docs/measured/compare.md."""
+    """Return the page docs/measured/compare.md."""
     table_of_all = situations.part(n_seeds, jobs)
     models = f"{ABOUT_MODELS}\n{situations.model_table()}"
     return "\n".join([HEAD + table_of_all, figure(), models, SINGLE, *map(section, SITUATIONS)])

@@ -23,13 +23,15 @@ SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20
 
 
 def cell(outcome: Outcome) -> str:
-    """RMS error, greatest error, dip, current above 50 Hz."""
+    """Return RMS error, greatest error, dip, current above 50 Hz."""
     assert outcome.dip is not None
     return ", ".join(f"{value:.3g}" for value in (outcome.rms, outcome.largest, outcome.dip, outcome.sound))
 
 
 def usable_gains(seeds: Sequence[int], jobs: int) -> tuple[str, list[Found]]:
-    """A row per disc and method: at each tick the usable gain and what comes of it; and the same for the figure."""
+    """Return a row per disc and method: at each tick the usable gain and what comes of it; and the same for the
+    figure.
+    """
     rows, found = [], []
     for disc, encoder in DISCS.items():
         for kind in KINDS:
@@ -49,7 +51,7 @@ def usable_gains(seeds: Sequence[int], jobs: int) -> tuple[str, list[Found]]:
 
 
 def weights(seeds: Sequence[int], jobs: int) -> str:
-    """Ticks of 20 µs: the observer with every tick, and with every update, for S and M/T."""
+    """Return ticks of 20 µs: the observer with every tick, and with every update, for S and M/T."""
     rows = []
     for disc, encoder in DISCS.items():
         for kv in (40.0, 80.0, 160.0):
@@ -59,7 +61,7 @@ def weights(seeds: Sequence[int], jobs: int) -> str:
 
 
 def assumptions(seeds: Sequence[int], jobs: int) -> str:
-    """What is changed against the real disc, ticks of 1 ms and 20 µs, k_v = 40 and 80."""
+    """Return what is changed against the real disc, ticks of 1 ms and 20 µs, k_v = 40 and 80."""
     rows: dict[str, list[str]] = {}
     for kv, seconds in ((40.0, 1e-3), (80.0, 20e-6)):
         base = setting(KINDS[0], kv, seconds, REAL)
@@ -70,7 +72,7 @@ def assumptions(seeds: Sequence[int], jobs: int) -> str:
 
 
 def in_gates(seeds: Sequence[int], jobs: int) -> str:
-    """The controller in gates against its golden model, and against double precision."""
+    """Return the controller in gates against its golden model, and against double precision."""
     held = setting(KINDS[0], 80.0, 20e-6, REAL)
     cosine = replace(
         setting(KINDS[0], 50.0, 20e-6, REAL), task=Task(motion=Cosine(10.0), noise=held.task.noise), begin=1.0
@@ -93,7 +95,7 @@ def in_gates(seeds: Sequence[int], jobs: int) -> str:
 
 
 def solutions(seeds: Sequence[int], jobs: int) -> str:
-    """The largest deviations of Fig. 14 with shorter ticks, mean of seeds: 1 s to 39 rad/s, from 2 s to 4 s."""
+    """Return the largest deviations of Fig. 14 with shorter ticks, mean of seeds: 1 s to 39 rad/s, from 2 s to 4 s."""
     motion, rows = parse_motion("ramp:0:39rad/s:1s+constant:39rad/s:3s"), []
     for seconds in (1e-3, 1e-4, 20e-6, 1e-6):
         _, tick = TICKS[seconds]
@@ -106,7 +108,9 @@ def solutions(seeds: Sequence[int], jobs: int) -> str:
 
 
 def accelerations(seeds: Sequence[int], jobs: int) -> str:
-    """Tracking, real disc, ticks of 20 µs: the disturbance from the velocity, and from the measured acceleration."""
+    """Return tracking, real disc, ticks of 20 µs: the disturbance from the velocity, and from the measured
+    acceleration.
+    """
     rows = []
     ways = {"velocity": Observer.SYNCHRONISED, "acceleration": Observer.ACCELERATION}
     for kv, times in ((40.0, 2), (80.0, 2), (113.1, 2), (113.1, 1), (160.0, 1)):

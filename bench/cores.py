@@ -136,7 +136,7 @@ PAPER = STachometer(encoder=Encoder(500, 1), timing=Timing.parse("48MHz", "1ms",
 def variants(
     name: str, what: str, spec: TachometerSpec, bars: Mapping[str, Mapping[str, float]]
 ) -> tuple[Configuration, ...]:
-    """A method with and without a greatest speed, and with ticks from outside if it does not make its own."""
+    """Return a method with and without a greatest speed, and with ticks from outside if it does not make its own."""
     found = [Configuration(name, what, spec, bars, is_option=False)]
     fast = replace(spec, max_speed=MAX_SPEED)
     found.append(

@@ -76,14 +76,14 @@ EXAMPLES = (
 
 
 def turn(counts_per_tick: float, encoder: VirtualEncoder, spec: STachometer) -> tuple[Encoding, Run]:
-    """An encoder at constant speed on a core's golden model."""
+    """Return an encoder at constant speed on a core's golden model."""
     speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.seconds(spec.timing.tick_cycles)))
     encoding = encoder.record(parse_motion(f"constant:{speed!r}rev/s:{DURATION_S}s"))
     return encoding, golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
 
 
 def velocity_errors(spec: STachometer, encoding: Encoding, run: Run) -> str:
-    """RMS and mean error of the held velocity in per cent of the speed, once the start is forgotten."""
+    """Return RMS and mean error of the held velocity in per cent of the speed, once the start is forgotten."""
     held = held_velocity(spec, run)
     settled = held.time >= SETTLED_S
     error = velocity_error(HeldVelocity(held.time[settled], held.velocity_rad_s[settled]), encoding.true_speed)
@@ -93,7 +93,7 @@ def velocity_errors(spec: STachometer, encoding: Encoding, run: Run) -> str:
 
 
 def measure(example: Example) -> list[str]:
-    """A row of the table."""
+    """Return a row of the table."""
     ppr = CORE.encoder.pulses_per_rev
     spec = replace(CORE, encoder=Encoder(ppr, example.decoding), filter_clocks=example.filter_clocks)
     encoder = VirtualEncoder(ppr, start_angle_rad=math.pi / (4 * ppr), seed=SEED, **example.measured)
@@ -113,7 +113,7 @@ def measure(example: Example) -> list[str]:
 
 
 def table() -> str:
-    """Markdown."""
+    """Return markdown."""
     head = [
         "encoder and core",
         "position off (counts)",
@@ -127,7 +127,7 @@ def table() -> str:
 
 
 def staircase(time: FloatArray, value: NDArray[Any], end: float, bottom: float, height: float, colour: str) -> str:
-    """A line of SVG: each value from its time on, one unit being `height` pixels above `bottom`."""
+    """Return a line of SVG: each value from its time on, one unit being `height` pixels above `bottom`."""
     x, y = LEFT + np.append(time, end) / end * WIDTH, bottom - value * float(height)
     corners = zip(np.repeat(x, 2)[1:-1], np.repeat(y, 2), strict=True)
     points = " ".join(f"{px:.1f},{py:.1f}" for px, py in corners)
@@ -135,11 +135,12 @@ def staircase(time: FloatArray, value: NDArray[Any], end: float, bottom: float, 
 
 
 def text(x: float, y: float, words: str, anchor: str = "start") -> str:
+    """Return a text of SVG."""
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{BLACK}">{words}</text>\n'
 
 
 def draw(name: str, drawn: dict[str, Any], top: float) -> str:
-    """Lines of an encoder over those of an ideal one, and the positions that a decoder makes of both."""
+    """Return lines of an encoder over those of an ideal one, and the positions that a decoder makes of both."""
     encoder = VirtualEncoder(PULSES_PER_REV, start_angle_rad=math.pi / (4 * PULSES_PER_REV), seed=SEED, index=True)
     motion = parse_motion(f"constant:1rev/s:{PERIODS / PULSES_PER_REV}s")
     svg = text(8, top + 2 * LANE, name)
@@ -162,7 +163,7 @@ def draw(name: str, drawn: dict[str, Any], top: float) -> str:
 
 
 def picture() -> str:
-    """SVG."""
+    """Return SVG."""
     shown = [example for example in EXAMPLES if example.drawn]
     size = f"{LEFT + WIDTH + 20} {TOP + len(shown) * ROW}"
     svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" font-family="DejaVu Sans, Arial, sans-serif"'

@@ -70,17 +70,17 @@ WHOLE_CYCLES: Mapping[str, Method] = {
 
 
 def recorded(motion: str, seed: int, **faults: Any) -> Encoding:
-    """A motion on a disc; the disc depends on the seed alone."""
+    """Return a motion on a disc; the disc depends on the seed alone."""
     return VirtualEncoder(LINES, seed=seed, **faults).record(parse_motion(motion))
 
 
 def pooled(errors: list[float]) -> float:
-    """RMS of several runs."""
+    """Return RMS of several runs."""
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
 def gained(disc: str, motion: str, begin: float) -> dict[str, list[float]]:
-    """RMS errors in rad/s of each method: with positions, whole cycles, a learned cycle, and a learned disc."""
+    """Return RMS errors in rad/s of each method: with positions, whole cycles, a learned cycle, and a learned disc."""
     found: dict[str, list[list[float]]] = {name: [] for name in METHODS}
     for seed in SEEDS:
         # The jitter of an edge is that of its number: another line of the disc has it.
@@ -104,7 +104,7 @@ def gained(disc: str, motion: str, begin: float) -> dict[str, list[float]]:
 
 
 def gains() -> str:
-    """The errors as they are, and the parts that are left with a cycle, with a disc, and with whole cycles."""
+    """Return the errors as they are, and the parts that are left with a cycle, with a disc, and with whole cycles."""
     rows = []
     for disc in DISCS:
         for motion, (text, begin) in MOTIONS.items():
@@ -116,7 +116,7 @@ def gains() -> str:
 
 
 def speeds_of_learning() -> str:
-    """How far the offsets of a cycle are off after some cycles, RMS over ten discs, in counts."""
+    """Tell how far the offsets of a cycle are off after some cycles, RMS over ten discs, in counts."""
     after = (4, 16, 64, 256, 1024, 8192)
     rows = []
     for disc in ("real", "bad"):
@@ -132,7 +132,7 @@ def speeds_of_learning() -> str:
 
 
 def row_of(counts: Counts, truth: FloatArray, instants: FloatArray, slowest_s: float = 1.0) -> list[str]:
-    """RMS errors of M/T with T_c = 300 us in rad/s, with and without learned offsets."""
+    """Return RMS errors of M/T with T_c = 300 us in rad/s, with and without learned offsets."""
     method = METHODS["M/T 300 us"]
     with_them = method(counts, learn(counts, slowest_s=slowest_s).coordinate(counts))
     without = method(counts, counts.coordinate(np.zeros(1)))
@@ -140,7 +140,7 @@ def row_of(counts: Counts, truth: FloatArray, instants: FloatArray, slowest_s: f
 
 
 def limits() -> str:
-    """Hysteresis that depends on the line, and a vibration in step with the cycle."""
+    """Return hysteresis that depends on the line, and a vibration in step with the cycle."""
     rows = []
     faults: dict[str, Any] = {"jitter": 0.01, "nonuniformity": 0.01, "phase_error_deg": 10}
     encoding = recorded("sine:50rad/s:5Hz:800ms", 1, **faults)

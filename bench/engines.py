@@ -98,7 +98,7 @@ STEP_COLUMNS = ["loop", "clocks/s"]
 
 
 def seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """The shortest processor time of some runs."""
+    """Return the shortest processor time of some runs."""
     times = []
     for _ in range(repeats):
         begun = time.process_time()
@@ -108,7 +108,7 @@ def seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def loops(spec: TachometerSpec, trace: PinTrace, *options: str, debug: bool = False) -> Any:
-    """The library with the loops; `debug` with what Amaranth's `cxxrtl.convert` writes as it stands."""
+    """Return the library with the loops; `debug` with what Amaranth's `cxxrtl.convert` writes as it stands."""
     design = Design(spec, driven_pins(spec, trace))
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
         text = (
@@ -133,14 +133,14 @@ def strobes(library: Any, name: str, trace: PinTrace) -> int:
 
 
 def checked(expected: Run, run: Run, name: str, spec: TachometerSpec) -> None:
-    """See that an engine gave what is expected; RuntimeError if not."""
+    """Check that an engine gave what is expected; RuntimeError if not."""
     wrong, first = compare(expected, run)
     if wrong:
         raise RuntimeError(f"{name}, {spec.method}: hardware and golden model disagree: {first[0]}")
 
 
 def loop_alone(name: str, spec: TachometerSpec, trace: PinTrace, expected: Run, repeats: int = REPEATS) -> float:
-    """The shortest processor time in which an engine runs all clocks, without what it does before and after."""
+    """Return the shortest processor time in which an engine runs all clocks, without what it does before and after."""
     engine = pick(name)
     assert isinstance(engine, CompiledEngine)
     design = Design(spec, driven_pins(spec, trace))
@@ -176,7 +176,7 @@ def speed(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW, fa
 
 
 def process(method: str, name: str) -> float:
-    """Processor time of a process that simulates the motion and compares it with the golden model."""
+    """Return processor time of a process that simulates the motion and compares it with the golden model."""
     command = [sys.executable, __file__, "--alone", method, name]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, check=True)
@@ -185,7 +185,7 @@ def process(method: str, name: str) -> float:
 
 
 def whole(name: str, spec: TachometerSpec, trace: PinTrace) -> list[str]:
-    """All of the motion on cxxrtl and on the golden model."""
+    """Return all of the motion on cxxrtl and on the golden model."""
     run = golden.run(spec, trace)
     engines = ("cxxrtl-every-clock", "cxxrtl")
     loop = [loop_alone(each, spec, trace, run, 1) for each in engines]
@@ -197,7 +197,7 @@ def whole(name: str, spec: TachometerSpec, trace: PinTrace) -> list[str]:
 
 
 def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[list[str]]:
-    """The loops, from the one of the manual to the bare one of the table above."""
+    """Return the loops, from the one of the manual to the bare one of the table above."""
     part = part_of(trace, BEGIN, n_clocks)
     with_debug, without = loops(spec, part, debug=True), loops(spec, part)
     rows = [

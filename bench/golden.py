@@ -36,7 +36,7 @@ REPEATS = 3
 
 @dataclass(frozen=True)
 class Result:
-    """What was measured of one core; times in seconds."""
+    """Holds the times of one core in seconds."""
 
     name: str
     clocks: int
@@ -63,7 +63,7 @@ COLUMNS = ["core", "golden model", "ticks/s", "clocks/s", "pysim, clocks/s", "ra
 
 
 def fastest(work: Callable[[], object]) -> float:
-    """The shortest time of some runs."""
+    """Return the shortest time of some runs."""
     times = []
     for _ in range(REPEATS):
         start = time.perf_counter()
@@ -73,7 +73,7 @@ def fastest(work: Callable[[], object]) -> float:
 
 
 def part_of(trace: PinTrace, begin: int, clocks: int) -> PinTrace:
-    """Some clocks of a trace."""
+    """Return some clocks of a trace."""
     first = int(trace.clock.searchsorted(begin, side="right")) - 1
     inside = slice(first, int(trace.clock.searchsorted(begin + clocks)))
     at = (trace.clock[inside] - begin).clip(min=0)
@@ -81,7 +81,7 @@ def part_of(trace: PinTrace, begin: int, clocks: int) -> PinTrace:
 
 
 def measure(name: str, spec: TachometerSpec, trace: PinTrace) -> Result:
-    """Golden model on the whole, simulator on a part; RuntimeError if they disagree."""
+    """Return golden model on the whole, simulator on a part; RuntimeError if they disagree."""
     part = part_of(trace, BEGIN, SIMULATED)
     start = time.perf_counter()
     simulated = PySim().run(spec, part)
@@ -94,7 +94,7 @@ def measure(name: str, spec: TachometerSpec, trace: PinTrace) -> Result:
 
 
 def cores() -> dict[str, TachometerSpec]:
-    """Every method, and the S method with what costs the golden model time."""
+    """Return every method, and the S method with what costs the golden model time."""
     common: dict[str, Any] = {"encoder": Encoder(500), "timing": Timing.parse(CLOCK, "20us", "10ms")}
     found = {name: method(**common) for name, method in METHODS.items()}
     return found | {

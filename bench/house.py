@@ -48,7 +48,9 @@ def ladders(files: list[Path]) -> int:
         tree = ast.parse(file.read_text(encoding="utf-8"))
         if SPECS & {node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}:
             continue
-        asks = (node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance")
+        asks = (
+            node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance"
+        )
         count += sum(bool(SPECS & {name.id for name in ast.walk(node) if isinstance(name, ast.Name)}) for node in asks)
     return count
 
@@ -60,7 +62,9 @@ def quoted(tests: list[Path], product: list[Path]) -> int:
     for file in tests:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
-            code = len(text) >= 8 and "\n" not in text and any(mark in text for mark in ("(", " = ", "==", ".eq", " + "))
+            code = (
+                len(text) >= 8 and "\n" not in text and any(mark in text for mark in ("(", " = ", "==", ".eq", " + "))
+            )
             count += code and text in lines
     return count
 
@@ -72,7 +76,10 @@ def main() -> None:
         print(f"{folder}: {len(found)} rooms, {len(arrows)} imports between them")
     from tachometry.spec import METHODS, of_texts
 
-    specs = [of_texts(method, {"ppr": "500", "tick": "100us"} if method != "rairan" else {"ppr": "500"}) for method in METHODS]
+    specs = [
+        of_texts(method, {"ppr": "500", "tick": "100us"} if method != "rairan" else {"ppr": "500"})
+        for method in METHODS
+    ]
     members = [sum(not name.startswith("_") for name in dir(spec)) for spec in specs]
     print(f"public members of a spec: {min(members)} to {max(members)}")
     print(f"depth of its classes: at most {max(len(type(spec).__mro__) - 1 for spec in specs)}")

@@ -7,7 +7,7 @@ from tachometry.sim.signals.files import replacing
 
 
 def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
-    """A table for a page, numbers to the right; `left` are the columns of words."""
+    """Return a table for a page, numbers to the right; `left` are the columns of words."""
     rules = ["---" if column in left else "---:" for column in range(len(columns))]
     return "".join(f"| {' | '.join(row)} |\n" for row in (columns, rules, *rows))
 

@@ -38,7 +38,7 @@ DEVICES = {**TARGETS, "ECP5-85F": LARGEST}
 
 
 def verilog_of(files: Sequence[Path], top: str) -> str:
-    """The sources as one Verilog text; VHDL files are given in the order in which they are to be analysed.
+    """Return the sources as one Verilog text; VHDL files are given in the order in which they are to be analysed.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def verilog_of(files: Sequence[Path], top: str) -> str:
 
 
 def ports_of(verilog: str, top: str, prepare: str) -> list[Port]:
-    """The ports of a module.
+    """Return the ports of a module.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def ports_of(verilog: str, top: str, prepare: str) -> list[Port]:
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
-    """The options of the command."""
+    """Return the options of the command."""
     parser = argparse.ArgumentParser(description="Measure any Verilog or VHDL as `make size` measures the cores.")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="all sources, .v, .vhd or .vhdl")
     parser.add_argument("--top", required=True, metavar="NAME", help="the module or entity")
@@ -132,7 +132,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """The command; returns its exit code."""
+    """Run the command; return its exit code."""
     try:
         run(arguments(words))
     except (RuntimeError, UnicodeDecodeError) as error:

@@ -165,7 +165,7 @@ error, and so is any access where there is no register.
 
 
 def options() -> str:
-    """The page of all options: a table for each command, and each group under the first command that has it."""
+    """Return the page of all options: a table for each command, and each group under the first command that has it."""
     parts = [
         "# Options\n",
         "`make docs` writes this page from what the code declares. "
@@ -202,7 +202,7 @@ def _cell(text: str) -> str:
 
 
 def ports() -> str:
-    """The page of all ports of all methods."""
+    """Return the page of all ports of all methods."""
     found: dict[str, list[str]] = {}
     has: dict[str, list[str]] = {}
     always = {port.name for method in METHODS for port in of_texts(method, {"ppr": "500"}).ports}
@@ -239,7 +239,7 @@ def ports() -> str:
 
 
 def boards() -> str:
-    """The page of the boards and of their pins."""
+    """Return the page of the boards and of their pins."""
     rows = []
     for name, board in BOARDS.items():
         made = "project for the vendor's tools" if board.flow is None else "bitstream"
@@ -261,7 +261,7 @@ def boards() -> str:
 
 
 def columns() -> str:
-    """The page of the columns of a sweep's results."""
+    """Return the page of the columns of a sweep's results."""
     same = [name for name, (_, about) in COLUMNS.items() if about == "as the option"]
     rows = [[f"`{name}`", kind, about] for name, (kind, about) in COLUMNS.items() if name not in same]
     rows.append([", ".join(f"`{name}`" for name in same), "", "as the options of these names"])
@@ -277,20 +277,20 @@ def columns() -> str:
 
 
 def _beyond(**options: Any) -> list[Port]:
-    """Ports that options of a loop add, or make of others."""
+    """Return ports that options of a loop add, or make of others."""
     there = {port.name: port.direction for port in loop_ports(_LOOP)}
     return [port for port in loop_ports(replace(_LOOP, **options)) if there.get(port.name) != port.direction]
 
 
 def _described(port: Port) -> list[str]:
-    """A row of the table of ports."""
+    """Return a row of the table of ports."""
     kind = "strobe" if port.is_strobe else f"with `{port.held_by}`" if port.held_by else port.direction
     width = "signed" if port.signed else "1 bit" if port.width == 1 else "unsigned"
     return [f"`{port.name}`", kind, width, port.help]
 
 
 def registers() -> str:
-    """The page of the registers."""
+    """Return the page of the registers."""
     buses = "\n".join(f"| `{bus.name}` | {bus.help[0].upper()}{bus.help[1:]} |" for bus in BUSES.values())
     commanded = LoopMap(_LOOP.tachometer, replace(_LOOP, gains="inputs"))
     generating = LoopMap(_LOOP.tachometer, replace(_LOOP, gains="inputs", command="generator"))
@@ -307,7 +307,7 @@ def registers() -> str:
 
 
 def _cores(method: str) -> list[TachometerSpec]:
-    """Cores that have among them every port of a method."""
+    """Return cores that have among them every port of a method."""
     everything = EVERYTHING if METHODS[method].has_bounds else EVERYTHING | {"bounds": None}
     cores = [of_texts(method, everything)]
     if not METHODS[method].own_ticks:

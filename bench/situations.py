@@ -62,7 +62,7 @@ class Cell:
 
     @staticmethod
     def of(name: str, errors: list[float]) -> "Cell":
-        """Of the errors with all seeds."""
+        """Return of the errors with all seeds."""
         mean = sum(errors) / len(errors)
         if len(errors) == 1:
             return Cell(name, mean, None)
@@ -77,14 +77,14 @@ Cells = Mapping[str, list[Cell]]  # by situation, in the order of columns
 
 
 def tried(column: str) -> list[str]:
-    """All settings of a column; its name is the only one of `OURS`."""
+    """Return all settings of a column; its name is the only one of `OURS`."""
     if column in OURS:
         return [column]
     return [name for name, _ in core_settings(column)] if column in TUNED else settings(column)
 
 
 def errors(situation: Situation, seed: int, names: Iterable[str]) -> Errors:
-    """RMS errors (rad/s) of methods with one seed; those that are impossible are left out."""
+    """Return RMS errors (rad/s) of methods with one seed; those that are impossible are left out."""
     truth = situation.record(seed)
     steps = Steps.of_recording(truth.recording, _DECODING * PULSES_PER_REV, _DECODING)
     instants = common_instants([], truth.recording.duration, _TICK_S, situation.start_s)
@@ -113,7 +113,7 @@ def _errors(task: tuple[Situation, int, list[str]]) -> Errors:
 def measured(
     situations: Iterable[Situation], n_seeds: int, jobs: int, columns: Iterable[str] = (*OURS, *RIVALS)
 ) -> Table:
-    """Errors of all settings of the columns: by situation and by name.
+    """Return errors of all settings of the columns: by situation and by name.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def best(table: Table, columns: Iterable[str]) -> Cells:
 
 
 def single(table: Table, column: str) -> str:
-    """The setting of a column that is the best over all situations, by the geometric mean of its errors.
+    """Return the setting of a column that is the best over all situations, by the geometric mean of its errors.
 
     An error that is less than `_SMALL` counts as that: what is good enough in one situation makes up for no other.
     """
@@ -171,7 +171,7 @@ def single(table: Table, column: str) -> str:
 
 
 def error_table(heads: Sequence[str], cells: Cells) -> str:
-    """Errors in Markdown; the least of a row is bold."""
+    """Return errors in Markdown; the least of a row is bold."""
 
     def shown(row: list[Cell]) -> list[str]:
         least = min(cell.mean for cell in row)
@@ -181,7 +181,9 @@ def error_table(heads: Sequence[str], cells: Cells) -> str:
 
 
 def setting_table(cells: Cells) -> str:
-    """The situations as options of the command, and the best settings behind the names of the methods, in Markdown."""
+    """Return the situations as options of the command, and the best settings behind the names of the methods, in
+    Markdown.
+    """
     options = {situation.name: f"`{situation.options}`" for situation in SITUATIONS}
 
     def shown(cell: Cell) -> str:
@@ -192,7 +194,7 @@ def setting_table(cells: Cells) -> str:
 
 
 def model_table() -> str:
-    """The float models, in Markdown."""
+    """Return the float models, in Markdown."""
 
     def values(name: str) -> str:
         swept = BASELINES[name].swept
@@ -209,7 +211,7 @@ def model_table() -> str:
 
 
 def part(n_seeds: int, jobs: int) -> str:
-    """This part of the page."""
+    """Return this part of the page."""
     table = measured(SITUATIONS, n_seeds, jobs)
     ours = [f"`{name}`" for name in OURS]
     singles = [single(table, rival) for rival in RIVALS]

@@ -71,7 +71,7 @@ class Table:
     text: str = ""
 
     def markdown(self) -> str:
-        """A section in Markdown."""
+        """Return a section in Markdown."""
         words = [column for column, head in enumerate(self.header) if head in WORDS]
         below = f"\n{self.text}\n" if self.text else ""
         return f"## {self.title}\n\n{markdown(self.header, self.rows, words)}{below}"
@@ -193,7 +193,7 @@ def measure(
 
 
 def box_name(cell: str) -> str:
-    """Box that a cell of the core alone is in."""
+    """Return box that a cell of the core alone is in."""
     if cell.startswith("$"):
         return "packer"  # ends of carry chains, constants
     instances = split_name(cell)[:-1]
@@ -202,7 +202,7 @@ def box_name(cell: str) -> str:
 
 
 def boxes(configuration: Configuration, target_name: str, verilog: str, tools: Mapping[str, str]) -> Table:
-    """Cells by box: the core packed as before, but synthesised without optimisation across boxes.
+    """Return cells by box: the core packed as before, but synthesised without optimisation across boxes.
 
     Flattened, a cell bears the name of a net that may be another box's. The price is a total that differs somewhat.
     """
@@ -217,7 +217,7 @@ def boxes(configuration: Configuration, target_name: str, verilog: str, tools: M
 
 
 def boxes_table(title: str, cells: Mapping[str, Mapping[str, Any]], counted: Mapping[str, str]) -> Table:
-    """Packed cells by box, the largest box first."""
+    """Return packed cells by box, the largest box first."""
     found = Counter((box_name(name), cell["type"]) for name, cell in cells.items())
     names = {box for box, kind in found if kind in counted.values()}
     rows = sorted(([found[box, kind] for kind in counted.values()], box) for box in names)[::-1]
@@ -226,7 +226,7 @@ def boxes_table(title: str, cells: Mapping[str, Mapping[str, Any]], counted: Map
 
 
 def text_of(figure: str, found: Measurement) -> str:
-    """A figure as the tables show it: Fmax with its spread."""
+    """Return a figure as the tables show it: Fmax with its spread."""
     value = found.figures.get(figure, "")
     if figure != "Fmax" or value == "":
         return str(value)
@@ -234,12 +234,12 @@ def text_of(figure: str, found: Measurement) -> str:
 
 
 def heading(figure: str) -> str:
-    """A figure's name with its unit."""
+    """Return a figure's name with its unit."""
     return f"{figure} ({UNITS.get(figure, 'cells')})"
 
 
 def target_table(target_name: str, results: Results) -> Table:
-    """All configurations on one target."""
+    """Return all configurations on one target."""
     figures = [*TARGETS[target_name].cells, *UNITS]
     described = {configuration.name: configuration.what for configuration in CONFIGURATIONS}
     rows = [
@@ -252,7 +252,7 @@ def target_table(target_name: str, results: Results) -> Table:
 
 
 def cost_table(results: Results) -> Table:
-    """What each option costs: differences from the reference."""
+    """Return what each option costs: differences from the reference."""
     base = CONFIGURATIONS[0].name
     rows = [
         [option.name, option.what]
@@ -268,7 +268,7 @@ def cost_table(results: Results) -> Table:
 
 
 def speed_table(results: Results) -> Table:
-    """What a greatest speed changes: differences from the same core without one."""
+    """Return what a greatest speed changes: differences from the same core without one."""
     shown = [
         (target, figure)
         for target, device in TARGETS.items()
@@ -293,13 +293,13 @@ def speed_table(results: Results) -> Table:
 
 
 def is_met(figure: str, bar: float, found: Measurement) -> bool:
-    """Whether a figure is what it should be: Fmax at least the bar, all others at most."""
+    """Tell whether a figure is what it should be: Fmax at least the bar, all others at most."""
     value = found.figures[figure]
     return value >= bar if figure == "Fmax" else value <= bar
 
 
 def bar_table(results: Results) -> Table:
-    """The bars of each configuration, and which of them are missed."""
+    """Return the bars of each configuration, and which of them are missed."""
     rows, missed = [], set()
     for configuration in CONFIGURATIONS:
         for target, bars in configuration.bars.items():
@@ -315,7 +315,7 @@ def bar_table(results: Results) -> Table:
 
 
 def tables(results: Results) -> list[Table]:
-    """All tables of measured figures that are not empty."""
+    """Return all tables of measured figures that are not empty."""
     made = [*(target_table(target, results) for target in TARGETS), bar_table(results), speed_table(results)]
     if CONFIGURATIONS[0].name in {name for name, _ in results}:
         made.append(cost_table(results))
@@ -323,13 +323,13 @@ def tables(results: Results) -> list[Table]:
 
 
 def page(measured: Sequence[Table], tools: Mapping[str, str]) -> str:
-    """The page docs/measured/size.md."""
+    """Return the page docs/measured/size.md."""
     used = ", ".join(f"{package} {version}" for package, version in tools.items())
     return PAGE_HEAD.format(used=used) + "\n".join(table.markdown() for table in [*measured, PEERS, PEER_SOURCES])
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
-    """The options of the command."""
+    """Return the options of the command."""
     parser = argparse.ArgumentParser(description="Measure size and speed of the cores on three FPGAs.")
     names = [configuration.name for configuration in CONFIGURATIONS]
     parser.add_argument("--only", nargs="+", choices=names, metavar="NAME", help=f"some of: {', '.join(names)}")
@@ -378,13 +378,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def with_progress(items: Iterable[Item], total: int) -> Iterable[Item]:
-    """The items, with a bar on stderr if that is a terminal."""
+    """Return the items, with a bar on stderr if that is a terminal."""
     console = Console(stderr=True)
     return track(items, "measuring", total, console=console, transient=True, disable=not console.is_terminal)
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """The command; returns its exit code."""
+    """Run the command; return its exit code."""
     try:
         return run(arguments(words))
     except RuntimeError as error:

@@ -25,13 +25,13 @@ COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]
 
 
 def all_points() -> dict[str, Point]:
-    """Those of the file."""
+    """Return those of the file."""
     settings = of_file(FILE, by_name(sweep) | point_options())
     return points_of(settings, settings.fixed["methods"], 0.05, None).points
 
 
 def errors() -> dict[float, dict[str, float]]:
-    """Relative errors of the methods at each number of counts per tick."""
+    """Return relative errors of the methods at each number of counts per tick."""
     places: dict[float, dict[str, float]] = {}
     settings = of_file(FILE, by_name(sweep) | point_options())
     for point in points_of(settings, ",".join(METHODS), 0.05, None).points.values():
@@ -48,7 +48,7 @@ def _shown(values: list[float]) -> str:
 
 
 def bands(places: dict[float, dict[str, float]]) -> str:
-    """A row for each range of counts per tick."""
+    """Return a row for each range of counts per tick."""
     rows = []
     for name, (low, high) in BANDS.items():
         here = [found for counts, found in places.items() if low <= counts < high]
@@ -58,7 +58,7 @@ def bands(places: dict[float, dict[str, float]]) -> str:
 
 
 def measure(where: str, run: Callable[[], Iterable[object]]) -> list[str]:
-    """The row of the table; the first thing that `run` gives is that it has begun, all others are points."""
+    """Return the row of the table; the first thing that `run` gives is that it has begun, all others are points."""
     before, begun = _processor(), time.monotonic()
     arriving = iter(run())
     next(arriving)
@@ -75,12 +75,12 @@ def measure(where: str, run: Callable[[], Iterable[object]]) -> list[str]:
 
 
 def _processor() -> float:
-    """Processor time in seconds, of this process and of those that it has begun and that have ended."""
+    """Return processor time in seconds, of this process and of those that it has begun and that have ended."""
     return time.process_time() + sum(os.times()[2:4])
 
 
 def table(jobs: Iterable[int]) -> list[list[str]]:
-    """All rows."""
+    """Return all rows."""
     points = all_points()
 
     def plain() -> Iterable[object]:

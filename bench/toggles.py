@@ -25,7 +25,7 @@ LEVELS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 def registers(fragment: Any, box: str = "") -> Iterator[tuple[str, Signal]]:
-    """All signals that flip-flops drive, with the box of the core that they are in."""
+    """Yield all signals that flip-flops drive, with the box of the core that they are in."""
     for domain, statements in fragment.statements.items():
         if domain != "comb":
             for signal in statements._lhs_signals():
@@ -36,7 +36,7 @@ def registers(fragment: Any, box: str = "") -> Iterator[tuple[str, Signal]]:
 
 
 def changes(spec: TachometerSpec, rad_per_s: float, ticks: int) -> Counter[str]:
-    """Flip-flop changes by box in so many ticks."""
+    """Return flip-flop changes by box in so many ticks."""
     core = Tachometer(spec)
     fragment = Fragment.get(core, None)
     found = list(registers(fragment))

@@ -23,7 +23,7 @@ SHOWN = (
 
 
 def error(situation: Situation, seed: int, tick: str) -> float:
-    """RMS error (rad/s) at the clocks in which updates appear."""
+    """Return RMS error (rad/s) at the clocks in which updates appear."""
     edge_error = "0.6" if situation.name.endswith("bad") else "0.4"
     core = {"ppr": "500", "clock": "48MHz", "tick": tick, "max-time": "10ms", "max-speed": "400rad/s"}
     spec = of_texts("track", core | {"edge-error": edge_error})

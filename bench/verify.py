@@ -20,13 +20,13 @@ ENGINES = {"engines": "all", "every-clock": "cxxrtl-every-clock"}
 
 
 def table(said: str) -> str:
-    """The table that the command has printed."""
+    """Return the table that the command has printed."""
     rows = [line.split() for line in said.splitlines() if line.split()[:1] and line.split()[0] in ("method", *METHODS)]
     return markdown(rows[0], [row for row in rows[1:] if len(row) == len(rows[0])], left=(0, 1))
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """The command; returns its exit status."""
+    """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--clocks", default="0", metavar="N", help="of each engine, spread over the configurations")
     parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose tables are replaced")

@@ -1,1 +1,1 @@
-"""Where it runs: programs that talk to a core."""
+"""Put cores on boards, and talk to them."""

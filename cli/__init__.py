@@ -1,0 +1,1 @@
+"""The command `tachometry` reads options, calls one study, and prints its report."""

@@ -1,4 +1,4 @@
-"""What the command needs of the system: folders for caches, and what is said of a full disk."""
+"""The command needs folders for caches, and a message for a full disk."""
 
 import errno
 import os
@@ -11,7 +11,7 @@ DISK = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO))
 
 @contextmanager
 def writable_caches() -> Iterator[None]:
-    """See that the tools find a cache that can be written: where the user's cannot, a folder that ends with this.
+    """Check that the tools find a cache that can be written: where the user's cannot, a folder that ends with this.
 
     Yosys, Matplotlib and compilers have caches of their own there.
     """

@@ -55,7 +55,7 @@ class Outputs:
         return self._staging[target.parent] / _NEW / target.name
 
     def get(self, what: str) -> Path | None:
-        """Where to write the output `what` for now, or None if it is not wanted."""
+        """Tell where to write the output `what` for now, or None if it is not wanted."""
         return self[what] if what in self._targets else None
 
     def __enter__(self) -> Self:
@@ -158,7 +158,9 @@ class Outputs:
 
 
 def _new_staging(parent: Path) -> tuple[Path, int | None]:
-    """A new temporary directory, and what locks it for as long as this process lives; None where there are no locks."""
+    """Return a new temporary directory, and what locks it for as long as this process lives; None where there are no
+    locks.
+    """
     while True:
         folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
         lock = _lock(folder, wait=True)
@@ -185,7 +187,7 @@ def _clear_stale(parent: Path) -> None:
 
 
 def _lock(folder: Path, *, wait: bool) -> int | None:
-    """A descriptor that locks a directory; None if it is locked, or cannot be."""
+    """Return a descriptor that locks a directory; None if it is locked, or cannot be."""
     if sys.platform == "win32":
         return None
     descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
@@ -198,7 +200,7 @@ def _lock(folder: Path, *, wait: bool) -> int | None:
 
 
 def _real(path: Path) -> Path:
-    """The same file by its only name; a link is a file of its own, which a rename replaces."""
+    """Return the same file by its only name; a link is a file of its own, which a rename replaces."""
     if path.name in ("", ".."):  # a directory, by no name of its own
         return Path(os.path.realpath(path))
     return Path(os.path.realpath(path.parent)) / path.name

@@ -21,7 +21,7 @@ from tachometry.cli.options.option import told
 
 
 class Refused(Exception):
-    """What was asked for cannot be done; the message is what the user reads."""
+    """Tells the user, by its message, that a request cannot be met."""
 
 
 @click.group(
@@ -40,7 +40,7 @@ Examples:
 @click.version_option(package_name="tachometry", message="%(prog)s %(version)s")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """Encoder pins in, velocity out: the speed measurement of a servo drive for FPGAs.
+    """Measure the speed of a servo drive in an FPGA: encoder pins in, velocity out.
 
     Generates tachometer cores as Verilog, and compares every bit of them with a golden model, on the signals of a
     virtual encoder or on those that a logic analyser has captured.

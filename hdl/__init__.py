@@ -1,4 +1,4 @@
-"""What is synthesised: Amaranth components, one file a box."""
+"""Amaranth components are synthesised, one file a box."""
 
 from tachometry.hdl.core.core import AnyTachometer, core_of
 from tachometry.hdl.core.tachometer import Tachometer

@@ -1,0 +1,1 @@
+"""Golden models, engines and studies hold the hardware against the papers."""

@@ -1,4 +1,4 @@
-"""What is to be built: frozen objects that hardware, golden models, manifest and documents all read."""
+"""Frozen objects say what is to be built: hardware, golden models, manifest and documents all read them."""
 
 from collections.abc import Mapping
 from itertools import chain, combinations
@@ -27,30 +27,30 @@ METHODS: dict[str, type[TachometerSpec]] = {
 
 
 def common_options() -> tuple[Option, ...]:
-    """Options that every method has."""
+    """Return options that every method has."""
     return (*options_of(Encoder), *options_of(Timing), *options_of(TachometerSpec))
 
 
 def own_options(method: str) -> tuple[Option, ...]:
-    """Options of a method beyond those that every method has, and those of these that it has in another way."""
+    """Return options of a method beyond those that every method has, and those of these that it has in another way."""
     common = common_options()
     return tuple(about for about in options_of(METHODS[method]) if about not in common)
 
 
 def methods_with(name: str) -> list[str]:
-    """Methods that have an option of their own by this name."""
+    """Return methods that have an option of their own by this name."""
     return [method for method in METHODS if any(about.name == name for about in own_options(method))]
 
 
 def spec_class(method: str) -> type[TachometerSpec]:
-    """The spec of a method; ParameterError if there is none of this name."""
+    """Return the spec of a method; ParameterError if there is none of this name."""
     if method not in METHODS:
         raise ParameterError("method", f"must be one of {', '.join(METHODS)}, not {method!r}")
     return METHODS[method]
 
 
 def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
-    """The core that texts of options describe, as on the command line, in files of sweeps and in tests.
+    """Return the core that texts of options describe, as on the command line, in files of sweeps and in tests.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
 
 
 def of_parameters(parameters: Mapping[str, Any]) -> TachometerSpec:
-    """The core whose `parameters` a manifest has.
+    """Return the core whose `parameters` a manifest has.
 
     Raises
     ------

@@ -28,7 +28,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def generated(tmp_path: Path) -> Callable[..., Path]:
-    """The command `tachometry generate` in this process: the folder in which it has written a core's files."""
+    """Return the command `tachometry generate` in this process: the folder in which it has written a core's files."""
 
     def generate(name: str, *words: str) -> Path:
         from support.command import run

@@ -69,13 +69,13 @@ def imports(file: Path) -> set[str]:
 
 
 def room_of(place: str) -> str:
-    """The room of a module or file below a layer, by its path."""
+    """Return the room of a module or file below a layer, by its path."""
     parts = place.split("/")
     return "/".join(parts[:2]) if "/".join(parts[:2]) in ALLOWED else parts[0]
 
 
 def files(room: str) -> list[Path]:
-    """Files of a room, those of rooms within it left out."""
+    """Return files of a room, those of rooms within it left out."""
     found = [file for file in (ROOT / room).rglob("*.py") if room_of(file.relative_to(ROOT).as_posix()) == room]
     assert found, room
     return found
@@ -87,7 +87,7 @@ def test_every_folder_is_a_room() -> None:
 
 
 def _is_in(room: str, allowed: str, asking: str) -> bool:
-    """Whether a room is an allowed one or within it; within its own layer each room is allowed by its name."""
+    """Tell whether a room is an allowed one or within it; within its own layer each room is allowed by its name."""
     own = asking.split("/")[0] == allowed
     return room == allowed or (room.startswith(f"{allowed}/") and (not own or allowed == "cli"))
 

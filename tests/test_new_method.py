@@ -78,7 +78,7 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[list[str]]:
-    """A scheduler with a worker in a thread of this process, where the method is known."""
+    """Yield a scheduler with a worker in a thread of this process, where the method is known."""
     with LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
     ) as local:

@@ -27,7 +27,7 @@ def heads(path: Path) -> list[str]:
 
 
 def changed(run: Run, strobe: str, name: str) -> Run:
-    """The run with one bit of one port wrong in its first row."""
+    """Return the run with one bit of one port wrong in its first row."""
     table = run.tables[strobe]
     column = table[name].copy()
     column[0] ^= 1

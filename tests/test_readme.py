@@ -85,14 +85,14 @@ def test_python_examples(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def cells(page: str, heading: str, row: str) -> list[str]:
-    """A row of a table of a page of the documentation, under a heading."""
+    """Return a row of a table of a page of the documentation, under a heading."""
     _, part = (ROOT / "docs" / page).read_text(encoding="utf-8").split(f"\n## {heading}\n")
     line = next(line for line in part.split("\n## ")[0].splitlines() if line.startswith(f"| {row} | "))
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
 def alike(shown: str, measured: str) -> bool:
-    """Whether a number is another to two digits, or none where there is none."""
+    """Tell whether a number is another to two digits, or none where there is none."""
     return float(f"{float(measured):.2g}") == float(shown) if measured else shown == "-"
 
 
@@ -128,7 +128,7 @@ PAGES = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").glob("*/*.md")), *sorted((R
 
 
 def anchors(page: Path) -> set[str]:
-    """The headings of a page, as links name them."""
+    """Return the headings of a page, as links name them."""
     headings = re.findall("^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 

@@ -24,7 +24,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 
 def files(*folders: str) -> set[str]:
-    """What git has in folders."""
+    """Return what git has in folders."""
     listed = subprocess.run(["git", "ls-files", "-z", "--", *folders], cwd=ROOT, capture_output=True, text=True)
     found = {name for name in listed.stdout.split("\0") if (ROOT / name).is_file()}
     assert listed.returncode == 0, listed.stderr
@@ -33,7 +33,7 @@ def files(*folders: str) -> set[str]:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built from what git has alone, so nothing that lies in the checkout gets in."""
+    """Return built from what git has alone, so nothing that lies in the checkout gets in."""
     source, made = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
     for name in files(*LAYERS, "package", "pyproject.toml", "README.md", "LICENSE"):
         (source / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,1 +1,1 @@
-"""Boards: which there are, what goes on them, and the tools that build and load it."""
+"""Describe boards, what goes on them, and the tools that build and load it."""

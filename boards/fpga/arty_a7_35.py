@@ -1,4 +1,4 @@
-"""Arty A7-35: an Artix-7, for Vivado."""
+"""The Arty A7-35 has an Artix-7, and is built with Vivado."""
 
 from typing import Any
 

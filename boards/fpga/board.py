@@ -1,4 +1,4 @@
-"""What a board is: its clock, its pins, and what builds and loads it."""
+"""A board has a clock, pins, and tools that build and load it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from tachometry.boards.fpga.flow import Flow
 
 @dataclass(frozen=True)
 class Header:
-    """A connector of a board.
+    """Is a connector of a board.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Header:
 
 @dataclass(frozen=True)
 class Board:
-    """A board on which a core can run.
+    """Describes a board on which a core can run.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""All boards by their names."""
+"""Lists all boards by their names."""
 
 from tachometry.boards.fpga.arty_a7_35 import ARTY_A7_35
 from tachometry.boards.fpga.board import Board

@@ -1,4 +1,4 @@
-"""From a component to a bitstream, or to an archive for the vendor's tools."""
+"""A component becomes a bitstream, or an archive for the vendor's tools."""
 
 import importlib.util
 import io
@@ -26,7 +26,7 @@ _PLATFORMS = ("amaranth", "amaranth-boards")
 
 @dataclass(frozen=True)
 class Built:
-    """What came out.
+    """Holds the outcome of a build.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Built:
 
 
 def check_tools(board: Board) -> None:
-    """See that all is installed that a board needs.
+    """Check that all is installed that a board needs.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def check_tools(board: Board) -> None:
 
 
 def prepared(core: "wiring.Component", board: Board) -> Any:
-    """Amaranth's build plan of a component on a board: equal components give equal files on every machine."""
+    """Return Amaranth's build plan of a component on a board: equal components give equal files on every machine."""
     from tachometry.boards.fpga.top import BoardTop
 
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
@@ -106,7 +106,7 @@ def build(core: "wiring.Component", board: Board, say: Callable[[str], None]) ->
 
 
 def _open(flow: Flow, clock_hz: int, folder: Path, say: Callable[[str], None]) -> Built:
-    """The bitstream of what the platform has written to a folder."""
+    """Return the bitstream of what the platform has written to a folder."""
     say("synthesising")
     run(SYNTHESIS, folder)
     if flow.netlist is not None:

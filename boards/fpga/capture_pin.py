@@ -1,4 +1,4 @@
-"""The pin that captures the registers."""
+"""A pin can capture the registers."""
 
 from amaranth import Module, Signal
 from amaranth.lib import wiring

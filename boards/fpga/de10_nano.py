@@ -1,4 +1,4 @@
-"""DE10-Nano: a Cyclone V, for Quartus."""
+"""The DE10-Nano has a Cyclone V, and is built with Quartus."""
 
 from typing import Any
 

@@ -50,7 +50,7 @@ def use_output_registers(netlist: Mapping[str, Any]) -> int:
 def _registers(
     cells: Mapping[str, Any], memory: Mapping[str, Any], readers: Mapping[int, list[tuple[str, str]]]
 ) -> dict[str, str]:
-    """The flip-flop behind each output of a block RAM; none if a single one cannot be moved."""
+    """Return the flip-flop behind each output of a block RAM; none if a single one cannot be moved."""
     if any(memory["parameters"].get(f"REGMODE_{side}", _WITHOUT) != _WITHOUT for side in "AB"):
         return {}
     clocks = [memory["connections"].get(f"CLK{side}", ["0"])[0] for side in "AB"]

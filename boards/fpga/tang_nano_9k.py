@@ -1,4 +1,4 @@
-"""Tang Nano 9K: a Gowin GW1NR-9C."""
+"""The Tang Nano 9K has a Gowin GW1NR-9C."""
 
 from typing import Any
 

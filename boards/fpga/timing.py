@@ -1,4 +1,4 @@
-"""Whether a routed design is fast enough, as nextpnr reports it.
+"""Judges whether a routed design is fast enough, as nextpnr reports it.
 
 nextpnr counts arcs to block RAMs of Gowin several times (its issue #1803), and calls paths violations of hold times
 that by its own sums are none. So it is told not to judge, and what it lists is judged here: a violation is one if its
@@ -21,7 +21,7 @@ class TimingError(ValueError):
 
 
 def slowest_clock(report: Mapping[str, Any], clock_hz: int) -> float:
-    """Fmax in MHz of the slowest clock in a report of nextpnr.
+    """Return Fmax in MHz of the slowest clock in a report of nextpnr.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def slowest_clock(report: Mapping[str, Any], clock_hz: int) -> float:
 
 
 def check_hold(log: str) -> None:
-    """See that no data come too early, in a log of nextpnr.
+    """Check that no data come too early, in a log of nextpnr.
 
     Raises
     ------

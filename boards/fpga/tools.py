@@ -1,4 +1,4 @@
-"""Programs of the extra `boards`: where they are, what they say, and of which version they are."""
+"""Finds the programs of the extra `boards`, runs them, and asks for their versions."""
 
 import importlib.metadata
 import os
@@ -17,12 +17,12 @@ class ToolError(OSError):
 
 
 def scripts() -> str:
-    """The folder of the programs that packages have brought to this Python."""
+    """Return the folder of the programs that packages have brought to this Python."""
     return sysconfig.get_path("scripts")
 
 
 def find(name: str) -> str:
-    """The path of a program: beside this Python, or on the PATH.
+    """Return the path of a program: beside this Python, or on the PATH.
 
     Raises
     ------
@@ -58,14 +58,14 @@ def run(command: Sequence[str], folder: Path) -> None:
 
 
 def told(output: str) -> str:
-    """The line of an output that says what is wrong."""
+    """Return the line of an output that says what is wrong."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     of_error = [line for line in lines if "error" in line.lower()]
     return (of_error or lines[-1:] or [""])[0][:_LONGEST]
 
 
 def versions(packages: Iterable[str]) -> dict[str, str]:
-    """Versions of packages.
+    """Return versions of packages.
 
     Raises
     ------

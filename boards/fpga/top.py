@@ -1,4 +1,4 @@
-"""What goes on a board: the core between the pins."""
+"""A board gets a core between its pins."""
 
 from typing import Any
 
@@ -23,12 +23,12 @@ _SHARED = {"spi_miso": "spi_cs_n"}  # outputs that are only driven while an inpu
 
 
 def component(spec: TachometerSpec | LoopSpec, bus: Bus) -> wiring.Component:
-    """What is put on boards."""
+    """Return what is put on boards."""
     return Demo(demo_map(spec), bus)
 
 
 def described(spec: TachometerSpec | LoopSpec, bus: Bus, board: Board, name: str) -> dict[str, Any]:
-    """The manifest of what `component` makes for a board.
+    """Return the manifest of what `component` makes for a board.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def described(spec: TachometerSpec | LoopSpec, bus: Bus, board: Board, name: str
 
 
 class BoardTop(Elaboratable):
-    """A component on a board: what it has of the ports that the board has pins for is connected to them.
+    """Connects the ports of a component to the pins that the board has for them.
 
     Inputs have pull-ups. Outputs without a pin are left open, and inputs without one are 0. LEDs are lit by ones.
 
@@ -95,7 +95,7 @@ class BoardTop(Elaboratable):
         return bool(self._core.signature.members[name].flow == In)
 
     def _resource(self) -> Resource:
-        """The pins that the component has, on the headers."""
+        """Return the pins that the component has, on the headers."""
         names = self._on_headers()
         subsignals = []
         for header in self._board.headers:

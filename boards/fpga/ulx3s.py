@@ -1,4 +1,4 @@
-"""ULX3S: ECP5 of four sizes."""
+"""The ULX3S comes with ECP5 of four sizes."""
 
 from typing import Any
 

@@ -1,1 +1,1 @@
-"""What runs on the machine that a board is connected to."""
+"""Run on the machine that a board is connected to."""

@@ -1,4 +1,4 @@
-"""A client of a core on a bus: what its registers show, by the names of the ports."""
+"""A client reads the registers of a core on a bus, by the names of the ports."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -11,11 +11,11 @@ Write = Callable[[int, int], None]
 
 
 class WrongBoard(ValueError):
-    """What answers is not the core of the manifest."""
+    """Tells that another core answers than that of the manifest."""
 
 
 class Client:
-    """A core on a bus.
+    """Reads and writes the registers of a core on a bus.
 
     Several threads must not use it at the same time: a snapshot takes several accesses.
 
@@ -53,7 +53,7 @@ class Client:
             )
 
     def snapshot(self) -> Snapshot:
-        """Capture, and read all that was captured.
+        """Return capture, and read all that was captured.
 
         After `hold(True)` it does not capture, and reads what the input `capture` of the core has captured last. If
         that input captures while this reads, the snapshot is mixed.
@@ -62,7 +62,9 @@ class Client:
         return self.registers.snapshot([self._word(one["name"]) for one in self.registers.captured])
 
     def counters(self) -> dict[str, int]:
-        """How often something happened since reset or `clear`, by the names of the counters; 255 is 255 or more."""
+        """Tell how often something happened since reset or `clear`, by the names of the counters;
+        255 is 255 or more.
+        """
         return self.registers.fields("COUNTERS", self._word("COUNTERS"))
 
     def clear(self) -> None:

@@ -1,4 +1,4 @@
-"""A demo board over a UART: its settings, its telemetry, and when what was written took effect."""
+"""Talks to a demo board over a UART: settings, telemetry, and when a setting took effect."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ SETTINGS = ("RATE", "ERRORS", "NOISE", "SPEED", "DEMO")
 
 
 class DemoBoard:
-    """The demo on a board, or a simulated one.
+    """Talks to the demo on a board, or to a simulated one.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class DemoBoard:
         return [field for register in SETTINGS for field in self._fields(register)]
 
     def changed(self) -> int:
-        """When a setting was written last, in clocks since the restart."""
+        """Tell when a setting was written last, in clocks since the restart."""
         return self.link.read(self.registers.offset("CHANGED"))
 
     def stream(self, ticks: int) -> None:
@@ -94,7 +94,7 @@ class DemoBoard:
         self.link.receiver.forget()
 
     def poll(self) -> Sequence[Snapshot]:
-        """Telemetry that has come since the last call."""
+        """Return telemetry that has come since the last call."""
         return [self.registers.snapshot(words) for words in self.link.poll()]
 
     def _write(self, register: str, values: Mapping[str, int]) -> None:

@@ -1,4 +1,4 @@
-"""Frames over a UART: requests and their answers, and telemetry between them."""
+"""Frames go over a UART: requests and their answers, and telemetry between them."""
 
 import time
 from collections import deque
@@ -13,10 +13,10 @@ _WORD_BYTES = 4
 
 
 class Port(Protocol):
-    """A serial port, such as those of pyserial."""
+    """Describes a serial port, such as those of pyserial."""
 
     def read(self, size: int = 1, /) -> bytes:
-        """At most so many bytes: what is there, or what comes within the port's own time limit."""
+        """Return at most so many bytes: what is there, or what comes within the port's own time limit."""
 
     def write(self, data: bytes, /) -> int | None:
         """Send bytes."""
@@ -39,7 +39,7 @@ class NoAnswer(TimeoutError):
 
 @dataclass
 class Counts:
-    """What a receiver has seen.
+    """Counts what a receiver has seen.
 
     Parameters
     ----------
@@ -106,11 +106,13 @@ class Receiver:
         self._bytes.clear()
 
     def forget(self) -> None:
-        """The core restarts, or other telemetry is asked for: nothing is lost up to the next frame."""
+        """Forget the sequence, as the core restarts, or other telemetry is asked for: nothing is lost up to the next
+        frame.
+        """
         self._last = None
 
     def _frame(self, at: int) -> int:
-        """Bytes of what stands there: a frame, or a byte that belongs to none; 0 if more must come."""
+        """Return bytes of what stands there: a frame, or a byte that belongs to none; 0 if more must come."""
         found = self._bytes
         telemetry = found[at] & ~(frames.SEQUENCES - 1) == frames.TELEMETRY_HEADER
         answer = bool(self.request) and found[at] == self.request[0] | 1 << frames.FROM_CORE
@@ -140,7 +142,7 @@ class Receiver:
         return True
 
     def _missing(self, least: int, clocks: int) -> int:
-        """Frames between two: the sequence says `least`, or 16, 32 … more, and the time how many."""
+        """Return frames between two: the sequence says `least`, or 16, 32 … more, and the time how many."""
         if not self.frame_clocks:
             return least
         between = clocks % (1 << 32) / self.frame_clocks - 1
@@ -156,7 +158,7 @@ class Receiver:
 
 
 class Link:
-    """Registers of a core over a UART.
+    """Reads and writes the registers of a core over a UART.
 
     Parameters
     ----------
@@ -175,7 +177,7 @@ class Link:
         self.receiver = Receiver(registers)
 
     def read(self, offset: int) -> int:
-        """The register at an offset in bytes.
+        """Return the register at an offset in bytes.
 
         Raises
         ------
@@ -187,7 +189,7 @@ class Link:
         return self.words(offset, 1)[0]
 
     def words(self, offset: int, n_words: int) -> tuple[int, ...]:
-        """Registers that follow each other."""
+        """Return registers that follow each other."""
         return self._ask(lambda sequence: frames.read_request(offset // _WORD_BYTES, n_words, sequence)).words
 
     def write(self, offset: int, value: int) -> None:
@@ -195,7 +197,7 @@ class Link:
         self._ask(lambda sequence: frames.write_request(offset // _WORD_BYTES, value, sequence))
 
     def poll(self) -> Sequence[tuple[int, ...]]:
-        """Words of the frames of telemetry that have come since the last call."""
+        """Return words of the frames of telemetry that have come since the last call."""
         self.receiver.feed(self._port.read(4096))
         found = list(self.receiver.telemetry)
         self.receiver.telemetry.clear()

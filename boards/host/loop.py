@@ -1,4 +1,4 @@
-"""A client of a core with a control loop: its commands and gains, in their units."""
+"""A client of a core with a control loop sets its commands and gains, in their units."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -21,7 +21,7 @@ _COMMANDS = {
 
 
 class LoopClient(Client):
-    """A core with a control loop on a bus.
+    """Reads and writes a core with a control loop on a bus.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class LoopClient(Client):
         return tuple(self._scales)
 
     def raw(self, name: str, value: float) -> int:
-        """What stands in the registers for a value.
+        """Return what stands in the registers for a value.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class LoopClient(Client):
 
 
 def _scales(loop: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """What one LSB of each setting is."""
+    """Yield what one LSB of each setting is."""
     for name, gain in loop["gains"].items():
         yield name, gain["per_lsb"]
     for name, key in _COMMANDS.items():

@@ -1,4 +1,4 @@
-"""What the manifest of a core on a bus says of its registers, as a host uses it."""
+"""The manifest of a core on a bus describes its registers; a host reads them here."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,7 +7,7 @@ from tachometry.boards.host.snapshot import Snapshot
 
 
 class HostRegisters:
-    """Registers by their names.
+    """Holds the registers by their names.
 
     Parameters
     ----------
@@ -38,22 +38,22 @@ class HostRegisters:
         return name in self._registers
 
     def offset(self, name: str) -> int:
-        """Bytes from the first register to this one."""
+        """Return bytes from the first register to this one."""
         return int(self._registers[name]["offset"])
 
     def mask(self, name: str, field: str) -> int:
-        """Bits of a field."""
+        """Return bits of a field."""
         found = self._field(name, field)
         return int((1 << found["width"]) - 1 << found["low"])
 
     def fields(self, name: str, word: int) -> dict[str, int]:
-        """Fields of a register that shows this word, by their names, without a sign."""
+        """Return fields of a register that shows this word, by their names, without a sign."""
         return {
             field["name"]: word >> field["low"] & (1 << field["width"]) - 1 for field in self._registers[name]["fields"]
         }
 
     def with_fields(self, name: str, word: int, values: Mapping[str, int]) -> int:
-        """A word of a register with other values in some of its fields.
+        """Return a word of a register with other values in some of its fields.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class HostRegisters:
         return word
 
     def snapshot(self, words: Sequence[int]) -> Snapshot:
-        """What the captured registers say that show these words, in the order of their offsets."""
+        """Return what the captured registers say that show these words, in the order of their offsets."""
         values: dict[str, int] = {}
         for register, word in zip(self.captured, words, strict=True):
             for field in register["fields"]:
@@ -83,7 +83,7 @@ class HostRegisters:
         return Snapshot(values, self._flags, self._rad_per_s_per_lsb)
 
     def possible(self, words: Sequence[int]) -> bool:
-        """Whether the captured registers can show these words: bits that no port has are as they must be."""
+        """Tell whether the captured registers can show these words: bits that no port has are as they must be."""
         for word, (unused, sign) in zip(words, self._unused, strict=True):
             if word & unused != (unused if sign and word & sign else 0):
                 return False
@@ -97,7 +97,7 @@ class HostRegisters:
 
     @staticmethod
     def _unused_of(register: Mapping[str, Any]) -> tuple[int, int]:
-        """Bits of a captured register that repeat its sign bit, or are 0; and the sign bit, if there is one."""
+        """Return bits of a captured register that repeat its sign bit, or are 0; and the sign bit, if there is one."""
         used, sign, every = 0, 0, 0xFFFF_FFFF
         for field in register["fields"]:
             width = min(max(field["port_width"] - field["shift"], 0), field["width"])

@@ -1,4 +1,4 @@
-"""What a core showed in one clock."""
+"""A snapshot holds what a core showed in one clock."""
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
@@ -7,7 +7,7 @@ _VELOCITIES = ("velocity_lower", "velocity_upper")  # ports with the LSB of velo
 
 
 class Snapshot(Mapping[str, int]):
-    """What the core showed in one clock: integers by the names of the ports; it cannot be changed.
+    """Holds what the core showed in one clock: integers by the names of the ports; it cannot be changed.
 
     Ports of one bit are there as 0 or 1, and so are `updated` and `indexed`, the events since the capture before.
 

@@ -1,1 +1,1 @@
-"""What `tachometry monitor` does with a board: self-test, view, recording."""
+"""Test, show and record a board for `tachometry monitor`."""

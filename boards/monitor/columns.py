@@ -1,4 +1,4 @@
-"""What a recording and a view show of a frame: columns by the names of the ports, each with its unit."""
+"""A recording and a view show a frame as columns by the names of the ports, each with its unit."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Value = float | int | bool | None
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a recording.
+    """Is a column of a recording.
 
     Parameters
     ----------
@@ -39,7 +39,9 @@ class Column:
 
 
 def columns(registers: DemoMap) -> list[Column]:
-    """Every captured port but the time; what is in the LSB of the velocity is in the unit in which speeds are shown."""
+    """Return every captured port but the time; what is in the LSB of the velocity is in the unit in which speeds are
+    shown.
+    """
     spec = registers.spec
     lsb = spec.rad_per_s_per_lsb
     (speeds,) = (port.unit for port in registers.ports if port.name == "velocity")

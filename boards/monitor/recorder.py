@@ -1,4 +1,4 @@
-"""Recordings of telemetry: a row for each frame."""
+"""Telemetry is recorded with a row for each frame."""
 
 import csv
 import os
@@ -55,7 +55,7 @@ class Recorder:
 
     @contextmanager
     def _named(self) -> Iterator[None]:
-        """A write that fails does not say of which file."""
+        """Yield a write that fails does not say of which file."""
         try:
             yield
         except OSError as error:

@@ -1,4 +1,6 @@
-"""The self-test of a demo board: the emulator moves in known ways, and golden models say what every frame must show."""
+"""In the self-test of a demo board the emulator moves in known ways, and golden models say what every frame must
+show.
+"""
 
 import math
 import time
@@ -20,7 +22,7 @@ _SILENCE = 30.0  # seconds after which no more telemetry will come
 
 @dataclass(frozen=True)
 class Step:
-    """A part of the self-test, from a restart on.
+    """Is a part of the self-test, from a restart on.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Result:
-    """What a step has shown.
+    """Holds the outcome of a step.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ class Result:
 
 
 def steps(registers: DemoMap) -> list[Step]:
-    """Speeds, reversals, standstill, illegal edges, and an encoder with all its faults."""
+    """Return speeds, reversals, standstill, illegal edges, and an encoder with all its faults."""
     spec = registers.spec
     highest = min(spec.max_speed.rad_per_s if spec.max_speed else math.inf, fastest(spec))
     silence = 2.5 * spec.stalled_after_ticks * spec.timing.tick_cycles / spec.timing.clock_hz
@@ -157,7 +159,7 @@ def _run(board: DemoBoard, registers: DemoMap, step: Step, period: int) -> Resul
 
 
 class _Words:
-    """Telemetry until an instant, however long that takes."""
+    """Waits for telemetry until an instant, however long that takes."""
 
     def __init__(self, board: DemoBoard, registers: DemoMap) -> None:
         self._board = board

@@ -1,4 +1,4 @@
-"""Serial ports, with one kind of error for all that can happen to them."""
+"""Serial ports have one kind of error for all that can happen to them."""
 
 import errno
 import os
@@ -14,7 +14,7 @@ _BUSY = frozenset((errno.EAGAIN, errno.EBUSY))
 
 
 class Unplugged(OSError):
-    """The port is not there, for now.
+    """Tells that the port is not there, for now.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Unplugged(OSError):
 
 
 class SerialPort:
-    """A serial port that nobody else uses; a context manager.
+    """Opens a serial port that nobody else uses; it is a context manager.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class SerialPort:
         self.close()
 
     def read(self, size: int = 1, /) -> bytes:
-        """What is there; if there is nothing, what comes first within a short time."""
+        """Return what is there; if there is nothing, what comes first within a short time."""
         with _told(self.name):
             return bytes(self._port.read(max(1, min(size, self._port.in_waiting))))
 
@@ -102,7 +102,7 @@ def _told(name: str, *, opens: bool = False) -> Iterator[None]:
 
 
 def _number(error: BaseException) -> int | None:
-    """The number that the system has for an error, which pyserial may have wrapped."""
+    """Return the number that the system has for an error, which pyserial may have wrapped."""
     wrapped: BaseException | None = error
     while wrapped is not None:
         # Beside OSError, termios has an error of its own.

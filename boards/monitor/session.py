@@ -1,4 +1,4 @@
-"""A board that is watched, through unplugging and silence."""
+"""A session watches a board, through unplugging and silence."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -19,19 +19,19 @@ _WRAP = 1 << 32  # clocks
 
 
 class ClosablePort(Port, Protocol):
-    """A port that can be given back."""
+    """Describes a port that can be given back."""
 
     def close(self) -> None:
         """Give it back."""
 
 
 class ForeignDevice(ValueError):
-    """What is at the port speaks, but not as a tachometer."""
+    """Tells that a device speaks at the port, but not as a tachometer."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Telemetry, and when it was captured.
+    """Holds telemetry, and when it was captured.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Frame:
 
 
 def connected(name: str, port: Port, manifest: Mapping[str, Any], timeout: float = 0.5) -> DemoBoard:
-    """The demo at a port.
+    """Return the demo at a port.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def connected(name: str, port: Port, manifest: Mapping[str, Any], timeout: float
 
 
 class Session:
-    """Telemetry of a board.
+    """Gives the telemetry of a board.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Session:
 
     @property
     def counts(self) -> Counts:
-        """What all connections have seen."""
+        """The sum over all connections."""
         return self._before if self._board is None else _sum(self._before, self._board.link.receiver.counts)
 
     @property
@@ -122,7 +122,7 @@ class Session:
         return self._waits_for
 
     def poll(self) -> Sequence[Frame]:
-        """Telemetry that has come since the last call; connects, and waits for a short time if nothing is there.
+        """Return telemetry that has come since the last call; connects, and waits for a short time if nothing is there.
 
         Raises
         ------
@@ -162,7 +162,7 @@ class Session:
                 self._disconnect(error.why)
 
     def counters(self) -> dict[str, int]:
-        """What the core has counted; empty if it cannot be asked now."""
+        """Return what the core has counted; empty if it cannot be asked now."""
         if self._board is None:
             return {}
         try:

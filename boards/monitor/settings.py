@@ -1,4 +1,4 @@
-"""Settings of the emulator as people write them."""
+"""Reads settings of the emulator as people write them."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -26,7 +26,7 @@ Fields = dict[str, int]
 
 
 def emulator_settings(spec: TachometerSpec, words: Iterable[str]) -> Fields:
-    """Fields of the demo's registers from words such as `speed=100rad/s`.
+    """Return fields of the demo's registers from words such as `speed=100rad/s`.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def _source(spec: TachometerSpec, text: str) -> Fields:
 
 
 def _error(name: str) -> Callable[[TachometerSpec, str], Fields]:
-    """How late an edge is, as a part of a period of the line."""
+    """Tell how late an edge is, as a part of a period of the line."""
     field = name.replace("-", "_")
 
     def read(spec: TachometerSpec, text: str) -> Fields:

@@ -1,1 +1,1 @@
-"""Boards without hardware: the demo in the compiled engine, behind a serial port."""
+"""A board without hardware is the demo in the compiled engine, behind a serial port."""

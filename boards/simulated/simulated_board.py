@@ -1,4 +1,4 @@
-"""A simulated board behind a pseudo-terminal, which any program opens as a serial port."""
+"""A simulated board stands behind a pseudo-terminal, which any program opens as a serial port."""
 
 import os
 import select
@@ -22,7 +22,7 @@ _ROOM = 4096  # bytes that are taken from the host at once
 
 
 class Simulation(Protocol):
-    """A board whose clocks pass when it is told, such as `sim.engines.board.BoardSimulation`."""
+    """Describes a board whose clocks pass on request, such as `sim.engines.board.BoardSimulation`."""
 
     def run(self, n_clocks: int, data: bytes = b"") -> tuple[bytes, bytes]:
         """Let clocks pass while bytes come; what is sent, and what of the bytes is left."""

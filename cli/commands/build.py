@@ -131,7 +131,7 @@ def build(
 
 
 def _made(board: Board, name: str, built: Built) -> dict[str, Any]:
-    """What the manifest says of how the bitstream or the project was made."""
+    """Return what the manifest says of how the bitstream or the project was made."""
     return {
         "archive" if board.flow is None else "bitstream": f"{name}{built.suffix}",
         "tools": dict(built.tools),

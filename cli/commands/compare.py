@@ -222,7 +222,7 @@ def _tradeoff(path: Path, spec: TachometerSpec, costs: dict[str, list[Cost]], sp
 
 
 def _tools() -> dict[str, str]:
-    """Versions of what measures sizes."""
+    """Return versions of what measures sizes."""
     from tachometry.sim.studies.size import versions
 
     try:
@@ -232,7 +232,7 @@ def _tools() -> dict[str, str]:
 
 
 def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
-    """COMB, FF and Fmax of the cores on an ECP5, by name."""
+    """Return COMB, FF and Fmax of the cores on an ECP5, by name."""
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import progress_bar

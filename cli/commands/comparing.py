@@ -1,4 +1,4 @@
-"""What `compare` runs: methods as they are given, and all settings of a method, of which one is the best."""
+"""`compare` runs methods as they are given, or all settings of a method to find the best one."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Setting:
     encoder: Encoder
 
     def curve(self, recording: Recording) -> Curve:
-        """What it shows.
+        """Return what it shows.
 
         Raises
         ------
@@ -52,12 +52,12 @@ class Setting:
 
 
 def given(named: Methods, encoder: Encoder) -> list[Setting]:
-    """The methods as they are given."""
+    """Return the methods as they are given."""
     return [Setting(name, spec, encoder) for name, spec in named.specs.items()]
 
 
 def _tried(setting: Setting, make: Make, *, of_cores: bool) -> list[Setting]:
-    """All settings of a method; one if it is given with options, and of a core that is not to be tuned."""
+    """Return all settings of a method; one if it is given with options, and of a core that is not to be tuned."""
     from tachometry.sim.studies.comparing.rivals import settings
     from tachometry.sim.studies.comparing.tune import TUNED, core_settings
 
@@ -76,7 +76,7 @@ def _tried(setting: Setting, make: Make, *, of_cores: bool) -> list[Setting]:
 
 
 def _counted(settings: dict[str, list[Setting]], verb: str) -> Iterator[tuple[str, Iterator[Setting]]]:
-    """Methods with their settings one by one; a progress bar counts these."""
+    """Yield methods with their settings one by one; a progress bar counts these."""
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import progress_bar
@@ -99,7 +99,7 @@ def _counted(settings: dict[str, list[Setting]], verb: str) -> Iterator[tuple[st
 def tuned(
     named: Methods, encoder: Encoder, make: Make, recording: Recording, instants: FloatArray, true_speed: TrueSpeed
 ) -> tuple[Methods, dict[str, int]]:
-    """The methods, in place of each baseline and of M/T without options its best setting.
+    """Return the methods, in place of each baseline and of M/T without options its best setting.
 
     Returns them, and the number of settings that were tried, by the name of the best.
 
@@ -128,7 +128,8 @@ def tuned(
 def costs(
     named: Methods, encoder: Encoder, make: Make, recording: Recording, instants: FloatArray, true_speed: TrueSpeed
 ) -> tuple[dict[str, list[Cost]], float]:
-    """What all settings of each method cost, and the RMS speed (rad/s) of the motion, with which delays were measured.
+    """Return what all settings of each method cost, and the RMS speed (rad/s) of the motion, with which delays were
+    measured.
 
     Raises
     ------

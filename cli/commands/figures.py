@@ -98,7 +98,7 @@ def _chosen(only: str) -> list[Entry]:
 
 
 def _within(report: Callable[[float], None] | None, before: float, entry: Entry) -> Callable[[float], None] | None:
-    """What a figure's lab reports to: the share of the figure that is done."""
+    """Return what a figure's lab reports to: the share of the figure that is done."""
     return None if report is None else lambda share: report(before + share * entry.seconds)
 
 

@@ -153,7 +153,7 @@ def loop(
 
 
 def _alone(point: LoopPoint, jobs: int | None) -> tuple[Log, list[Outcome]]:
-    """The log with the first seed, and what came of all."""
+    """Return the log with the first seed, and what came of all."""
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import progress_bar
@@ -178,7 +178,7 @@ def _mean(outcomes: list[Outcome]) -> Row:
 
 
 def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, Row]:
-    """Rows of all points, in their order."""
+    """Return rows of all points, in their order."""
     from rich.progress import MofNCompleteColumn, TextColumn
 
     from tachometry.cli.reports.terminal import PerSecond, progress_bar
@@ -203,7 +203,7 @@ def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, R
 
 
 def _across(found: Loops) -> str:
-    """The axis over which loops are drawn."""
+    """Return the axis over which loops are drawn."""
     varied = [name for name, values in found.axes.items() if len(values) > 1]
     if not varied:
         raise ValueError("--vary must be given together with --plot of several loops, with two values or more")

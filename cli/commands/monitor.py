@@ -173,7 +173,7 @@ def _refuse(other: str, others: dict[str, object]) -> None:
 
 
 def _ticks(registers: DemoMap, text: str) -> int:
-    """Ticks from a frame to the next."""
+    """Return ticks from a frame to the next."""
     timing = registers.spec.timing
     ticks = int(parse_time("every", text) / timing.tick_seconds + Fraction(1, 2))
     most = (1 << PERIOD_WIDTH) - 1

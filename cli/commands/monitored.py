@@ -45,7 +45,7 @@ class Target:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """What the manifest says of it."""
+        """The entry of the manifest."""
         return demo_manifest(self.registers, self.bus, self.module)
 
     @property
@@ -55,7 +55,7 @@ class Target:
 
     @contextmanager
     def running(self) -> Iterator[str]:
-        """The name of the serial port, while there is a board at it."""
+        """Yield the name of the serial port, while there is a board at it."""
         if not self.simulated:
             yield self.port
             return
@@ -70,18 +70,18 @@ class Target:
             simulation.close()
 
     def label(self, name: str) -> str:
-        """What messages call the port of this name."""
+        """Return what messages call the port of this name."""
         return f"{self.port} at {name}" if self.simulated else name
 
     def opened(self, name: str) -> SerialPort:
-        """The port, opened."""
+        """Return the port, opened."""
         from tachometry.boards.monitor.serial_port import SerialPort
 
         return SerialPort(name, self.bus.baud)
 
 
 def simulated(port: str, core: CoreTexts) -> Target:
-    """The board that `sim:NAME` names, with this core.
+    """Return the board that `sim:NAME` names, with this core.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def simulated(port: str, core: CoreTexts) -> Target:
 
 
 def attached(port: str, core: CoreTexts, path: Path | None) -> Target:
-    """The board at a serial port, whose manifest is in a file.
+    """Return the board at a serial port, whose manifest is in a file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What `monitor` does with a board: watch it, test it, or run it for others."""
+"""`monitor` watches a board, tests it, or runs a simulated one for others."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ _PATIENCE = 5.0  # seconds without telemetry after which a duration can be over
 
 @contextmanager
 def interrupts() -> Iterator[threading.Event]:
-    """An event that Ctrl-C, SIGTERM and SIGHUP set; later on they interrupt, but not while all is put in order."""
+    """Yield an event that Ctrl-C, SIGTERM and SIGHUP set; later on they interrupt, but not while
+    all is put in order.
+    """
     stop = threading.Event()
     begun = 0.0
 

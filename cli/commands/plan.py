@@ -100,7 +100,7 @@ def plan(
 
 
 def _plans(named: Methods | None, speed: NDArray[np.float64]) -> dict[str, Plan]:
-    """Plans of all methods at these speeds, rad/s; none without a list."""
+    """Return plans of all methods at these speeds, rad/s; none without a list."""
     from tachometry.sim.studies.plan import plan_at
 
     specs = {} if named is None else named.specs
@@ -108,7 +108,7 @@ def _plans(named: Methods | None, speed: NDArray[np.float64]) -> dict[str, Plan]
 
 
 def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
-    """Least and greatest speed in rad/s, and the unit to show speeds in."""
+    """Return least and greatest speed in rad/s, and the unit to show speeds in."""
     if text is None:
         from tachometry.sim.studies.plan import default_range
 

@@ -1,4 +1,4 @@
-"""What simulate and replay share: run hardware and golden model, and report."""
+"""Both simulate and replay run hardware and golden model, and report."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def run_and_report(
 
 
 def refuse_plot(targets: Mapping[str, Path]) -> None:
-    """See that no figure is wanted of many axes."""
+    """Check that no figure is wanted of many axes."""
     if "--plot" in targets:
         raise ValueError("--plot must not be given together with --axes: a figure is of one axis")
 
@@ -54,7 +54,7 @@ def run_axes_and_report(
     engine: str,
     window: Window,
 ) -> int:
-    """The same for many axes, with a recording, and what the shaft truly did, of each."""
+    """Return the same for many axes, with a recording, and what the shaft truly did, of each."""
     from tachometry.cli.reports.axes import print_axes_summary
     from tachometry.sim.signals.axes import AxesTrace
 
@@ -73,7 +73,7 @@ def _played(
     engine: str,
     window: Window,
 ) -> tuple[Lockstep, str]:
-    """What came of a trace, and what has simulated it; what is wanted is written."""
+    """Return what came of a trace, and what has simulated it; what is wanted is written."""
     from tachometry.cli.reports.terminal import clocks_progress
     from tachometry.sim.engines.pick import pick
     from tachometry.sim.studies.lockstep import lockstep
@@ -99,7 +99,7 @@ def _status(found: Lockstep, wanted: int) -> int:
 
 
 def _least(spec: CoreSpec) -> int:
-    """Fewest clocks after which there is something to report."""
+    """Return fewest clocks after which there is something to report."""
     return spec.longest_tick + spec.tick_latency
 
 

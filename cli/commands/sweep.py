@@ -224,7 +224,7 @@ def _tables(settings: Settings) -> list[Path]:
 
 
 def _axes(text: str | None, found: Points) -> dict[str, list[str]]:
-    """Axes of the heat map with their values: across, and upwards if there are two."""
+    """Return axes of the heat map with their values: across, and upwards if there are two."""
     varied = {name: values for name, values in found.axes.items() if len(values) > 1}
     if not varied:
         raise ValueError("--vary must be given together with --plot, with two values or more")

@@ -121,7 +121,7 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
 
 
 def _listed(what: str, text: str, known: list[str]) -> list[str]:
-    """The names of a list, in the order in which they are known."""
+    """Return the names of a list, in the order in which they are known."""
     names = known if text.strip() == "all" else [word.strip() for word in text.split(",")]
     for name in names:
         if name not in known:
@@ -131,7 +131,7 @@ def _listed(what: str, text: str, known: list[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class _Result:
-    """What came of a configuration: by the engine, and what to say of its failures."""
+    """Holds the outcome of a configuration by engine, and the text of its failures."""
 
     method: str
     outcomes: dict[str, Outcome]
@@ -168,7 +168,7 @@ def _heed_only_the_pool() -> None:
 
 
 def _end_with_the_parent() -> None:
-    """The main process may be killed, and then nobody else ends this one."""
+    """End with the main process, which may be killed: nobody else ends this one then."""
     parent = parent_process()
     if parent is not None:
         parent.join()
@@ -179,7 +179,7 @@ def _end_with_the_parent() -> None:
 def _each(
     check: Callable[[_Configuration], _Result], cores: list[_Configuration], n_jobs: int
 ) -> Iterator[Iterable[_Result]]:
-    """Results as they come; what still runs ends with the context."""
+    """Yield results as they come; what still runs ends with the context."""
     if n_jobs == 1:
         yield map(check, cores)
         return

@@ -24,7 +24,9 @@ _OPTIONS = [
 
 
 def axes_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator below that of the options of the core: `spec` is that of many axes, if there are to be many."""
+    """Decorate a command, below that of the options of the core: `spec` is that of many axes, if there are to be
+    many.
+    """
 
     @functools.wraps(command)
     def build(*, spec: TachometerSpec, axes: int | None, parallel: bool, **others: Any) -> Any:
@@ -38,7 +40,7 @@ def axes_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def of_axes(spec: TachometerSpec, axes: int, parallel: bool) -> AxesSpec:
-    """A core of so many axes, each of which is as `spec`.
+    """Return a core of so many axes, each of which is as `spec`.
 
     Raises
     ------

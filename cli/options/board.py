@@ -23,15 +23,15 @@ class _BoardChoice(click.Choice[str]):
 
 
 def board_argument(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the name of a board, handed to the command as `board`."""
+    """Decorate a command: the name of a board, handed to the command as `board`."""
     return click.argument("board", type=_BoardChoice(), metavar="BOARD")(command)
 
 
 def default_folder(board: Board) -> Path:
-    """Where files for a board are, if nothing else is said."""
+    """Tell where files for a board are, if nothing else is said."""
     return Path("build") / board.name
 
 
 def boards_help() -> str:
-    """The boards in a paragraph of a help text."""
+    """Return the boards in a paragraph of a help text."""
     return "\b\nBOARD is one of:\n" + "\n".join(f"  {board.name:<14}{board.title}" for board in BOARDS.values())

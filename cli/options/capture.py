@@ -67,7 +67,9 @@ _OPTIONS = [
 
 
 def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: handed to the command as `read`, which reads a capture for a spec, or for an axis of so many."""
+    """Decorate a command: handed to the command as `read`, which reads a capture for a spec, or for an axis of so
+    many.
+    """
 
     @functools.wraps(command)
     def build(
@@ -105,7 +107,7 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _of_axis(line: str, text: str | None, axis: int, axes: int | None) -> str | None:
-    """The channel of a line, or that of one of many axes; None: the reader's default."""
+    """Return the channel of a line, or that of one of many axes; None: the reader's default."""
     if axes is None:
         return line if text is None and line == "z" else text
     if text is None:

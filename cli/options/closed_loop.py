@@ -165,7 +165,9 @@ def _filter(spec: TachometerSpec, text: str | None, observer: float) -> float:
 
 
 def _setting_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: all options of a loop but those of its core, handed over as a function that makes a `Setting`."""
+    """Decorate a command: all options of a loop but those of its core, handed over as a function that makes a
+    `Setting`.
+    """
 
     @functools.wraps(command)
     def build(*, motion: str, seed: int, **given: Any) -> Any:
@@ -226,7 +228,7 @@ def _setting(
 
 
 def _check_sizes(given: dict[str, float]) -> None:
-    """What no drive has is a slip of the pen."""
+    """Refuse numbers that no drive has: they are slips of the pen."""
     for name, (least, most) in _SIZES.items():
         # What is 0, negative, or no number is told by what takes it.
         if 0 < given[name] < least or most < given[name] < math.inf:
@@ -298,10 +300,10 @@ LOOP = click.command("loop")(_setting_options(lambda make, motion, seed: (make, 
 
 
 def loop_click_options() -> dict[str, click.Option]:
-    """All options of a loop but those of its core, by their names."""
+    """Return all options of a loop but those of its core, by their names."""
     return by_name(LOOP)
 
 
 def loop_options() -> dict[str, click.Option]:
-    """All options of a loop and its core that may vary, by their names."""
+    """Return all options of a loop and its core that may vary, by their names."""
     return core_click_options() | loop_click_options()

@@ -56,13 +56,13 @@ def _made_common(declared: tuple[declaration.Option, ...]) -> tuple[click.Option
 
 
 def _otherwise(name: str) -> str:
-    """What `--help` says of the methods that have a common option in another way."""
+    """Return what `--help` says of the methods that have a common option in another way."""
     own = {method: about for method in METHODS for about in own_options(method) if about.name == name}
     return "".join(f" Method {method}: {about.help}{_default(about)}" for method, about in own.items())
 
 
 def own_click_options() -> Sequence[click.Option]:
-    """The options that not all methods have; without defaults, so that it is seen where they do not belong."""
+    """Return the options that not all methods have; without defaults, so that it is seen where they do not belong."""
     found: dict[str, dict[str, declaration.Option]] = {}
     common = {about.name for about in common_options()}
     for method in METHODS:
@@ -75,7 +75,7 @@ def own_click_options() -> Sequence[click.Option]:
 
 @cache
 def _made_own(name: str, by_method: tuple[tuple[str, declaration.Option], ...]) -> click.Option:
-    """The option of one or several methods: if they say different things of it, its help has all of them."""
+    """Return the option of one or several methods: if they say different things of it, its help has all of them."""
     about = by_method[0][1]
     alike = len({_default(one) for _, one in by_method}) == 1
     said: dict[str, list[str]] = {}
@@ -97,7 +97,7 @@ def _kind(about: declaration.Option) -> dict[str, Any]:
 
 
 def _default(about: declaration.Option) -> str:
-    """What `--help` says of the default, behind the rest."""
+    """Return what `--help` says of the default, behind the rest."""
     shown = about.shown
     if about.flag and about.shown is None and isinstance(about.default, bool):
         shown = about.name if about.default else f"no-{about.name}"
@@ -105,12 +105,12 @@ def _default(about: declaration.Option) -> str:
 
 
 def _argument(name: str) -> str:
-    """What click calls the value of an option of the core."""
+    """Return what click calls the value of an option of the core."""
     return _PREFIX + name.replace("-", "_")
 
 
 def own_texts(method: str, words: list[str]) -> Texts:
-    """Options of a method from words such as `average=8` or `cancel=no`, by their names."""
+    """Return options of a method from words such as `average=8` or `cancel=no`, by their names."""
     own = [about.name for about in own_options(method)]
     given: Texts = {}
     for word in words:
@@ -133,7 +133,7 @@ def _taken(given: dict[str, Any]) -> Texts:
 
 
 def common_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: what all methods share, handed to the command as `make`, which makes a spec of a method.
+    """Decorate a command: what all methods share, handed to the command as `make`, which makes a spec of a method.
 
     `make` takes the method's name and what is given of its own options, as texts by their names.
     """
@@ -147,7 +147,7 @@ def common_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the options of the core, handed to the command as one argument `spec`."""
+    """Decorate a command: the options of the core, handed to the command as one argument `spec`."""
 
     @functools.wraps(command)
     def build(*, make: Make, **others: Any) -> Any:
@@ -157,7 +157,9 @@ def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def core_and_make_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: as `core_options`, with what makes a spec of another method as `make`, see `common_core_options`."""
+    """Decorate a command as `core_options`, with what makes a spec of another method as `make`, see
+    `common_core_options`.
+    """
 
     @functools.wraps(command)
     def build(*, method: str, **given: Any) -> Any:
@@ -170,7 +172,7 @@ def core_and_make_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def board_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: as `core_options`, of a command that is given a `board`, whose clock is that of the core."""
+    """Decorate a command as `core_options`, of a command that is given a `board`, whose clock is that of the core."""
 
     @functools.wraps(command)
     def build(*, method: str, board: Any, **given: Any) -> Any:
@@ -213,7 +215,7 @@ class CoreTexts:
     given: bool
 
     def at(self, clock_hz: int) -> TachometerSpec:
-        """The core, at the clock of a board.
+        """Return the core, at the clock of a board.
 
         Raises
         ------
@@ -227,7 +229,7 @@ class CoreTexts:
 
 
 def optional_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: as `core_options`, but none must be given; handed to the command as `core`, of `CoreTexts`."""
+    """Decorate a command as `core_options`, but none must be given; handed to the command as `core`, of `CoreTexts`."""
 
     @functools.wraps(command)
     def build(*, method: str, **given: Any) -> Any:
@@ -255,5 +257,5 @@ def _not_required(option: click.Option) -> click.Option:
 
 
 def core_click_options() -> dict[str, click.Option]:
-    """All options of cores and methods by their names."""
+    """Return all options of cores and methods by their names."""
     return {option.opts[0].removeprefix("--"): option for option in (*_common(), *own_click_options())}

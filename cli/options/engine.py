@@ -39,7 +39,8 @@ _ENGINE_OPTIONS = [
 
 
 def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: handed to the command as `engine`, a name, and `window`, a function of spec and number of clocks.
+    """Decorate a command: handed to the command as `engine`, a name, and `window`, a function of spec and number of
+    clocks.
 
     The function gives the first clock of the waveform and the one after the last; ValueError if there is none.
     """
@@ -61,7 +62,7 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _clock(what: str, text: str, spec: TachometerSpec) -> int:
-    """The clock in which an instant lies."""
+    """Return the clock in which an instant lies."""
     if text.isdecimal():
         return int(text)
     seconds = parse_time(what, text)

@@ -36,7 +36,9 @@ _OPTIONS = [
 
 
 def loop_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator below that of the axes: `spec` is that of a core with a control loop, if there is to be one."""
+    """Decorate a command, below that of the axes: `spec` is that of a core with a control loop, if there is to be
+    one.
+    """
 
     @functools.wraps(command)
     def build(*, spec: CoreSpec, loop: bool, **others: Any) -> Any:
@@ -58,7 +60,7 @@ def _alone(spec: CoreSpec, texts: dict[str, str]) -> CoreSpec:
 
 
 def of_loop(spec: CoreSpec, texts: dict[str, str]) -> AnySpec:
-    """A core with a control loop, from texts of its options by their names.
+    """Return a core with a control loop, from texts of its options by their names.
 
     Raises
     ------

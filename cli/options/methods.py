@@ -10,7 +10,7 @@ from tachometry.spec import METHODS, TachometerSpec
 
 @dataclass(frozen=True)
 class Methods:
-    """What a list of methods names.
+    """Holds the methods of a list.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class Methods:
 
 
 def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Methods:
-    """The methods of a list with commas, `all` being every method and all `others`.
+    """Return the methods of a list with commas, `all` being every method and all `others`.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
 
 
 def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, Texts]]:
-    """What is in a list with commas: each with its method, None of `others`, and what is given of its options.
+    """Return what is in a list with commas: each with its method, None of `others`, and what is given of its options.
 
     Raises
     ------

@@ -138,7 +138,7 @@ _OPTIONS = [
 
 
 def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the options of the virtual encoder, handed to the command as two arguments.
+    """Decorate a command: the options of the virtual encoder, handed to the command as two arguments.
 
     `record` gives what the encoder of a spec, or that of an axis, records of the motion; `tables` are the files that it
     reads.
@@ -147,7 +147,8 @@ def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def disc_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the motion, and what may be wrong with the disc and its edges where a loop is closed about them.
+    """Decorate a command: the motion, and what may be wrong with the disc and its edges where a loop is closed about
+    them.
 
     They are handed over as `motion`, `jitter`, `nonuniformity`, `phase_error_deg`, `duty_error_deg` and `seed`.
     """
@@ -159,17 +160,19 @@ def disc_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def optional_motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: as `motion_options`, but without a motion `record` is None."""
+    """Decorate a command as `motion_options`, but without a motion `record` is None."""
     return all_of([_motion(required=False), *_OPTIONS], _recording(command))
 
 
 def encoder_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: as `motion_options`, but handed over as `motion`, a text, and `encoder`, a function of a spec."""
+    """Decorate a command as `motion_options`, but handed over as `motion`, a text, and `encoder`, a function of a
+    spec.
+    """
     return all_of([_motion(required=True), *_OPTIONS], _encoding(command))
 
 
 def tables_of(motion: str) -> list[Path]:
-    """Files that a motion reads, or the motions of several axes."""
+    """Return files that a motion reads, or the motions of several axes."""
     parts = [part.strip().partition(":") for part in {motion, *motion.split(",")}]
     return [Path(table) for kind, _, table in parts if kind == "csv"]
 

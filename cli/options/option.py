@@ -18,7 +18,7 @@ _OPTIONS: dict[str, str] = {}
 
 
 def told(error: ValueError) -> str:
-    """What is wrong, with the option in place of a parameter: "--max-time, in ticks, must be …"."""
+    """Return what is wrong, with the option in place of a parameter: "--max-time, in ticks, must be …"."""
     if not isinstance(error, ParameterError):
         return str(error)
     name, _, part = error.parameter.partition(" ")
@@ -85,7 +85,7 @@ class Later(click.Option):
 
 
 def later(name: str, make: Callable[[], Sequence[click.Option]]) -> Callable[[Command], Command]:
-    """Decorator: the options that `make` gives when the command runs, in this place."""
+    """Decorate a command: the options that `make` gives when the command runs, in this place."""
     return click.option(f"--{name}", cls=Later, make=make, hidden=True)
 
 
@@ -117,12 +117,12 @@ class GroupedCommand(click.Command):
 
 
 def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Command]:
-    """Decorator for an option in a group; defaults are shown."""
+    """Decorate a command with an option in a group; defaults are shown."""
     return click.option(*names, cls=Option, group=group, show_default=True, **attributes)
 
 
 def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:
-    """See that none of some options is given to the running command: without another one they have no effect.
+    """Check that none of some options is given to the running command: without another one they have no effect.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:
 
 
 def all_of(options: list[Callable[[Any], Any]], command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command with all of these options, in order."""
+    """Return a command with all of these options, in order."""
     for decorate in reversed(options):
         command = decorate(command)
     return command
@@ -172,13 +172,13 @@ def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | N
 
 
 def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
-    """Decorator for an option that names a file to be written, with one of some suffixes."""
+    """Decorate a command with an option that names a file to be written, with one of some suffixes."""
     callback = _suffix(*suffixes) if suffixes else None
     return option(_OUTPUTS, name, type=FilePath(), metavar="FILE", callback=callback, help=help)
 
 
 def output_folder(default: str, *, help: str) -> Callable[[Any], Any]:
-    """Decorator for the option that names the folder of all outputs, handed to the command as `directory`."""
+    """Decorate a command with the option that names the folder of all outputs, handed to the command as `directory`."""
     kind = FilePath(file_okay=False)
     return option(_OUTPUTS, "-o", "--output", "directory", type=kind, default=default, metavar="DIR", help=help)
 
@@ -211,7 +211,8 @@ _OUTPUT_OPTIONS = [
 
 
 def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator: the outputs of a simulation, handed to the command as `targets`, a dictionary of option to path.
+    """Decorate a command: the outputs of a simulation, handed to the command as `targets`, a dictionary of option to
+    path.
 
     A `.gtkw` comes with `--vcd`.
     """

@@ -10,11 +10,11 @@ ENCODER = click.command("sweep")(encoder_options(lambda encoder, motion: (encode
 
 
 def by_name(command: click.Command) -> dict[str, click.Option]:
-    """The options of a command by their names, without dashes."""
+    """Return the options of a command by their names, without dashes."""
     options = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
     return {option.opts[0].lstrip("-"): option for option in options}
 
 
 def point_options() -> dict[str, click.Option]:
-    """All options that a sweep can vary, by their names."""
+    """Return all options that a sweep can vary, by their names."""
     return core_click_options() | by_name(ENCODER)

@@ -1,1 +1,1 @@
-"""What commands print."""
+"""Reports format results for the terminal and for files."""

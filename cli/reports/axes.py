@@ -1,4 +1,4 @@
-"""What commands print of a core of many axes."""
+"""Commands print these lines of a core of many axes."""
 
 from collections.abc import Sequence
 
@@ -88,7 +88,7 @@ def _of_axis(spec: AxesSpec, run: Run, axis: int, truth: Encoding | None) -> str
 
 
 def _counts_in(spec: AxesSpec, ticks: int, axis: int, truth: Encoding) -> int:
-    """Counts that the shaft has made from the first look at an axis to the last one of the last tick."""
+    """Return counts that the shaft has made from the first look at an axis to the last one of the last tick."""
     latency = spec.axis.pin_to_count
     clocks = np.array([spec.look(axis, latency), spec.look(axis, ticks * spec.rounds - 1)]) - latency
     first, last = truth.true_position(clocks / spec.timing.clock_hz, spec.axis.encoder.decoding)

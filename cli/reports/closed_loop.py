@@ -1,4 +1,4 @@
-"""What `tachometry loop` prints and writes."""
+"""`tachometry loop` prints and writes these results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `compare` prints and writes: a row per method, with sizes if they were measured; and what settings cost."""
+"""`compare` prints and writes a row per method, with sizes if they were measured, and the cost of settings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
 
 
 def shown_time(seconds: float) -> str:
-    """A time to four digits."""
+    """Return a time to four digits."""
     return format_time(Fraction(f"{seconds:.4g}"))
 
 

@@ -1,4 +1,4 @@
-"""What `generate` and `plan` print of a core: what it is, what it measures, and how wide and late its outputs are."""
+"""`generate` and `plan` print what a core is, what it measures, and how wide and late its outputs are."""
 
 import math
 from fractions import Fraction
@@ -20,7 +20,7 @@ def print_core(spec: TachometerSpec, bus: str = "none") -> None:
 
 
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
-    """Rows of the table: a name and its value."""
+    """Return rows of the table: a name and its value."""
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
     greatest = f"{speed_text(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
@@ -50,7 +50,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
 
 
 def full_scale_text(spec: TachometerSpec, full_scale: int) -> str:
-    """A greatest velocity in LSB, in the unit of a core and in rad/s."""
+    """Return a greatest velocity in LSB, in the unit of a core and in rad/s."""
     value = f"{full_scale * 2.0**-spec.frac_bits:.9g} {spec.unit}"
     if spec.unit == NATIVE:
         value += f" = {full_scale * spec.rad_per_s_per_lsb:.6g} rad/s"
@@ -67,7 +67,7 @@ def _full_scale(spec: TachometerSpec) -> str:
 
 
 def _resolution(spec: TachometerSpec) -> list[tuple[str, str]]:
-    """What the equations of the method promise at the ends of its range."""
+    """Return what the equations of the method promise at the ends of its range."""
     found, unit, rows = plan_at(spec, default_range(spec)), spec.shown_unit, []
     columns = zip(("low", "high"), found.speed, found.resolution, found.measurement_time, strict=True)
     for name, speed, resolution, time in columns:
@@ -84,14 +84,14 @@ def _resolution(spec: TachometerSpec) -> list[tuple[str, str]]:
 
 
 def registers_row(spec: AnySpec, bus: str) -> tuple[str, str]:
-    """How many registers a core has on a bus."""
+    """Tell how many registers a core has on a bus."""
     registers = registers_of(spec)
     number = len(registers.registers)
     return "registers", f"{number} of {WORD} bits on {bus}, configuration 0x{registers.configuration:08x}"
 
 
 def memory_text(kind: str, entries: int, width: int) -> str:
-    """A memory, and how many bits it has."""
+    """Return a memory, and how many bits it has."""
     return f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"
 
 
@@ -102,10 +102,10 @@ def _standstill(spec: TachometerSpec) -> str:
 
 
 def speed_text(rad_per_s: float) -> str:
-    """A speed in all units."""
+    """Return a speed in all units."""
     return " = ".join(f"{SpeedUnit(unit).of(rad_per_s):.6g} {unit}" for unit in SPEED)
 
 
 def short_time(seconds: Fraction | float) -> str:
-    """A time to four digits."""
+    """Return a time to four digits."""
     return format_time(Fraction(f"{float(seconds):.4g}"))

@@ -1,4 +1,4 @@
-"""What `generate` prints of a core with a control loop."""
+"""`generate` prints these lines of a core with a control loop."""
 
 from tachometry.cli.reports.core import configuration, registers_row, short_time
 from tachometry.cli.reports.terminal import print_rows

@@ -1,4 +1,4 @@
-"""What `monitor` shows of a board: a live view, or plain lines."""
+"""`monitor` shows a board in a live view, or by plain lines."""
 
 import sys
 import time
@@ -32,7 +32,7 @@ _SATURATED = 255
 
 @dataclass
 class State:
-    """What is known of a board.
+    """Holds the state of a board.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class State:
             self.history.popleft()
 
     def value(self, name: str) -> Value:
-        """A value of the latest frame, None if there is none."""
+        """Return a value of the latest frame, None if there is none."""
         return self.columns[name].value(self.frame.snapshot) if self.frame and name in self.columns else None
 
 
@@ -167,12 +167,12 @@ class LiveView:
 
 
 def display(plain: bool) -> Display:
-    """The live view if stdout is a terminal, and plain lines otherwise."""
+    """Return the live view if stdout is a terminal, and plain lines otherwise."""
     return PlainLines() if plain or not sys.stdout.isatty() else LiveView()
 
 
 def line(state: State) -> str:
-    """The state in a line."""
+    """Return the state in a line."""
     assert state.frame is not None
     parts = [f"{state.frame.time:.3f} s", *(f"{name} {text}" for name, text in _measured(state))]
     parts += [f"{name} {text}" for name, text in [*_wrong(state), *_received(state)]]
@@ -180,7 +180,7 @@ def line(state: State) -> str:
 
 
 def view(state: State, width: int, height: int) -> RenderableType:
-    """A picture of the state, so many columns wide and lines high."""
+    """Return a picture of the state, so many columns wide and lines high."""
     head = Text(printable(state.title), style="bold", no_wrap=True, overflow="ellipsis")
     foot = Text(no_wrap=True, overflow="ellipsis")
     if state.waits_for:
@@ -207,7 +207,7 @@ def view(state: State, width: int, height: int) -> RenderableType:
 
 
 def plot(state: State, width: int, height: int) -> Text:
-    """Speed, and its bounds, over the last seconds."""
+    """Return speed, and its bounds, over the last seconds."""
     figure = plotext()
     figure.clear_figure()
     figure.theme("clear")
@@ -227,7 +227,7 @@ def plot(state: State, width: int, height: int) -> Text:
 
 
 def plotext() -> Any:
-    """The module that draws in text.
+    """Return the module that draws in text.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What `tachometry plan` prints: the configuration, and tables over speed."""
+"""`tachometry plan` prints the configuration, and tables over speed."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What a command prints about the results of a run."""
+"""Commands print these lines about a run."""
 
 import math
 import sys
@@ -48,7 +48,7 @@ def print_warnings(warnings: list[str]) -> None:
 
 
 def merged_edges(recording: Recording, clock_hz: int, n_clocks: int) -> list[str]:
-    """A warning if the clock is too slow for the edges of its first `n_clocks`."""
+    """Return a warning if the clock is too slow for the edges of its first `n_clocks`."""
     merged = recording.n_merged(clock_hz, n_clocks)
     if not merged:
         return []
@@ -59,7 +59,7 @@ def merged_edges(recording: Recording, clock_hz: int, n_clocks: int) -> list[str
 
 
 def _warnings(spec: TachometerSpec, run: Run, recording: Recording, truth: Encoding | None) -> list[str]:
-    """Why the core cannot have counted what the shaft did."""
+    """Tell why the core cannot have counted what the shaft did."""
     found = merged_edges(recording, spec.timing.clock_hz, run.n_clocks)
     if truth is None and (together := recording.n_together):
         found.append(
@@ -72,7 +72,7 @@ def _warnings(spec: TachometerSpec, run: Run, recording: Recording, truth: Encod
 
 
 def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches: int) -> list[tuple[str, str]]:
-    """Rows of the table: a name and its value."""
+    """Return rows of the table: a name and its value."""
     updates = run.updates
     n_overflows = int(np.count_nonzero(run.ticks.overflow))
     rows = [
@@ -102,13 +102,13 @@ def summary(spec: TachometerSpec, run: Run, truth: Encoding | None, n_mismatches
 
 
 def counts_in(spec: TachometerSpec, run: Run, truth: Encoding) -> int:
-    """Counts that the shaft has made up to the pin sample that the last tick can hold."""
+    """Return counts that the shaft has made up to the pin sample that the last tick can hold."""
     clock = int(run.ticks.clock[-1]) - spec.tick_latency - spec.pin_to_count
     return int(truth.true_position(_sampled(max(clock, 0), spec.timing.clock_hz), spec.encoder.decoding))
 
 
 def _sampled(clock: int, clock_hz: int) -> float:
-    """The last instant that `Recording.place` puts at or before clock edge `clock`, in seconds."""
+    """Return the last instant that `Recording.place` puts at or before clock edge `clock`, in seconds."""
     instant = clock / clock_hz
     while instant * clock_hz > clock:
         instant = math.nextafter(instant, 0)
@@ -123,7 +123,7 @@ def _counts_out(spec: TachometerSpec, run: Run) -> int:
 
 
 def _difference(spec: TachometerSpec, run: Run, truth: Encoding) -> int:
-    """Counts out less counts in; the position may have wrapped."""
+    """Return counts out less counts in; the position may have wrapped."""
     half = 1 << (spec.position_width - 1)
     return (_counts_out(spec, run) - counts_in(spec, run, truth) + half) % (2 * half) - half
 
@@ -160,7 +160,7 @@ def _errors(spec: TachometerSpec, run: Run, truth: Encoding | None) -> list[tupl
 
 
 def verdict(run: Run, n_mismatches: int, warned: bool) -> Text:
-    """The last line: whether hardware and golden model agree."""
+    """Return the last line: whether hardware and golden model agree."""
     if n_mismatches:
         return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
     only = "; neither was compared with the shaft: see the warning" if warned else ""

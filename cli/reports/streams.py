@@ -40,5 +40,5 @@ def silence(stream: TextIO) -> None:
 
 
 def printable(text: str) -> str:
-    """A text without the characters that a terminal would obey: it may come from a file. Line ends stay."""
+    """Return a text without the characters that a terminal would obey: it may come from a file. Line ends stay."""
     return text if text.isprintable() else "".join(c for c in text if c.isprintable() or c == "\n")

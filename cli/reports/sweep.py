@@ -1,4 +1,4 @@
-"""What `tachometry sweep` prints at its end."""
+"""`tachometry sweep` prints this at its end."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _number(value: float | None, scale: float = 1, unit: str = "") -> str:
 
 
 def _time(seconds: float | None) -> str:
-    """A time to three digits."""
+    """Return a time to three digits."""
     if seconds is None:
         return "-"
     return ("-" if seconds < 0 else "") + format_time(Fraction(f"{abs(seconds):.3g}"))

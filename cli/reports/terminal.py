@@ -1,4 +1,4 @@
-"""What goes to the terminal: tables on stdout, and progress on stderr."""
+"""Tables go to stdout, and progress to stderr."""
 
 import sys
 import threading
@@ -32,7 +32,7 @@ _GAP = 2  # columns between two of a table
 
 @contextmanager
 def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[Callable[[float], None] | None]:
-    """A function to be called with how much of `total` is done.
+    """Yield a function to be called with how much of `total` is done.
 
     It shows a bar on stderr as soon as the work is seen to take more than two seconds; None if stderr is no terminal.
     """
@@ -61,7 +61,9 @@ def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[
 
 @contextmanager
 def activity() -> Iterator[Callable[[str], None]]:
-    """A function to be told what is being done; after two seconds it is shown on stderr, if that is a terminal."""
+    """Yield a function to be told what is being done; after two seconds it is shown on stderr, if
+    that is a terminal.
+    """
     if not sys.stderr.isatty():
         yield lambda what: None
         return
@@ -78,7 +80,7 @@ def activity() -> Iterator[Callable[[str], None]]:
 
 
 def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
-    """A progress bar of the clocks that are simulated."""
+    """Return a progress bar of the clocks that are simulated."""
     return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), PerSecond("clocks"))
 
 
@@ -105,7 +107,7 @@ class _Console(Console):
 
 
 def stdout_console() -> Console:
-    """Where to print: as wide as the terminal, or without breaking a line if there is none."""
+    """Tell where to print: as wide as the terminal, or without breaking a line if there is none."""
     return _Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
 
 
@@ -146,7 +148,7 @@ def print_table(heads: Sequence[str], rows: Iterable[Sequence[str]], left: Colle
 
 
 def _parts(widths: Sequence[int], room: int) -> list[list[int]]:
-    """Columns that fit beside each other, the first in every part."""
+    """Return columns that fit beside each other, the first in every part."""
     parts, used = [[0]], widths[0]
     for column, width in enumerate(widths[1:], 1):
         if used + _GAP + width > room and len(parts[-1]) > 1:

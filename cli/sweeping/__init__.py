@@ -1,1 +1,1 @@
-"""What a sweep is asked for, and the points that it consists of."""
+"""A sweep has settings, from which its points follow."""

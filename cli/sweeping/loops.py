@@ -18,7 +18,7 @@ Loops = Found[LoopPoint]
 
 
 def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
-    """All loops.
+    """Return all loops.
 
     Parameters
     ----------

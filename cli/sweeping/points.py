@@ -38,7 +38,7 @@ Item = TypeVar("Item", bound=_Digested)
 
 @dataclass(frozen=True)
 class Found(Generic[Item]):
-    """What is to be run.
+    """Holds the points that are to be run.
 
     Parameters
     ----------
@@ -107,12 +107,12 @@ class Points(Found[Point]):
 
     @property
     def values(self) -> list[str]:
-        """What is varied within the motion."""
+        """Values that are varied within the motion."""
         return list(dict.fromkeys(name for point in self.points.values() for name in point.values))
 
 
 def points_of(settings: Settings, methods: str, earliest: float, engine: str | None) -> Points:
-    """All points of a sweep.
+    """Return all points of a sweep.
 
     An option that not all methods have is for those that have it; `tick` is not for a method that has its `dt`.
 
@@ -144,7 +144,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
 
 
 def has_option(settings: Settings, method: str, name: str) -> bool:
-    """Whether an option is for a method."""
+    """Tell whether an option is for a method."""
     own_ticks = METHODS[method].own_ticks
     if name == "dt":
         return own_ticks
@@ -181,7 +181,9 @@ class _Maker:
         self._spec, self._encoder, self._motion = cache(_spec), cache(_parsed_encoder), cache(parse_motion)
 
     def point(self, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> Point:
-        """The point of a method, of whose options some are given, with texts of options and of names in the motion."""
+        """Return the point of a method, of whose options some are given, with texts of options and of names in the
+        motion.
+        """
         core = {key: texts[key] for key in core_click_options() if key in texts} | dict(given)
         spec = self._spec(method, tuple(core.items()))
         encoder, motion = self._encoder(_words(texts, ENCODER))

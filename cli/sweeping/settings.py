@@ -1,4 +1,4 @@
-"""What a sweep is given: options and axes, of a file and of the command line, as texts by the names of the options."""
+"""The settings of a sweep are texts by the names of options, from a file and from the command line."""
 
 import re
 import tomllib
@@ -37,18 +37,18 @@ class Settings:
     vary: dict[str, list[Text]] = field(default_factory=dict)
 
     def over(self, other: "Settings") -> "Settings":
-        """These settings, and from the others what these leave open; axes are in the order of the others."""
+        """Return these settings, and from the others what these leave open; axes are in the order of the others."""
         fixed = {name: text for name, text in other.fixed.items() if name not in self.vary}
         vary = {name: values for name, values in other.vary.items() if name not in self.fixed}
         return Settings(fixed | self.fixed, vary | self.vary)
 
     def first(self) -> dict[str, Text]:
-        """All options, with the first value of every axis."""
+        """Return all options, with the first value of every axis."""
         return self.fixed | {name: values[0] for name, values in self.vary.items()}
 
 
 def of_command_line(raw: Mapping[str, Any], options: Mapping[str, click.Option]) -> Settings:
-    """Settings of what click's parser has found, by the names of its parameters."""
+    """Return settings of what click's parser has found, by the names of its parameters."""
     fixed = {}
     for name, option in options.items():
         if name != "vary" and (given := raw.get(option.name or "")) is not None:
@@ -65,7 +65,7 @@ def of_command_line(raw: Mapping[str, Any], options: Mapping[str, click.Option])
 
 
 def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
-    """Settings of a TOML file: keys are names of options, and axes stand in its table `vary`.
+    """Return settings of a TOML file: keys are names of options, and axes stand in its table `vary`.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
 
 
 def arguments(texts: Mapping[str, Text], options: Mapping[str, click.Option]) -> list[str]:
-    """These settings as words of a command line."""
+    """Return these settings as words of a command line."""
     words = []
     for name, text in texts.items():
         option = options[name]
@@ -112,7 +112,7 @@ def arguments(texts: Mapping[str, Text], options: Mapping[str, click.Option]) ->
 
 
 def yes(name: str, text: str) -> bool:
-    """What the text of a flag says."""
+    """Return what the text of a flag says."""
     return parse_flag(f"--{name}", text)
 
 
@@ -143,7 +143,7 @@ def _items(name: str, value: Any) -> list[str]:
 
 
 def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]) -> list[Text]:
-    """Values of an axis: items are values, `none`, or ranges."""
+    """Return values of an axis: items are values, `none`, or ranges."""
     option = options.get(name)
     found: list[Text] = []
     for item in (item.strip() for item in items):
@@ -165,7 +165,9 @@ def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]
 
 
 def _range(name: str, item: str, match: re.Match[str], whole: bool) -> list[str]:
-    """Values from LO to HI, evenly spaced or as their logarithms are; whole numbers between plain whole numbers."""
+    """Return values from LO to HI, evenly spaced or as their logarithms are; whole numbers between plain whole
+    numbers.
+    """
     low, high, count, log = Fraction(match[1]), Fraction(match[3]), int(match[5]), match[6]
     unit = match[2] or match[4]
     if match[4] != unit:

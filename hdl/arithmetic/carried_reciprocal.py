@@ -9,7 +9,7 @@ from tachometry.spec.formats import carried_reciprocal
 
 
 def _less_another(total: Signal, more: Value, q: Signal, borrow: Value) -> Value:
-    """total + more − (q − borrow) with one carry: sums and carries of every bit first, which a LUT forms."""
+    """Return total + more − (q − borrow) with one carry: sums and carries of every bit first, which a LUT forms."""
     width = len(total)
     one, two, three = total, Cat(more, Const(0, width))[:width], ~Cat(q, Const(0, width))[:width]
     sums, carries = one ^ two ^ three, (one & two) | (one & three) | (two & three)

@@ -78,12 +78,14 @@ class Divider(wiring.Component):
         self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)
 
     def next_digit_of(self, number: int) -> Value:
-        """What `digit` would be in the clock after this one if the quotient were this number."""
+        """Return what `digit` would be in the clock after this one if the quotient were this number."""
         place = self._left[: (self._steps - 1).bit_length()]
         return Array(number >> self._reached(k) & 1 for k in range(1 << len(place)))[place]
 
     def _reached(self, place: int) -> int:
-        """The place of a digit that stands for one beyond them: most bits are the same, so few have to be looked at."""
+        """Return the place of a digit that stands for one beyond them: most bits are the same, so few have to be looked
+        at.
+        """
         for bit in reversed(range(place.bit_length() - 1)):
             if place < self._steps:
                 break
@@ -126,7 +128,7 @@ class Divider(wiring.Component):
 
     @property
     def _scaled(self) -> Value:
-        """What is divided."""
+        """The dividend."""
         scale, zeros = self._scale_bits, self._zeros
         if not self._nearest:
             return self.dividend << scale

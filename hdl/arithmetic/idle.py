@@ -1,4 +1,4 @@
-"""What a simulation may skip: clocks in which counters count or a division goes on, and nothing else happens."""
+"""A simulation may skip clocks in which counters count or a division goes on, and nothing else happens."""
 
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
@@ -33,7 +33,7 @@ class IdleCounter:
         return (self.path,)
 
     def within(self, box: str) -> "IdleCounter":
-        """The same from outside of a box."""
+        """Return the same from outside of a box."""
         return replace(self, path=f"{box}.{self.path}")
 
 
@@ -60,7 +60,7 @@ class IdleDivision:
         return (self.digits, self.less_one)
 
     def within(self, box: str) -> "IdleDivision":
-        """The same from outside of a box."""
+        """Return the same from outside of a box."""
         digits, less_one, m = (f"{box}.{path}" for path in (self.digits, self.less_one, self.m))
         return replace(self, digits=digits, less_one=less_one, m=m)
 

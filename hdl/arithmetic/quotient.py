@@ -15,7 +15,7 @@ from tachometry.spec.formats import carried_reciprocal, reciprocal
 
 
 class _Scaler(Protocol):
-    """What all scalers have."""
+    """Describes the ports that all scalers have."""
 
     load: Signal
     start: Signal
@@ -28,7 +28,7 @@ class _Scaler(Protocol):
 
 @runtime_checkable
 class _TakesRemainder(Protocol):
-    """What a scaler for a carried reciprocal has in addition."""
+    """Describes the ports that a scaler for a carried reciprocal has in addition."""
 
     r: Signal
 

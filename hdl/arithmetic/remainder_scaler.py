@@ -16,14 +16,14 @@ from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 
 
 def _reduce(remainder: Value, multiple: Value) -> Value:
-    """remainder − multiple, or + multiple if it is negative: one adder, into which an additional bit carries."""
+    """Return remainder − multiple, or + multiple if it is negative: one adder, into which an additional bit carries."""
     subtract = ~remainder[-1]
     operand = Cat(subtract, multiple ^ subtract.replicate(len(multiple)), subtract).as_signed()
     return (Cat(1, remainder).as_signed() + operand) >> 1
 
 
 def _rounded(total: Value, quotient: Value, up: Value) -> Value:
-    """total + quotient, and one more if `up`: one adder."""
+    """Return total + quotient, and one more if `up`: one adder."""
     return (Cat(1, total).as_signed() + Cat(up, quotient).as_signed()) >> 1
 
 
@@ -82,7 +82,7 @@ class RemainderScaler(wiring.Component):
         )
 
     def _up(self, doubled: Value, m: Value) -> Value:
-        """Whether ⌊N·R/m⌋ must be increased by one; `doubled` is twice its remainder, less m."""
+        """Tell whether ⌊N·R/m⌋ must be increased by one; `doubled` is twice its remainder, less m."""
         nearest = ~doubled[-1]
         return (nearest, doubled + m != 0, Const(0))[self._towards]
 

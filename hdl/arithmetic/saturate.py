@@ -4,7 +4,7 @@ from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
 
 
 def saturate(m: Module, value: Signal, limit: int) -> tuple[Signal, Signal]:
-    """`value` held within −limit … +limit, and a flag that is high where that changed it."""
+    """Return `value` held within −limit … +limit, and a flag that is high where that changed it."""
     held = Signal(signed(limit.bit_length() + 1))
     changed = Signal()
     if limit >> (len(value) - 1):  # no value is as large
@@ -27,7 +27,7 @@ def raised_for(most: int, limit: int) -> int:
 
 
 def saturate_raised(m: Module, raised: Signal, limit: int) -> tuple[Signal, Signal]:
-    """As `saturate`, of `raised` − `raised_for(…)`, with half of the cells.
+    """Return as `saturate`, of `raised` − `raised_for(…)`, with half of the cells.
 
     All numbers within the bounds have the same upper bits, 0, so none of these is compared with a sign. A number that
     is held within its bounds keeps its sign.
@@ -54,7 +54,9 @@ def saturate_raised(m: Module, raised: Signal, limit: int) -> tuple[Signal, Sign
 
 
 def _bit_held(bit: Value, changed: Signal, sign: Signal, limit: int, place: int) -> Value:
-    """A bit of the number, or that of +`limit` or −`limit` if `changed`: most are the same in both, or need no Mux."""
+    """Return a bit of the number, or that of +`limit` or −`limit` if `changed`: most are the same in both, or need no
+    Mux.
+    """
     kept = ~changed & bit
     match limit >> place & 1, -limit >> place & 1:
         case 1, 1:
@@ -67,14 +69,14 @@ def _bit_held(bit: Value, changed: Signal, sign: Signal, limit: int, place: int)
 
 
 def _beyond(value: Signal, limit: int) -> Value:
-    """Whether |value| is greater than `limit`."""
+    """Tell whether |value| is greater than `limit`."""
     negative = value[-1]
     # value ^ negative is |value|, or one less if it is negative; then equal is beyond, too.
     return _exceeds(value[:-1] ^ negative.replicate(len(value) - 1), limit, negative)
 
 
 def _exceeds(size: Value, limit: int, equal: Value) -> Value:
-    """Whether size > limit, or `equal` if it is the same, by gates of few bits.
+    """Tell whether size > limit, or `equal` if it is the same, by gates of few bits.
 
     A carry chain is slower up to a dozen bits.
     """

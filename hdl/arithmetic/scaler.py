@@ -16,7 +16,7 @@ from tachometry.spec.formats.reciprocal import Reciprocal
 
 
 class _Scaler(wiring.Component):
-    """What all scalers share.
+    """Holds the parts that all scalers share.
 
     Parameters
     ----------
@@ -104,11 +104,13 @@ class _SerialScaler(_Scaler):
         return m
 
     def _next_digit(self, m: Module) -> Value:
-        """The two bits that tell a digit, and the one below them first; another digit in every clock after `load`."""
+        """Return the two bits that tell a digit, and the one below them first; another digit in every clock after
+        `load`.
+        """
         raise NotImplementedError
 
     def _sum(self, m: Module, adds: Value, addend: Value, carry: Value) -> Value:
-        """The quotient from the sum of all products, of which `addend` and `carry` are the last.
+        """Return the quotient from the sum of all products, of which `addend` and `carry` are the last.
 
         Where `adds` is high, they are added to what is kept.
         """
@@ -181,7 +183,7 @@ class WideSerialScaler(_SerialScaler):
 
 
 def _increment(bits: Value, by: Value) -> tuple[Value, Value]:
-    """Two bits with another one added, and what is carried: without an adder, whose chain would be longer."""
+    """Return two bits with another one added, and what is carried: without an adder, whose chain would be longer."""
     return Cat(bits[0] ^ by, bits[1] ^ (bits[0] & by)), bits[0] & bits[1] & by
 
 

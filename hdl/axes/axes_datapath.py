@@ -79,7 +79,7 @@ class AxesDatapath(wiring.Component):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """What a waveform should show of the inside."""
+        """Signals of the inside that a waveform should show."""
         return {"turn": self.turns.axis, "m_s": self.window.state.m_s, "numerator": self.window.numerator}
 
     def elaborate(self, platform: object) -> Module:
@@ -154,7 +154,7 @@ class AxesDatapath(wiring.Component):
         return m
 
     def _stored(self, m: Module, after: data.View, decides: Value) -> Value | data.View:
-        """The state of the axis that has its turn, as it was; it becomes `after` where it decides."""
+        """Return the state of the axis that has its turn, as it was; it becomes `after` where it decides."""
         if self._spec.axes == 1:
             only = Signal.like(after, reset_less=True)  # Verilog has no addresses of no bits
             with m.If(decides):

@@ -100,5 +100,5 @@ class AxisCounters(wiring.Component):
 
 
 def of_slot(lines: Signal, slot: Signal) -> Value:
-    """The line of the axis whose slot it is; those of nobody stay low."""
+    """Return the line of the axis whose slot it is; those of nobody stay low."""
     return Cat(lines, Const(0, 1 << len(slot))).bit_select(slot, 1)

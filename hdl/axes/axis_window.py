@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 
 class AxisWindow(wiring.Component):
-    """What `AlterationDetector` and `IntervalAccumulator` do together; their registers come in and go out. No latency.
+    """Does the work of `AlterationDetector` and `IntervalAccumulator`; their registers come in and go out. No latency.
 
     Parameters
     ----------

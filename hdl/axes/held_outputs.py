@@ -1,4 +1,4 @@
-"""What was last shown of every axis."""
+"""The outputs of every axis are held."""
 
 from collections.abc import Mapping, Sequence
 

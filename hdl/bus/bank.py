@@ -103,7 +103,7 @@ class RegisterBank(wiring.Component):
         return m
 
     def _settings(self, m: Module, here: dict[str, Value]) -> dict[str, Value]:
-        """The settings by their names, as they are read."""
+        """Return the settings by their names, as they are read."""
         read: dict[str, Value] = {}
         for register in self._map:
             for field in register.fields:
@@ -120,7 +120,7 @@ class RegisterBank(wiring.Component):
         return read
 
     def _counts(self, m: Module, *, lost: Value) -> dict[str, Value]:
-        """The counters of COUNTERS by their names."""
+        """Return the counters of COUNTERS by their names."""
         events = {"decode_errors": self.decode_error, "overflows": self.tick & self.overflow, "lost_updates": lost}
         if hasattr(self, "tick_error"):
             events["tick_errors"] = self.tick_error
@@ -137,7 +137,7 @@ def _shape(field: Field) -> Shape:
 
 
 def _shapes(fields: Iterable[Field]) -> dict[str, tuple[Shape, int]]:
-    """Shapes and resets of the ports that fields set, some of them in two words, the upper one with the sign."""
+    """Return shapes and resets of the ports that fields set, some of them in two words, the upper one with the sign."""
     found: dict[str, tuple[Shape, int]] = {}
     for field in fields:
         _, init = found.get(field.port, (None, 0))
@@ -146,7 +146,7 @@ def _shapes(fields: Iterable[Field]) -> dict[str, tuple[Shape, int]]:
 
 
 def _held(m: Module, field: Field, given: Value) -> Value:
-    """What is written, held within what the field can have."""
+    """Return what is written, held within what the field can have."""
     assert field.least is not None
     assert field.most is not None
     word = given.as_signed() if field.signed else given
@@ -157,7 +157,7 @@ def _held(m: Module, field: Field, given: Value) -> Value:
 
 
 def _word(m: Module, register: Register, shown: dict[str, Value]) -> Value:
-    """What a register reads when its fields show this."""
+    """Return what a register reads when its fields show this."""
     word = Signal(WORD, name=register.name.lower())
     for field in register.fields:
         if register.constant:

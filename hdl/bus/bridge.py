@@ -1,4 +1,4 @@
-"""What all bridges from a bus to the native port share."""
+"""All bridges from a bus to the native port share this."""
 
 from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
@@ -34,7 +34,7 @@ class Bridge(wiring.Component):
 
 
 def next_number(count: Signal) -> Value:
-    """The number after a count of a few bits, of which each takes a gate; a carry chain takes more."""
+    """Return the number after a count of a few bits, of which each takes a gate; a carry chain takes more."""
     return Cat(bit ^ count[:place].all() if place else ~bit for place, bit in enumerate(count))
 
 

@@ -7,7 +7,8 @@ from tachometry.spec.registers.map import WORD
 
 
 def native_port(address_width: int) -> wiring.Signature:
-    """An access is a clock with `read` or `write`; its answer is there in the clock after it, for that clock only.
+    """Return an access is a clock with `read` or `write`; its answer is there in the clock after it, for that clock
+    only.
 
     Members
     -------

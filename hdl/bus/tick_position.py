@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 
 class TickPosition(wiring.Component):
-    """What `position` was in the clock of the latest tick, that of a tick in this clock included.
+    """Keeps `position` of the clock of the latest tick, that of a tick in this clock included.
 
     Latency: none. Where `open_sum` is the sum of all steps since, and nothing sets the position to 0, a subtraction
     gives it without a register.

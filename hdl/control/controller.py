@@ -185,7 +185,7 @@ class Controller(wiring.Component):
         return m
 
     def _limited(self, m: Module, value: Signal) -> tuple[Signal, Signal]:
-        """What `saturate` gives, with the limit that is an input."""
+        """Return what `saturate` gives, with the limit that is an input."""
         form = self._form
         limit = Signal(range(form.current_limit + 1), name="most")
         m.d.sync += limit.eq(Mux(self.current_limit > form.current_limit, form.current_limit, self.current_limit))
@@ -196,7 +196,7 @@ class Controller(wiring.Component):
         return limited, changed
 
     def _factor(self, m: Module, term: Signal, load: Value) -> Value:
-        """The coefficient of a term, valid in the clock after `load`."""
+        """Return the coefficient of a term, valid in the clock after `load`."""
         form = self._form
         values: dict[Term, ValueLike] = {one: each.values[0] for one, each in form.terms.items()}
         if form.gain_bits:
@@ -209,7 +209,7 @@ class Controller(wiring.Component):
         return factor
 
     def _tabled(self, m: Module, term: Signal, load: Value) -> Value:
-        """A coefficient that depends on n: equal tables are one."""
+        """Return a coefficient that depends on n: equal tables are one."""
         form = self._form
         places: dict[tuple[int, ...], int] = {}
         of_term = {one: form.terms[one].values for one in TABLED if one in form.terms}
@@ -225,7 +225,7 @@ class Controller(wiring.Component):
         return read.data
 
     def _word(self, m: Module, term: Signal, total: Signal, velocity: Signal, acceleration: Signal) -> Value:
-        """What a term multiplies, or what y is still to be taken from."""
+        """Return what a term multiplies, or what y is still to be taken from."""
         form = self._form
         held, _ = saturate(m, total, form.most_error)
         error = Signal.like(held, reset_less=True)

@@ -1,4 +1,4 @@
-"""What has been since the update before."""
+"""A window sums what happens between two updates."""
 
 from amaranth import Module, Signal, signed
 from amaranth.lib import wiring

@@ -41,7 +41,7 @@ class AxesTachometer(wiring.Component):
 
     @property
     def spec(self) -> AxesSpec:
-        """What this core was built from."""
+        """The spec that this core was built from."""
         return self._spec
 
     def elaborate(self, platform: object) -> Module:

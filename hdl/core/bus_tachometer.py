@@ -22,7 +22,7 @@ BRIDGES: dict[str, type[Bridge]] = {
 
 
 def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
-    """The bridge from a bus to these registers.
+    """Return the bridge from a bus to these registers.
 
     Raises
     ------

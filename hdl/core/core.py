@@ -10,7 +10,7 @@ AnyTachometer = Tachometer | AxesTachometer | LoopCore
 
 
 def core_of(spec: AnySpec) -> AnyTachometer:
-    """The whole core, for one axis or for many, or with a control loop."""
+    """Return the whole core, for one axis or for many, or with a control loop."""
     if isinstance(spec, LoopSpec):
         return LoopCore(spec)
     return AxesTachometer(spec) if isinstance(spec, AxesSpec) else Tachometer(spec)

@@ -1,4 +1,4 @@
-"""What the demo puts on a board."""
+"""The demo puts a tachometer and an emulated encoder on a board."""
 
 from amaranth import Cat, Module, Mux, ResetInserter, Signal
 from amaranth.lib import wiring
@@ -111,7 +111,7 @@ class Demo(wiring.Component):
         return m
 
     def _native(self, m: Module, sends: Signal) -> None:
-        """The bridge and the telemetry on one native port: one of them begins when the other has ended."""
+        """Put the bridge and the telemetry on one native port: one of them begins when the other has ended."""
         native, bridge, telemetry = self.core.bus, self.bridge, self.telemetry
         if telemetry is None:
             wiring.connect(m, bridge.native, native)

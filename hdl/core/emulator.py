@@ -130,7 +130,7 @@ class EncoderEmulator(wiring.Component):
         return m
 
     def _index(self, m: Module, fine: Signal, turns: object) -> None:
-        """The index line, in the first quarter of the first period."""
+        """Drive the index line, in the first quarter of the first period."""
         last = self._lines_per_rev - 1 if self._lines_per_rev else 0
         period = Signal(range(last + 1))
         with m.If(turns == 1):

@@ -43,7 +43,7 @@ class LoopCore(wiring.Component):
 
     @property
     def spec(self) -> LoopSpec:
-        """What this core was built from."""
+        """The spec that this core was built from."""
         return self._spec
 
     def elaborate(self, platform: object) -> Module:

@@ -83,7 +83,7 @@ class RegisterCore(wiring.Component):
         return m
 
     def _keep(self, m: Module, loop: LoopCore) -> None:
-        """What a program changes is shown as it was with its strobe, whenever it is captured."""
+        """Keep what a program changes as it was with its strobe, whenever it is captured."""
         for strobe, names in self._map.core.strobes.items():
             for name in names:
                 if name in self._map.spec.strobes.get(strobe, ()):

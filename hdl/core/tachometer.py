@@ -75,12 +75,12 @@ class Tachometer(wiring.Component):
 
     @property
     def spec(self) -> TachometerSpec:
-        """What this core was built from."""
+        """The spec that this core was built from."""
         return self._spec
 
     @property
     def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
-        """See `IdleCounter` and `IdleDivision`."""
+        """Counters and divisions that a simulation may skip: `IdleCounter` and `IdleDivision`."""
         boxes: dict[str, object] = {"datapath": self.datapath}
         if not self._spec.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
@@ -157,7 +157,7 @@ class Tachometer(wiring.Component):
         return m
 
     def _rest(self, m: Module) -> None:
-        """Whether the shaft rests."""
+        """Tell whether the shaft rests."""
         if isinstance(self.datapath, OwnStandstill):
             m.d.comb += self.stalled.eq(self.datapath.stalled)
         if self.standstill is not None:
@@ -171,7 +171,9 @@ class Tachometer(wiring.Component):
                 m.d.comb += standstill.shift.eq(self.datapath.tick_shift)
 
     def _output(self, m: Module) -> stream.Interface:
-        """From the datapath to the ports, by way of the low-pass filter and of the unit if they are there: updates."""
+        """Return from the datapath to the ports, by way of the low-pass filter and of the unit if they are there:
+        updates.
+        """
         updates = self.datapath.updates
         if self.low_pass is not None:
             m.submodules.low_pass = low_pass = self.low_pass

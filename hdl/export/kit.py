@@ -1,4 +1,4 @@
-"""What lies beside the Verilog to build it into a design: template, constraints, FuseSoC core file, smoke test."""
+"""Template, constraints, FuseSoC core file and smoke test lie beside the Verilog, to build it into a design."""
 
 from tachometry.hdl.export.render import render_files
 from tachometry.spec import AxesSpec, TachometerSpec

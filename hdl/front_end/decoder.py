@@ -66,7 +66,7 @@ class QuadratureDecoder(wiring.Component):
 def transition(
     decoding: int, level_a: Value, level_b: Value, past_a: Value, past_b: Value
 ) -> tuple[Value, Value, Value]:
-    """Whether a change of levels counts, whether backward, and whether both have changed, which never counts."""
+    """Tell whether a change of levels counts, whether backward, and whether both have changed, which never counts."""
     change_a = level_a ^ past_a
     change_b = level_b ^ past_b
     counted = {

@@ -58,7 +58,7 @@ class SamplingClock(wiring.Component):
 
     @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
-        """See `IdleCounter`."""
+        """Counters that a simulation may skip: `IdleCounter`."""
         if self.states:
             return (IdleCounter("state", order=self.states),)
         # Of two clocks none is worth skipping, and one bit goes by the name of what it is connected to.

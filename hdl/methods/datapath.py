@@ -1,4 +1,4 @@
-"""What every datapath has in common."""
+"""All datapaths share these ports."""
 
 from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
@@ -24,7 +24,7 @@ class Datapath(Protocol):
 
     @property
     def probes(self) -> Mapping[str, Value]:
-        """What a waveform should show of the inside."""
+        """Signals of the inside that a waveform should show."""
 
 
 class TickSource(Protocol):
@@ -55,7 +55,7 @@ class OwnStandstill(Datapath, Protocol):
 
 
 def datapath_members(spec: TachometerSpec) -> dict[str, Member]:
-    """Members of every datapath: `tick`, `pulse_count` with it, the number of ticks so far, and the updates."""
+    """Return members of every datapath: `tick`, `pulse_count` with it, the number of ticks so far, and the updates."""
     return {
         **{name: In(width) for name, width in stamped(spec).items()},
         "tick": In(1),
@@ -65,11 +65,11 @@ def datapath_members(spec: TachometerSpec) -> dict[str, Member]:
 
 
 def stamped(spec: TachometerSpec) -> dict[str, int]:
-    """What travels with an update for its age, as fields of a structure."""
+    """Return what travels with an update for its age, as fields of a structure."""
     return {"stamp": spec.stamp_width} if spec.stamp_width else {}
 
 
 def quotients(spec: TachometerSpec) -> dict[str, tuple[int, int]]:
-    """Bits of each velocity of an update, and which way it is rounded."""
+    """Return bits of each velocity of an update, and which way it is rounded."""
     members = update_layout(spec).members
     return {name: (members[name].width, towards) for name, towards in VELOCITIES.items() if name in members}

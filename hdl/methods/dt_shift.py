@@ -84,11 +84,11 @@ class DtShift(wiring.Component):
         return m
 
     def of(self, constant: Callable[[int], int]) -> Value:
-        """A constant that depends on k."""
+        """Return a constant that depends on k."""
         return Array([constant(min(k, self._spec.max_shift)) for k in range(1 << len(self.shift))])[self.shift]
 
     def _soon(self, m: Module, value: Value, init: int = 0) -> Value:
-        """A constant that depends on k, from a register: a window lasts a dt at least, except at a reversal."""
+        """Return a constant that depends on k, from a register: a window lasts a dt at least, except at a reversal."""
         if self._spec.timing.tick_cycles == 1:
             return value
         held = Signal.like(value, init=init)

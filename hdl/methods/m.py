@@ -68,7 +68,7 @@ class MovingSum(wiring.Component):
         return m
 
     def _earlier(self, m: Module, value: Signal, last: int) -> Value:
-        """What `value` was `last` ticks ago, valid with `tick`."""
+        """Return what `value` was `last` ticks ago, valid with `tick`."""
         m.submodules.past = memory = Memory(shape=value.shape(), depth=last, init=[])
         write = memory.write_port()
         read = memory.read_port()
@@ -131,7 +131,7 @@ class MMethod(wiring.Component):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """What a waveform should show of the inside."""
+        """Signals of the inside that a waveform should show."""
         return {"sum": self.moving_sum.total}
 
     def elaborate(self, platform: object) -> Module:
@@ -158,7 +158,7 @@ class MMethod(wiring.Component):
         return m
 
     def _divided(self, m: Module, known: data.View) -> tuple[Signal, data.View]:
-        """The mean and its bounds, with what is known of the sum."""
+        """Return the mean and its bounds, with what is known of the sum."""
         total, shift = self.moving_sum.total, self._spec.shift
         if self.quotient is not None:
             m.submodules.quotient = quotient = self.quotient

@@ -26,7 +26,7 @@ class MTMethod(TimedDatapath):
 
     @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
-        """See `IdleCounter`."""
+        """Counters that a simulation may skip: `IdleCounter`."""
         counters = super().idle_counters
         stops = (self._min_periods, self._patient_periods)
         return (*counters, IdleCounter("length", 1, stops)) if counters else ()
@@ -58,7 +58,7 @@ class MTMethod(TimedDatapath):
         return ends, total, Mux(ends, length, timer.age)
 
     def _waits(self, m: Module, length: Signal, opens: Signal) -> Value:
-        """Whether this count lies within a cycle that the window is to complete."""
+        """Tell whether this count lies within a cycle that the window is to complete."""
         # Counts since the window opened: as long as none is against the one before, their sum but for the sign.
         counted = Signal(range(self._cycle_counts))
         number = Signal.like(counted)

@@ -133,7 +133,7 @@ class QuotientVelocity(wiring.Component):
         return m
 
     def _taken(self, m: Module, way: Value, divided: Value) -> tuple[Value, Value]:
-        """What the divider takes of a number, and whether the way is more than it takes.
+        """Return what the divider takes of a number, and whether the way is more than it takes.
 
         The latter is known while the way is divided. Only with a greatest speed is the divider so narrow; a way that it
         does not take is too fast in any time.
@@ -150,7 +150,7 @@ class QuotientVelocity(wiring.Component):
         return Cat(divided[:kept], divided[-1].replicate(2)), upper != upper[-1].replicate(len(upper))
 
     def _bounded(self, m: Module, measuring: Signal, velocity: Value, too_far: Value) -> tuple[Value, Value, Value]:
-        """The quotient held within a bound: whether it was nearer to 0, or beyond, and what it is then.
+        """Return the quotient held within a bound: whether it was nearer to 0, or beyond, and what it is then.
 
         The bound of a measurement is the greatest speed, that of a decay the velocity. The digits of highest weight
         come first: so the first that differs from the bound's decides, and if the quotient is beyond, all that follow
@@ -191,7 +191,7 @@ class QuotientVelocity(wiring.Component):
         return nearer, farther if spec.saturates else Const(0), Cat(copy[:-1], ~copy[-1]).as_signed()
 
     def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
-        """Two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
+        """Add two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
         counted = Signal()
         # Distances in 2^−finer counts, and by how much edges may be off.
         finer = self._spec.error_bits

@@ -56,12 +56,12 @@ class RairanMethod(wiring.Component):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """What a waveform should show of the inside."""
+        """Signals of the inside that a waveform should show."""
         return {"c_ep": self.counters.c_more + self.counters.any, "c_dt": self.counters.c_dt}
 
     @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
-        """See `IdleCounter`."""
+        """Counters that a simulation may skip: `IdleCounter`."""
         return (IdleCounter("counters.left", -1, (-1,)),) if self._spec.timing.tick_cycles > 1 else ()
 
     def elaborate(self, platform: object) -> Module:
@@ -114,7 +114,7 @@ class RairanMethod(wiring.Component):
         return m
 
     def _bounds(self, m: Module, new: data.View, *, shown: Value, backward: Signal) -> None:
-        """Both bounds from tables; backwards, they are negated and exchanged."""
+        """Look up both bounds; backwards, they are negated and exchanged."""
         spec, counters = self._spec, self.counters
         width = spec.bound_width - 1
         low = ~counters.high & counters.unsynced
@@ -151,7 +151,7 @@ class RairanMethod(wiring.Component):
             ]
 
     def _velocity(self, n: Signal, high: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
-        """The estimate with its sign: the complement and a carry are −v, so one adder rounds and negates."""
+        """Return the estimate with its sign: the complement and a carry are −v, so one adder rounds and negates."""
         spec = self._spec
         f = spec.native_frac_bits
         whole = (n + 1 if spec.estimate == "n1" else n) & high.replicate(len(n) + 1)
@@ -174,7 +174,7 @@ class RairanMethod(wiring.Component):
         return (padded ^ backward.replicate(spec.native_width)) + (carry ^ backward)
 
     def _without_tie(self, n: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
-        """Half an LSB backwards is rounded to 0."""
+        """Return half an LSB backwards is rounded to 0."""
         ties = {k: tie for k in range(self._spec.max_shift + 1) if (tie := self._spec.tie(k)) is not None}
         if not ties:
             return entry

@@ -118,7 +118,7 @@ class RairanCounters(wiring.Component):
         return m
 
     def _of_dt(self, constant: Callable[[int], int]) -> Value | int:
-        """A constant that depends on k of dt·2^k."""
+        """Return a constant that depends on k of dt·2^k."""
         return constant(0) if self.dt is None else self.dt.of(constant)
 
     def _clock(self, m: Module, opens: Signal) -> Value:
@@ -161,7 +161,7 @@ class RairanCounters(wiring.Component):
             m.d.sync += [c_dt.eq(0), self.rest.eq(0)]
 
     def _at_end(self, m: Module, value: Value) -> Value:
-        """What is asked at an end of dt without a count, from a register.
+        """Return what is asked at an end of dt without a count, from a register.
 
         What it depends on has then been the same for a clock at least: another end of dt, or a count that opened a
         window, is a dt ago; and a count that opens none finds and leaves a Cdt of 0, and makes several of one.
@@ -173,11 +173,11 @@ class RairanCounters(wiring.Component):
         return held
 
     def _is(self, constant: Callable[[int], int]) -> Value:
-        """Cdt is a constant that depends on k of dt·2^k."""
+        """Return Cdt is a constant that depends on k of dt·2^k."""
         return self.c_dt == self._of_dt(constant)
 
     def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal, fresh: Signal) -> None:
-        """What a count or the end of dt makes of the estimate."""
+        """Update the estimate at a count or at the end of dt."""
         spec = self._spec
         several, one = self.c_more.any(), self.any
         in_step = Signal()  # the last count opened its window
@@ -236,7 +236,7 @@ class RairanCounters(wiring.Component):
                 set_(waited, forced=1, loose=1)
 
     def _update_to_the_letter(self, m: Module, opens: Signal) -> None:
-        """Lines 5 to 9 of Table 1."""
+        """Follow lines 5 to 9 of Table 1."""
         m.d.sync += self.update.eq(opens | (self.last & self.any))
         with m.If(opens):
             m.d.sync += self.n_dt1.eq(self.c_dt)

@@ -70,7 +70,7 @@ class SMethod(wiring.Component):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """What a waveform should show of the inside."""
+        """Signals of the inside that a waveform should show."""
         return {
             "alteration": self.alteration.alteration & self.tick,
             "m_s": self.interval_accumulator.m_s,
@@ -79,7 +79,7 @@ class SMethod(wiring.Component):
 
     @property
     def idle_counters(self) -> tuple[IdleDivision, ...]:
-        """See `IdleDivision`: q is read from the next tick on."""
+        """Divisions that a simulation may skip: q is read from the next tick on."""
         found = self._spec.reciprocal
         if not isinstance(found, DividedReciprocal) or found.steps > 62:
             return ()

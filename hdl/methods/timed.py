@@ -1,4 +1,4 @@
-"""What the datapaths of the methods have in common that measure the time between counts."""
+"""The datapaths of the methods that measure the time between counts share this."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
@@ -48,19 +48,19 @@ class TimedDatapath(wiring.Component):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """What a waveform should show of the inside."""
+        """Signals of the inside that a waveform should show."""
         return {"gap": self.gap_timer.age}
 
     @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
-        """See `IdleCounter`."""
+        """Counters that a simulation may skip: `IdleCounter`."""
         if self._spec.on_lattice:  # which counts with the tick
             return ()
         return (IdleCounter("gap_timer.age", 1, (self._spec.max_periods - 1,)),)
 
     @property
     def _size(self) -> Signal:
-        """What a timer period counted."""
+        """The count of a timer period."""
         size: Signal = self.pulse_count if self._spec.on_lattice else self.count_way.step
         return size
 
@@ -88,7 +88,7 @@ class TimedDatapath(wiring.Component):
         return Cat(bits[periods >> k & 1, -periods >> k & 1] for k in range(periods.bit_length() + 1)).as_signed()
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:
-        """Whether a measurement ends with this count, its distance, and its length.
+        """Tell whether a measurement ends with this count, its distance, and its length.
 
         The distance is in counts, times the timer periods in a tick. Where nothing ends, the length is the age of the
         last count.

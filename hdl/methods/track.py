@@ -47,7 +47,7 @@ class TrackMethod(wiring.Component):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """What a waveform should show of the inside."""
+        """Signals of the inside that a waveform should show."""
         return {"counts_number": self.tick_counts.number, "counts_times": self.tick_counts.times}
 
     def elaborate(self, platform: object) -> Module:

@@ -22,7 +22,7 @@ class Left(IntEnum):
 
 
 class Special(IntEnum):
-    """What an operation does beside the adder."""
+    """Says what an operation does beside the adder."""
 
     NONE = 0
     TEST = 1
@@ -68,14 +68,14 @@ _LINES = (
 
 
 def _layout(address: int) -> data.StructLayout:
-    """An instruction: the lines, an address, and the clocks that it still takes after its first."""
+    """Return an instruction: the lines, an address, and the clocks that it still takes after its first."""
     return data.StructLayout(
         {"left": 2, **dict.fromkeys(_LINES, 1), "special": 3, "address": address, "more": MAX_STEPS.bit_length()}
     )
 
 
 def _word(layout: data.StructLayout, code: Instruction) -> int:
-    """An instruction as the program memory holds it."""
+    """Return an instruction as the program memory holds it."""
     fields = _CONTROLS[code.op]
     values = {**fields, "address": code.address, "more": code.steps - 1}
     if code.op == Op.JUMP:  # which needs no adder, and has its condition there
@@ -253,7 +253,7 @@ class TrackMachine(wiring.Component):
         return m
 
     def _holds(self, condition: Value, negative: Value, flag: Value, phase: Value) -> Value:
-        """Whether a condition is met."""
+        """Tell whether a condition is met."""
         met = {
             Condition.ALWAYS: 1,
             Condition.NEGATIVE: negative,
@@ -273,7 +273,7 @@ class TrackMachine(wiring.Component):
         return Mux(change[1], following, Mux(change[0], back, 0))
 
     def _input(self, which: Value) -> Value:
-        """What is loaded into ac."""
+        """Return what is loaded into ac."""
         form = self._program.form
         inputs: dict[Input, Value] = {
             Input.TIMES: self.times,

@@ -119,7 +119,7 @@ class LowPass(wiring.Component):
         return m
 
     def _factors(self, m: Module, take: Signal, interval: Signal) -> list[Signal]:
-        """E of each table, valid in the clock after `take` and held until the next."""
+        """Return E of each table, valid in the clock after `take` and held until the next."""
         found, split = [], self._spec.low_bits
         places = interval[:split], interval[split:]
         for name, table, place in zip(("low", "high"), self._spec.tables, places, strict=False):

@@ -1,4 +1,4 @@
-"""Whether the shaft rests."""
+"""Tell whether the shaft rests."""
 
 from amaranth import Module, Mux, Signal, signed
 from amaranth.lib import wiring

@@ -12,7 +12,7 @@ VELOCITIES = {"velocity": 0, **BOUNDS}
 
 
 def update_layout(spec: TachometerSpec) -> data.StructLayout:
-    """What a method hands on: all outputs that change only with `velocity_valid`, velocities in counts per tick.
+    """Return what a method hands on: all outputs that change only with `velocity_valid`, velocities in counts per tick.
 
     `stamp` is for the age: how many ticks there were when the update was caused, modulo a power of two. `rests` is for
     the low-pass filter: no update will follow before the next count.
@@ -29,11 +29,13 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
 
 
 def shown_layout(layout: data.StructLayout, output: VelocityOutput) -> data.StructLayout:
-    """What the output stage makes of such an update: velocities in another unit, and whether one was saturated."""
+    """Return what the output stage makes of such an update: velocities in another unit, and whether one was
+    saturated.
+    """
     shown = {name: signed(output.width) for name in layout.members if name in VELOCITIES}
     return data.StructLayout({**layout.members, **shown, "velocity_overflow": 1})
 
 
 def update_stream(layout: data.StructLayout) -> stream.Signature:
-    """Updates, each valid for a clock; nothing can hold them up."""
+    """Return updates, each valid for a clock; nothing can hold them up."""
     return stream.Signature(layout, always_ready=True)

@@ -18,7 +18,7 @@ from tachometry.spec.formats import velocity_output
 
 
 class _VelocityOutput(wiring.Component):
-    """What both share.
+    """Holds the parts that both share.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class _VelocityOutput(wiring.Component):
         )
 
     def _show(self, m: Module, update: data.View, totals: dict[str, Value]) -> data.View:
-        """What the outputs take: each velocity from its total, and the rest of the update."""
+        """Return what the outputs take: each velocity from its total, and the rest of the update."""
         shown = registers(self.shown.p.shape(), "taken")
         for name, total in totals.items():
             rounded = Signal.like(total, name=f"rounded_{name}")

@@ -6,7 +6,7 @@ from amaranth import Module, Signal, Value, ValueLike
 
 
 def delay(m: Module, *values: ValueLike, clocks: int = 1, only_if: Value | None = None) -> Sequence[Signal]:
-    """Registers that follow the values so many clocks later; where `only_if` is low, they become 0 instead.
+    """Return registers that follow the values so many clocks later; where `only_if` is low, they become 0 instead.
 
     A register is named after what it follows, if that is a signal.
     """

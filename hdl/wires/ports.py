@@ -12,7 +12,7 @@ _FLOW = {"input": In, "output": Out}
 
 
 def members(ports: Iterable[Port]) -> dict[str, Any]:
-    """Members by the names of the ports, less clock and reset, which are those of the domain."""
+    """Return members by the names of the ports, less clock and reset, which are those of the domain."""
     return {
         port.name: _FLOW[port.direction](signed(port.width) if port.signed else port.width)
         for port in ports

@@ -9,7 +9,7 @@ from amaranth.lib import data
 def registers(
     layout: data.StructLayout, prefix: str, *, init: Mapping[str, int] | None = None, reset_less: bool = False
 ) -> data.View:
-    """A structure each field of which is a signal of its own, named after it.
+    """Return a structure each field of which is a signal of its own, named after it.
 
     One signal for all of it would do the same, but Yosys maps the logic before it to more cells, up to 4 % of a core.
     """

@@ -1,1 +1,1 @@
-"""Captures of logic analysers and simulators, read and written."""
+"""Read and write the captures of logic analysers and simulators."""

@@ -1,4 +1,4 @@
-"""What every kind of capture shares: its error, the choice of channels, and files written whole or not at all."""
+"""Every kind of capture shares this: its error, the choice of channels, and files written whole or not at all."""
 
 import itertools
 import zlib
@@ -35,7 +35,7 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def check_edges(path: Path, n: int) -> None:
-    """See that a capture has no more changes than a recording may have."""
+    """Check that a capture has no more changes than a recording may have."""
     if n > MAX_EDGES:
         raise CaptureError(f"{path} must have at most {MAX_EDGES} changes of the lines, and has more")
 

@@ -1,4 +1,4 @@
-"""The head of a text capture: its columns, what separates them, and how its rows are dated."""
+"""The head of a text capture says which columns it has, what separates them, and how its rows are dated."""
 
 import csv
 import re
@@ -22,7 +22,7 @@ _SIGROK = {"samples": "s", "milliseconds": "ms", "microseconds": "us", "nanoseco
 
 @dataclass(frozen=True)
 class Header:
-    """The head of a text capture.
+    """Holds the head of a text capture.
 
     Parameters
     ----------
@@ -61,17 +61,17 @@ class Header:
         return dict(enumerate(name for column, name in enumerate(self.names) if column != self.time))
 
     def column(self, channel: int) -> int:
-        """The column of a channel."""
+        """Return the column of a channel."""
         return channel + (self.time is not None and channel >= self.time)
 
     def seconds(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What the first column, or the number of the row, is in seconds; a sample is dated as in a `.sr`."""
+        """Return what the first column, or the number of the row, is in seconds; a sample is dated as in a `.sr`."""
         if self.samplerate_hz is None:
             return time / float(1 / TIME[self.unit].size)
         return divide(self._sample(time), self.samplerate_hz, up=False)
 
     def duration(self, last: float) -> float:
-        """Seconds up to the last row, or to the end of the last sample."""
+        """Return seconds up to the last row, or to the end of the last sample."""
         if self.samplerate_hz is None:
             return float(self.seconds(np.array([last]))[0])
         return float(divide(self._sample(np.array([last])) + 1, self.samplerate_hz, up=True)[0])
@@ -135,7 +135,7 @@ def read_header(path: Path, file: BinaryIO, time: Channel | None, samplerate_hz:
 
 
 def _first_line(file: BinaryIO) -> tuple[str, list[str], int]:
-    """The first line that is no comment, the comments before it, and how many lines that were."""
+    """Return the first line that is no comment, the comments before it, and how many lines that were."""
     comments: list[str] = []
     left, lines = LONGEST, 0
     while line := file.readline(left):
@@ -164,7 +164,7 @@ def _time_column(path: Path, names: list[str], time: Channel | None) -> int | No
 
 
 def _unit(path: Path, name: str) -> str:
-    """The unit in brackets behind a name, else seconds."""
+    """Return the unit in brackets behind a name, else seconds."""
     match = re.search(r"[\[(]\s*(.*?)\s*[\])]$", name)
     unit = plain_unit(match[1]) if match else _SIGROK.get(name.casefold(), "s")
     if unit not in TIME:
@@ -177,7 +177,8 @@ def _of_sigrok(comments: list[str], pattern: str) -> str:
 
 
 def _sigrok_period(rate: float) -> tuple[int, str]:
-    """What sigrok makes of the time between two samples, and its unit: the coarsest that has the samplerate or more.
+    """Return what sigrok makes of the time between two samples, and its unit: the coarsest that has the samplerate or
+    more.
 
     It is a whole number: 24 MHz has 41 ns, which is off by 1.6 percent. So times divided by it are numbers of samples.
     """

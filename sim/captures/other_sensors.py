@@ -1,4 +1,4 @@
-"""Captures of what is no quadrature encoder, as the quadrature that counts the same."""
+"""Captures of other sensors become the quadrature that counts the same."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from tachometry.spec import TachometerSpec
 
 
 def of_pulses(recording: Recording) -> Recording:
-    """A single line, here A, as of a tooth wheel: always forward.
+    """Return a single line, here A, as of a tooth wheel: always forward.
 
     B changes halfway between two edges of A, so what counts edges of A alone counts each at its time.
     """
@@ -29,7 +29,9 @@ def of_steps(recording: Recording) -> Recording:
 
 
 def _moved(recording: Recording, times: NDArray[np.float64], first: int, steps: NDArray[np.int64] | int) -> Recording:
-    """The recording with lines A and B that begin in a quarter period, and change by these steps at these times."""
+    """Return the recording with lines A and B that begin in a quarter period, and change by these steps at these
+    times.
+    """
     time = np.unique(np.concatenate([recording.time, times]))
     travelled = np.append(0, np.cumsum(np.broadcast_to(steps, times.shape)))
     level = quadrature(first + travelled[np.searchsorted(times, time, side="right")])
@@ -46,7 +48,7 @@ SENSORS: dict[str, tuple[Callable[[Recording], Recording], tuple[int, ...]]] = {
 
 
 def converted(recording: Recording, sensor: str, spec: TachometerSpec) -> Recording:
-    """The recording of a sensor as quadrature; that of `quadrature` is as it is.
+    """Return the recording of a sensor as quadrature; that of `quadrature` is as it is.
 
     Raises
     ------

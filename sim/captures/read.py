@@ -16,7 +16,7 @@ from tachometry.spec import CoreSpec
 
 
 class Reader(Protocol):
-    """A function that reads one kind of capture."""
+    """Describes a function that reads one kind of capture."""
 
     def __call__(
         self,
@@ -76,7 +76,8 @@ def read_capture(
 
 
 def with_last_tick(recording: Recording, spec: CoreSpec) -> Recording:
-    """A list of edges with the tick of its last edge: the levels after it hold until the core has shown this tick.
+    """Return a list of edges with the tick of its last edge: the levels after it hold until the core has shown this
+    tick.
 
     What ends later than with an edge ends where it says, and external ticks end with the capture.
     """

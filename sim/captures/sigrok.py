@@ -1,4 +1,5 @@
-"""sigrok sessions (`.sr`), as sigrok-cli and PulseView save them: read as a `Recording`, written from a `PinTrace`.
+"""sigrok sessions (`.sr`), as sigrok-cli and PulseView save them, are read as a `Recording` and written from a
+`PinTrace`.
 
 The format is described at https://sigrok.org/wiki/File_format:Sigrok/v2. Both ways work chunk by chunk: memory grows
 with the edges and with one chunk, never with the length of the capture.
@@ -126,7 +127,7 @@ def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chun
 
 
 def _member(name: str) -> zipfile.ZipInfo:
-    """A member without the time, and with the same attributes on every system."""
+    """Return a member without the time, and with the same attributes on every system."""
     member = zipfile.ZipInfo(name)  # 1980-01-01, the earliest that a zip file can tell
     member.create_system = 3  # Unix
     return member
@@ -153,7 +154,7 @@ def _metadata(samplerate_hz: int, channels: list[str]) -> str:
 
 
 class _Bounded(io.FileIO):
-    """A file of which `zipfile` reads the list of members at once, before anything else is known of it."""
+    """Bounds a file of which `zipfile` reads the list of members at once, before anything else is known of it."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is not None and size > max(_MOST_LISTED, CHUNK):
@@ -162,7 +163,7 @@ class _Bounded(io.FileIO):
 
 
 def _small(path: Path, archive: zipfile.ZipFile, name: str) -> bytes:
-    """A member that is read at once."""
+    """Return a member that is read at once."""
     if (size := archive.getinfo(name).file_size) > _MOST_METADATA:
         raise CaptureError(f"{name} of {path} must have at most {_MOST_METADATA} bytes, not {size}")
     return archive.read(name)
@@ -253,6 +254,7 @@ def parse_samplerate(path: Path, text: str | None) -> float | None:
 
 
 def agreed_samplerate(path: Path, in_file: float | None, given: float | None) -> float:
+    """Return the samplerate of a file or the given one; CaptureError if they differ, or there is none."""
     if in_file is not None and given is not None and in_file != given:
         raise CaptureError(f"samplerate of {path} must be {in_file:.15g} Hz as the file has it, not {given:.15g} Hz")
     rate = in_file if in_file is not None else given

@@ -1,4 +1,4 @@
-"""Text (`.csv`) as a capture: read as a `Recording`, and written."""
+"""Text (`.csv`) is read as a `Recording`, and written."""
 
 import gzip
 import io

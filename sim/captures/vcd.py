@@ -1,4 +1,4 @@
-"""Waveforms (`.vcd`) as captures: one-bit variables of a simulation or of a logic analyser's export."""
+"""Waveforms (`.vcd`) are read as captures: one-bit variables of a simulation or of a logic analyser's export."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -55,7 +55,7 @@ def read_vcd(
 
 
 def _check_end(path: Path, file: BinaryIO) -> None:
-    """See that the last line is whole: of one that is cut, a part may read as another time or variable."""
+    """Check that the last line is whole: of one that is cut, a part may read as another time or variable."""
     if file.seek(0, os.SEEK_END):
         file.seek(-1, os.SEEK_END)
         if not file.read(1).isspace():
@@ -73,7 +73,7 @@ def _tokens(path: Path, file: BinaryIO) -> Iterator[Token]:
 
 
 def _declarations(path: Path, tokens: Iterator[Token]) -> tuple[dict[int, str], list[str], tuple[int, int]]:
-    """Names and codes of all one-bit variables, and the time unit as a numerator and denominator in seconds."""
+    """Return names and codes of all one-bit variables, and the time unit as a numerator and denominator in seconds."""
     scopes: list[str] = []
     names: dict[int, str] = {}
     codes: list[str] = []
@@ -99,7 +99,7 @@ def _declarations(path: Path, tokens: Iterator[Token]) -> tuple[dict[int, str], 
 
 
 def _default(names: dict[int, str], a: Channel | None, b: Channel | None) -> tuple[Channel | None, Channel | None]:
-    """What is not given, by the last part of the name, where that is unique."""
+    """Return what is not given, by the last part of the name, where that is unique."""
 
     def only(line: str) -> int | None:
         alike = [number for number, name in names.items() if name.rpartition(".")[2].casefold() == line]

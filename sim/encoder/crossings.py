@@ -46,18 +46,18 @@ class Disc:
     offset: FloatArray
 
     def threshold(self, k: IntArray) -> FloatArray:
-        """Angle of edge k, in pitches."""
+        """Return angle of edge k, in pitches."""
         return k + self.offset[k % len(self.offset)]
 
     def quarter(self, angle_rad: FloatArray) -> IntArray:
-        """Index of the last edge at or below an angle; an angle exactly on an edge has passed it."""
+        """Return index of the last edge at or below an angle; an angle exactly on an edge has passed it."""
         angle = angle_rad / self.pitch_rad
         k = np.floor(angle).astype(np.int64)
         return k - (angle < self.threshold(k)) + (angle >= self.threshold(k + 1))
 
 
 def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
-    """Every passage of an edge, in the order of time.
+    """Return every passage of an edge, in the order of time.
 
     Time is cut into cells in which the angle is monotone, so that the quarters at a cell's ends tell which edges lie
     in it; each is then located between two neighbouring floats. A passage is the first instant at which
@@ -95,7 +95,7 @@ def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
 
 
 def _split(function: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:
-    """`time` and the zeros of a function that is continuous between them, but may jump at them."""
+    """Return `time` and the zeros of a function that is continuous between them, but may jump at them."""
     low, high = time[:-1], np.nextafter(time[1:], -np.inf)
     cell = np.flatnonzero(np.sign(function(low)) * np.sign(function(high)) < 0)
     zeros = _sign_change(lambda t, _: function(t), low[cell], high[cell])
@@ -103,7 +103,7 @@ def _split(function: Callable[[FloatArray], FloatArray], time: FloatArray) -> Fl
 
 
 def _crossings_of_cells(shaft: Shaft, disc: Disc, time: FloatArray) -> Iterator[tuple[FloatArray, IntArray]]:
-    """Passages between consecutive times, between which the angle is monotone, some at a time."""
+    """Yield passages between consecutive times, between which the angle is monotone, some at a time."""
     quarter = disc.quarter(shaft.angle(time))
     steps = np.diff(quarter)
     last = np.cumsum(np.abs(steps))
@@ -125,7 +125,7 @@ def _passages(shaft: Shaft, disc: Disc, edge: IntArray, low: FloatArray, high: F
 def _sign_change(
     function: Callable[[FloatArray, NDArray[np.intp]], FloatArray], low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """First float after `low` from which a function is as it is at `high`: negative, or not.
+    """Return first float after `low` from which a function is as it is at `high`: negative, or not.
 
     Chandrupatla's method (Adv. Eng. Softw. 28, 1997): inverse quadratic interpolation where it is safe, else bisection.
     `function(t, i)` is asked for the i-th problems only, i being those not yet solved.
@@ -155,7 +155,7 @@ def _sign_change(
 def _interpolate(
     x1: FloatArray, x2: FloatArray, x3: FloatArray, f1: FloatArray, f2: FloatArray, f3: FloatArray
 ) -> FloatArray:
-    """Where the root is expected, as a fraction of the distance from x1 to x2."""
+    """Tell where the root is expected, as a fraction of the distance from x1 to x2."""
     with np.errstate(divide="ignore", invalid="ignore"):  # of quotients that are not taken
         xi = (x1 - x2) / (x3 - x2)
         phi = (f1 - f2) / (f3 - f2)

@@ -1,4 +1,4 @@
-"""What goes wrong between the edges of a disc and the lines of an encoder; `VirtualEncoder` says what each means.
+"""Imperfections stand between the edges of a disc and the lines of an encoder; `VirtualEncoder` explains each.
 
 Everything is drawn from raw PCG64 words and evaluated with operations that IEEE 754 rounds exactly: equal inputs give
 equal bits on every machine. Each imperfection has random numbers of its own, as many for each edge of the shaft,
@@ -60,12 +60,12 @@ class Bounce:
 
 
 def stream(seed: int, which: int) -> np.random.PCG64:
-    """The random numbers of one imperfection."""
+    """Return the random numbers of one imperfection."""
     return np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(which,)))
 
 
 def displaced_edges(phase_error_deg: float, duty_error_deg: float) -> FloatArray:
-    """Offsets of the edges 0 to 3 of each period, in pitches of 90 electrical degrees.
+    """Return offsets of the edges 0 to 3 of each period, in pitches of 90 electrical degrees.
 
     The centre of B's pulse moves by the phase error, the ends of both pulses by half the duty error, outwards.
     """
@@ -75,7 +75,7 @@ def displaced_edges(phase_error_deg: float, duty_error_deg: float) -> FloatArray
 
 
 def jittered(time: FloatArray, duration: float, deviation: float, random: np.random.PCG64) -> FloatArray:
-    """Edges shifted in time; they keep their order, and stay within the recording."""
+    """Return edges shifted in time; they keep their order, and stay within the recording."""
     gap = np.diff(time, prepend=0.0, append=duration)
     shift = np.clip(deviation * gaussian(random, len(time)), -_CLIP, _CLIP)
     return time + shift * np.minimum(gap[:-1], gap[1:])
@@ -100,7 +100,7 @@ def lose_pulses(level: Levels, probability: float, random: np.random.PCG64) -> t
 
 
 def late_edges(level: Levels, row: Rows, probability: float, random: np.random.PCG64) -> NDArray[np.bool_]:
-    """Which of the rows `row`, those that change a line, come at the instant of the next of them."""
+    """Tell which of the rows `row`, those that change a line, come at the instant of the next of them."""
     late = np.zeros(len(row), dtype=np.bool_)
     drawn = (uniform(random, len(level) - 1) < probability)[row[1:-1] - 1]
     drawn &= level[row[2:]] ^ level[row[:-2]] == 3  # the two edges are of different lines
@@ -113,7 +113,7 @@ def late_edges(level: Levels, row: Rows, probability: float, random: np.random.P
 def chattering(
     time: FloatArray, level: Levels, row: Rows, duration: float, bounce: Bounce, random: np.random.PCG64
 ) -> tuple[FloatArray, Levels]:
-    """Times and levels of the rows `row`, with the chatter after each of them that changes one line."""
+    """Return times and levels of the rows `row`, with the chatter after each of them that changes one line."""
     n_changes = 2 * bounce.count
     moment = np.sort(uniform(random, (len(time) - 1) * n_changes).reshape(-1, n_changes)[row[1:] - 1], axis=1)
     time, level = time[row], level[row]
@@ -128,7 +128,7 @@ def chattering(
 def gated_index(
     time: FloatArray, level: Levels, slot_time: FloatArray, slot: NDArray[np.bool_]
 ) -> tuple[FloatArray, Levels]:
-    """Times, and levels with 4 Z: high while the shaft is in the slot of the index and both lines are low."""
+    """Return times, and levels with 4 Z: high while the shaft is in the slot of the index and both lines are low."""
     times = np.union1d(time, slot_time)
     level = level[np.searchsorted(time, times, side="right") - 1]
     slot = slot[np.searchsorted(slot_time, times, side="right") - 1]
@@ -138,12 +138,12 @@ def gated_index(
 
 
 def uniform(random: np.random.PCG64, n: int) -> FloatArray:
-    """Uniform in [0, 1), from the raw words, which numpy promises never to change."""
+    """Return uniform in [0, 1), from the raw words, which numpy promises never to change."""
     return (random.random_raw(n) >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
 
 def gaussian(random: np.random.PCG64, n: int) -> FloatArray:
-    """Standard normal (Box and Muller); numpy's own differs between versions and C libraries."""
+    """Return standard normal (Box and Muller); numpy's own differs between versions and C libraries."""
     normal = np.empty(n)
     for begin in range(0, n, _CHUNK):
         part = normal[begin : begin + _CHUNK]
@@ -153,7 +153,7 @@ def gaussian(random: np.random.PCG64, n: int) -> FloatArray:
 
 
 def _log(x: FloatArray) -> FloatArray:
-    """Natural logarithm, the same bits on every machine; |error| < 1e-15 max(1, |log x|)."""
+    """Return natural logarithm, the same bits on every machine; |error| < 1e-15 max(1, |log x|)."""
     mantissa, exponent = np.frexp(x)
     low = mantissa < math.sqrt(0.5)
     mantissa, exponent = np.where(low, 2 * mantissa, mantissa), exponent - low

@@ -49,7 +49,7 @@ _SINE_SERIES = (
 
 
 def _sine_of_quarter(turns: FloatArray) -> FloatArray:
-    """sin(2 pi turns) for |turns| <= 1/4."""
+    """Return sin(2 pi turns) for |turns| <= 1/4."""
     square = turns * turns
     total = np.full_like(turns, _SINE_SERIES[0])
     for coefficient in _SINE_SERIES[1:]:
@@ -58,14 +58,14 @@ def _sine_of_quarter(turns: FloatArray) -> FloatArray:
 
 
 def sin2pi(phase: ArrayLike) -> FloatArray:
-    """Sine of a phase in turns, the same bits on every machine; |error| < 1e-15."""
+    """Return sine of a phase in turns, the same bits on every machine; |error| < 1e-15."""
     phase = np.asarray(phase, dtype=np.float64)
     turns = phase - np.floor(phase + 0.5)
     return _sine_of_quarter(np.where(np.abs(turns) > 0.25, np.copysign(0.5, turns) - turns, turns))
 
 
 def cos2pi(phase: ArrayLike) -> FloatArray:
-    """Cosine of a phase in turns, the same bits on every machine; |error| < 1e-15."""
+    """Return cosine of a phase in turns, the same bits on every machine; |error| < 1e-15."""
     phase = np.asarray(phase, dtype=np.float64)
     return _sine_of_quarter(0.25 - np.abs(phase - np.floor(phase + 0.5)))
 
@@ -140,7 +140,7 @@ class Motion:
             return float(np.sum(mean_speed * duration))
 
     def angle(self, t: ArrayLike) -> FloatArray:
-        """Angle in rad at times `t` in seconds; before and after the motion, as at its ends."""
+        """Return angle in rad at times `t` in seconds; before and after the motion, as at its ends."""
         j, u = self._locate(t)
         angle = self.start_angle[j] + u * (self.start_speed[j] + 0.5 * self.constant_acceleration[j] * u)
         if self._has_sine:
@@ -148,7 +148,7 @@ class Motion:
         return angle
 
     def speed(self, t: ArrayLike) -> FloatArray:
-        """Speed in rad/s at times `t` in seconds; at a breakpoint, that of the segment that begins."""
+        """Return speed in rad/s at times `t` in seconds; at a breakpoint, that of the segment that begins."""
         j, u = self._locate(t)
         speed = self.start_speed[j] + self.constant_acceleration[j] * u
         if self._has_sine:
@@ -156,7 +156,7 @@ class Motion:
         return speed
 
     def acceleration(self, t: ArrayLike) -> FloatArray:
-        """Acceleration in rad/s^2 at times `t` in seconds; at a breakpoint, that of the segment that begins."""
+        """Return acceleration in rad/s^2 at times `t` in seconds; at a breakpoint, that of the segment that begins."""
         j, u = self._locate(t)
         acceleration = self.constant_acceleration[j]
         if self._has_sine:
@@ -169,14 +169,14 @@ class Motion:
         return bool(np.any(self.sine_frequency))
 
     def _locate(self, t: ArrayLike) -> tuple[NDArray[np.intp], FloatArray]:
-        """Segment of each time, and time since that segment began."""
+        """Return segment of each time, and time since that segment began."""
         time = np.clip(np.asarray(t, dtype=np.float64), 0.0, self.duration)
         j = np.searchsorted(self.breakpoints[1:-1], time, side="right")
         return j, time - self.breakpoints[j]
 
 
 def _sine_angle(speed: FloatArray, frequency: FloatArray, u: FloatArray) -> FloatArray:
-    """Integral of speed sin(2 pi frequency u), free of the cancellation in 1 - cos."""
+    """Return integral of speed sin(2 pi frequency u), free of the cancellation in 1 - cos."""
     half = sin2pi(0.5 * frequency * u)
     return speed * half * half / np.where(frequency > 0, math.pi * frequency, 1.0)
 
@@ -211,15 +211,15 @@ class Vibration:
         )
 
     def angle(self, t: ArrayLike) -> FloatArray:
-        """Angle in rad at times in seconds."""
+        """Return angle in rad at times in seconds."""
         return self.amplitude_rad * sin2pi(self._phase(t))
 
     def speed(self, t: ArrayLike) -> FloatArray:
-        """Speed in rad/s at times in seconds."""
+        """Return speed in rad/s at times in seconds."""
         return self.amplitude_rad * self._rate * cos2pi(self._phase(t))
 
     def acceleration(self, t: ArrayLike) -> FloatArray:
-        """Acceleration in rad/s^2 at times in seconds."""
+        """Return acceleration in rad/s^2 at times in seconds."""
         return -self.amplitude_rad * self._rate * self._rate * sin2pi(self._phase(t))
 
     @property

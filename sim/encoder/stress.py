@@ -10,7 +10,7 @@ _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
 
 
 def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
-    """Speeds about the unit velocity and its multiples, reversals, illegal transitions, creeping, standstill.
+    """Return speeds about the unit velocity and its multiples, reversals, illegal transitions, creeping, standstill.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
 
 
 def stress_of(spec: CoreSpec, seed: int, n_edges: int = 300) -> Trace:
-    """The same for many axes as well, each of which has a motion of its own."""
+    """Return the same for many axes as well, each of which has a motion of its own."""
     if not isinstance(spec, AxesSpec):
         return stress(spec, seed, n_edges)
     # Of different lengths, so that not all axes stand when one does.

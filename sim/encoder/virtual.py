@@ -181,7 +181,9 @@ class VirtualEncoder:
         return Encoding(self, motion, recording, n_illegal, n_lost)
 
     def _lines(self, time: FloatArray, quarter: IntArray, duration: float) -> tuple[Recording, int, int]:
-        """What the lines make of quarters that begin at some times, and how many edges came together or were lost."""
+        """Return what the lines make of quarters that begin at some times, and how many edges came together or were
+        lost.
+        """
         level, n_lost, n_illegal = quadrature(quarter), 0, 0
         if self.lost:
             level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
@@ -205,7 +207,7 @@ class VirtualEncoder:
 
 @dataclass(frozen=True, eq=False)
 class Encoding:
-    """What an encoder recorded of a motion, and the truth about it.
+    """Holds the recording that an encoder made of a motion, and the truth about it.
 
     Parameters
     ----------
@@ -226,7 +228,7 @@ class Encoding:
     n_lost: int
 
     def true_position(self, t: ArrayLike, decoding: int = 4) -> NDArray[np.int64]:
-        """Counts since time 0 that an ideal decoder of the disc would have at times `t` in seconds.
+        """Return counts since time 0 that an ideal decoder of the disc would have at times `t` in seconds.
 
         Decoding 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low. Vibration and what
         is of the disc (nonuniformity, phase and duty error) are in it; jitter, bounce, lost pulses and illegal
@@ -239,11 +241,11 @@ class Encoding:
         return ((now + lead) >> shift) - ((start + lead) >> shift)
 
     def true_speed(self, t: ArrayLike) -> FloatArray:
-        """Speed of the shaft in rad/s, vibration included, at times `t` in seconds."""
+        """Return speed of the shaft in rad/s, vibration included, at times `t` in seconds."""
         return self._shaft.speed(t)
 
     def motion_speed(self, t: ArrayLike) -> FloatArray:
-        """Speed of the motion in rad/s, without vibration, at times `t` in seconds."""
+        """Return speed of the motion in rad/s, without vibration, at times `t` in seconds."""
         return self.motion.speed(t)
 
     @property

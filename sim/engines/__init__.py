@@ -1,1 +1,1 @@
-"""Engines: what runs the hardware. Only this package imports `tachometry.hdl`."""
+"""Engines run the hardware. Only this package of sim imports `tachometry.hdl`."""

@@ -1,4 +1,4 @@
-"""A demo board in the compiled engine: bytes into its UART, bytes out of it, and clocks that pass."""
+"""The compiled engine runs a demo board: bytes go into its UART, bytes come out of it, and clocks pass."""
 
 import ctypes
 import threading
@@ -23,7 +23,7 @@ _ROOM = 1 << 16  # bytes that a call can give back
 
 @dataclass(frozen=True)
 class _BoardDesign(Design):
-    """The demo, whose last input is the line to the core."""
+    """Describes the demo, whose last input is the line to the core."""
 
     registers: DemoMap | None = None
     bus: Bus | None = None
@@ -57,7 +57,7 @@ class _Transfer(ctypes.Structure):
 
 
 class BoardSimulation:
-    """The demo on a UART, from its reset on.
+    """Runs the demo on a UART, from its reset on.
 
     Parameters
     ----------

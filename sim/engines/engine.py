@@ -1,4 +1,4 @@
-"""Engines: what runs the hardware. All take a trace of pins and give a `Run`."""
+"""Engines run the hardware: all take a trace of pins and give a `Run`."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +10,7 @@ from tachometry.spec import CoreSpec, Port
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C in a simulation.
+    """Tells of Ctrl-C in a simulation.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Engine(Protocol):
-    """A simulator of the core."""
+    """Simulates the core."""
 
     name: str
 
@@ -59,7 +59,7 @@ class Engine(Protocol):
 
 
 def driven_pins(spec: CoreSpec, trace: Trace) -> list[Port]:
-    """The inputs that a trace drives.
+    """Return the inputs that a trace drives.
 
     Raises
     ------

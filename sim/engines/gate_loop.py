@@ -1,4 +1,4 @@
-"""A core that has its control loop in gates, about a motor: pins A and B in, current out, and what went through it."""
+"""A core that has its control loop in gates runs about a motor: pins A and B in, current out."""
 
 import ctypes
 import math
@@ -28,7 +28,7 @@ MOST_EDGES = 1 << 22
 
 class _GateDesign(LoopDesign):
     def source(self, model: str) -> str:
-        """See `Design.source`."""
+        """Write the source, as `Design.source` says."""
         places = {pin.name: place for place, pin in enumerate(self.pins)}
         names = ("PIN_A", "PIN_B", "PIN_ENABLE", "PIN_POSITION", "PIN_VELOCITY", "PIN_ACCELERATION")
         head = "".join(f"#define {name} {places[pin]}\n" for name, pin in zip(names, _PINS, strict=True))
@@ -38,7 +38,7 @@ class _GateDesign(LoopDesign):
 
 @dataclass(frozen=True, eq=False)
 class Through:
-    """What went through a core with a loop.
+    """Holds all that went through a core with a loop.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Through:
 
 
 class GateLoop:
-    """A core with a control loop in gates, about a motor; it is compiled once.
+    """Runs a core with a control loop in gates about a motor; it is compiled once.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ class GateLoop:
         self._simulation = LoopSimulation(spec.tachometer, self._design)
 
     def stop(self, ending: bool = True) -> None:
-        """See `LoopSimulation.stop`."""
+        """Stop the run, as `LoopSimulation.stop` says."""
         self._simulation.stop(ending)
 
     def run(
         self, motor: Motor, edges: Edges, course: Course, *, feed_forward: bool = False, log: float = 1e-4
     ) -> tuple[Log, Through]:
-        """A run as long as the course, from rest: the columns of a log as of `LoopSimulation.run`, and what went
+        """Return a run as long as the course, from rest: the columns of a log as of `LoopSimulation.run`, and what went
         through.
 
         Raises

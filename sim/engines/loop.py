@@ -1,4 +1,4 @@
-"""A core in a control loop: motor, encoder and controller run in the compiled engine, a whole run in one call."""
+"""A core runs in a control loop: motor, encoder and controller are in the compiled engine, a whole run in one call."""
 
 import ctypes
 import math
@@ -23,7 +23,8 @@ Log = dict[str, FloatArray]
 
 class Observer(IntEnum):
     """When and from what the disturbance is estimated: at each control tick with the held velocity (Fig. 2), with each
-    update of the velocity (Fig. 11), or at each control tick from an acceleration that the core measures."""
+    update of the velocity (Fig. 11), or at each control tick from an acceleration that the core measures.
+    """
 
     CONVENTIONAL = 0
     SYNCHRONISED = 1
@@ -32,7 +33,7 @@ class Observer(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Motor:
-    """A motor with its driver and load.
+    """Describes a motor with its driver and load.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ class Motor:
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """A controller of velocity and position with a disturbance observer.
+    """Describes a controller of velocity and position with a disturbance observer.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ def _at_least_0(what: object, *names: str) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """What is commanded, and what comes in between; all at times `seconds` apart.
+    """Holds the commands, and what comes in between; all at times `seconds` apart.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Where a disc's edges are met.
+    """Says where a disc's edges are met.
 
     Parameters
     ----------
@@ -171,16 +172,17 @@ class Edges:
 
 
 class LoopDesign(Design):
-    """A core to be compiled with plant and controller."""
+    """Describes a core to be compiled with plant and controller."""
 
     def source(self, model: str) -> str:
-        """See `Design.source`."""
+        """Write the source, as `Design.source` says."""
         head = f"#define N_COLUMNS {len(self.outputs)}\n#define GATES 0\n#include <cstdint>\n"
         parts = [Path(__file__).with_name(part).read_text(encoding="utf-8") for part in PARTS]
         return "\n".join([head, model, *parts])
 
 
 def struct(name: str, **members: Any) -> type[ctypes.Structure]:
+    """Return a structure of C with these members."""
     return type(name, (ctypes.Structure,), {"_fields_": list(members.items())})
 
 
@@ -212,7 +214,7 @@ _LOOP = struct(
 
 
 class LoopSimulation:
-    """A core of a spec in loops; it is compiled once. Runs may go on in several threads at once.
+    """Runs the core of a spec in loops; it is compiled once. Runs may go on in several threads at once.
 
     Parameters
     ----------
@@ -239,7 +241,7 @@ class LoopSimulation:
     def run(
         self, motor: Motor, edges: Edges, gains: Gains, course: Course, *, log: float = 1e-4, step: float = 1e-5
     ) -> Log:
-        """A run as long as the course, from rest: a column of values at times `log` seconds apart for each name.
+        """Return a run as long as the course, from rest: a column of values at times `log` seconds apart for each name.
 
         The motor goes on in steps of `step` seconds, or from event to event.
 
@@ -253,7 +255,7 @@ class LoopSimulation:
     def call(
         self, motor: Motor, edges: Edges, controller: Any, course: Course, log: float, step: float, gates: int | None
     ) -> Log:
-        """See `run`; `gates` is where a controller in gates is described, in place of one in double precision."""
+        """Run as `run` does; `gates` describes a controller in gates, in place of one in double precision."""
         spec = self._spec
         arrays = (edges.offset, edges.jitter, course.speed, course.angle, course.load, course.current)
         offset, jitter, *tables = (np.ascontiguousarray(one, dtype=np.float64) for one in arrays)
@@ -283,7 +285,7 @@ class LoopSimulation:
         return dict(zip(COLUMNS, rows[: loop.n_rows].T, strict=True))
 
     def clocks(self, seconds: float) -> int:
-        """A time in whole clocks, at least one."""
+        """Return a time in whole clocks, at least one."""
         return max(round(seconds * self._spec.timing.clock_hz), 1)
 
     def _controller(self, gains: Gains) -> Any:

@@ -1,4 +1,4 @@
-"""The engines by name, and the choice between them."""
+"""Engines are known by name, and chosen here."""
 
 from tachometry.sim.engines.build import compiler, find_compiler
 from tachometry.sim.engines.engine import Engine
@@ -8,7 +8,7 @@ NAMES = (*ENGINES, "cxxrtl-every-clock")
 
 
 def pick(name: str = "auto") -> Engine:
-    """The engine of a name; `auto` is cxxrtl where there is a C++ compiler, and pysim where there is none.
+    """Return the engine of a name; `auto` is cxxrtl where there is a C++ compiler, and pysim where there is none.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def pick(name: str = "auto") -> Engine:
 
 
 def present() -> list[str]:
-    """Names of the engines that can be used here."""
+    """Return names of the engines that can be used here."""
     found = []
     for name in ENGINES:
         try:

@@ -1,4 +1,4 @@
-"""What a waveform shows of a core."""
+"""Says which signals of a core a waveform shows."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ _ORDER = {TICK: 1, UPDATE: 2, INDEX: 3}  # of strobes in the waveform; errors co
 
 
 def shown(core: AnyTachometer) -> dict[str, Value]:
-    """Signals of the waveform, in the order in which they are shown.
+    """Return signals of the waveform, in the order in which they are shown.
 
     First the pins, then every strobe with the ports that are new with it; the inside of the datapath stands before the
     update that comes of it.
@@ -32,7 +32,7 @@ def shown(core: AnyTachometer) -> dict[str, Value]:
 
 
 class Watched(wiring.Component):
-    """A core whose shown signals are outputs.
+    """Wraps a core, so that the signals to be shown are outputs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Amaranth's own simulator: needs nothing else, and is slow."""
+"""Amaranth's own simulator needs nothing else, and is slow."""
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
@@ -48,7 +48,7 @@ async def drive(ctx: Any, trace: Trace, pins: Mapping[str, Signal], period: floa
 
 
 class PySim:
-    """The engine that is always there."""
+    """Is the engine that is always there."""
 
     name = "pysim"
 
@@ -61,7 +61,7 @@ class PySim:
         window: tuple[int, int] | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> Run:
-        """See `Engine.run`."""
+        """Run the core, as `Engine.run` says."""
         core = core_of(spec)
         top = Module()
         top.submodules.core = core
@@ -117,7 +117,7 @@ class PySim:
 
 
 def _packed(top: Module, values: list[Value]) -> Signal:
-    """One signal of many: the simulator compiles it, where it would interpret a `Cat` anew in every clock."""
+    """Return one signal of many: the simulator compiles it, where it would interpret a `Cat` anew in every clock."""
     packed = Signal(sum(map(len, values)))
     top.d.comb += packed.eq(Cat(*values))
     return packed
@@ -135,7 +135,7 @@ def _watch(simulator: Simulator, waveform: Waveform, packed: Signal, begin: int,
 
 
 def _unpack(rows: list[tuple[int, int]], shapes: list[tuple[int, bool]]) -> NDArray[np.int64]:
-    """Rows (clock, packed values) as columns; `shapes` gives width and signedness, least significant first."""
+    """Return rows (clock, packed values) as columns; `shapes` gives width and signedness, least significant first."""
     columns = [[clock for clock, _ in rows]]
     shift = 0
     for width, is_signed in shapes:

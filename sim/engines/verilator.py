@@ -1,4 +1,4 @@
-"""Verilator: the exported Verilog, compiled; it shares nothing with Amaranth's simulators but that text."""
+"""Verilator compiles the exported Verilog; it shares nothing with Amaranth's simulators but that text."""
 
 import importlib.util
 import os
@@ -46,7 +46,7 @@ struct Working {{
 
 
 def home() -> Path:
-    """Folder of the package verilator.
+    """Return folder of the package verilator.
 
     Raises
     ------
@@ -66,20 +66,20 @@ def verilate(options: list[str], folder: Path) -> None:
 
 
 class Verilator(CompiledEngine):
-    """The engine that runs the exported Verilog."""
+    """Runs the exported Verilog."""
 
     name = "verilator"
     more = _LEVEL  # options of the compiler
 
     def text(self, design: Design) -> str:
-        """The Verilog: what is exported, or, if signals are to be shown, a core with these as outputs."""
+        """Return the Verilog: what is exported, or, if signals are to be shown, a core with these as outputs."""
         if not design.n_words:
             return export(design.spec)["tachometer.v"]
         with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
             return str(verilog.convert(design.component, name="tachometer", emit_src=False))
 
     def library(self, design: Design) -> Path:
-        """See `CompiledEngine.library`."""
+        """Build the library, as `CompiledEngine.library` says."""
         text = self.text(design)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("verilator"))
@@ -101,14 +101,14 @@ class Verilator(CompiledEngine):
 
 
 def runtimes() -> list[Path]:
-    """Verilator's runtime, compiled once for all cores."""
+    """Return Verilator's runtime, compiled once for all cores."""
     compiler = build.compiler()
     tools = (compiler, build.version(compiler), build.flags(), version_of("verilator"))
     return [_runtime(source, tools) for source in _RUNTIME]
 
 
 def _runtime(source: str, tools: tuple[object, ...]) -> Path:
-    """A part of the runtime."""
+    """Return a part of the runtime."""
 
     def make(folder: Path) -> Path:
         options = [*build.flags(), *_LEVEL, f"-I{home() / 'include'}", "-c", "-o", "runtime.o"]
@@ -119,7 +119,7 @@ def _runtime(source: str, tools: tuple[object, ...]) -> Path:
 
 
 def _model(design: Design, includes: str) -> str:
-    """The struct `Model`."""
+    """Return the struct `Model`."""
     return _MODEL.format(
         includes=includes,
         pins=design.pins_text(lambda pin, level: f"top.{pin} = {level};"),

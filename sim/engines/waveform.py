@@ -1,4 +1,4 @@
-"""VCD waveforms with a GTKWave save file that shows them as an engineer wants to see them."""
+"""Waveforms are written as VCD, with a GTKWave save file that shows them as an engineer wants to see them."""
 
 from pathlib import Path
 from types import TracebackType
@@ -40,7 +40,7 @@ class Waveform:
         self._time = 0
 
     def sample(self, clock: int, packed: int) -> None:
-        """The signals in clock `clock`, packed in order, the first in the least significant bits."""
+        """Write the signals in clock `clock`, packed in order, the first in the least significant bits."""
         changed = -1 if self._last is None else packed ^ self._last
         if changed:
             # Kept before it is written: Ctrl-C may come between.

@@ -1,4 +1,4 @@
-"""The papers' figures, computed anew: what is drawn, what the paper says of it, and what came out.
+"""The papers' figures are computed anew: each module draws some, and holds them against the words of the paper.
 
 `FIGURES` has one function for each; `tachometry figures` draws them all.
 """

@@ -1,4 +1,4 @@
-"""Figures on paper and as tables: SVG, PNG and CSV of a `Result`."""
+"""A `Result` is drawn as SVG and PNG, and written as CSV."""
 
 import textwrap
 from pathlib import Path
@@ -52,7 +52,9 @@ def _plain(label: str) -> str:
 
 
 def draw(result: Result) -> Figure:
-    """The figure, panels one below the other; placed by hand, as `sim.plot` does, to be equal from run to run."""
+    """Return the figure, panels one below the other; placed by hand, as `sim.plot` does, to be
+    equal from run to run.
+    """
     n = len(result.panels)
     panel_height = _PANEL if n > 1 else _ONLY_PANEL
     height = _TOP + _BOTTOM + n * panel_height + (n - 1) * _GAP
@@ -70,7 +72,7 @@ def draw(result: Result) -> Figure:
 
 
 def reduced(x: np.ndarray, y: np.ndarray, log_x: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """No more points than a figure can show; x increases."""
+    """Return no more points than a figure can show; x increases."""
     kept = columns(np.log(x) if log_x else x, y)
     return x[kept], y[kept]
 

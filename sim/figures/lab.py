@@ -1,4 +1,4 @@
-"""Where figures are measured: a virtual encoder, golden models, and the hardware beside them."""
+"""Figures are measured in a lab: a virtual encoder, golden models, and the hardware beside them."""
 
 from collections.abc import Callable
 
@@ -56,7 +56,7 @@ class Lab:
         start_angle_rad: float = 0.0,
         seed: int = 1,
     ) -> Encoding:
-        """What the virtual encoder of a spec records."""
+        """Return what the virtual encoder of a spec records."""
         encoder = VirtualEncoder(
             spec.encoder.pulses_per_rev,
             vibration=None if vibration is None else Vibration.parse(vibration),
@@ -68,11 +68,11 @@ class Lab:
         return encoder.record(parse_motion(motion) if isinstance(motion, str) else motion)
 
     def golden(self, spec: TachometerSpec, encoding: Encoding) -> Run:
-        """What the core shows, by its golden model."""
+        """Return what the core shows, by its golden model."""
         return golden.run(spec, PinTrace.of(encoding.recording, spec))
 
     def lockstep(self, spec: TachometerSpec, encoding: Encoding, begin: float = 0.0, end: float = 1.0) -> Run:
-        """What `golden` gives, compared with the hardware in Amaranth's simulator.
+        """Return what `golden` gives, compared with the hardware in Amaranth's simulator.
 
         It takes the figure from the share `begin` of its work to the share `end`.
         """

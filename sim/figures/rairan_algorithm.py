@@ -1,4 +1,4 @@
-"""Figs. 2 and 3 of Rairán 2013: Table 1 at work, and its estimate over speed."""
+"""Figs. 2 and 3 of Rairán 2013 show Table 1 at work, and its estimate over speed."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ _DT = 1000  # ts
 
 
 def _example(ratio: float, first: float, windows: int) -> list[Row]:
-    """Table 1 at a constant speed of so many ω_lim, from a first pulse at `first` dt on, for so many dt."""
+    """Return table 1 at a constant speed of so many ω_lim, from a first pulse at `first` dt on, for so many dt."""
     period = _DT / ratio
     n_pulses = int(windows * ratio) + 1
     pulses = np.rint(first * _DT + period * np.arange(n_pulses)).astype(np.int64)
@@ -24,7 +24,7 @@ def _example(ratio: float, first: float, windows: int) -> list[Row]:
 
 
 def _letters(rows: list[Row]) -> list[str]:
-    """Letters of the events from a on; ends of dt in a row that update nothing have one together."""
+    """Return letters of the events from a on; ends of dt in a row that update nothing have one together."""
     letters, number = [], -1
     for before, row in zip([None, *rows], rows, strict=False):
         alike = before is not None and _idle(before) and _idle(row)
@@ -38,13 +38,13 @@ def _idle(row: Row) -> bool:
 
 
 def _updating(rows: list[Row], chosen: str) -> str:
-    """The first two events in which something was updated."""
+    """Return the first two events in which something was updated."""
     letters = [letter for letter, row in zip(_letters(rows), rows, strict=True) if getattr(row, chosen)]
     return " and ".join(letters[:2])
 
 
 def _settled(rows: list[Row]) -> str:
-    """The last event that changed the estimate."""
+    """Return the last event that changed the estimate."""
     return _letters(rows)[max(k for k in range(1, len(rows)) if rows[k].n1 != rows[k - 1].n1)]
 
 
@@ -78,7 +78,7 @@ def _example_panels(title: str, rows: list[Row]) -> tuple[Panel, Panel]:
 
 
 def fig2(lab: Lab) -> Result:
-    """Fig. 2: examples of algorithm use."""
+    """Compute fig. 2: examples of algorithm use."""
     examples = {"a": (0.24, 1.5, 16), "b": (1.5, 0.2, 8)}
     panels: list[Panel] = []
     runs = {}
@@ -123,7 +123,7 @@ def fig2(lab: Lab) -> Result:
 
 
 def _estimates(top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Speeds in ω_lim, increasing, and n1 of Table 1 at them once it is in step."""
+    """Return speeds in ω_lim, increasing, and n1 of Table 1 at them once it is in step."""
     dt = 2520  # divisible by 1 to 10: the ends of all intervals are met
     periods = np.unique(np.rint(dt / np.linspace(0.125, top, 900)).astype(np.int64))
     ends = np.array([dt * k for k in range(1, 9)] + [dt // k for k in (2, 3, 4)])
@@ -137,7 +137,7 @@ def _estimates(top: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fig3(lab: Lab) -> Result:
-    """Fig. 3: speed estimation and relative error for the proposed algorithm."""
+    """Compute fig. 3: speed estimation and relative error for the proposed algorithm."""
     speed, n1 = _estimates(4.5)
     error = rairan_eq03_error(n1, speed, 1)
     bound = rairan_eq04_max_error(n1)

@@ -1,4 +1,4 @@
-"""Figs. 5 and 7 of Rairán 2013: estimates at variable speeds, and their relative errors."""
+"""Figs. 5 and 7 of Rairán 2013 show estimates at variable speeds, and their relative errors."""
 
 import math
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ _NAMES = ("$ω_{m1}$", "$ω_{m2}$", "$ω_{m3}$")
 
 @dataclass(frozen=True, eq=False)
 class _Estimates:
-    """What Table 1 shows after each update, in ω_lim, from when both counts are there; shape (n,).
+    """Holds the estimates of Table 1 after each update, in ω_lim, from when both counts are there; shape (n,).
 
     Parameters
     ----------
@@ -47,7 +47,9 @@ class _Estimates:
 
 
 def _estimates(spec: RairanTachometer, run: Run) -> _Estimates:
-    """n1 from the counts at the ports, n2 and n3 from it; in the regime that was updated last, as the velocity is."""
+    """Return n1 from the counts at the ports, n2 and n3 from it; in the regime that was updated last, as the velocity
+    is.
+    """
     updates = run.updates
     unit = 2.0**spec.frac_bits
     # n3 tells the regime: 2/3 and less is low, 4/3 and more is high.
@@ -64,7 +66,9 @@ def _held(at: _Estimates, values: FloatArray, clock: FloatArray) -> FloatArray:
 
 
 def _window_means(spec: RairanTachometer, encoding: Encoding, at: _Estimates) -> FloatArray:
-    """Mean true speed, in counts per dt, over what each update has measured: dt, or the time since the last count."""
+    """Return mean true speed, in counts per dt, over what each update has measured: dt, or the time since the last
+    count.
+    """
     clock_hz, dt = spec.timing.clock_hz, spec.timing.tick_cycles
     trace = encoding.recording.place(clock_hz)
     counted = trace.clock[1:]  # all edges count, in one direction
@@ -76,7 +80,7 @@ def _window_means(spec: RairanTachometer, encoding: Encoding, at: _Estimates) ->
 
 
 def fig5(lab: Lab) -> Result:
-    """Fig. 5: estimation for variable speed; hardware and golden model in lockstep."""
+    """Compute fig. 5: estimation for variable speed; hardware and golden model in lockstep."""
     pulses, dt, clock_hz = 10_000, 1e-3, 10_000_000
     spec = RairanTachometer(
         encoder=Encoder(pulses // 4),
@@ -146,18 +150,18 @@ def fig5(lab: Lab) -> Result:
 
 
 def _shown_speeds() -> FloatArray:
-    """Of 43 voltages, from 3 to 24 V by 0.5 V; the speeds are ours, none special."""
+    """Return of 43 voltages, from 3 to 24 V by 0.5 V; the speeds are ours, none special."""
     return np.linspace(2.03, 29.17, 43)
 
 
 def _bounds(speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Eqs. (4), (8) and (13) over speeds in ω_lim."""
+    """Compute eqs. (4), (8) and (13) over speeds in ω_lim."""
     n1 = np.where(speed > 1, np.ceil(speed), 1 / np.maximum(np.ceil(1 / speed) - 1, 1))
     return rairan_eq04_max_error(n1), rairan_eq08_sup_error(rairan_eq05_n2(n1)), rairan_eq13_max_error(n1)
 
 
 def _core(ts: float, to_the_letter: bool) -> RairanTachometer:
-    """160 slots, which 40 lines are of which all edges count; dt = 1 ms."""
+    """Return 160 slots, which 40 lines are of which all edges count; dt = 1 ms."""
     return RairanTachometer(
         encoder=Encoder(40),
         timing=Timing(round(1 / ts), round(1e-3 / ts), 50),
@@ -169,7 +173,7 @@ def _core(ts: float, to_the_letter: bool) -> RairanTachometer:
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """Relative errors at each speed.
+    """Holds the relative errors at each speed.
 
     Parameters
     ----------
@@ -208,7 +212,9 @@ def _errors(lab: Lab, spec: RairanTachometer, speeds: FloatArray, limit: float, 
 
 
 def fig7(lab: Lab) -> Result:
-    """Fig. 7: relative error for pul = 160, dt = 1 ms, and ts = 100 µs; the hardware over a short run of all speeds."""
+    """Compute fig. 7: relative error for pul = 160, dt = 1 ms, and ts = 100 µs; the hardware over a short run of all
+    speeds.
+    """
     pulses, dt, ts = 160, 1e-3, 100e-6
     speeds = _shown_speeds()
     spec = _core(ts, to_the_letter=False)

@@ -1,4 +1,4 @@
-"""A figure as data: panels with curves, and the paper's claims with what was computed."""
+"""A figure is data: panels with curves, and the paper's claims with the values that were computed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A line of a panel.
+    """Is a line of a panel.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Axes with curves.
+    """Is a pair of axes with curves.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Claim:
-    """What a paper says of a figure.
+    """Holds a paper's word on a figure beside the value that was computed.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Claim:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A figure that was computed.
+    """Holds a figure that was computed.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure that can be computed.
+    """Describes a figure that can be computed.
 
     Parameters
     ----------
@@ -127,5 +127,5 @@ class Entry:
 
 
 def percent(part: NDArray[np.bool_]) -> float:
-    """Share of True, in per cent."""
+    """Return share of True, in per cent."""
     return float(100 * np.mean(part))

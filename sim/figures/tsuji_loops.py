@@ -1,4 +1,4 @@
-"""Figs. 13, 14 and 15 of Tsuji 2009: velocity loops with a disturbance observer about the core."""
+"""Figs. 13, 14 and 15 of Tsuji 2009 show velocity loops with a disturbance observer about the core."""
 
 import math
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ def _shown(log: Log) -> Curve:
 
 
 def fig13(lab: Lab) -> Result:
-    """Fig. 13: PD control with a disturbance observer, by the M method and by the S method."""
+    """Compute fig. 13: PD control with a disturbance observer, by the M method and by the S method."""
     load = Load(torque=0.2, begin=7.0, seconds=0.5)
     motion = parse_motion("ramp:0:40rad/s:5s+constant:40rad/s:5s")
     task = Task(motion=motion, load=load, virtual=True, noise=_NOISE)
@@ -108,7 +108,9 @@ SOLUTIONS = (
 
 
 def fig14(lab: Lab) -> Result:
-    """Fig. 14: S without the technical solutions, with alternate alterations cancelled, and synchronised too."""
+    """Compute fig. 14: S without the technical solutions, with alternate alterations cancelled, and
+    synchronised too.
+    """
     motion = parse_motion("ramp:0:39rad/s:5s+constant:39rad/s:10s")
     panels, means = [], []
     limits: dict[str, Any] = {"levels": tuple(_COUNT / 1e-3 * k for k in range(1, 4)), "y_limits": (0.0, 48.0)}
@@ -136,13 +138,13 @@ def fig14(lab: Lab) -> Result:
 
 
 def solution(tick: str, motion: Command, cancel: bool, synchronised: bool) -> Setting:
-    """The loop of Fig. 14 with some of the technical solutions."""
+    """Return the loop of Fig. 14 with some of the technical solutions."""
     spec, task = _core(STachometer, decoding=1, tick=tick, cancel=cancel), Task(motion=motion, noise=_NOISE)
     return _setting(spec, task, 0.0, kp=100.0, kv=30.0, rate=40.0, synchronised=synchronised)
 
 
 def deviation(log: Log, begin: float) -> float:
-    """The largest deviation of the speed as it is shown from the command, from a time on."""
+    """Return the largest deviation of the speed as it is shown from the command, from a time on."""
     shown = _shown(log)
     wanted = np.interp(shown.x, log["time"], log["command"])
     return float(np.abs(shown.y - wanted)[shown.x >= begin].max())
@@ -155,12 +157,12 @@ class Cosine:
     duration: float
 
     def speed(self, t: FloatArray) -> FloatArray:
-        """In rad/s."""
+        """Return in rad/s."""
         return np.asarray(200 / math.pi * (1 - cos2pi(np.asarray(t) / 20)))
 
 
 def fig15(lab: Lab) -> Result:
-    """Fig. 15: the RMS of the tracking error over the gain."""
+    """Compute fig. 15: the RMS of the tracking error over the gain."""
     task = Task(motion=Cosine(10.0 if lab.whole else 4.0), noise=_NOISE)
     kvs = np.array(_KVS if lab.whole else _FEW_KVS)
     mt = _core(MTTachometer, decoding=4, tick="20us", timer="tick", paper_exact=True, min_time=48_000)

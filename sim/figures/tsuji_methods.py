@@ -1,4 +1,4 @@
-"""Figs. 6, 7 and 8 of Tsuji 2009: measurement time and resolution of the methods over speed."""
+"""Figs. 6, 7 and 8 of Tsuji 2009 show measurement time and resolution of the methods over speed."""
 
 import math
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ _MEAN = f"M, mean of {AVERAGE}"
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """What a golden model does at constant speeds: mean measurement time, s, and greatest error, rad/s."""
+    """Holds mean measurement time, s, and greatest error, rad/s, of a golden model at constant speeds."""
 
     speed: FloatArray
     time: FloatArray
@@ -54,7 +54,7 @@ def _measured(lab: Lab, spec: TachometerSpec, seconds: float = 3.0) -> _Measured
 
 
 def _speeds() -> FloatArray:
-    """Up to four counts per tick, the multiples of ω_u among them and the brink of force on either side."""
+    """Return up to four counts per tick, the multiples of ω_u among them and the brink of force on either side."""
     brink = np.arange(0, int(_FASTEST / UNIT) + 1)[:, np.newaxis] + np.array([-1, -0.999, 0, 0.999, 1]) / MAX_TICKS
     every = np.concatenate([np.linspace(0.2, _FASTEST, 8000), UNIT * brink.ravel(), [UNIT * (1 - 1e-9)]])
     return np.unique(every[(every > 0.1) & (every <= _FASTEST)])
@@ -71,13 +71,13 @@ def _all(speed: FloatArray) -> dict[str, Performance]:
 
 
 def lattice_mt(**core: Any) -> MTTachometer:
-    """M/T as in the paper: times in ticks, at least T_c, that is later than T_c less a tick."""
+    """Return M/T as in the paper: times in ticks, at least T_c, that is later than T_c less a tick."""
     tick_cycles = core["timing"].tick_cycles
     return MTTachometer(timer="tick", min_time=(MIN_TICKS - 1) * tick_cycles, paper_exact=True, **core)
 
 
 def _golden(lab: Lab, mt: MTTachometer) -> dict[str, _Measured]:
-    """The methods whose golden models are measured beside the equations."""
+    """Return the methods whose golden models are measured beside the equations."""
     specs: dict[str, TachometerSpec] = {
         _MEAN: MTachometer(average=AVERAGE, **_CORE),  # type: ignore[arg-type]
         "T": TTachometer(timer="tick", paper_exact=True, **_CORE),  # type: ignore[arg-type]
@@ -88,7 +88,7 @@ def _golden(lab: Lab, mt: MTTachometer) -> dict[str, _Measured]:
 
 
 def fig06(lab: Lab) -> Result:
-    """Fig. 6: measurement time on each method."""
+    """Compute fig. 6: measurement time on each method."""
     speed = _speeds()
     # Eq. (16) has the exact times of counts: those of a timer that is faster than the tick.
     timer = MTTachometer(min_time=MIN_TICKS * 200, paper_exact=True, **_CORE)  # type: ignore[arg-type]
@@ -133,7 +133,7 @@ def fig06(lab: Lab) -> Result:
 
 
 def fig07(lab: Lab) -> Result:
-    """Fig. 7: measurement resolution on each method."""
+    """Compute fig. 7: measurement resolution on each method."""
     speed = _speeds()
     theory, golden = _all(speed), _golden(lab, lattice_mt(**_CORE))
     curves = [Curve(name, *reduced(speed, method.resolution)) for name, method in theory.items()]
@@ -189,7 +189,7 @@ def fig07(lab: Lab) -> Result:
 
 
 def fig08(lab: Lab) -> Result:
-    """Fig. 8: performance comparison of M/T method and S method, M/T with a timer."""
+    """Compute fig. 8: performance comparison of M/T method and S method, M/T with a timer."""
     counts, tick, timer, m_c = 81_000, 20e-6, 200e-9, 100
     unit = float(unit_velocity(counts, tick))
     bands, samples = 155, 2000

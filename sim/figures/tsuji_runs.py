@@ -1,4 +1,4 @@
-"""Figs. 5, 9 and 12 of Tsuji 2009: velocities over time."""
+"""Figs. 5, 9 and 12 of Tsuji 2009 show velocities over time."""
 
 import math
 
@@ -25,7 +25,7 @@ def _multiples(low: float, high: float) -> tuple[float, ...]:
 
 
 def fig05(lab: Lab) -> Result:
-    """Fig. 5: pulse pattern in simulation."""
+    """Compute fig. 5: pulse pattern in simulation."""
     spec = MTachometer(**_CORE)  # type: ignore[arg-type]
     ramp = lab.turn(spec, "ramp:0:40rad/s:2s")
     held = held_velocity(spec, lab.golden(spec, ramp))
@@ -100,7 +100,7 @@ def _rms(error: FloatArray) -> float:
 
 
 def fig09(lab: Lab) -> Result:
-    """Fig. 9: velocity measurement with alternate pulse alteration."""
+    """Compute fig. 9: velocity measurement with alternate pulse alteration."""
     m = MTachometer(**_CORE)  # type: ignore[arg-type]
     plain, cancelled = (STachometer(cancel=cancel, **_CORE) for cancel in (False, True))  # type: ignore[arg-type]
     encoding = lab.turn(m, "ramp:12.3:12.9rad/s:1s", vibration="0.5mrad:170Hz", nonuniformity=0.2)
@@ -161,7 +161,7 @@ def fig09(lab: Lab) -> Result:
 
 
 def fig12(lab: Lab) -> Result:
-    """Fig. 12: velocity measurement on each method; hardware and golden models in lockstep."""
+    """Compute fig. 12: velocity measurement on each method; hardware and golden models in lockstep."""
     specs = _methods()
     encoding = lab.turn(next(iter(specs.values())), "ramp:0:40rad/s:1s+constant:40rad/s:200ms+ramp:40:0rad/s:800ms")
     duration = encoding.recording.duration
@@ -228,7 +228,7 @@ def _methods() -> dict[str, TachometerSpec]:
 
 
 def _deviation(run: Run, spec: TachometerSpec, encoding: Encoding) -> tuple[float, bool, tuple[float, float]]:
-    """Errors of alterations' updates against the mean speeds over their windows.
+    """Return errors of alterations' updates against the mean speeds over their windows.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Golden models: exact integers over whole recordings, from the papers and the spec alone."""
+"""Golden models compute exact integers over whole recordings, from the papers and the spec alone."""
 
 from typing import Any
 
@@ -18,12 +18,12 @@ from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 
 
 def model(spec: TachometerSpec) -> Any:
-    """The golden model of the spec's method."""
+    """Return the golden model of the spec's method."""
     return MODELS[spec.method](spec)
 
 
 def run(spec: CoreSpec, trace: Trace) -> Run:
-    """What the core of `spec` must show at its ports for these pins."""
+    """Return what the core of `spec` must show at its ports for these pins."""
     if isinstance(spec, AxesSpec):
         assert isinstance(trace, AxesTrace), "many axes need the pins of each"
         return run_axes(spec, trace, tables)
@@ -32,7 +32,7 @@ def run(spec: CoreSpec, trace: Trace) -> Run:
 
 
 def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
-    """The same by strobes, and with each update the clock of its cause, as the column `cause`."""
+    """Return the same by strobes, and with each update the clock of its cause, as the column `cause`."""
     steps = decoded(spec, trace)
     golden = model(spec)
     if spec.own_ticks:

@@ -1,4 +1,4 @@
-"""Golden model of many axes: each is a core of its own, on what it sees of its pins."""
+"""The golden model of many axes takes each as a core of its own, on what it sees of its pins."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,9 @@ from tachometry.spec.methods.axes import COUNT_LATENCY, AxesSpec
 
 
 def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]]) -> Run:
-    """What the core of `spec` must show at its ports for these pins; `tables` is the golden model of a single core."""
+    """Return what the core of `spec` must show at its ports for these pins; `tables` is the golden model of a single
+    core.
+    """
     found: dict[str, list[Table]] = {name: [] for name in spec.axis.strobes}
     for axis, pins in enumerate(trace.each):
         rows = tables(spec.axis, seen(spec, pins, axis))
@@ -38,7 +40,7 @@ def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec,
 
 
 def seen(spec: AxesSpec, pins: PinTrace, axis: int) -> PinTrace:
-    """What an axis sees of its pins, on the clock of `spec.axis`: the levels at its looks.
+    """Return what an axis sees of its pins, on the clock of `spec.axis`: the levels at its looks.
 
     The first level that counts is looked at in the third round; a core of its own has its first in the third clock.
     """
@@ -53,7 +55,7 @@ def seen(spec: AxesSpec, pins: PinTrace, axis: int) -> PinTrace:
 
 
 def _merged(tables: list[Table], n_clocks: int) -> Table:
-    """The rows of all axes in the order of their clocks, no two of which are the same."""
+    """Return the rows of all axes in the order of their clocks, no two of which are the same."""
     clock = np.concatenate([table.clock for table in tables])
     order = np.argsort(clock, kind="stable")
     columns = {name: np.concatenate([table[name] for table in tables])[order] for name in tables[0].columns}
@@ -62,7 +64,7 @@ def _merged(tables: list[Table], n_clocks: int) -> Table:
 
 
 def _held(table: Table, names: tuple[str, ...], axes: int) -> Table:
-    """The table with a column for each value and axis, which has the latest; at first 0."""
+    """Return the table with a column for each value and axis, which has the latest; at first 0."""
     columns = {}
     for axis in range(axes):
         own = np.flatnonzero(table["axis"] == axis)

@@ -1,4 +1,4 @@
-"""Golden command generator: constant speeds, ramps and sines, control tick by control tick, in exact integers."""
+"""The golden command generator makes constant speeds, ramps and sines in exact integers, one control tick at a time."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from tachometry.spec.control.generator import FACTOR_BITS, RAMP, SINE, Generator
 
 @dataclass(frozen=True)
 class Command:
-    """What is commanded in a control tick, in LSB of the ports.
+    """Holds the commands of a control tick, in LSB of the ports.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Demand:
-    """What the generator is told in a control tick, in LSB of the ports.
+    """Holds the inputs of the generator in a control tick, in LSB of the ports.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Demand:
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains and limit of a control tick, in LSB of the ports.
+    """Holds gains and limit of a control tick, in LSB of the ports.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def _held(value: int, most: int) -> int:
 
 
 class Generator:
-    """The state of a generator between two control ticks.
+    """Keeps the state of a generator between two control ticks.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Generator:
         self._swings = False
 
     def command(self, enable: bool = True) -> Command:
-        """What is commanded."""
+        """Return what is commanded."""
         form = self._form
         wide = form.place_width
         place = (self.place + (1 << (wide - 1))) % (1 << wide) - (1 << (wide - 1))
@@ -101,7 +101,7 @@ class Generator:
         return _held(_product(word, scale.factor), (1 << (width - 1)) - 1)
 
     def tick(self, position: int, demand: Demand) -> None:
-        """A control tick at a position, in counts: on to the next."""
+        """Take a control tick at a position, in counts."""
         form = self._form
         if not demand.enable:
             self.place, self.speed, self.change, self._swings = position << form.fraction, 0, 0, False
@@ -121,7 +121,7 @@ class Generator:
 
 
 def generated(form: GeneratorForm, positions: Iterable[int], demands: Iterable[Demand]) -> list[Command]:
-    """What is commanded in each control tick, from the positions and demands in them."""
+    """Return what is commanded in each control tick, from the positions and demands in them."""
     generator = Generator(form)
     found = []
     for position, demand in zip(positions, demands, strict=True):

@@ -1,4 +1,4 @@
-"""Golden control loop: observer and controller, control tick by control tick, in exact integers."""
+"""The golden control loop computes observer and controller in exact integers, one control tick at a time."""
 
 from collections.abc import Callable, Sequence
 
@@ -22,7 +22,7 @@ _COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 
 
 class Control:
-    """The state of a loop between two control ticks.
+    """Keeps the state of a loop between two control ticks.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Control:
         return self.y + self.w
 
     def set(self, gains: Gains) -> None:
-        """Gains from the next control tick on."""
+        """Set the gains from the next control tick on."""
         form = self._form
         raw = (gains.position, gains.velocity, gains.acceleration, gains.disturbance)
         for term, one in zip(GAINS, raw, strict=True):
@@ -65,14 +65,14 @@ class Control:
         self._limit = min(gains.limit, form.current_limit)
 
     def update(self, velocity: int) -> None:
-        """An update of the velocity, after the last control tick."""
+        """Take an update of the velocity, after the last control tick."""
         if self._form.synchronised and self._waits:
             return
         self._held = velocity
         self._waits = self._ticked
 
     def tick(self, position: int, command: Command) -> int:
-        """A control tick at a position, in counts: the new current."""
+        """Return a control tick at a position, in counts: the new current."""
         form = self._form
         if not form.synchronised:
             self._observe(1)
@@ -97,7 +97,7 @@ class Control:
         return self.current
 
     def _observe(self, n: int) -> None:
-        """Eq. (22) for velocity and observer, with the currents of n control ticks."""
+        """Compute eq. (22) for velocity and observer, with the currents of n control ticks."""
         fine = self._held << self._form.extra_bits
         z = self.z
         if Term.FILTER in self._terms:
@@ -121,7 +121,7 @@ def control(
     commands: Sequence[Command],
     gains: Sequence[Gains] | None = None,
 ) -> Table:
-    """What the loop shows with `current_valid`, of a shaft whose motion does not follow from its currents.
+    """Return what the loop shows with `current_valid`, of a shaft whose motion does not follow from its currents.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def run_loop(
     tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]],
     gains: Sequence[Gains] | None = None,
 ) -> Run:
-    """What the core of `spec` must show for these pins; `tables` is the golden model of a tachometer.
+    """Return what the core of `spec` must show for these pins; `tables` is the golden model of a tachometer.
 
     There is a command for each control tick within the trace; of a core with a command generator, a demand;
     and gains, where they are inputs.

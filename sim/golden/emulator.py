@@ -1,4 +1,4 @@
-"""Golden encoder emulator: every edge that it makes, from its settings and when they were written."""
+"""The golden encoder emulator computes every edge from the settings and the times at which they were written."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _TURN = 1 << FINE_WIDTH
 
 @dataclass(frozen=True)
 class Change:
-    """A write to the emulator's registers.
+    """Is a write to the emulator's registers.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Change:
 
 
 class _Random:
-    """The random bits: the newest in clock t is bit t of a sequence."""
+    """Gives the random bits: the newest in clock t is bit t of a sequence."""
 
     def __init__(self) -> None:
         self._bits = np.zeros(RANDOM_WIDTH, dtype=np.uint8)
@@ -62,16 +62,16 @@ class _Random:
             self._bits = np.append(self._bits, self._bits[-long : have - long + short] ^ self._bits[-short:])
 
     def bit(self, clock: NDArray[np.int64], place: int) -> NDArray[np.uint8]:
-        """A bit of the register in some clocks."""
+        """Return a bit of the register in some clocks."""
         return self._bits[clock + RANDOM_WIDTH - 1 - place]
 
     def number(self, clock: NDArray[np.int64], low: int, width: int) -> NDArray[np.int64]:
-        """Some bits of the register as a number."""
+        """Return some bits of the register as a number."""
         return np.sum([self.bit(clock, low + k).astype(np.int64) << k for k in range(width)], axis=0)
 
 
 class _Line:
-    """One line, see `hdl.core.line`."""
+    """Computes one line, see `hdl.core.line`."""
 
     def __init__(self, k: int, random: _Random) -> None:
         self._k, self._random = k, random
@@ -79,7 +79,7 @@ class _Line:
         self._until = 0  # the line bounces in all clocks before this one
 
     def play(self, clock: NDArray[np.int64], ideal: NDArray[np.uint8], settings: EmulatorSettings) -> NDArray[np.uint8]:
-        """Levels in these clocks; `ideal` is what the flip-flop takes at their ends."""
+        """Return levels in these clocks; `ideal` is what the flip-flop takes at their ends."""
         seen = np.append(np.uint8(self._ideal), ideal)
         edges = np.flatnonzero(seen[:-1] != np.append(np.uint8(self._before), seen[:-2]))
         dropped = self._random.number(clock[edges], DROP_BITS[self._k], DROP_WIDTH) < settings.drop
@@ -99,7 +99,7 @@ class _Line:
 
 
 class GoldenEmulator:
-    """The emulator from a restart on.
+    """Computes the emulator from a restart on.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class GoldenEmulator:
         self._z = [0, 0]
 
     def trace(self, changes: Sequence[Change], n_clocks: int) -> PinTrace:
-        """The lines as a core would see them whose clock 0 is that of the restart; once for each emulator.
+        """Return the lines as a core would see them whose clock 0 is that of the restart; once for each emulator.
 
         Parameters
         ----------
@@ -145,7 +145,9 @@ class GoldenEmulator:
         return PinTrace(np.concatenate(clocks), a, b, n_clocks, None if self._lines_per_rev is None else z)
 
     def _speeds(self, n: int, target: int, rate: int) -> NDArray[np.int64]:
-        """Speeds in n clocks and in the one after; they change in every second clock, by what the one before found."""
+        """Return speeds in n clocks and in the one after; they change in every second clock, by what the one before
+        found.
+        """
         first = np.full(self._clock % 2, self._speed, dtype=np.int64)  # the second clock of a change that has begun
         speed = self._speed
         if len(first):
@@ -163,7 +165,7 @@ class GoldenEmulator:
         return found
 
     def _play(self, clock: NDArray[np.int64], settings: EmulatorSettings) -> NDArray[np.uint8]:
-        """A + 2 B + 4 Z in these clocks."""
+        """Return a + 2 B + 4 Z in these clocks."""
         n = len(clock)
         self._random.until(self._clock + n)
         target = settings.speed << RATE_SHIFT

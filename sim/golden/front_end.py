@@ -1,4 +1,4 @@
-"""Golden front end: from sampled levels to steps, pulse numbers and positions."""
+"""The golden front end turns sampled levels into steps, pulse numbers and positions."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,8 @@ def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[N
 def filter_line(
     clock: NDArray[np.int64], level: NDArray[np.uint8], clocks: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.int64]]:
-    """Glitch filter: a level counts only when it holds for so many clocks; before the first one that does, none counts.
+    """Return glitch filter: a level counts only when it holds for so many clocks; before the first one that does, none
+    counts.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def changes(trace: PinTrace, name: str) -> tuple[NDArray[np.int64], NDArray[np.u
 
 @dataclass(frozen=True)
 class Steps:
-    """What the decoder sees, on the core's clock.
+    """Holds the steps that the decoder sees, on the core's clock.
 
     Parameters
     ----------
@@ -109,7 +110,7 @@ def together(
 
 
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
-    """Conditioned and decoded lines."""
+    """Return conditioned and decoded lines."""
     returned = [np.empty(0, dtype=np.int64)]
 
     def conditioned(name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
@@ -135,7 +136,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
 
 
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:
-    """Direction in which the sum of steps first left ±`limit` in each window; 0 where it did not."""
+    """Return direction in which the sum of steps first left ±`limit` in each window; 0 where it did not."""
     found = np.zeros(len(last) + 1, dtype=np.int64)
     window = places(last, steps.clock, "left")
     total = np.cumsum(steps.step)
@@ -152,7 +153,7 @@ def count(
     last: NDArray[np.int64],
     beyond: NDArray[np.bool_] | None = None,
 ) -> tuple[Table, Table]:
-    """Pulse numbers and positions of all ticks, and positions at the index.
+    """Return pulse numbers and positions of all ticks, and positions at the index.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Golden registers of a core with a control loop: what is written to them has an effect on what they show."""
+"""The golden registers of a core with a control loop show the effect of what is written to them."""
 
 from collections.abc import Iterable, Sequence
 
@@ -15,7 +15,7 @@ _DEMANDS = tuple(f"generator_{name}" for name in ("mode", "velocity", "accelerat
 
 
 class GoldenLoopBank(GoldenBank):
-    """The bank of a core with a control loop whose pins are driven so, with the input `enable` high.
+    """Answers for the bank of a core with a control loop whose pins are driven so, with the input `enable` high.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class GoldenLoopBank(GoldenBank):
         self._strobes = (*self._strobes, CONTROL, CURRENT)
 
     def answers(self, accesses: Sequence[Access], captures: Iterable[int] = ()) -> list[tuple[int | None, bool]]:
-        """See `GoldenBank.answers`."""
+        """Answer accesses, as `GoldenBank.answers` does."""
         loop = self._of_loop.loop
         commands: list[Command] = []
         demands: list[Demand] = []

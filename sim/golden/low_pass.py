@@ -1,4 +1,4 @@
-"""Golden low-pass filter: eq. (22) of Tsuji 2009, update by update."""
+"""The golden low-pass filter computes eq. (22) of Tsuji 2009, update by update."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tachometry.spec import TachometerSpec
 
 
 def filtered(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
-    """Updates with the filtered velocity in counts per tick, as late as the filter shows them.
+    """Return updates with the filtered velocity in counts per tick, as late as the filter shows them.
 
     The filter takes an update when it has finished the one before. Of the updates that come meanwhile it takes only the
     last, with the ticks of all. It takes the last update of a shaft at rest as it is.

@@ -1,4 +1,4 @@
-"""Places in ordered arrays, without binary searches where a pass over the arrays finds them."""
+"""Places in ordered arrays are found here, without binary searches where a pass over the arrays is enough."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ _JUMPS = 6  # `chain` follows 2^6 places at once
 
 
 def places(ordered: Ints, values: Ints, side: str) -> Ints:
-    """What `np.searchsorted` gives; for evenly spaced places, as ticks of the core's own clock are, by division.
+    """Return what `np.searchsorted` gives; for evenly spaced places, as ticks of the core's own clock are, by division.
 
     Parameters
     ----------
@@ -27,13 +27,15 @@ def places(ordered: Ints, values: Ints, side: str) -> Ints:
 
 
 def next_place(chosen: Ints, n: int) -> Ints:
-    """The first of some ordered places after each of n places; n for none."""
+    """Return the first of some ordered places after each of n places; n for none."""
     ends = np.append(chosen, n)
     return np.repeat(ends, np.diff(ends, prepend=0))
 
 
 def not_before(clock: Ints, wanted: Ints) -> Ints:
-    """The first place after each whose clock is not before the wanted one, which does not decrease; n for none."""
+    """Return the first place after each whose clock is not before the wanted one, which does not decrease; n for
+    none.
+    """
     n = len(clock)
     found = np.arange(1, n + 1)
     left = np.flatnonzero(clock[1:] < wanted[:-1])
@@ -46,14 +48,14 @@ def not_before(clock: Ints, wanted: Ints) -> Ints:
 
 
 def spans(begin: Ints, end: Ints) -> tuple[Ints, Ints]:
-    """All numbers from each `begin` to before its `end`, and for each of them the row of its span."""
+    """Return all numbers from each `begin` to before its `end`, and for each of them the row of its span."""
     length = np.maximum(end - begin, 0)
     row = np.repeat(np.arange(len(length)), length)
     return np.arange(len(row)) - (np.cumsum(length) - length - begin)[row], row
 
 
 def chain(following: Ints) -> NDArray[np.bool_]:
-    """Which of n places are met from place 0 on; `following[k]` > k is the next after k, n for none.
+    """Tell which of n places are met from place 0 on; `following[k]` > k is the next after k, n for none.
 
     Where 64 jumps lead is found for all places at once. So only each 64th place that is met has to be followed.
     """

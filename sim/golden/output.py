@@ -1,4 +1,4 @@
-"""Golden velocity output: from counts per tick to the unit, the LSB and the width that are wanted."""
+"""The golden velocity output turns counts per tick into the unit, the LSB and the width that are wanted."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from tachometry.spec.core.tachometer import BOUNDS
 
 
 def in_unit(spec: TachometerSpec, updates: Table) -> Table:
-    """Updates with native velocity and bounds as the output shows them, later by the latency of the output.
+    """Return updates with native velocity and bounds as the output shows them, later by the latency of the output.
 
     Where 64 bits do not hold the products, Python's integers do.
     """
@@ -31,7 +31,9 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
 
 
 def with_age(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
-    """Ticks with the age of the velocity: how many there were since the cause of its update, or from reset, on."""
+    """Return ticks with the age of the velocity: how many there were since the cause of its update, or from reset,
+    on.
+    """
     if not spec.age:
         return ticks
     cause = np.append(-1, updates.cause)[np.searchsorted(updates.clock, ticks.clock, side="right")]

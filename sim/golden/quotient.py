@@ -1,4 +1,4 @@
-"""Golden arithmetic: quotients of integers, rounded."""
+"""Golden arithmetic rounds quotients of integers."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 def round_quotient(
     numerator: NDArray[np.int64], denominator: NDArray[np.int64], frac_bits: int, towards: int = 0
 ) -> NDArray[np.int64]:
-    """2^frac_bits · numerator/denominator as an integer; the denominators are positive and below 2^61.
+    """Return 2^frac_bits · numerator/denominator as an integer; the denominators are positive and below 2^61.
 
     Where 64 bits do not hold the shifted numerators, it is a long division, some bits at a time, so that no remainder
     overflows. The result must fit.

@@ -1,4 +1,4 @@
-"""Golden registers: what a bank answers to accesses, from what the core shows."""
+"""Golden registers answer accesses from what the core shows."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, 
 
 @dataclass(frozen=True)
 class Access:
-    """One clock of the native port.
+    """Is one clock of the native port.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Access:
 
 
 def initial(registers: RegisterMap) -> dict[str, int]:
-    """Settings after a reset, by their ports."""
+    """Return settings after a reset, by their ports."""
     found = dict.fromkeys((field.port for field in registers.settings), 0)
     for field in registers.settings:
         found[field.port] |= field.reset << field.shift
@@ -39,7 +39,7 @@ def initial(registers: RegisterMap) -> dict[str, int]:
 
 
 def written(field: Field, data: int, before: int) -> int:
-    """A setting after a word was written to one of its fields."""
+    """Return a setting after a word was written to one of its fields."""
     value = data >> field.low & (1 << field.width) - 1
     if field.most is not None and field.least is not None:
         value = value - (1 << WORD) if field.signed and value >> (WORD - 1) else value
@@ -54,7 +54,7 @@ def written(field: Field, data: int, before: int) -> int:
 
 
 class GoldenBank:
-    """The bank of a core whose pins are driven so; of a demo, from a restart on, with all settings 0.
+    """Answers for the bank of a core whose pins are driven so; of a demo, from a restart on, with all settings 0.
 
     Parameters
     ----------
@@ -80,7 +80,8 @@ class GoldenBank:
         self._events = {name: clocks for name, clocks in strobes.items() if name in registers.counted}
 
     def answers(self, accesses: Sequence[Access], captures: Iterable[int] = ()) -> list[tuple[int | None, bool]]:
-        """Data and error of each access, in the order of their clocks; `captures` are clocks of the input `capture`.
+        """Return data and error of each access, in the order of their clocks; `captures` are clocks of the input
+        `capture`.
 
         None stands for data that are not defined: what belongs to an update, the velocity aside, before the first.
         """
@@ -145,11 +146,11 @@ class GoldenBank:
 
     @staticmethod
     def _count(clocks: np.ndarray, after: int, until: int) -> int:
-        """Clocks in (after, until]."""
+        """Return clocks in (after, until]."""
         return int(np.searchsorted(clocks, until, side="right") - np.searchsorted(clocks, after, side="right"))
 
     def _lost(self, until: int) -> int:
-        """Updates since the counters were cleared that came when one waited for a capture."""
+        """Return updates since the counters were cleared that came when one waited for a capture."""
         clocks = self._tables[UPDATE].clock
         before = np.append(-1, clocks[:-1])
         captures = np.array([-1, *self._captures])

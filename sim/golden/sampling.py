@@ -1,4 +1,4 @@
-"""Golden sampling periods: where the windows end, by the core's own clock or by ticks from outside."""
+"""Golden sampling periods say where the windows end, by the core's own clock or by ticks from outside."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,9 @@ from tachometry.spec.core.tachometer import TICK_IN_TO_WINDOW_END
 
 
 def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Last clocks of all windows, and clocks of all `tick_error`s; each `tick` and `tick_error` is within the trace."""
+    """Return last clocks of all windows, and clocks of all `tick_error`s; each `tick` and `tick_error` is within the
+    trace.
+    """
     n_clocks = trace.n_clocks - spec.tick_latency
     if spec.max_tick_cycles is None:
         cycles = spec.timing.tick_cycles
@@ -24,7 +26,7 @@ def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], N
 def external_windows(
     rises: NDArray[np.int64], n_clocks: int, min_cycles: int, max_cycles: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Windows that end with a rise, none shorter than `min_cycles` and none longer than `max_cycles`.
+    """Return windows that end with a rise, none shorter than `min_cycles` and none longer than `max_cycles`.
 
     Parameters
     ----------

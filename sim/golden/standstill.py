@@ -1,4 +1,4 @@
-"""Golden standstill: whether nothing has been counted for longer than the maximum time."""
+"""Golden standstill says whether nothing has been counted for longer than the maximum time."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from tachometry.spec import TachometerSpec
 
 
 def with_stalled(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64]) -> Table:
-    """Ticks with whether the shaft rests; `nominal` says how many nominal ticks each is long.
+    """Return ticks with whether the shaft rests; `nominal` says how many nominal ticks each is long.
 
     It does if the ticks in a row that counted nothing, this one included, are together long enough. The tick before the
     first one counts as empty.

@@ -1,1 +1,1 @@
-"""Figures of runs and studies."""
+"""Draw runs and studies."""

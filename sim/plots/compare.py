@@ -1,4 +1,4 @@
-"""The figure of a comparison: all velocities, and the error of each."""
+"""The figure of a comparison shows all velocities, and the error of each."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Figures of control loops: a run, and what came of many over an axis."""
+"""Figures of control loops show a run, or many of them over an axis."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

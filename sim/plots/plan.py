@@ -1,4 +1,4 @@
-"""The figure of a plan: resolution and measurement time over speed."""
+"""The figure of a plan shows resolution and measurement time over speed."""
 
 from collections.abc import Mapping
 from pathlib import Path

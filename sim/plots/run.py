@@ -1,4 +1,4 @@
-"""The figure of a run: velocity, its error, pulse numbers and measurement times."""
+"""The figure of a run shows velocity, its error, pulse numbers and measurement times."""
 
 from pathlib import Path
 from typing import Any
@@ -93,14 +93,14 @@ def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
 
 
 def _held_to_end(clock: NDArray[np.int64], values: NDArray[np.generic], n_clocks: int) -> tuple[FloatArray, FloatArray]:
-    """Points of a step line that ends with the run."""
+    """Return points of a step line that ends with the run."""
     if not len(clock):
         return np.empty(0), np.empty(0)
     return np.append(clock, n_clocks).astype(np.float64), np.append(values, values[-1]).astype(np.float64)
 
 
 def _multiples(axes: Axes, unit_velocity: float) -> None:
-    """An axis in counts per tick, and lines at whole numbers of them if they are few."""
+    """Draw an axis in counts per tick, and lines at whole numbers of them if they are few."""
 
     def counts(velocity: Any) -> Any:
         return velocity / unit_velocity

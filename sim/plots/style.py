@@ -1,4 +1,4 @@
-"""How every figure looks, and how it is written: equal figures give equal files."""
+"""All figures look alike, and equal figures give equal files."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -59,7 +59,8 @@ def save_figure(path: Path, draw: Callable[[], Figure]) -> None:
 
 
 def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = COLUMNS) -> NDArray[np.int64]:
-    """Indices of the first, least, greatest and last point in each of `n_columns` equal stretches of x, in order.
+    """Return indices of the first, least, greatest and last point in each of `n_columns` equal stretches of x, in
+    order.
 
     A line through them covers the same pixels as one through all. `x` does not decrease.
     """
@@ -75,7 +76,7 @@ def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = COLUMNS) -> 
 def place_panels(
     spec: TachometerSpec, heights: dict[str, float], what: str | None = None
 ) -> tuple[Figure, dict[str, Axes]]:
-    """A figure, titled with the configuration, with one panel below the other, so many inches high.
+    """Return a figure, titled with the configuration, with one panel below the other, so many inches high.
 
     The title begins with `what`, or with the method. Panels are placed by hand: what
     Matplotlib's layout engine computes differs from run to run in the last bits.
@@ -108,7 +109,9 @@ def _title(spec: TachometerSpec, what: str | None) -> str:
 
 
 def in_words(name: str) -> str:
-    """A method for a legend, such as `M method (average=8)` of `m:average=8`; what is no method keeps its name."""
+    """Return a method for a legend, such as `M method (average=8)` of `m:average=8`; what is no method keeps its
+    name.
+    """
     method, _, options = name.partition(":")
     if method not in METHODS:
         return name

@@ -1,4 +1,4 @@
-"""Heat maps of a sweep: a figure over two axes, one panel per method."""
+"""Heat maps show a sweep over two axes, one panel per method."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -61,7 +61,7 @@ def save_heat_maps(
 
 
 def _field(points: Sequence[tuple[Mapping[str, str], float | None]], axes: Mapping[str, Sequence[str]]) -> FloatArray:
-    """Medians, one for each pair of values, row by row upwards; NaN where there is none."""
+    """Return medians, one for each pair of values, row by row upwards; NaN where there is none."""
     place = {name: {value: k for k, value in enumerate(values)} for name, values in axes.items()}
     there: dict[tuple[int, ...], list[float]] = {}
     for where, value in points:
@@ -112,7 +112,7 @@ def _norm(fields: Sequence[FloatArray], log: bool) -> Normalize:
 
 
 def _label(panel: Axes, axes: Mapping[str, Sequence[str]], lowest: bool, leftmost: bool) -> None:
-    """Values at the fields, as many as can be read, and names at the outer panels."""
+    """Write values at the fields, as many as can be read, and names at the outer panels."""
     panel.tick_params(length=0, labelbottom=lowest, labelleft=leftmost, labelsize=7)
     across, *rest = ((_name(name, values), _numbers(values)) for name, values in axes.items())
     name, values = across
@@ -126,7 +126,7 @@ def _label(panel: Axes, axes: Mapping[str, Sequence[str]], lowest: bool, leftmos
 
 
 def _unit(values: Sequence[str]) -> str:
-    """The unit of all values; none if they differ in it."""
+    """Return the unit of all values; none if they differ in it."""
     units = {match[1] if (match := _WITH_UNIT.fullmatch(value)) else "" for value in values}
     return units.pop() if len(units) == 1 else ""
 

@@ -1,4 +1,4 @@
-"""The figure of error over delay: a curve per method over its settings."""
+"""The figure of error over delay has a curve per method over its settings."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

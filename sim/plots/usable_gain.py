@@ -1,4 +1,4 @@
-"""The figure of usable gains: gain, dip and current over the tick, a column per disc and a curve per method."""
+"""The figure of usable gains shows gain, dip and current over the tick, a column per disc and a curve per method."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _ROWS = ("usable $k_v$ (1/s)", "dip under 0.2 Nm (rad/s)", "current above 50 Hz 
 
 @dataclass(frozen=True)
 class Found:
-    """The greatest gain that is usable.
+    """Holds the greatest gain that is usable.
 
     Parameters
     ----------

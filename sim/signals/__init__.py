@@ -1,1 +1,1 @@
-"""Signals as arrays: recordings, pin traces, runs, tables."""
+"""Signals are arrays: recordings, pin traces, runs, tables."""

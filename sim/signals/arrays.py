@@ -1,4 +1,4 @@
-"""Names for the kinds of arrays that signals are made of."""
+"""Names the kinds of arrays that signals are made of."""
 
 import numpy as np
 from numpy.typing import NDArray

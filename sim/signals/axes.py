@@ -1,4 +1,4 @@
-"""Pins of many encoders, and the tables of one of them."""
+"""Holds the pins of many encoders, and finds the tables of one of them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tachometry.spec.methods.axes import AxesSpec
 
 @dataclass(frozen=True)
 class AxesTrace:
-    """Levels that the first synchroniser flip-flops of many axes sample, on the core's clock.
+    """Holds the levels that the first synchroniser flip-flops of many axes sample, on the core's clock.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ class AxesTrace:
 
     @classmethod
     def of(cls, each: Sequence[PinTrace]) -> AxesTrace:
-        """Traces up to where the last of them ends: where another ends earlier, its levels stay."""
+        """Return traces up to where the last of them ends: where another ends earlier, its levels stay."""
         n_clocks = max(trace.n_clocks for trace in each)
         return cls(tuple(replace(trace, n_clocks=n_clocks) for trace in each))
 
     @classmethod
     def placed(cls, recordings: Sequence[Recording], spec: AxesSpec) -> AxesTrace:
-        """What the pins of a core see of a recording for each axis.
+        """Return what the pins of a core see of a recording for each axis.
 
         Raises
         ------
@@ -83,7 +83,7 @@ class AxesTrace:
         return np.packbits(np.stack(bits, axis=1).astype(np.uint8), axis=1, bitorder="little")
 
     def until(self, n_clocks: int) -> AxesTrace:
-        """The first clocks of the trace."""
+        """Return the first clocks of the trace."""
         return AxesTrace(tuple(trace.until(n_clocks) for trace in self.each))
 
 
@@ -91,7 +91,7 @@ Trace = PinTrace | AxesTrace
 
 
 def of_axis(spec: AxesSpec, run: Run, axis: int) -> Run:
-    """The rows of one axis, with the ports of a core of its own.
+    """Return the rows of one axis, with the ports of a core of its own.
 
     The rows of the strobe of updates are those among the ticks of this axis.
     """

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and the tables in them."""
+"""Files appear whole or not at all."""
 
 import csv
 import os
@@ -35,6 +35,6 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]
 
 
 def rows_of(columns: Sequence[NDArray[Any]]) -> Iterator[tuple[object, ...]]:
-    """Rows of columns of equal length, as Python objects; memory is bounded, however long they are."""
+    """Yield rows of columns of equal length, as Python objects; memory is bounded, however long they are."""
     for first in range(0, len(columns[0]), _ROWS):
         yield from zip(*(column[first : first + _ROWS].tolist() for column in columns), strict=True)

@@ -1,4 +1,4 @@
-"""Encoder signals as they travel through the project: change lists in seconds, then on the core's clock.
+"""Encoder signals travel through the project as change lists, in seconds, then on the core's clock.
 
 A `Recording` is what a virtual encoder or a logic analyser gives: the instants at which the lines change. `place`
 puts it on a clock, as the first synchroniser flip-flop would see it; the `PinTrace` that results is what every engine
@@ -27,12 +27,12 @@ _QUADRATURE = np.array([0, 1, 3, 2], dtype=np.uint8)
 
 
 def quadrature(quarter: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """A + 2 B in the quarters of a period, counted forwards from the one in which both are low."""
+    """Return a + 2 B in the quarters of a period, counted forwards from the one in which both are low."""
     return _QUADRATURE[quarter & 3]
 
 
 def packed(lines: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """A number for each row, with a bit for each line, the first lowest."""
+    """Return a number for each row, with a bit for each line, the first lowest."""
     level = np.zeros_like(lines[0])
     for bit, line in enumerate(lines):
         level |= line << np.uint8(bit)
@@ -40,7 +40,9 @@ def packed(lines: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
 
 
 def merged(*clocks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """All clocks of ordered lists, in their order, each once; `np.union1d` would hash them, ten times as slowly."""
+    """Return all clocks of ordered lists, in their order, each once; `np.union1d` would hash them, ten times as
+    slowly.
+    """
     every = np.sort(np.concatenate(clocks), kind="stable")
     return every[np.diff(every, prepend=every[:1] - 1) > 0]
 
@@ -73,7 +75,7 @@ def _same_length(*columns: NDArray[np.generic]) -> bool:
 
 @dataclass(frozen=True)
 class Recording(_Lines):
-    """Levels of the encoder lines over continuous time.
+    """Holds the levels of the encoder lines over continuous time.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ class Recording(_Lines):
     def of_level(
         time: NDArray[np.float64], level: NDArray[np.uint8], duration: float, lines: Sequence[str] = ("a", "b")
     ) -> "Recording":
-        """The recording with these lines whose `level` is given."""
+        """Return the recording with these lines whose `level` is given."""
         return Recording(time, duration=duration, **_split(level, lines))
 
     def place(self, clock_hz: int) -> "PinTrace":
@@ -131,7 +133,7 @@ class Recording(_Lines):
         return PinTrace(clock[row[changed]], n_clocks=max(n_clocks, 1), **lines)
 
     def _clock(self, clock_hz: int) -> NDArray[np.int64]:
-        """The clock edge at which each row is seen."""
+        """Return the clock edge at which each row is seen."""
         if self.duration * clock_hz >= 1 << 53:
             raise ValueError(f"a recording must last less than 2^53 clocks, not {self.duration:.6g} s")
         edges = self.time * clock_hz
@@ -145,7 +147,7 @@ class Recording(_Lines):
         return row, changes[row - 1]
 
     def n_merged(self, clock_hz: int, n_clocks: int) -> int:
-        """Edges of A and B that come in the same clock as an edge before them, within the first `n_clocks`."""
+        """Return edges of A and B that come in the same clock as an edge before them, within the first `n_clocks`."""
         row, _ = self._edges
         clock = self._clock(clock_hz)[row]
         return int(np.count_nonzero(np.diff(clock[clock < n_clocks]) == 0))
@@ -158,7 +160,7 @@ class Recording(_Lines):
 
 @dataclass(frozen=True)
 class PinTrace(_Lines):
-    """Levels that the first synchroniser flip-flop samples, on the core's clock.
+    """Holds the levels that the first synchroniser flip-flop samples, on the core's clock.
 
     Parameters
     ----------
@@ -186,8 +188,8 @@ class PinTrace(_Lines):
 
     @classmethod
     def of(cls, recording: Recording, spec: TachometerSpec) -> "PinTrace":
-        """What the pins of a core see of a recording; with nominal external ticks if the core takes them and there are
-        none.
+        """Return what the pins of a core see of a recording; with nominal external ticks if the core takes them and
+        there are none.
 
         Raises
         ------
@@ -198,13 +200,13 @@ class PinTrace(_Lines):
         return recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
 
     def until(self, n_clocks: int) -> "PinTrace":
-        """The first clocks of the trace."""
+        """Return the first clocks of the trace."""
         inside = self.clock < n_clocks
         lines = {name: line[inside] for name, line in self.lines.items()}
         return PinTrace(self.clock[inside], n_clocks=n_clocks, **lines)
 
     def with_tick_in(self, rises: NDArray[np.int64]) -> "PinTrace":
-        """The same trace with an external tick that is high for one clock from each of the clocks `rises`.
+        """Return the same trace with an external tick that is high for one clock from each of the clocks `rises`.
 
         They increase by at least 2; those from `n_clocks` on are left out.
         """
@@ -216,14 +218,14 @@ class PinTrace(_Lines):
         return PinTrace(clock, n_clocks=self.n_clocks, **lines)
 
     def with_nominal_ticks(self, spec: TachometerSpec) -> "PinTrace":
-        """The same trace, with nominal external ticks if the core takes them and there are none."""
+        """Return the same trace, with nominal external ticks if the core takes them and there are none."""
         if not spec.max_tick_cycles or self.tick_in is not None:
             return self
         return self.with_tick_in(nominal_ticks(spec, self.n_clocks))
 
 
 def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS, of: str = "") -> None:
-    """See that so many seconds are not too many ticks to be held, `of` each axis; ValueError if they are."""
+    """Check that so many seconds are not too many ticks to be held, `of` each axis; ValueError if they are."""
     ticks = duration / float(spec.timing.tick_seconds)
     if not ticks <= most:
         longest = format_time(most * spec.timing.tick_seconds)
@@ -234,7 +236,9 @@ def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS, of
 
 
 def nominal_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
-    """Clocks at which an external tick rises that is exactly as long as nominal, in step with the core's reset."""
+    """Return clocks at which an external tick rises that is exactly as long as nominal, in step with the core's
+    reset.
+    """
     cycles = spec.timing.tick_cycles
     ends = np.arange(2 * cycles - 1 if cycles <= TICK_IN_TO_WINDOW_END + 1 else cycles - 1, n_clocks, cycles)
     return ends.astype(np.int64) - TICK_IN_TO_WINDOW_END

@@ -1,4 +1,4 @@
-"""What a core shows at its ports, as arrays: the common language of engines and golden models.
+"""A run holds what a core shows at its ports, as arrays: engines and golden models both make one.
 
 A run is what the ports say: a table for every strobe, with a column for every port that is held by it.
 """
@@ -19,7 +19,7 @@ from tachometry.spec.language.port import INDEX, TICK, UPDATE
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """One row for every clock in which a strobe is high.
+    """Has one row for every clock in which a strobe is high.
 
     A column is found by its name, `table["velocity"]`, or as an attribute, `table.velocity`.
 
@@ -46,22 +46,22 @@ class Table:
         return self.columns[name]
 
     def get(self, name: str) -> NDArray[Any]:
-        """A column, or zeros where the core has no such port."""
+        """Return a column, or zeros where the core has no such port."""
         return self.columns.get(name, np.zeros(len(self), dtype=np.bool_))
 
     def rows(self, chosen: Any) -> Table:
-        """The rows of an index array, a mask or a slice."""
+        """Return the rows of an index array, a mask or a slice."""
         return Table(self.clock[chosen], {name: column[chosen] for name, column in self.columns.items()})
 
     def having(self, **columns: NDArray[Any]) -> Table:
-        """The same table with these columns added or replaced; `clock` replaces the clocks."""
+        """Return the same table with these columns added or replaced; `clock` replaces the clocks."""
         clock = columns.pop("clock", self.clock)
         return Table(clock, {**self.columns, **columns})
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """All that happened at the ports in clocks 0 … n_clocks − 1.
+    """Holds all that happened at the ports in clocks 0 … n_clocks − 1.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Run:
 
     @classmethod
     def of_ports(cls, spec: AnySpec, n_clocks: int, tables: Mapping[str, Table]) -> Run:
-        """The run with just what the ports of `spec` say, in their order; KeyError if a column is missing."""
+        """Return the run with just what the ports of `spec` say, in their order; KeyError if a column is missing."""
         found = {
             strobe: Table(tables[strobe].clock, {name: tables[strobe][name] for name in names})
             for strobe, names in spec.strobes.items()
@@ -112,7 +112,7 @@ _NONE = Table(np.empty(0, dtype=np.int64), {"index_position": np.empty(0, dtype=
 
 
 def observed(spec: AnySpec, n_clocks: int, rows: Ints) -> Run:
-    """The run that was seen at the output ports.
+    """Return the run that was seen at the output ports.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def observed(spec: AnySpec, n_clocks: int, rows: Ints) -> Run:
 
 @dataclass(frozen=True)
 class Mismatch:
-    """The first row in which two runs differ in one signal; `clock` is the earlier of the rows'."""
+    """Is the first row in which two runs differ in one signal; `clock` is the earlier of the rows'."""
 
     signal: str
     row: int

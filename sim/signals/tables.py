@@ -1,4 +1,4 @@
-"""A run as tables: updates, ticks, and the held velocity with its error."""
+"""A run becomes tables here: updates, ticks, and the held velocity with its error."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from tachometry.spec.language.port import TICK, UPDATE
 
 @dataclass(frozen=True)
 class HeldVelocity:
-    """The velocity that the core shows, tick by tick, from the first update on.
+    """Holds the velocity that the core shows, tick by tick, from the first update on.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class HeldVelocity:
 
 @dataclass(frozen=True)
 class VelocityError:
-    """Held velocity less true speed, in rad/s, over all ticks from the first update on.
+    """Holds statistics of held velocity less true speed, in rad/s, over all ticks from the first update on.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ class VelocityError:
 
 
 def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
-    """Velocity at the end of every tick; empty if there was no update."""
+    """Return velocity at the end of every tick; empty if there was no update."""
     clock = run.ticks.clock + spec.tick_to_velocity
     return held_from(clock[clock < run.n_clocks], run.updates, spec)
 
 
 def held_from(clock: NDArray[np.int64], updates: Table, spec: TachometerSpec) -> HeldVelocity:
-    """The velocity that is held in these clocks, from the first update on."""
+    """Return the velocity that is held in these clocks, from the first update on."""
     latest = np.searchsorted(updates.clock, clock, side="right") - 1
     clock, latest = clock[latest >= 0], latest[latest >= 0]
     velocity = updates.velocity[latest].astype(np.float64) * spec.rad_per_s_per_lsb
@@ -63,7 +63,7 @@ def held_from(clock: NDArray[np.int64], updates: Table, spec: TachometerSpec) ->
 def velocity_error(
     held: HeldVelocity, true_speed: Callable[[NDArray[np.float64]], NDArray[np.float64]]
 ) -> VelocityError | None:
-    """Statistics of a held velocity against the true speed (rad/s) at times (s); None if it is empty."""
+    """Return statistics of a held velocity against the true speed (rad/s) at times (s); None if it is empty."""
     if not len(held.time):
         return None
     error = held.velocity_rad_s - true_speed(held.time)

@@ -23,7 +23,7 @@ AXES: tuple[Words, ...] = (
 
 
 def core_of(words: Words) -> CoreSpec:
-    """The core that the command line makes of these words, which may be one of many axes."""
+    """Return the core that the command line makes of these words, which may be one of many axes."""
     if "--axes" not in words:
         return spec_of(words)
     place = words.index("--axes")

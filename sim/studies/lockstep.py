@@ -13,7 +13,7 @@ from tachometry.spec import CoreSpec
 
 @dataclass(frozen=True)
 class Lockstep:
-    """What came of a trace.
+    """Holds both runs of a trace, and their differences.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ Texts = dict[str, str]  # values of options by their names
 
 @cache
 def factors(method: str) -> dict[str, tuple[str, ...]]:
-    """Options of a method with the values that they take; the empty text leaves the option out.
+    """Return options of a method with the values that they take; the empty text leaves the option out.
 
     Values in words depend on the rest: `most - 20` fraction bits, 20 less than there can be; `needed - 2` bits of the
     velocity, two less than it can need, if no speed must fit; `some counts per tick`, about the speed of the motions;
@@ -46,7 +46,7 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
 
 @cache
 def apart(method: str) -> frozenset[frozenset[tuple[str, str]]]:
-    """Pairs of options with their values that cannot be together; an option that is left out goes with all."""
+    """Return pairs of options with their values that cannot be together; an option that is left out goes with all."""
     found = set()
     for (one, its), (other, others) in combinations(factors(method).items(), 2):
         for pair in product(filter(None, its), filter(None, others)):
@@ -58,7 +58,7 @@ def apart(method: str) -> frozenset[frozenset[tuple[str, str]]]:
 
 @cache
 def rows(method: str) -> tuple[Texts, ...]:
-    """Values of all factors of a method, one row for each configuration."""
+    """Return values of all factors of a method, one row for each configuration."""
     from covertable import make
 
     never = [
@@ -77,12 +77,12 @@ def rows(method: str) -> tuple[Texts, ...]:
 
 @cache
 def configurations(method: str) -> tuple[tuple[str, ...], ...]:
-    """Words of the command line, for each configuration of a method."""
+    """Return words of the command line, for each configuration of a method."""
     return tuple(words_of(method, _texts(method, row)) for row in rows(method))
 
 
 def words_of(method: str, texts: Texts) -> tuple[str, ...]:
-    """The same options as words of the command line."""
+    """Return the same options as words of the command line."""
     known = _known(method)
     words = ["--method", method]
     for name, text in texts.items():
@@ -94,7 +94,7 @@ def words_of(method: str, texts: Texts) -> tuple[str, ...]:
 
 
 def spec_of(words: tuple[str, ...]) -> TachometerSpec:
-    """The core that the command line makes of these words."""
+    """Return the core that the command line makes of these words."""
     first, method, *rest = words
     assert first == "--method"
     known = _known(method)
@@ -123,7 +123,7 @@ def _known(method: str) -> dict[str, Option]:
 
 
 def _texts(method: str, row: Texts) -> Texts:
-    """The options of a row, with numbers where it says what is special about them."""
+    """Return the options of a row, with numbers where it says what is special about them."""
     texts = {"ppr": str(_PPR), "clock": str(_CLOCK_HZ)}
     for name, value in row.items():
         if value.startswith("yes "):
@@ -153,5 +153,5 @@ def _texts(method: str, row: Texts) -> Texts:
 
 
 def _less(text: str) -> int:
-    """How much less than the most: 20 of "most - 20"."""
+    """Tell how much less than the most: 20 of "most - 20"."""
     return int(text.split()[-1])

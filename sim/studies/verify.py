@@ -40,7 +40,7 @@ class Failure:
 
 @dataclass
 class Outcome:
-    """What came of the motions on an engine.
+    """Holds the outcome of all motions on an engine.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Testbenches that stand on their own."""
+"""Make testbenches that stand on their own."""

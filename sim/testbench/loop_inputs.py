@@ -1,4 +1,4 @@
-"""What a testbench puts on the inputs of a control loop: commands, demands and gains of all sizes."""
+"""A testbench puts commands, demands and gains of all sizes on the inputs of a control loop."""
 
 from typing import Any
 
@@ -62,7 +62,7 @@ def _inputs(spec: LoopSpec, trace: PinTrace, clock: IntArray) -> dict[str, IntAr
 
 
 def _levels(port: Port, rng: np.random.Generator, n: int) -> IntArray:
-    """Numbers of any size, the greatest among them, each for some control ticks."""
+    """Return numbers of any size, the greatest among them, each for some control ticks."""
     bits = port.width - port.signed
     most, least = (1 << bits) - 1, -(1 << bits) if port.signed else 0
     size = np.exp2(rng.uniform(0, 1, n) ** 2 * bits).astype(np.int64)
@@ -72,7 +72,7 @@ def _levels(port: Port, rng: np.random.Generator, n: int) -> IntArray:
 
 
 def _held(inputs: dict[str, IntArray]) -> dict[str, IntArray]:
-    """What is taken where inputs are frozen now and then."""
+    """Return what is taken where inputs are frozen now and then."""
     freeze = inputs.get("freeze")
     if freeze is None:
         return {}
@@ -83,7 +83,7 @@ def _held(inputs: dict[str, IntArray]) -> dict[str, IntArray]:
 
 
 def changes(spec: LoopSpec, trace: PinTrace, inputs: dict[str, IntArray]) -> list[IntArray]:
-    """Columns of clocks, lines and inputs: these are there from two clocks before their control tick on."""
+    """Return columns of clocks, lines and inputs: these are there from two clocks before their control tick on."""
     tick = np.arange(spec.first_tick, trace.n_clocks, spec.period)
     at = np.unique(np.concatenate([trace.clock, tick - 2]))
     at = at[(at >= 0) & (at < trace.n_clocks)]

@@ -1,4 +1,4 @@
-"""A testbench that stands on its own: what to put on the pins, and what the outputs must show, as data."""
+"""A testbench stands on its own: its data say what to put on the pins, and what the outputs must show."""
 
 import json
 from pathlib import Path
@@ -29,7 +29,7 @@ _MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 
 
 def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recording | None = None) -> dict[str, str]:
-    """A bench for cocotb as texts by file name: `test_NAME.py` and `NAME_vectors.json`.
+    """Return a bench for cocotb as texts by file name: `test_NAME.py` and `NAME_vectors.json`.
 
     Parameters
     ----------
@@ -78,7 +78,8 @@ def _vectors(core: TachometerSpec | LoopSpec, trace: PinTrace) -> dict[str, Any]
 
 
 def usual_motion(spec: TachometerSpec) -> Recording:
-    """Fast and slow, forward, backward and back over the index, with jitter and illegal transitions, then at rest.
+    """Return fast and slow, forward, backward and back over the index, with jitter and illegal transitions, then at
+    rest.
 
     The rest outlasts the maximum time, so that the core reads zero, unless that takes a million clocks or more.
     """
@@ -117,7 +118,7 @@ def _usual_form(spec: TachometerSpec) -> str:
 
 
 def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
-    """Clocks of ticks that come a little early or late, sometimes much too early or too late."""
+    """Return clocks of ticks that come a little early or late, sometimes much too early or too late."""
     cycles = spec.timing.tick_cycles
     k = np.arange(n_clocks // 2 // cycles + 2)
     gap = cycles + (k % 5 - 2) * (cycles // 16)
@@ -127,7 +128,7 @@ def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
 
 
 def strobe_rows(run: Run) -> dict[str, Any]:
-    """Each strobe of the core, with its ports and rows; with `tick` also what is held since the last update."""
+    """Return each strobe of the core, with its ports and rows; with `tick` also what is held since the last update."""
     last = np.searchsorted(run.updates.clock, run.ticks.clock, side="right")
     held = {name: np.array([None, *column], dtype=object)[last] for name, column in run.updates.columns.items()}
     strobes = {}

@@ -1,4 +1,4 @@
-"""The papers' equations, one function each, vectorised over numpy arrays.
+"""Each equation of the papers is a function here, vectorised over numpy arrays.
 
 Both papers number their equations from (1); names say which is meant.
 """

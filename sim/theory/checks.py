@@ -1,4 +1,4 @@
-"""Ranges of the arguments, for both papers."""
+"""Checks the ranges of arguments, for both papers."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +10,7 @@ _SLACK = 1e-9
 
 
 def positive(what: str, value: ArrayLike) -> Floats:
-    """The value as an array; ValueError if one is not greater than 0."""
+    """Return the value as an array; ValueError if one is not greater than 0."""
     array = np.asarray(value, dtype=np.float64)
     if not np.all(array > 0):
         raise ValueError(f"{what} must be greater than 0")
@@ -18,7 +18,7 @@ def positive(what: str, value: ArrayLike) -> Floats:
 
 
 def at_least(what: str, value: ArrayLike, least: float) -> Floats:
-    """The value as an array; ValueError if one is less than `least`."""
+    """Return the value as an array; ValueError if one is less than `least`."""
     array = np.asarray(value, dtype=np.float64)
     if not np.all(array >= least):
         raise ValueError(f"{what} must be at least {least:g}")
@@ -26,7 +26,7 @@ def at_least(what: str, value: ArrayLike, least: float) -> Floats:
 
 
 def in_a_regime(what: str, value: ArrayLike, low_end: float, high_end: float) -> Floats:
-    """The value as an array; ValueError if one is not greater than 0, or lies between the regimes.
+    """Return the value as an array; ValueError if one is not greater than 0, or lies between the regimes.
 
     Parameters
     ----------

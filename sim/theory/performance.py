@@ -1,4 +1,4 @@
-"""What the methods of Tsuji 2009 and Rairán 2013 measure at a constant speed: resolution Q_V and time T_m.
+"""At a constant speed the methods of both papers have a resolution Q_V and a measurement time T_m, computed here.
 
 All are vectorised over the speeds, in rad/s and greater than 0. `max_ticks` is the maximum measurement time, after
 which a value is given by force (Sec. V-B); None: there is none.
@@ -30,7 +30,7 @@ _SLACK = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """Of a method, at each speed.
+    """Holds the figures of a method at each speed.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Performance:
 
 
 def m_performance(speed: Floats, n: int, counts_per_rev: int, tick_seconds: float) -> Performance:
-    """M method, mean of n ticks: eqs. (7) and (8)."""
+    """Return M method, mean of n ticks: eqs. (7) and (8)."""
     like = np.ones_like(speed)
     return Performance(
         tsuji.tsuji_eq07_resolution(n, counts_per_rev, tick_seconds) * like,
@@ -58,7 +58,7 @@ def m_performance(speed: Floats, n: int, counts_per_rev: int, tick_seconds: floa
 
 
 def t_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None) -> Performance:
-    """T method: eqs. (10) to (12); above one count per tick it cannot measure."""
+    """Return T method: eqs. (10) to (12); above one count per tick it cannot measure."""
     m_s = tsuji.tsuji_eq12_interval(speed, counts_per_rev, tick_seconds)
     measured = m_s >= 1
     m_s, forced = _limited(np.where(measured, m_s, 1), max_ticks)
@@ -79,7 +79,7 @@ def mt_performance(
     max_ticks: int | None = None,
     cycle_counts: int = 1,
 ) -> Performance:
-    """M/T method with the minimum time of m_c ticks: eqs. (14) to (16).
+    """Return M/T method with the minimum time of m_c ticks: eqs. (14) to (16).
 
     Measurements of `cycle_counts` counts or more last a multiple of them.
     """
@@ -97,7 +97,7 @@ def mt_performance(
 
 
 def s_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None) -> Performance:
-    """S method with eq. (21): eqs. (18) to (20); where it is forced the error is at most ω_u/max_ticks."""
+    """Return S method with eq. (21): eqs. (18) to (20); where it is forced the error is at most ω_u/max_ticks."""
     m_s, forced = _limited(tsuji.tsuji_eq20_interval(speed, counts_per_rev, tick_seconds), max_ticks)
     return Performance(
         _or_forced(
@@ -115,7 +115,8 @@ def s_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_t
 def rairan_performance(
     speed: Floats, estimate: str, counts_per_rev: int, dt_seconds: float, max_dt: int | None = None
 ) -> Performance:
-    """Rairán 2013: Q_V is the greatest error of the estimate n1, n2 or n3 in its interval, T_m the time of Table 1.
+    """Return Rairán 2013: Q_V is the greatest error of the estimate n1, n2 or n3 in its interval, T_m the time of Table
+    1.
 
     The interval is [n2, n1], eq. (5); n3, eq. (11), is nearer to n2. Where the maximum time ends the measurement, the
     speed is less than Q_V.
@@ -146,7 +147,7 @@ def _or_forced(
 
 
 def _of_s(spec: STachometer, speed: Floats) -> Performance:
-    """S method, with eq. (17) as well.
+    """Return S method, with eq. (17) as well.
 
     Nearer to a multiple of ω_u than ω_u/max_ticks updates are forced, and eq. (18) does not hold. With m_s ≥ kept + 1
     in the window after a forced one, in which eq. (21) weights the only alteration by one half and eq. (17) by one, the
@@ -177,7 +178,7 @@ def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
 
 
 def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:
-    """Rairán's method, also with an adaptive dt that has grown from shorter ones."""
+    """Return Rairán's method, also with an adaptive dt that has grown from shorter ones."""
     counts, tick_seconds, longest = spec.encoder.counts_per_rev, float(spec.timing.tick_seconds), spec.timing.max_ticks
     if spec.adaptive is None:
         return rairan_performance(speed, spec.estimate, counts, tick_seconds, longest)
@@ -191,14 +192,15 @@ def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:
 
 
 def _steady_shift(spec: RairanTachometer, ratio: Floats) -> NDArray[np.int64]:
-    """k of an adaptive dt that comes from shorter ones, at speeds in counts per tick."""
+    """Return k of an adaptive dt that comes from shorter ones, at speeds in counts per tick."""
     rule = spec.adaptive_dt
     doubled = np.ceil(np.log2((rule.fewest - 1) / ratio) + 1e-12)
     return np.where(ratio * rule.slow <= 1, 0, np.clip(doubled, 0, rule.max_shift)).astype(np.int64)
 
 
 def _of_track(spec: TrackTachometer, speed: Floats) -> Performance:
-    """The tracking method when its memory has grown: edges are known to half a clock, and errors may all be one way.
+    """Return the tracking method when its memory has grown: edges are known to half a clock, and errors may all be one
+    way.
 
     T_m is how long the past counts, 1/λ. Counts that come more seldom than this keep a weight, so it is longer there.
     """
@@ -224,7 +226,7 @@ def _of_track(spec: TrackTachometer, speed: Floats) -> Performance:
 
 
 def unknown(spec: TachometerSpec, speed: Floats) -> Performance:
-    """For a method that has no equations here."""
+    """Return for a method that has no equations here."""
     nothing = np.full(len(speed), math.nan)
     return Performance(nothing, nothing, np.zeros(len(speed), dtype=np.bool_))
 

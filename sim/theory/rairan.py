@@ -1,4 +1,4 @@
-"""Equations (1) to (14) of Rairán 2013: estimates, their relative errors, delay and greatest acceleration.
+"""Equations (1) to (14) of Rairán 2013 give estimates, their relative errors, delay and greatest acceleration.
 
 Every function is vectorised: arguments are broadcast against each other, and the result has their shape, float64.
 Estimates n are in units of ω_lim = 1/(pul·dt): n1 = 1/Ndt1 at low speeds, Nep1 at high ones. Relative errors are
@@ -27,12 +27,13 @@ def _regime_n3(n3: ArrayLike) -> Floats:
 
 
 def rairan_speed_limit(pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
-    """ω_lim = 1/(pul·dt) in rev/s: one pulse per dt (Rairán 2013, introduction); dt in seconds."""
+    """Return ω_lim = 1/(pul·dt) in rev/s: one pulse per dt (Rairán 2013, introduction); dt in seconds."""
     return 1 / (positive("pulses_per_rev", pulses_per_rev) * positive("dt", dt))
 
 
 def rairan_eq01_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayLike) -> Floats:
-    """Eq. (1) of Rairán 2013: time dt_a = (−r/⌊r⌋ + 2 + 1/⌊r⌋)·dt between updates, r = ω/ω_lim; in the unit of dt.
+    """Compute eq. (1) of Rairán 2013: time dt_a = (−r/⌊r⌋ + 2 + 1/⌊r⌋)·dt between updates, r = ω/ω_lim; in the unit of
+    dt.
 
     Below ω_lim it is the time between two pulses. It joins the values of `rairan_update_time` at the multiples of ω_lim
     by straight lines.
@@ -49,7 +50,7 @@ def rairan_eq01_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayL
 
 
 def rairan_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayLike) -> Floats:
-    """Time (⌊r⌋ + 1)/r·dt between updates of Table 1 of Rairán 2013, r = ω/ω_lim; in the unit of dt.
+    """Return time (⌊r⌋ + 1)/r·dt between updates of Table 1 of Rairán 2013, r = ω/ω_lim; in the unit of dt.
 
     A window begins with a pulse and takes dt; the first pulse later than that begins the next. Below ω_lim, where
     ⌊r⌋ = 0, it is the time between two pulses. At the multiples of ω_lim a pulse that comes with the end of dt belongs
@@ -66,18 +67,20 @@ def rairan_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayLike) 
 
 
 def rairan_eq02_error(estimate: ArrayLike, speed: ArrayLike) -> Floats:
-    """Eq. (2) of Rairán 2013: relative error |ω_m − ω|/ω of an estimate ω_m, both in the same unit, ω > 0."""
+    """Compute eq. (2) of Rairán 2013: relative error |ω_m − ω|/ω of an estimate ω_m, both in the same unit, ω > 0."""
     speed = positive("speed", speed)
     return np.abs(np.asarray(estimate, dtype=np.float64) - speed) / speed
 
 
 def rairan_eq03_error(n1: ArrayLike, speed: ArrayLike, speed_limit: ArrayLike) -> Floats:
-    """Eq. (3) of Rairán 2013: relative error n1·ω_lim/ω − 1 of the upper estimate n1, which is never below ω."""
+    """Compute eq. (3) of Rairán 2013: relative error n1·ω_lim/ω − 1 of the upper estimate n1, which
+    is never below ω.
+    """
     return _regime_n1(n1) * positive("speed_limit", speed_limit) / positive("speed", speed) - 1
 
 
 def rairan_eq04_max_error(n1: ArrayLike) -> Floats:
-    """Eq. (4) of Rairán 2013: bound of eq. (3) over all speeds of an estimate: n1 if n1 ≤ 1, else 1/(n1 − 1).
+    """Compute eq. (4) of Rairán 2013: bound of eq. (3) over all speeds of an estimate: n1 if n1 ≤ 1, else 1/(n1 − 1).
 
     Attained for n1 ≤ 1, whose interval has its left end, n2; a supremum above, where it has not.
     """
@@ -86,13 +89,15 @@ def rairan_eq04_max_error(n1: ArrayLike) -> Floats:
 
 
 def rairan_eq05_n2(n1: ArrayLike) -> Floats:
-    """Eq. (5) of Rairán 2013: lower estimate n2 = 1/(1/n1 + 1) if n1 ≤ 1, else n1 − 1. Never above the speed."""
+    """Compute eq. (5) of Rairán 2013: lower estimate n2 = 1/(1/n1 + 1) if n1 ≤ 1, else n1 − 1.
+    Never above the speed.
+    """
     n1 = _regime_n1(n1)
     return np.where(n1 < 1.5, 1 / (1 / n1 + 1), n1 - 1)
 
 
 def rairan_eq06_n2(n_ep1: ArrayLike, n_dt1: ArrayLike) -> Floats:
-    """Eq. (6) of Rairán 2013: lower estimate n2 = Nep1/(Ndt1 + 1) if Nep1 = 1, else (Nep1 − 1)/Ndt1.
+    """Compute eq. (6) of Rairán 2013: lower estimate n2 = Nep1/(Ndt1 + 1) if Nep1 = 1, else (Nep1 − 1)/Ndt1.
 
     Parameters
     ----------
@@ -106,12 +111,14 @@ def rairan_eq06_n2(n_ep1: ArrayLike, n_dt1: ArrayLike) -> Floats:
 
 
 def rairan_eq07_error(n2: ArrayLike, speed: ArrayLike, speed_limit: ArrayLike) -> Floats:
-    """Eq. (7) of Rairán 2013: relative error 1 − n2·ω_lim/ω of the lower estimate n2, which is never above ω."""
+    """Compute eq. (7) of Rairán 2013: relative error 1 − n2·ω_lim/ω of the lower estimate n2, which
+    is never above ω.
+    """
     return 1 - _regime_n2(n2) * positive("speed_limit", speed_limit) / positive("speed", speed)
 
 
 def rairan_eq08_sup_error(n2: ArrayLike) -> Floats:
-    """Eq. (8) of Rairán 2013: bound of eq. (7) over all speeds of an estimate: n2 if n2 ≤ ½, else 1/(n2 + 1).
+    """Compute eq. (8) of Rairán 2013: bound of eq. (7) over all speeds of an estimate: n2 if n2 ≤ ½, else 1/(n2 + 1).
 
     A supremum at low speeds, but attained at ω_lim (n2 = ½), and in every interval of high speeds, which has its right
     end, n1.
@@ -121,22 +128,24 @@ def rairan_eq08_sup_error(n2: ArrayLike) -> Floats:
 
 
 def rairan_eq09_left_error(n3: ArrayLike, n2: ArrayLike) -> Floats:
-    """Eq. (9) of Rairán 2013: relative error n3/n2 − 1 of an estimate n3 from n2 to n1, at the interval's left end."""
+    """Compute eq. (9) of Rairán 2013: relative error n3/n2 − 1 of an estimate n3 from n2 to n1, at the interval's left
+    end.
+    """
     return positive("n3", n3) / _regime_n2(n2) - 1
 
 
 def rairan_eq10_right_error(n3: ArrayLike, n1: ArrayLike) -> Floats:
-    """Eq. (10) of Rairán 2013: relative error 1 − n3/n1 of an estimate n3 from n2 to n1, at the right end."""
+    """Compute eq. (10) of Rairán 2013: relative error 1 − n3/n1 of an estimate n3 from n2 to n1, at the right end."""
     return 1 - positive("n3", n3) / _regime_n1(n1)
 
 
 def rairan_eq11_n3(n1: ArrayLike, n2: ArrayLike) -> Floats:
-    """Eq. (11) of Rairán 2013: optimal estimate n3 = 2/(1/n1 + 1/n2), where eqs. (9) and (10) are equal."""
+    """Compute eq. (11) of Rairán 2013: optimal estimate n3 = 2/(1/n1 + 1/n2), where eqs. (9) and (10) are equal."""
     return 2 / (1 / _regime_n1(n1) + 1 / _regime_n2(n2))
 
 
 def rairan_eq12_max_error(n3: ArrayLike) -> Floats:
-    """Eq. (12) of Rairán 2013: greatest relative error of n3: n3/2 if n3 < 1, else (n3 − ⌊n3⌋)/⌊n3⌋.
+    """Compute eq. (12) of Rairán 2013: greatest relative error of n3: n3/2 if n3 < 1, else (n3 − ⌊n3⌋)/⌊n3⌋.
 
     Attained: every interval has one of its ends, and the error is the same at both. No n3 lies between ⅔ and 4/3.
     """
@@ -146,13 +155,14 @@ def rairan_eq12_max_error(n3: ArrayLike) -> Floats:
 
 
 def rairan_eq13_max_error(n1: ArrayLike) -> Floats:
-    """Eq. (13) of Rairán 2013: eq. (12) in terms of n1: 1/(1 + 2/n1) if n1 ≤ 1, else 1/(2·n1 − 1)."""
+    """Compute eq. (13) of Rairán 2013: eq. (12) in terms of n1: 1/(1 + 2/n1) if n1 ≤ 1, else 1/(2·n1 − 1)."""
     n1 = _regime_n1(n1)
     return np.where(n1 < 1.5, 1 / (1 + 2 / n1), 1 / np.maximum(2 * n1 - 1, 1))
 
 
 def rairan_eq14_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
-    """Eq. (14) of Rairán 2013: a_max = ω_lim/(2·dt), at low speeds over Ndt1·(Ndt1 + 1), Ndt1 = 1/n1; in rev/s².
+    """Compute eq. (14) of Rairán 2013: a_max = ω_lim/(2·dt), at low speeds over Ndt1·(Ndt1 + 1), Ndt1 = 1/n1; in
+    rev/s².
 
     At low speeds it is (Ndt1 + 1)/2 times what `rairan_max_acceleration` finds by the same argument.
 
@@ -169,7 +179,7 @@ def rairan_eq14_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: A
 
 
 def rairan_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
-    """Acceleration, rev/s², that changes the speed by n1 − n2 in the longest window.
+    """Return acceleration, rev/s², that changes the speed by n1 − n2 in the longest window.
 
     ω_lim/(2·dt) at high speeds, where windows are shorter than 2·dt, as eq. (14) of Rairán 2013; at low ones, where
     they take up to (Ndt1 + 1)·dt, ω_lim/(dt·Ndt1·(Ndt1 + 1)²), Ndt1 = 1/n1.

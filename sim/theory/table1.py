@@ -1,4 +1,4 @@
-"""Table 1 of Rairán 2013 to the letter, followed from event to event."""
+"""Table 1 of Rairán 2013 is followed here to the letter, from event to event."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """What Table 1 holds after an event.
+    """Holds the entries of Table 1 after an event.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Row:
 
 
 def table1_rows(pulses: Iterable[int], dt: int, duration: int) -> list[Row]:
-    """Every event of Table 1, its start first; the lines are those of the paper, in its order.
+    """Return every event of Table 1, its start first; the lines are those of the paper, in its order.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ _GROWTH = 10
 
 
 class Phase(Enum):
-    """How many counts are known."""
+    """Says how many counts are known."""
 
     REST = 0
     ONE = 1
@@ -32,7 +32,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """What the recursion depends on.
+    """Holds the numbers that the recursion depends on.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Tuning:
 
     @classmethod
     def of(cls, spec: TrackTachometer) -> "Tuning":
-        """Those of a core."""
+        """Return those of a core."""
         clock_hz, bandwidth = spec.timing.clock_hz, float(spec.bandwidth)
         # A power of two clocks: a quarter of 1/λ_0, or half the longest tick, whichever is more.
         bits = max(math.floor(math.log2(clock_hz / (4 * bandwidth))), math.floor(math.log2(spec.longest_tick)))
@@ -104,15 +104,15 @@ class Tuning:
         return self.greatest_velocity / (8 * self.unit_seconds)
 
     def rate(self, level: int) -> float:
-        """λ of a level, rad/s."""
+        """Return λ of a level, rad/s."""
         return float(self.bandwidth * 10 ** (-level / (_LEVELS - 1)))
 
     def reach(self, level: int) -> float:
-        """The greatest λ·m·T_s of a level: −ln θ_min."""
+        """Return the greatest λ·m·T_s of a level: −ln θ_min."""
         return -math.log(1 - (1 - self.least_memory) * max(10 ** (-level / (_LEVELS - 1)), _SHORTEST_MEMORY))
 
     def span(self, level: int) -> float:
-        """Seconds without trouble from a level to the next one.
+        """Return seconds without trouble from a level to the next one.
 
         λ falls by its e-th part in ten of its time constants, so dλ/dt = −λ²/10, and 1/λ grows by a tenth of the time.
         A level is taken when λ has fallen to the geometric mean of its rate and of that before.
@@ -130,7 +130,7 @@ class Tuning:
 
 @dataclass(frozen=True)
 class Tracked:
-    """What the recursion shows at the end of every tick, shape (n,) each.
+    """Holds the outputs of the recursion at the end of every tick, shape (n,) each.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Tracked:
 
 @dataclass
 class Recursion:
-    """The state, and what a tick makes of it.
+    """Keeps the state, and changes it in every tick.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class Recursion:
         self.silent = self.tuning.max_ticks
 
     def reaches(self, value: float, limit: float) -> bool:
-        """Whether a value is as great as a limit: every decision of the recursion that rounding could turn."""
+        """Tell whether a value is as great as a limit: every decision of the recursion that rounding could turn."""
         return value >= limit
 
     def tick(self, length: float, ages: list[float], steps: list[int], offsets: list[float] | None = None) -> None:
@@ -281,7 +281,7 @@ class Recursion:
             self.untroubled, self.level = 0.0, self.level + 1
 
     def _wait(self) -> None:
-        """No count: the place stays near the position, and a speed that leads away from it falls."""
+        """Keep the place near the position without a count, and let a speed fall that leads away from it."""
         limit = 0.5 + 1.5 * self.tuning.edge_error
         if not self.reaches(abs(self.place), limit):
             return
@@ -299,7 +299,7 @@ def track(
     last: NDArray[np.int64],
     recursion: Recursion | None = None,
 ) -> Tracked:
-    """The recursion over all ticks.
+    """Return the recursion over all ticks.
 
     Parameters
     ----------

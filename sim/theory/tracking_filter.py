@@ -1,4 +1,4 @@
-"""The filter of the tracking method between two counts, as a linear system: poles, bandwidth, noise, errors.
+"""Between two counts the filter of the tracking method is a linear system with poles, bandwidth, noise and errors.
 
 Here λ is constant, and a count comes every m·T_s. All depends on x = λ·m·T_s alone: θ = e^−x is the weight that the
 past keeps with each count (the coefficient of Tsuji 2009, eq. (22), for the time since the last count). The gains are
@@ -19,23 +19,27 @@ _SMALL = 0.01
 
 
 def gains(x: float) -> Floats:
-    """What place, velocity and acceleration take of an error, shape (3,)."""
+    """Return what place, velocity and acceleration take of an error, shape (3,)."""
     d = -math.expm1(-x)
     return np.array([1 - (1 - d) ** 3, 1.5 * d * (1 - (1 - d) ** 2), d**3])
 
 
 def _step(x: float) -> NDArray[np.float64]:
-    """What a prediction and a correction make of the state, shape (3, 3)."""
+    """Return what a prediction and a correction make of the state, shape (3, 3)."""
     return _PREDICT - np.outer(gains(x), _PREDICT[0])
 
 
 def poles(x: float) -> NDArray[np.complex128]:
-    """Poles in z, shape (3,); in exact numbers all are θ = e^−x: three equal real poles, so no overshoot of its own."""
+    """Return poles in z, shape (3,); in exact numbers all are θ = e^−x: three equal real poles, so no overshoot of its
+    own.
+    """
     return np.linalg.eigvals(_step(x)).astype(np.complex128)
 
 
 def noise_gains(x: float) -> Floats:
-    """Standard deviations of place, velocity and acceleration, for places of counts with one of 1, shape (3,)."""
+    """Return standard deviations of place, velocity and acceleration, for places of counts with one
+    of 1, shape (3,).
+    """
     step, gain = _step(x), gains(x)
     # P = A·P·Aᵀ + k·kᵀ, solved for the nine elements of P.
     covariance = np.linalg.solve(np.eye(9) - np.kron(step, step), np.outer(gain, gain).ravel())
@@ -43,7 +47,7 @@ def noise_gains(x: float) -> Floats:
 
 
 def worst_gain(x: float) -> float:
-    """The velocity that errors of at most 1 in the places of counts can cause: the sum of |impulse response|."""
+    """Return the velocity that errors of at most 1 in the places of counts can cause: the sum of |impulse response|."""
     if x < _SMALL:  # it is proportional to x, within 0.2 %
         return worst_gain(_SMALL) * x / _SMALL
     state, step = gains(x), _step(x)
@@ -64,7 +68,7 @@ def jerk_errors(x: float) -> Floats:
 
 
 def bandwidth(x: float) -> float:
-    """Where the velocity shown for a sine of the speed has 1/√2 of its amplitude: ω·m·T_s in rad, at most π."""
+    """Tell where the velocity shown for a sine of the speed has 1/√2 of its amplitude: ω·m·T_s in rad, at most π."""
     gain, step = gains(x), _step(x)
 
     def amplitude(w: float) -> float:

@@ -1,4 +1,4 @@
-"""Equations (3) to (22) of Tsuji 2009: the M, T, M/T and S methods and the low-pass filter.
+"""Equations (3) to (22) of Tsuji 2009 describe the M, T, M/T and S methods and the low-pass filter.
 
 Every function is vectorised: arguments are broadcast against each other, and the result has their shape, float64.
 Throughout, `counts_per_rev` is P and `tick_seconds` is T_s in seconds, both greater than 0; velocities and resolutions
@@ -15,7 +15,7 @@ from tachometry.sim.theory.checks import Floats, at_least, positive
 
 
 def unit_velocity(counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """ω_u = 2π/(P·T_s) in rad/s: one count per sampling period (Tsuji 2009, Sec. V-A)."""
+    """Return ω_u = 2π/(P·T_s) in rad/s: one count per sampling period (Tsuji 2009, Sec. V-A)."""
     return 2 * math.pi / (positive("counts_per_rev", counts_per_rev) * positive("tick_seconds", tick_seconds))
 
 
@@ -34,24 +34,24 @@ def _duration(what: str, ticks: ArrayLike, tick_seconds: ArrayLike) -> Floats:
 
 
 def tsuji_eq03_velocity(m_e: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (3) of Tsuji 2009: velocity of the M method, m_e·ω_u, from the counts m_e of one tick."""
+    """Compute eq. (3) of Tsuji 2009: velocity of the M method, m_e·ω_u, from the counts m_e of one tick."""
     return np.asarray(m_e) * unit_velocity(counts_per_rev, tick_seconds)
 
 
 def tsuji_eq04_resolution(counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (4) of Tsuji 2009: resolution Q_V = ω_u of the M method. Errors are less; it is their supremum."""
+    """Compute eq. (4) of Tsuji 2009: resolution Q_V = ω_u of the M method. Errors are less; it is their supremum."""
     return unit_velocity(counts_per_rev, tick_seconds)
 
 
 def tsuji_eq05_measurement_time(tick_seconds: ArrayLike) -> Floats:
-    """Eq. (5) of Tsuji 2009: measurement time T_m = T_s of the M method."""
+    """Compute eq. (5) of Tsuji 2009: measurement time T_m = T_s of the M method."""
     return positive("tick_seconds", tick_seconds)
 
 
 def tsuji_eq06_velocity(
     pulse_sum: ArrayLike, n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Eq. (6) of Tsuji 2009: velocity of the M method with averaging.
+    """Compute eq. (6) of Tsuji 2009: velocity of the M method with averaging.
 
     Parameters
     ----------
@@ -64,22 +64,26 @@ def tsuji_eq06_velocity(
 
 
 def tsuji_eq07_resolution(n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (7) of Tsuji 2009: resolution Q_V = ω_u/n of the M method with averaging. The supremum of the errors."""
+    """Compute eq. (7) of Tsuji 2009: resolution Q_V = ω_u/n of the M method with averaging. The supremum of the
+    errors.
+    """
     return unit_velocity(counts_per_rev, tick_seconds) / at_least("n", n, 1)
 
 
 def tsuji_eq08_measurement_time(n: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (8) of Tsuji 2009: measurement time T_m = n·T_s of the M method with averaging."""
+    """Compute eq. (8) of Tsuji 2009: measurement time T_m = n·T_s of the M method with averaging."""
     return _duration("n", n, tick_seconds)
 
 
 def tsuji_eq09_velocity(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (9) of Tsuji 2009: velocity ω_u/m_s of the T method, m_s ticks from count to count. It has no sign."""
+    """Compute eq. (9) of Tsuji 2009: velocity ω_u/m_s of the T method, m_s ticks from count to
+    count. It has no sign.
+    """
     return _mean_velocity(1, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
 
 
 def tsuji_eq10_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (10) of Tsuji 2009: resolution Q_V = ω_u/(m_s·(m_s − 1)) of the T method; infinite for m_s = 1.
+    """Compute eq. (10) of Tsuji 2009: resolution Q_V = ω_u/(m_s·(m_s − 1)) of the T method; infinite for m_s = 1.
 
     It is the step from the velocity of m_s ticks to that of m_s − 1, and the supremum of the errors.
     """
@@ -87,12 +91,12 @@ def tsuji_eq10_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_second
 
 
 def tsuji_eq11_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (11) of Tsuji 2009: measurement time T_m = m_s·T_s of the T method."""
+    """Compute eq. (11) of Tsuji 2009: measurement time T_m = m_s·T_s of the T method."""
     return _duration("m_s", m_s, tick_seconds)
 
 
 def tsuji_eq12_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (12) of Tsuji 2009: mean m_s = ω_u/|ω| of the T method in ticks; infinite at standstill.
+    """Compute eq. (12) of Tsuji 2009: mean m_s = ω_u/|ω| of the T method in ticks; infinite at standstill.
 
     A single m_s is one of the two integers beside it. Above ω_u it is less than 1, and the method fails.
 
@@ -109,7 +113,7 @@ def tsuji_eq12_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_second
 def tsuji_eq13_velocity(
     pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Eq. (13) of Tsuji 2009: velocity of the M/T method, whose windows begin and end at ticks with a count.
+    """Compute eq. (13) of Tsuji 2009: velocity of the M/T method, whose windows begin and end at ticks with a count.
 
     Parameters
     ----------
@@ -124,7 +128,7 @@ def tsuji_eq13_velocity(
 def tsuji_eq14_resolution(
     pulse_sum: ArrayLike, m_s: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Eq. (14) of Tsuji 2009: resolution Q_V = min(|Σ m_e|·ω_u/(m_s·(m_s − 1)), ω_u/m_c) of the M/T method.
+    """Compute eq. (14) of Tsuji 2009: resolution Q_V = min(|Σ m_e|·ω_u/(m_s·(m_s − 1)), ω_u/m_c) of the M/T method.
 
     Errors are less. The first term is the supremum for the time, uncertain by less than a tick at either end; the
     second is that for the counts when m_s = m_c, and more than it in longer windows.
@@ -144,12 +148,12 @@ def tsuji_eq14_resolution(
 
 
 def tsuji_eq15_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (15) of Tsuji 2009: measurement time T_m = m_s·T_s of the M/T method."""
+    """Compute eq. (15) of Tsuji 2009: measurement time T_m = m_s·T_s of the M/T method."""
     return _duration("m_s", m_s, tick_seconds)
 
 
 def tsuji_eq16_interval(speed: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (16) of Tsuji 2009: mean m_s = m_c·(⌊x⌋ + 1)/x of the M/T method in ticks, x = |ω|/ω_u·m_c.
+    """Compute eq. (16) of Tsuji 2009: mean m_s = m_c·(⌊x⌋ + 1)/x of the M/T method in ticks, x = |ω|/ω_u·m_c.
 
     x counts come in T_c; the window ends with the first one later than that. The printed form lacks the factor m_c: it
     is the time in units of T_c. Infinite at standstill.
@@ -171,7 +175,7 @@ def tsuji_eq16_interval(speed: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayL
 def tsuji_eq17_velocity(
     pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Eq. (17) of Tsuji 2009: velocity of the S method, whose windows end at pulse alterations.
+    """Compute eq. (17) of Tsuji 2009: velocity of the S method, whose windows end at pulse alterations.
 
     Parameters
     ----------
@@ -184,7 +188,7 @@ def tsuji_eq17_velocity(
 
 
 def tsuji_eq18_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (18) of Tsuji 2009: resolution Q_V = ω_u/(m_s·(m_s − 1)) of the S method; infinite for m_s = 1.
+    """Compute eq. (18) of Tsuji 2009: resolution Q_V = ω_u/(m_s·(m_s − 1)) of the S method; infinite for m_s = 1.
 
     The supremum of the errors of windows from alteration to alteration at constant speed; not of forced updates.
     """
@@ -192,12 +196,12 @@ def tsuji_eq18_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_second
 
 
 def tsuji_eq19_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (19) of Tsuji 2009: measurement time T_m = m_s·T_s of the S method."""
+    """Compute eq. (19) of Tsuji 2009: measurement time T_m = m_s·T_s of the S method."""
     return _duration("m_s", m_s, tick_seconds)
 
 
 def tsuji_eq20_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Eq. (20) of Tsuji 2009: mean m_s = 1/|ω/ω_u − ⌊ω/ω_u + ½⌋| in ticks; infinite at multiples of ω_u.
+    """Compute eq. (20) of Tsuji 2009: mean m_s = 1/|ω/ω_u − ⌊ω/ω_u + ½⌋| in ticks; infinite at multiples of ω_u.
 
     Parameters
     ----------
@@ -218,7 +222,7 @@ def tsuji_eq21_velocity(
     counts_per_rev: ArrayLike,
     tick_seconds: ArrayLike,
 ) -> Floats:
-    """Eq. (21) of Tsuji 2009: velocity of the S method with alternate alterations cancelled.
+    """Compute eq. (21) of Tsuji 2009: velocity of the S method with alternate alterations cancelled.
 
     The pulse numbers at both ends of the window count by one half: eq. (17)'s sum, half the opening more, half the
     closing less.
@@ -239,7 +243,7 @@ def tsuji_eq21_velocity(
 def tsuji_eq22_low_pass(
     u: ArrayLike, y_0: ArrayLike, m_s: ArrayLike, cutoff: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Eq. (22) of Tsuji 2009: output y = y_0 + (1 − e^(−G·m_s·T_s))·(u − y_0) of the LPF after m_s ticks.
+    """Compute eq. (22) of Tsuji 2009: output y = y_0 + (1 − e^(−G·m_s·T_s))·(u − y_0) of the LPF after m_s ticks.
 
     Exact for an input that is constant meanwhile.
 

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 
 def extra_bits_of(spec: LoopSpec) -> int:
-    """f."""
+    """Return f."""
     least = [rate * spec.seconds for rate in (spec.observer, spec.filter) if rate is not None]
     return form.extra_bits(*(1 - form.decay(one) for one in least))
 
 
 def ratios_of(spec: LoopSpec) -> dict[Term, list[Fraction]]:
-    """What each term is multiplied by, in units of its result for one of its word."""
+    """Return what each term is multiplied by, in units of its result for one of its word."""
     unit = spec.rad_per_s / (1 << extra_bits_of(spec))  # rad/s
     observed = form.ratios(spec.observer, spec.seconds, spec.longest)
     per_current = spec.torque_constant / (spec.inertia * spec.observer) * spec.amperes / unit
@@ -44,7 +44,7 @@ def ratios_of(spec: LoopSpec) -> dict[Term, list[Fraction]]:
 
 
 def _gains(spec: LoopSpec) -> dict[Term, Fraction]:
-    """k_p and k_v, and how much of the acceleration and of the disturbance becomes current: all."""
+    """Return k_p and k_v, and how much of the acceleration and of the disturbance becomes current: all."""
     return {
         Term.POSITION: spec.position_gain,
         Term.VELOCITY: spec.velocity_gain,
@@ -54,7 +54,7 @@ def _gains(spec: LoopSpec) -> dict[Term, Fraction]:
 
 
 def _of_one(spec: LoopSpec, term: Term) -> Fraction:
-    """What a term is multiplied by if its gain is 1."""
+    """Return what a term is multiplied by if its gain is 1."""
     unit = spec.rad_per_s / (1 << extra_bits_of(spec))
     part = spec.amperes / (1 << GUARD_BITS)  # A
     words = {
@@ -67,7 +67,7 @@ def _of_one(spec: LoopSpec, term: Term) -> Fraction:
 
 
 def control_form(spec: LoopSpec) -> ControlForm:
-    """Formats and coefficients."""
+    """Return formats and coefficients."""
     ratios = spec.ratios
     bits = form.factor_bits(list(ratios.values()))
     gain_bits = min(bits, MOST_GAIN_BITS) if spec.gains == "inputs" else 0
@@ -91,13 +91,15 @@ def control_form(spec: LoopSpec) -> ControlForm:
 
 
 def _usual(spec: LoopSpec, term: Term) -> Fraction:
-    """The ratio for which the range of a gain is made: that of its option, or of k_p = (k_v/2)² where that is 0."""
+    """Return the ratio for which the range of a gain is made: that of its option, or of k_p = (k_v/2)² where that is
+    0.
+    """
     gain = _gains(spec)[term] or spec.velocity_gain**2 / 4
     return gain * _of_one(spec, term)
 
 
 def gain_per_lsb(spec: LoopSpec, term: Term) -> Fraction:
-    """What one LSB of a gain that is an input is: of k_p in 1/s², of k_v in 1/s.
+    """Return what one LSB of a gain that is an input is: of k_p in 1/s², of k_v in 1/s.
 
     Of the acceleration and of the disturbance it is a part of what the motor's data make of them.
     """

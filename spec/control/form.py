@@ -69,7 +69,7 @@ GAINS = (Term.POSITION, Term.VELOCITY, Term.ACCELERATION, Term.DISTURBANCE)
 
 
 def decay(exponent: Fraction) -> Fraction:
-    """e^−exponent to 60 digits."""
+    """Return e^−exponent to 60 digits."""
     with localcontext() as context:
         context.prec = 70
         return Fraction((-Decimal(exponent.numerator) / Decimal(exponent.denominator)).exp())
@@ -151,7 +151,7 @@ class ControlForm:
         return len(self.terms[Term.CURRENT].values)
 
     def product(self, term: Term, word: int, n: int = 1) -> int:
-        """round(word·c / 2^p) for the coefficient of n, with the term's shift."""
+        """Return round(word·c / 2^p) for the coefficient of n, with the term's shift."""
         one = self.terms[term]
         return (((word << one.shift) * one.values[n - 1]) + (1 << (self.factor_bits - 1))) >> self.factor_bits
 
@@ -191,7 +191,7 @@ class ControlForm:
         return 1 << (self.velocity_width - 1 + self.extra_bits)
 
     def _most(self, term: Term, word: int) -> int:
-        """The product of a word with the greatest coefficient that a term can have."""
+        """Return the product of a word with the greatest coefficient that a term can have."""
         if not self.gain_bits:
             return self.product(term, word)
         one = replace(self.terms[term], values=(self.most_gain << self.gain_shift,))
@@ -256,35 +256,35 @@ class ControlForm:
 
 
 def ratios(rate: Fraction, seconds: Fraction, longest: int) -> list[Fraction]:
-    """c(n) for n from 1 to `longest`, eq. (22)."""
+    """Return c(n) for n from 1 to `longest`, eq. (22)."""
     return [1 - decay(rate * seconds * n) for n in range(1, longest + 1)]
 
 
 def extra_bits(*least: Fraction) -> int:
-    """f: the least with 2^f ≥ 4/c(1), of each."""
+    """Return f: the least with 2^f ≥ 4/c(1), of each."""
     return max(2, *(ceil_log2(4 / one) for one in least))
 
 
 def factor_bits(found: Sequence[Sequence[Fraction]]) -> int:
-    """p: so many that the least coefficient that is not 0 has its bits."""
+    """Return p: so many that the least coefficient that is not 0 has its bits."""
     least = min(min(each) / _one(each) for each in found if each[0])
     return LEAST_COEFFICIENT + max(1, ceil_log2(1 / least))
 
 
 def _one(found: Sequence[Fraction]) -> int:
-    """The power of two, at least 1, that is greater than all of them."""
+    """Return the power of two, at least 1, that is greater than all of them."""
     return 1 << math.floor(max(found)).bit_length()
 
 
 def gain(found: Fraction, usual: Fraction, bits: int, gain_bits: int) -> Coefficients:
-    """A ratio as a coefficient of so many bits that is a gain of fewer; its range is for the usual one."""
+    """Return a ratio as a coefficient of so many bits that is a gain of fewer; its range is for the usual one."""
     one = _one([usual * (1 << GAIN_HEADROOM)])
     raw = min(round(found / one * (1 << gain_bits)), (1 << gain_bits) - 1)
     return Coefficients((raw << (bits - gain_bits),), one.bit_length() - 1)
 
 
 def coefficients(found: Sequence[Fraction], bits: int) -> Coefficients:
-    """Ratios as coefficients of so many bits."""
+    """Return ratios as coefficients of so many bits."""
     one = _one(found)
     most = (1 << bits) - 1
     return Coefficients(tuple(min(round(each / one * (1 << bits)), most) for each in found), one.bit_length() - 1)

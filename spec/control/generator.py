@@ -61,7 +61,7 @@ class Scale:
 
     @classmethod
     def of(cls, ratio: Fraction) -> Scale:
-        """That of a ratio."""
+        """Return that of a ratio."""
         shift = _SCALE_BITS - FACTOR_BITS + math.floor(-math.log2(ratio))
         return cls(round(ratio * Fraction(2) ** (shift + FACTOR_BITS)), shift)
 
@@ -137,7 +137,7 @@ class GeneratorForm:
 
 
 def generator_form(spec: LoopSpec) -> GeneratorForm:
-    """That of a loop."""
+    """Yield that of a loop."""
     count = 2 * PI / spec.tachometer.encoder.counts_per_rev  # rad
     speed = count / spec.seconds  # a count per control tick in rad/s
     change = speed / spec.seconds
@@ -161,5 +161,5 @@ def generator_form(spec: LoopSpec) -> GeneratorForm:
 
 
 def generator_clocks(multiplier: str) -> int:
-    """Fewest clocks between two control ticks."""
+    """Return fewest clocks between two control ticks."""
     return _SERIAL if multiplier == "serial" else _PARALLEL

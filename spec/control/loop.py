@@ -226,7 +226,7 @@ class LoopSpec(HasPorts):
             )
 
     def _least_in(self, period: int) -> int:
-        """`least_period` with another period."""
+        """Return `least_period` with another period."""
         other = object.__new__(LoopSpec)
         for field in fields(self):
             object.__setattr__(other, field.name, getattr(self, field.name))
@@ -320,7 +320,7 @@ class LoopSpec(HasPorts):
 
     @cached_property
     def ratios(self) -> dict[Term, list[Fraction]]:
-        """What each term is multiplied by, in units of its result for one of its word."""
+        """The factor of each term, in units of its result for one of its word."""
         return ratios_of(self)
 
     @cached_property

@@ -26,7 +26,7 @@ _GAIN_UNIT = {Term.POSITION: " 1/s²", Term.VELOCITY: " 1/s"}
 
 
 def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
-    """Ports beside those of the tachometer."""
+    """Return ports beside those of the tachometer."""
     form, tachometer = spec.form, spec.tachometer
     fine = f"2^{-tachometer.frac_bits - form.extra_bits} {tachometer.unit}"
     return (
@@ -63,7 +63,7 @@ def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
 
 
 def _units(spec: LoopSpec) -> dict[str, tuple[int, str]]:
-    """Bits and unit of the commanded position, velocity and acceleration."""
+    """Return bits and unit of the commanded position, velocity and acceleration."""
     form, tachometer = spec.form, spec.tachometer
     return {
         "position": (tachometer.position_width + POSITION_FRAC_BITS, f"2^{-POSITION_FRAC_BITS} counts"),
@@ -73,7 +73,7 @@ def _units(spec: LoopSpec) -> dict[str, tuple[int, str]]:
 
 
 def _commands(spec: LoopSpec) -> tuple[Port, ...]:
-    """Commands from outside."""
+    """Return commands from outside."""
     told = {
         "position": "Commanded position; it wraps as position does.",
         "velocity": "Commanded velocity.",
@@ -87,7 +87,7 @@ def _commands(spec: LoopSpec) -> tuple[Port, ...]:
 
 
 def _gains(spec: LoopSpec) -> tuple[Port, ...]:
-    """Gains and limit from outside."""
+    """Return gains and limit from outside."""
     form, taken = spec.form, _TAKEN[spec.gains]
     return (
         *(
@@ -108,7 +108,7 @@ def _gains(spec: LoopSpec) -> tuple[Port, ...]:
 
 
 def _generated(spec: LoopSpec) -> tuple[Port, ...]:
-    """What the command generator is told, and what it commands."""
+    """Return what the command generator is told, and what it commands."""
     form = spec.generator
     taken = _TAKEN[spec.gains]
     inputs = (
@@ -149,7 +149,7 @@ def _generated(spec: LoopSpec) -> tuple[Port, ...]:
 
 
 def loop_entries(spec: LoopSpec) -> dict[str, Any]:
-    """What the manifest says of the loop."""
+    """Return what the manifest says of the loop."""
     form = spec.form
     generator: dict[str, Any] = {}
     if spec.command == "generator":
@@ -183,7 +183,7 @@ def loop_entries(spec: LoopSpec) -> dict[str, Any]:
 
 
 def _gain_entries(spec: LoopSpec) -> dict[str, Any]:
-    """What raw values of the gains mean: raw = round(gain/per_lsb), from 0 to most."""
+    """Return what raw values of the gains mean: raw = round(gain/per_lsb), from 0 to most."""
     form = spec.form
     if not form.gain_bits:
         return {}

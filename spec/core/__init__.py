@@ -1,1 +1,1 @@
-"""What every core of one axis has: encoder, timing, options, widths, latencies, ports."""
+"""Every core of one axis has an encoder, timing, options, widths, latencies and ports."""

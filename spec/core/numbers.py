@@ -1,4 +1,4 @@
-"""What follows from the parameters of a core: widths, formats and latencies."""
+"""Widths, formats and latencies follow from the parameters of a core."""
 
 import math
 from dataclasses import dataclass
@@ -29,12 +29,12 @@ class Numbers(Parameters):
         return max(coarsest, most)
 
     def fitting_frac_bits(self, counts: Fraction | int) -> int:
-        """The most fraction bits with which so many counts per tick fit `velocity_width`."""
+        """Return the most fraction bits with which so many counts per tick fit `velocity_width`."""
         lsb = counts * self.per_count / ((1 << (self.velocity_width - 1)) - 1)
         return -ceil_log2(lsb)
 
     def frac_bits_range(self, unit: str) -> tuple[int, int]:
-        """Fewest and most fraction bits of the velocity in `unit`."""
+        """Return fewest and most fraction bits of the velocity in `unit`."""
         if unit == NATIVE:
             return 4, MAX_NATIVE_FRAC_BITS
         # The greatest speed must be at least one LSB, and one count per tick at most 2^22.
@@ -172,7 +172,7 @@ class Numbers(Parameters):
         return max(2, self.busy_clocks if self.serial else 0, output)
 
     def has_room(self, clocks: int) -> bool:
-        """Whether a tick is long enough for work of so many clocks; external ones may come in half the time."""
+        """Tell whether a tick is long enough for work of so many clocks; external ones may come in half the time."""
         return self.timing.tick_cycles >= (clocks if self.max_tick_cycles is None else 2 * clocks)
 
     @property
@@ -253,5 +253,5 @@ class Numbers(Parameters):
         return self.datapath_latency + self.low_pass_latency + self.output_latency
 
     def seconds(self, clocks: int) -> Fraction:
-        """A number of clocks in seconds, exactly."""
+        """Return a number of clocks in seconds, exactly."""
         return Fraction(clocks, self.timing.clock_hz)

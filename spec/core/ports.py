@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:
-    """All ports of a core, in the order of the exported module; those of options and methods come last."""
+    """Return all ports of a core, in the order of the exported module; those of options and methods come last."""
     return (
         pin("clk", "Clock; all outputs change at its rising edge."),
         pin("rst", "Synchronous reset, active high."),

@@ -1,4 +1,4 @@
-"""What every method shares: checks, ports and what a method says of itself."""
+"""All methods share checks and ports, and say here how they differ."""
 
 import math
 from dataclasses import dataclass
@@ -116,7 +116,7 @@ class TachometerSpec(Numbers, HasPorts):
         )
 
     def _check_full_scale(self, coarsest: int) -> None:
-        """See that a velocity of so many bits shows the greatest speed."""
+        """Check that a velocity of so many bits shows the greatest speed."""
         if self.max_speed is None or is_derived(self.velocity_width):
             return
         counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
@@ -139,7 +139,7 @@ class TachometerSpec(Numbers, HasPorts):
 
     @property
     def heading(self) -> str:
-        """What figures call it."""
+        """The name that figures give it."""
         return f"{self.title or self.method.upper()} method"
 
     @property
@@ -149,7 +149,7 @@ class TachometerSpec(Numbers, HasPorts):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the core is not as its options say."""
+        """Sentences on what of the core is not as its options say."""
         if self.max_speed is None:
             return ()
         counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)

@@ -102,7 +102,8 @@ class Timing:
     def parse(
         cls, clock: str | int | None = None, tick: str | int | None = None, max_time: str | int | None = None
     ) -> "Timing":
-        """Timing from texts (`48MHz`, `20us`, `10ms`) or whole numbers (Hz, clocks, clocks); None is the default.
+        """Return timing from texts (`48MHz`, `20us`, `10ms`) or whole numbers (Hz, clocks, clocks); None is the
+        default.
 
         Raises
         ------
@@ -120,12 +121,14 @@ class Timing:
 
 
 def whole_clocks(what: str, given: str, clock_hz: int) -> int:
-    """A time such as `40us`, or a number of clocks, as a whole number of clocks; ParameterError if it is none."""
+    """Return a time such as `40us`, or a number of clocks, as a whole number of clocks;
+    ParameterError if it is none.
+    """
     return _whole(what, given, Fraction(1, clock_hz), "clock", Fraction(1, clock_hz))
 
 
 def _whole(what: str, given: str, period: Fraction, name: str, given_in: Fraction, least: int = 1) -> int:
-    """`given`, a time or a number of clocks, as a whole number of periods, of which `least` are needed."""
+    """Return `given`, a time or a number of clocks, as a whole number of periods, of which `least` are needed."""
     number = given.strip()
     plain = re.fullmatch(r"\d{1,30}", number, re.ASCII)
     or_plain = "or a whole number of clocks"

@@ -80,7 +80,7 @@ class CarriedReciprocal:
         return self.quotient_width + self.table_remainder_width
 
     def value(self, m: int) -> tuple[int, int]:
-        """(Q, R) for m ≥ 1."""
+        """Return (Q, R) for m ≥ 1."""
         return divmod(self.scale, m)
 
     @property

@@ -71,7 +71,8 @@ class LowPass:
     @property
     def latency(self) -> int:
         """Clocks from an update that finds the filter at rest to the filtered one: two to begin, a clock a bit of each
-        factor and one to load it, one to add, one to round."""
+        factor and one to load it, one to add, one to round.
+        """
         return 4 + (1 if self.max_interval < MAX_TABLE else 2) * (self.factor_bits + 2)
 
     def _table(self, step: int, entries: int) -> tuple[int, ...]:
@@ -79,7 +80,7 @@ class LowPass:
         return tuple(min(round(self._decay(k * step) * one), one - 1) for k in range(entries))
 
     def _decay(self, intervals: int) -> Fraction:
-        """e^(−exponent·intervals) to 60 digits."""
+        """Return e^(−exponent·intervals) to 60 digits."""
         with localcontext() as context:
             context.prec = 70
             power = self.exponent * intervals

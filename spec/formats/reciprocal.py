@@ -103,7 +103,7 @@ class Reciprocal:
         return self.value(1).bit_length()
 
     def rounding(self, towards: int = 0) -> int:
-        """C, what is added before the k bits are dropped: to round to the nearest (0), down (−1) or up (1)."""
+        """Return C, what is added before the k bits are dropped: to round to the nearest (0), down (−1) or up (1)."""
         if towards > 0:
             return (1 << self.scale_bits) - self.slack_up
         return self.slack + (0 if towards else 1 << (self.scale_bits - 1))
@@ -114,7 +114,7 @@ class Reciprocal:
         return False
 
     def is_wide(self, result_width: int) -> bool:
-        """Whether the sum for a result of so many bits takes two adders: the carries of one would limit the clock.
+        """Tell whether the sum for a result of so many bits takes two adders: the carries of one would limit the clock.
 
         They need an odd q, because the carry of −q would need a place of its own.
         """
@@ -126,7 +126,7 @@ class Reciprocal:
         return 1 << (self.max_m - 1).bit_length()
 
     def value(self, m: int) -> int:
-        """q(m) for 1 ≤ m ≤ max_m."""
+        """Return q(m) for 1 ≤ m ≤ max_m."""
         return ((2 << (self.frac_bits + self.guard_bits)) + m) // (2 * m)
 
     @property
@@ -177,7 +177,7 @@ class DividedReciprocal(Reciprocal):
 
 
 def odd_quotient(bits: int, m: int) -> int:
-    """The odd number Q with 2^bits = Q·m + R and −m < R ≤ m."""
+    """Return the odd number Q with 2^bits = Q·m + R and −m < R ≤ m."""
     return (((1 << bits) - 1) // (2 * m) << 1) + 1
 
 
@@ -206,7 +206,7 @@ class NarrowReciprocal(Reciprocal):
 
 @cache
 def _narrowest(form: NarrowReciprocal) -> tuple[int, Sequence[int]]:
-    """The fewest guard bits, and q(m) for m = 1, 2 …: of all that are right the least."""
+    """Return the fewest guard bits, and q(m) for m = 1, 2 …: of all that are right the least."""
     between = _between(form)
     for half in count(2 * form.digits):
         found = [(a << half) // b + 1 for (a, b), _ in between]
@@ -217,7 +217,7 @@ def _narrowest(form: NarrowReciprocal) -> tuple[int, Sequence[int]]:
 
 @cache
 def _fewest(form: DividedReciprocal) -> int:
-    """The fewest guard bits with which each q(m) lies between its fractions."""
+    """Return the fewest guard bits with which each q(m) lies between its fractions."""
     between = _between(form)
     for half in count(2 * form.digits):
         guard = half + 1 - form.halvings
@@ -228,7 +228,7 @@ def _fewest(form: DividedReciprocal) -> int:
 
 
 def _between(form: Reciprocal) -> Sequence[tuple[tuple[int, int], tuple[int, int]]]:
-    """The fractions between which 2q/2^k has to lie, for m = 1, 2 …"""
+    """Return the fractions between which 2q/2^k has to lie, for m = 1, 2 and so on."""
     assert not (form.bounds)
     assert not (form.has_ties)
     scaled = 1 << (form.frac_bits + 1 - form.halvings)
@@ -236,7 +236,7 @@ def _between(form: Reciprocal) -> Sequence[tuple[tuple[int, int], tuple[int, int
 
 
 def _odd_neighbours(numerator: int, denominator: int, most: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The nearest fractions below and above one, with odd numerators and denominators of at most `most`.
+    """Return the nearest fractions below and above one, with odd numerators and denominators of at most `most`.
 
     The one between has an even numerator in its lowest terms, or a greater denominator.
     """

@@ -88,15 +88,16 @@ class Tracking:
         return Fraction(1 << self.unit_bits, self.tick_cycles)
 
     def rate(self, level: int) -> float:
-        """λ of a level, per clock."""
+        """Return λ of a level, per clock."""
         return float(self.bandwidth) * RATIOS[level] / self.clock_hz
 
     def most(self, level: int) -> float:
-        """The greatest x = λ·m·T_s that counts for the gains of a level: −ln θ_min."""
+        """Return the greatest x = λ·m·T_s that counts for the gains of a level: −ln θ_min."""
         return -math.log(1 - float(1 - self.least_memory) * max(RATIOS[level], SHORTEST_MEMORY))
 
     def _gains(self) -> list[tuple[int, float]]:
-        """m and d where errors are greatest: a count in every tick, as seldom as may be, and where x reaches its most.
+        """Return m and d where errors are greatest: a count in every tick, as seldom as may be, and where x reaches its
+        most.
 
         In all of them λ is the least.
         """
@@ -237,21 +238,23 @@ class Tracking:
         return max(whole + self.frac_bits, dividend) + 1
 
     def fixed(self, value: float | Fraction) -> int:
-        """A number with F fraction bits."""
+        """Return a number with F fraction bits."""
         return round(value * (1 << self.frac_bits))
 
     def rate_word(self, rate: float) -> int:
-        """What a gap in clocks is multiplied by, and the product shifted right by gap_bits − 1, for x = rate·gap."""
+        """Return what a gap in clocks is multiplied by, and the product shifted right by gap_bits − 1, for x =
+        rate·gap.
+        """
         return round(rate * 2.0 ** (self.frac_bits + self.gap_bits - 1))
 
     @cached_property
     def rates(self) -> tuple[int, ...]:
-        """The same for each level."""
+        """The rates of each level."""
         return tuple(self.rate_word(self.rate(level)) for level in range(LEVELS))
 
     @cached_property
     def agile_rate(self) -> int:
-        """The same for an agile correction."""
+        """The rate of an agile correction."""
         return self.rate_word(AGILE * self.rate(0))
 
     @cached_property

@@ -45,7 +45,7 @@ class Op(IntEnum):
 
 
 class Input(IntEnum):
-    """What `INPUT` loads."""
+    """Lists the words that `INPUT` loads."""
 
     TIMES = 0  # Σ of the times from the counts of the tick to its end, clocks
     NUMBER = 1  # n, of these counts, shifted left by the bits of a mean
@@ -70,7 +70,7 @@ class Condition(IntEnum):
 
 
 class Level(IntEnum):
-    """What `LEVEL` does."""
+    """Lists the effects of `LEVEL`."""
 
     FIRST = 0
     BACK = 1  # STEP_BACK levels, not beyond the first
@@ -78,7 +78,7 @@ class Level(IntEnum):
 
 
 class Phase(IntEnum):
-    """What the recursion knows."""
+    """Says how much the recursion knows."""
 
     REST = 0
     BEGUN = 1
@@ -122,7 +122,7 @@ _CHANGES = (Op.STORE, Op.KEEP, Op.LEVEL)
 
 
 def _spaced(steps: Sequence[Step]) -> list[Step]:
-    """The steps, with a wait where one would read a word before it is written, or while another one is.
+    """Return the steps, with a wait where one would read a word before it is written, or while another one is.
 
     A word is read two steps before its use. So none is read two steps behind a change, nor what the last step changed.
     """
@@ -147,14 +147,14 @@ def _spaced(steps: Sequence[Step]) -> list[Step]:
 
 
 def clocks(steps: Sequence[Step]) -> int:
-    """Clocks of some steps."""
+    """Return clocks of some steps."""
     return sum(
         step.steps if isinstance(step, Do) else NOT_TAKEN + sum(_ways(step)[0]) + TAKEN for step in _spaced(steps)
     )
 
 
 def _ways(choice: Choice) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Clocks of `otherwise` and of `then`, each with those that have to be waited behind it."""
+    """Return clocks of `otherwise` and of `then`, each with those that have to be waited behind it."""
     otherwise, then = clocks(choice.otherwise), clocks(choice.then)
     # What follows may read what `then` has written last, so there are two waits between.
     both = max(NOT_TAKEN + otherwise + TAKEN, TAKEN + then + 2)
@@ -162,7 +162,7 @@ def _ways(choice: Choice) -> tuple[tuple[int, int], tuple[int, int]]:
 
 
 def assembled(steps: Sequence[Step], address: Callable[[str | int], int], begin: int = 0) -> list[Instruction]:
-    """Instructions of some steps, the first of which is at `begin`; `address` is that of a word."""
+    """Return instructions of some steps, the first of which is at `begin`; `address` is that of a word."""
     code: list[Instruction] = []
 
     def wait(clocks: int) -> None:

@@ -29,7 +29,7 @@ _ZERO = Do(Op.INPUT, Input.ZERO)  # ac = 0
 
 
 def _doubled(bits: int) -> list[Step]:
-    """ac = ac << bits, for mq without its leading bit."""
+    """Return ac = ac << bits, for mq without its leading bit."""
     return [Do(Op.DOUBLE, steps=bits)] if bits else []
 
 
@@ -58,7 +58,7 @@ class Program:
 
     @cached_property
     def acceleration_scale(self) -> tuple[int, int]:
-        """What a is multiplied by for the output, and the right shift after it."""
+        """The factor of a for the output, and the right shift after it."""
         shift = self.form.width - 2  # the factor is less than 1/12, as a is off by more than 1.5 of its LSB
         return round(self.acceleration_factor * (1 << shift)), shift
 
@@ -104,7 +104,7 @@ class Program:
         return {"rate": self.form.rates, "most_x": self.form.most_x, "span": self.form.spans}
 
     def address(self, word: str | int) -> int:
-        """The address of a word."""
+        """Return the address of a word."""
         if isinstance(word, int):
             return word
         states = ("p v a h gap gap_shifted mean before age e d r e1 e2 t x".split()).index
@@ -123,7 +123,7 @@ class Program:
         return words
 
     def _times(self, factor: str, word: str, bits: int) -> list[Step]:
-        """ac = word·factor/2^bits."""
+        """Return ac = word·factor/2^bits."""
         return [Do(Op.LOAD, factor), Do(Op.TO_MQ), Do(Op.MUL, word, bits + 1)]
 
     @property
@@ -133,7 +133,7 @@ class Program:
 
     @staticmethod
     def _within(most: str) -> list[Step]:
-        """ac = ac, held within ±most."""
+        """Return ac = ac, held within ±most."""
         return [
             *(Do(Op.KEEP, "t"), Do(Op.LOAD_SIGNED, "t"), Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most)),
             *(Do(Op.STORE, "t"), Do(Op.LOAD_SIGNED, "t")),
@@ -155,7 +155,7 @@ class Program:
 
     @property
     def _anew(self) -> list[Step]:
-        """What is known of the errors is forgotten."""
+        """Instructions that forget what is known of the errors."""
         stores = [Do(Op.STORE, word) for word in ("gap", "gap_shifted", "mean", "before", "age")]
         return [_ZERO, *stores, Do(Op.LEVEL, Level.FIRST)]
 
@@ -207,7 +207,7 @@ class Program:
         ]
 
     def _shifted(self, word: str, bits: int) -> list[Step]:
-        """t = word << bits."""
+        """Return t = word << bits."""
         return [_ZERO, Do(Op.TO_MQ), Do(Op.LOAD, word), *_doubled(bits), Do(Op.STORE, "t")]
 
     @property
@@ -240,7 +240,7 @@ class Program:
         ]
 
     def _reach(self, rate: str, most: str) -> list[Step]:
-        """ac = x = min(λ·m·T_s, most)."""
+        """Return ac = x = min(λ·m·T_s, most)."""
         least = [Do(Op.SUB, most), Do(Op.NEGATIVE), Do(Op.ADD, most)]
         return [*self._times("gap", rate, self.form.gap_bits - 1), *least]
 

@@ -15,7 +15,7 @@ UNITS = (NATIVE, *_PER_REV_PER_SECOND)
 
 
 def parse_lsb(what: str, text: str) -> int:
-    """Fraction bits N of an LSB, 2^−N, such as `2^-4` or `0.0625`; ParameterError if it is no power of two."""
+    """Return fraction bits N of an LSB, 2^−N, such as `2^-4` or `0.0625`; ParameterError if it is no power of two."""
     if match := re.fullmatch(r"2\^([+-]?[0-9]{1,3})", text.strip()):
         return -int(match[1])
     if re.fullmatch(r"\+?([0-9]{1,30}(\.[0-9]{0,100})?|\.[0-9]{1,100})", text.strip(), re.ASCII):
@@ -26,7 +26,7 @@ def parse_lsb(what: str, text: str) -> int:
 
 
 def per_count(unit: str, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
-    """One count per tick in `unit`."""
+    """Return one count per tick in `unit`."""
     return Fraction(1) if unit == NATIVE else _PER_REV_PER_SECOND[unit] / (counts_per_rev * tick_seconds)
 
 
@@ -75,7 +75,7 @@ class VelocityOutput:
         return self._constant[1]
 
     def rounding(self, towards: int = 0) -> int:
-        """What is added before these bits are dropped: to round to the nearest (0), down (−1) or up (1).
+        """Return what is added before these bits are dropped: to round to the nearest (0), down (−1) or up (1).
 
         Down and up allow for the greatest error of the rounded multiplier, so that the result is a bound.
         """
@@ -86,7 +86,7 @@ class VelocityOutput:
         return -slack if towards < 0 else (1 << self.shift) - 1 + slack
 
     def scaled(self, native: int, towards: int = 0) -> int:
-        """The output for a raw native velocity, before it is held within the limit."""
+        """Return the output for a raw native velocity, before it is held within the limit."""
         return (native * self.multiplier + self.rounding(towards)) >> self.shift
 
     @property

@@ -7,7 +7,7 @@ _SECTION = re.compile(r"\n\nParameters\n-{10}\n(.*?)(?=\n\n\w+\n-{3,}|\Z)", re.D
 
 
 def with_inherited(own: str | None, base: str | None) -> str | None:
-    """A docstring, with the parameters of another behind its own; one that both have is told as its own."""
+    """Return a docstring, with the parameters of another behind its own; one that both have is told as its own."""
     text, above = inspect.cleandoc(own or ""), _SECTION.search(inspect.cleandoc(base or ""))
     if not text or above is None:
         return own
@@ -22,5 +22,5 @@ def with_inherited(own: str | None, base: str | None) -> str | None:
 
 
 def _entries(parameters: str) -> dict[str, str]:
-    """Entries of a section by the names that they begin with."""
+    """Return entries of a section by the names that they begin with."""
     return {entry.split(" : ")[0]: entry for entry in re.split(r"\n(?=\S)", parameters)}

@@ -36,7 +36,7 @@ class ParameterError(ValueError):
 
     @staticmethod
     def longer(error: ValueError, more: str) -> ValueError:
-        """This error with more text at the end of its message."""
+        """Return this error with more text at the end of its message."""
         if isinstance(error, ParameterError):
             return ParameterError(error.parameter, error.rest + more)
         return ValueError(f"{error}{more}")
@@ -72,19 +72,19 @@ def settle(item: Any, *names: str) -> None:
 
 
 def is_derived(value: object) -> bool:
-    """Whether the value of a field was not given, but follows from other fields."""
+    """Tell whether the value of a field was not given, but follows from other fields."""
     return isinstance(value, Derived | Settled)
 
 
 def parse_flag(what: str, text: str) -> bool:
-    """Whether a text says yes."""
+    """Tell whether a text says yes."""
     if (word := text.strip().lower()) not in _YES | _NO:
         raise ParameterError(what, f"must be yes or no, not {text!r}")
     return word in _YES
 
 
 def parse_whole(what: str, text: str) -> int:
-    """A whole number."""
+    """Return a whole number."""
     try:
         if len(text) <= _MOST_DIGITS:
             return int(text)
@@ -94,7 +94,7 @@ def parse_whole(what: str, text: str) -> int:
 
 
 def parse_text(what: str, text: str) -> str:
-    """The text as it is."""
+    """Return the text as it is."""
     return text
 
 
@@ -173,7 +173,7 @@ class Option:
         return tuple("" if choice == self.default else choice for choice in self.choices)
 
     def canonical(self, value: Any) -> Any:
-        """A value of the field for a manifest."""
+        """Return a value of the field for a manifest."""
         if isinstance(value, Fraction):
             return f"{float(value)!r}{self.unit}" if self.unit else float(value)
         if isinstance(value, Settled):
@@ -181,14 +181,14 @@ class Option:
         return value if isinstance(value, bool | int | str | None) else str(value)
 
     def of_canonical(self, value: Any) -> Any:
-        """The value of the field that a manifest has."""
+        """Return the value of the field that a manifest has."""
         if isinstance(value, float):
             return Fraction(repr(value))
         return self.parse(self.parameter, value) if isinstance(value, str) else value
 
 
 def option(default: Any, help: str, *, text: str | None = None, also: tuple[Option, ...] = (), **about: Any) -> Any:
-    """A field that is an option.
+    """Return a field that is an option.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def option(default: Any, help: str, *, text: str | None = None, also: tuple[Opti
 
 
 def options_of(spec: Any) -> tuple[Option, ...]:
-    """Options of the fields of a class, in order."""
+    """Return options of the fields of a class, in order."""
     return _declared(spec)
 
 
@@ -229,7 +229,7 @@ def _of_field(about: Option, item: Field[Any]) -> Option:
 
 
 def read_options(spec: type[Any], texts: Mapping[str, str]) -> dict[str, Any]:
-    """Values of the fields of a class, from the texts that are given for its options.
+    """Return values of the fields of a class, from the texts that are given for its options.
 
     Raises
     ------

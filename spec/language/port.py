@@ -46,22 +46,22 @@ class Port:
 
 
 def pin(name: str, help: str, width: int = 1) -> Port:
-    """An input, of one bit as a rule."""
+    """Return an input, of one bit as a rule."""
     return Port(name, "input", width, help=help)
 
 
 def strobe(name: str, help: str) -> Port:
-    """An output that is high for one clock when something is new."""
+    """Return an output that is high for one clock when something is new."""
     return Port(name, "output", held_by=name, help=help)
 
 
 def held(by: str, name: str, width: int = 1, *, signed: bool = False, unit: str = "", help: str) -> Port:
-    """An output that is read in the clocks of the strobe `by`."""
+    """Return an output that is read in the clocks of the strobe `by`."""
     return Port(name, "output", width, signed, by, unit, help)
 
 
 class HasPorts:
-    """What follows from the ports of an exported core."""
+    """Derives pins, outputs and strobes from the ports of an exported core."""
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -1,4 +1,4 @@
-"""What every generated file says of itself: what made it, whose it is, and how it may be used."""
+"""Every generated file says what made it, whose it is, and how it may be used."""
 
 import functools
 import importlib.metadata
@@ -8,17 +8,17 @@ LICENSE = "BSD-2-Clause"
 
 @functools.cache
 def version() -> str:
-    """The version of tachometry."""
+    """Return the version of tachometry."""
     return importlib.metadata.version("tachometry")
 
 
 def generator() -> str:
-    """What makes the files."""
+    """Return what makes the files."""
     return f"tachometry {version()}"
 
 
 def notice(mark: str) -> str:
-    """Lines of a comment that begin with `mark`."""
+    """Return lines of a comment that begin with `mark`."""
     lines = (
         f"Made by {generator()}.",
         "SPDX-FileCopyrightText: 2026, the Tachometry contributors",

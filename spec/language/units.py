@@ -42,7 +42,7 @@ class Unit(NamedTuple):
         return self.size if self.pi is None else self.size * self.pi * PI
 
     def nearest(self, value: Fraction) -> float:
-        """So many of this unit as a float; what has no π in it is rounded once, so 7us is exactly 7e-6."""
+        """Return so many of this unit as a float; what has no π in it is rounded once, so 7us is exactly 7e-6."""
         rational = float(value * self.size)
         return rational if self.pi is None else rational * (math.pi * self.pi.numerator / self.pi.denominator)
 
@@ -68,7 +68,7 @@ TORQUE = _decimal(Nm=0, mNm=-3)
 
 
 def read_quantity(what: str, text: str, units: Units, default: str = "", also: str = "") -> tuple[Fraction, str]:
-    """The decimal number in a text, exactly, and its unit.
+    """Return the decimal number in a text, exactly, and its unit.
 
     Parameters
     ----------
@@ -103,31 +103,31 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
 
 
 def plain_unit(unit: str) -> str:
-    """The name of a unit in the tables, such as `us` for `µs`."""
+    """Return the name of a unit in the tables, such as `us` for `µs`."""
     return re.sub("^[µμ]", "u", unit)
 
 
 def read_exactly(what: str, text: str, units: Units, default: str = "", also: str = "") -> Fraction:
-    """The quantity in the first of the units, exactly; arguments and errors as of `read_quantity`."""
+    """Return the quantity in the first of the units, exactly; arguments and errors as of `read_quantity`."""
     value, unit = read_quantity(what, text, units, default, also)
     return value * units[unit].exact
 
 
 def rounded(value: Fraction | float, *, up: bool, digits: int = 4) -> str:
-    """A limit to some digits, from above or from below, so that what is told is allowed."""
+    """Return a limit to some digits, from above or from below, so that what is told is allowed."""
     exact = Fraction(value)
     with localcontext(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR):
         return f"{float(Decimal(exact.numerator) / exact.denominator):.{digits}g}"
 
 
 def read_nearest(what: str, text: str, units: Units, default: str = "") -> float:
-    """The quantity in the first of the units as a float; arguments and errors as of `read_quantity`."""
+    """Return the quantity in the first of the units as a float; arguments and errors as of `read_quantity`."""
     value, unit = read_quantity(what, text, units, default)
     return units[unit].nearest(value)
 
 
 def ratio(unit: str, other: str) -> Fraction | None:
-    """How many of `unit` one of `other` is, exactly; None if there is no exact ratio."""
+    """Tell how many of `unit` one of `other` is, exactly; None if there is no exact ratio."""
     for units in (TIME, FREQUENCY, SPEED, ANGLE):
         if unit in units and other in units and (units[unit].pi is None) == (units[other].pi is None):
             return units[other].exact / units[unit].exact
@@ -135,12 +135,12 @@ def ratio(unit: str, other: str) -> Fraction | None:
 
 
 def parse_time(what: str, text: str) -> Fraction:
-    """Seconds in a text such as `20us`; `what` names the quantity in the message of the ValueError."""
+    """Return seconds in a text such as `20us`; `what` names the quantity in the message of the ValueError."""
     return read_exactly(what, text, TIME)
 
 
 def parse_frequency(what: str, text: str | int) -> int:
-    """Hertz in a text such as `48MHz`, a whole number; a plain number is hertz.
+    """Return hertz in a text such as `48MHz`, a whole number; a plain number is hertz.
 
     Raises
     ------
@@ -154,12 +154,12 @@ def parse_frequency(what: str, text: str | int) -> int:
 
 
 def parse_bandwidth(what: str, text: str) -> Fraction:
-    """rad/s in a text such as `200rad/s` or `30Hz`."""
+    """Return rad/s in a text such as `200rad/s` or `30Hz`."""
     return read_exactly(what, text, BANDWIDTH)
 
 
 def format_time(seconds: Fraction) -> str:
-    """A time as people write it: the largest unit that leaves a number of at least 1."""
+    """Return a time as people write it: the largest unit that leaves a number of at least 1."""
     for unit, (size, _) in TIME.items():
         if seconds >= size:
             return f"{float(seconds / size):.9g}{unit}"
@@ -167,18 +167,18 @@ def format_time(seconds: Fraction) -> str:
 
 
 def plural(number: int, what: str) -> str:
-    """So many of a thing."""
+    """Return so many of a thing."""
     return f"{number} {what}{'s' * (number != 1)}"
 
 
 def ceil_log2(number: Fraction) -> int:
-    """The least k for which 2^k is at least `number`."""
+    """Return the least k for which 2^k is at least `number`."""
     k = number.numerator.bit_length() - number.denominator.bit_length()  # off by one at most
     return k + 1 if number > Fraction(2) ** k else k if number > Fraction(2) ** (k - 1) else k - 1
 
 
 def signed_width(limit: int) -> int:
-    """Bits of a two's complement number that holds -limit … +limit."""
+    """Return bits of a two's complement number that holds -limit … +limit."""
     return limit.bit_length() + 1
 
 
@@ -199,12 +199,12 @@ class SpeedUnit(NamedTuple):
         return float(SPEED[self.name].exact)
 
     def of(self, rad_per_s: Any) -> Any:
-        """A number or an array in rad/s, in this unit."""
+        """Return a number or an array in rad/s, in this unit."""
         return rad_per_s / self.rad_per_s
 
     @property
     def suffix(self) -> str:
-        """What the names of columns end with."""
+        """The ending of the names of columns."""
         return self.name.replace("/", "_")
 
 
@@ -239,13 +239,13 @@ class Speed:
         return float(self.value * SPEED[self.unit].exact)
 
     def counts(self, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
-        """Speed / ω_u, counts per tick, with ω_u = 2π/(P·T_s)."""
+        """Return speed / ω_u, counts per tick, with ω_u = 2π/(P·T_s)."""
         size, pi = SPEED[self.unit]
         turns = size / (2 * PI) if pi is None else size * pi / 2
         return self.value * turns * counts_per_rev * tick_seconds
 
     def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
-        """The most counts that one tick can hold at this speed."""
+        """Return the most counts that one tick can hold at this speed."""
         return math.ceil(self.counts(counts_per_rev, tick_seconds))
 
     def __str__(self) -> str:

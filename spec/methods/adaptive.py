@@ -10,7 +10,7 @@ from tachometry.spec.language.units import FRACTION, read_exactly
 
 
 def parse_target(what: str, text: str) -> Fraction:
-    """A fraction such as `0.1%`, `0.001` or `1/8`."""
+    """Return a fraction such as `0.1%`, `0.001` or `1/8`."""
     try:
         if quotient := re.fullmatch(r"\s*(\d{1,9})/0*([1-9]\d{0,8})\s*", text, re.ASCII):
             return Fraction(int(quotient[1]), int(quotient[2]))
@@ -50,9 +50,9 @@ class AdaptiveDt:
         return min(self.fewest - 1, isqrt(1 << self.max_shift))
 
     def slow_from(self, shift: int) -> int:
-        """The least Ndt1 at which k is reduced or stays 0: a count takes `slow` dt, or one more if k > 0."""
+        """Return the least Ndt1 at which k is reduced or stays 0: a count takes `slow` dt, or one more if k > 0."""
         return -(-(self.slow + (shift > 0)) >> shift)
 
     def rare_to(self, shift: int) -> int:
-        """The greatest Nep1 at which k is reduced because the counts are so far apart."""
+        """Return the greatest Nep1 at which k is reduced because the counts are so far apart."""
         return (1 << shift) // (self.slow + 1)

@@ -49,12 +49,12 @@ _STROBES = {
 
 
 def _slots(axes: int, cycles: int) -> int | None:
-    """S for a tick of so many clocks; None if no number divides it."""
+    """Return S for a tick of so many clocks; None if no number divides it."""
     return next((slots for slots in range(max(axes, MIN_SLOTS), MAX_AXES + 1) if cycles % slots == 0), None)
 
 
 def _axis(spec: STachometer, slots: int) -> STachometer:
-    """The core that each axis is if a round has so many slots."""
+    """Return the core that each axis is if a round has so many slots."""
     timing, speed = spec.timing, spec.max_speed
     return replace(
         spec,
@@ -69,7 +69,7 @@ def _turn_cycles(axis: STachometer) -> int:
 
 
 def _fits(spec: STachometer, axes: int, cycles: int) -> bool:
-    """Whether a tick of so many clocks has whole rounds, and room for the turns of all axes."""
+    """Tell whether a tick of so many clocks has whole rounds, and room for the turns of all axes."""
     slots = _slots(axes, cycles)
     if slots is None:
         return False
@@ -79,7 +79,7 @@ def _fits(spec: STachometer, axes: int, cycles: int) -> bool:
 
 
 def _nearest(spec: STachometer, axes: int) -> list[int]:
-    """The longest tick below that of `spec` that fits, and the shortest above, in clocks, if they are near."""
+    """Return the longest tick below that of `spec` that fits, and the shortest above, in clocks, if they are near."""
 
     def possible(cycles: int) -> bool:
         try:
@@ -190,7 +190,7 @@ class AxesSpec(HasPorts):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is other than might be expected."""
+        """Sentences on what is other than might be expected."""
         if self.tachometer.max_speed is None or self.axis.max_count == self.tachometer.max_count:
             return ()
         return (
@@ -203,16 +203,18 @@ class AxesSpec(HasPorts):
         return "table", self.reciprocal.depth, self.reciprocal.width
 
     def look(self, axis: int, number: Any) -> Any:
-        """The clock in which the level of an axis is looked at for the `number`-th time, of a number or an array."""
+        """Return the clock in which the level of an axis is looked at for the `number`-th time, of a number or an
+        array.
+        """
         return number * self.slots + axis
 
     def tick_clock(self, axis: int, tick: Any) -> Any:
-        """The clock in which `tick` is high for the `tick`-th tick of an axis, of a number or an array."""
+        """Return the clock in which `tick` is high for the `tick`-th tick of an axis, of a number or an array."""
         begun = self.look(0, (tick + 1) * self.rounds - 1) + HAND_OVER_LATENCY
         return begun + axis * self.turn_cycles + self.turn_cycles + READ + self.parallel
 
     def seconds(self, clocks: int) -> Fraction:
-        """A number of clocks in seconds, exactly."""
+        """Return a number of clocks in seconds, exactly."""
         return self.tachometer.seconds(clocks)
 
     @property
@@ -270,7 +272,7 @@ class AxesSpec(HasPorts):
                 yield pin(port.name, f"Bit k, of axis k: {port.help}", self.axes)
 
     def _strobed(self) -> Iterable[Port]:
-        """Strobes and what axis they are of; what is new with them, if it is not held for each axis."""
+        """Return strobes and what axis they are of; what is new with them, if it is not held for each axis."""
         last = (self.axes - 1).bit_length() or 1
         for port in self._of_an_axis():
             if not port.is_strobe:
@@ -290,7 +292,9 @@ class AxesSpec(HasPorts):
                 yield replace(port, name=f"{port.name}_{axis}", help=f"Of axis {axis}, held: {port.help}")
 
     def _of_an_axis(self) -> tuple[Port, ...]:
-        """Those of the core that each axis is; but its clocks are rounds, and times here are in clocks of this core."""
+        """Return those of the core that each axis is; but its clocks are rounds, and times here are in clocks of this
+        core.
+        """
         units = {port.name: port.unit for port in self.tachometer.outputs}
         return tuple(replace(port, unit=units[port.name]) for port in self.axis.outputs)
 

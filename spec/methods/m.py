@@ -57,7 +57,7 @@ class MTachometer(TachometerSpec):
 
     @property
     def shift(self) -> int | None:
-        """What the sum is shifted left by, where n is a power of two of at most 2^frac_bits; else None."""
+        """The left shift of the sum, where n is a power of two of at most 2^frac_bits; else None."""
         halvings = self.average.bit_length() - 1
         exact = self.average == 1 << halvings and halvings + self.error_bits <= self.native_frac_bits
         return self.native_frac_bits - halvings if exact else None

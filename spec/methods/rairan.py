@@ -140,7 +140,7 @@ class RairanTachometer(TachometerSpec):
         return self.max_count << self.max_shift
 
     def max_dt(self, shift: int) -> int:
-        """Greatest Ndt1 for dt·2^shift: how many of these the maximum time has."""
+        """Return greatest Ndt1 for dt·2^shift: how many of these the maximum time has."""
         return self.timing.max_ticks >> shift
 
     @property
@@ -178,7 +178,7 @@ class RairanTachometer(TachometerSpec):
         return min(math.floor(exact) if towards < 0 else math.ceil(exact), self.absent_bound)
 
     def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
-        """The table of a bound; `one` gives the entry for n, k and the regime.
+        """Return the table of a bound; `one` gives the entry for n, k and the regime.
 
         An entry's address is twice that of the estimate, plus one if it is high. Where dt is adaptive, a leading one
         tells the k of the address: for a low estimate k places below that of `low_depth`, for a high one k places above
@@ -237,7 +237,9 @@ class RairanTachometer(TachometerSpec):
         return 2 * max(self.low_depth, self.high_depth << self.max_shift)
 
     def tie(self, shift: int) -> int | None:
-        """The Ndt1 for which n1 or n2 is just half an LSB, if there can be one: it is rounded up, to 1 or to −0."""
+        """Return the Ndt1 for which n1 or n2 is just half an LSB, if there can be one: it is rounded up, to 1 or to
+        −0.
+        """
         ndt1 = (2 << self.native_frac_bits >> shift) - (self.estimate == "n2")
         return ndt1 if self.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
 

@@ -87,7 +87,9 @@ class STachometer(TachometerSpec):
 
     @property
     def numerator_per_count(self) -> int:
-        """What one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17); or finer parts."""
+        """The number that one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17); or finer
+        parts.
+        """
         return (2 if self.cancel else 1) << self.finer
 
     @property

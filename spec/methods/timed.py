@@ -1,4 +1,4 @@
-"""What the methods that measure the time between counts share (Tsuji 2009, Sec. IV-B and C)."""
+"""The methods that measure the time between counts share this (Tsuji 2009, Sec. IV-B and C)."""
 
 import math
 from dataclasses import dataclass
@@ -104,7 +104,7 @@ class TimedTachometer(TachometerSpec):
         return (*super().notes, *self._raised("maximum time", given, self.max_time_cycles))
 
     def _raised(self, what: str, given: int, built: int) -> tuple[str, ...]:
-        """A note if a time is longer than it was asked for."""
+        """Return a note if a time is longer than it was asked for."""
         if built == given:
             return ()
         return (f"{what} raised from {plural(given, 'clock')} to {built}: a division takes {self.division_clocks}",)

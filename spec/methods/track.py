@@ -143,7 +143,7 @@ class TrackTachometer(TachometerSpec):
 
     @cached_property
     def program(self) -> Program:
-        """What the datapath does from a tick to the update."""
+        """The program of the datapath from a tick to the update."""
         form = self.form
         per_lsb = self._acceleration_per_count / (form.unit_ticks**2 * (1 << (form.frac_bits + form.extra_bits)))
         delay = self.pin_to_count + self.tick_latency + FETCH_CLOCKS + self.low_pass_latency + self.output_latency

@@ -43,7 +43,7 @@ class Bus:
     baud: int = 0
 
     def bit_cycles(self, clock_hz: int) -> int:
-        """Clocks of a bit on a line without a clock.
+        """Return clocks of a bit on a line without a clock.
 
         Raises
         ------
@@ -57,7 +57,7 @@ class Bus:
         return cycles
 
     def ports(self, registers: RegisterMap) -> tuple[Port, ...]:
-        """Ports that it adds to a core with these registers."""
+        """Return ports that it adds to a core with these registers."""
         width = registers.address_width - (WORD // 8 - 1).bit_length() * self.words
         return tuple(
             Port(port.name, port.direction, port.width or width, help=port.help) for port in (CAPTURE, *self.lines)
@@ -183,7 +183,7 @@ BUSES = {
 
 
 def bus_of(name: str, baud: int | None = None) -> Bus | None:
-    """The bus of a name, with these bits a second if they are given; None for `none`.
+    """Return the bus of a name, with these bits a second if they are given; None for `none`.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def bus_of(name: str, baud: int | None = None) -> Bus | None:
 
 
 def ports_on(spec: AnySpec, bus: Bus | None) -> tuple[Port, ...]:
-    """All ports of a core, with those of the bus on which its registers are."""
+    """Return all ports of a core, with those of the bus on which its registers are."""
     if bus is None:
         return spec.ports
     registers = registers_of(spec)
@@ -212,7 +212,7 @@ def ports_on(spec: AnySpec, bus: Bus | None) -> tuple[Port, ...]:
 
 
 def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
-    """The manifest of a core on a bus.
+    """Return the manifest of a core on a bus.
 
     Raises
     ------

@@ -99,7 +99,7 @@ class DemoLoopMap(LoopMap, DemoMap):
 
 
 def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
-    """All registers of the demo of a core.
+    """Return all registers of the demo of a core.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
 
 
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
-    """All ports of a demo on a bus."""
+    """Return all ports of a demo on a bus."""
     inputs = [port for port in registers.core_ports if port.direction == "input"]
     of_loop = [port for port in registers.core_ports if port.name == DRIVE]
     emulated = [
@@ -123,7 +123,7 @@ def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
 
 
 def demo_manifest(registers: DemoMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
-    """The manifest of a demo on a bus.
+    """Return the manifest of a demo on a bus.
 
     Raises
     ------

@@ -26,7 +26,7 @@ LATENCY = 3
 
 @dataclass(frozen=True)
 class EmulatorSettings:
-    """What the emulator does; all numbers as its registers have them.
+    """Sets the emulator; all numbers are as its registers have them.
 
     Parameters
     ----------
@@ -55,12 +55,12 @@ class EmulatorSettings:
 
 
 def speed_of(spec: TachometerSpec, rad_per_s: float) -> int:
-    """Phase a clock at a speed of the shaft."""
+    """Return phase a clock at a speed of the shaft."""
     return round(_periods(spec, rad_per_s) / spec.timing.clock_hz * 2**PHASE_WIDTH)
 
 
 def rad_per_s(spec: TachometerSpec, speed: int) -> float:
-    """Speed of the shaft at a phase a clock."""
+    """Return speed of the shaft at a phase a clock."""
     return speed / 2**PHASE_WIDTH * spec.timing.clock_hz / _periods(spec, 1.0)
 
 
@@ -70,10 +70,10 @@ def rate_of(spec: TachometerSpec, rad_per_s2: float) -> int:
 
 
 def fastest(spec: TachometerSpec) -> float:
-    """Highest emulated speed in rad/s: an eighth of a period a clock, so that no two lines change at once."""
+    """Return highest emulated speed in rad/s: an eighth of a period a clock, so that no two lines change at once."""
     return rad_per_s(spec, 1 << PHASE_WIDTH - 3)
 
 
 def _periods(spec: TachometerSpec, radians: float) -> float:
-    """Periods of a line in an angle of the shaft."""
+    """Return periods of a line in an angle of the shaft."""
     return radians / (2 * math.pi) * spec.encoder.pulses_per_rev

@@ -37,7 +37,7 @@ _WORD_BYTES = 4
 
 
 class Type(IntEnum):
-    """What a frame of the UART is for."""
+    """Says which purpose a frame of the UART has."""
 
     READ = 0
     WRITE = 1
@@ -48,7 +48,7 @@ TELEMETRY_HEADER = 1 << FROM_CORE | Type.TELEMETRY << TYPE_LOW
 
 
 class FrameError(ValueError):
-    """What came is no frame, or not the one that was expected."""
+    """Tells that no frame came, or not the one that was expected."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was answered.
+    """Holds an answer.
 
     Parameters
     ----------
@@ -89,19 +89,19 @@ class Answer:
 
 
 def crc(data: bytes) -> int:
-    """The check of some bytes; over a frame with its check it is 0."""
+    """Return the check of some bytes; over a frame with its check it is 0."""
     # That of the library has the same polynomial, but the bits the other way round.
     high, low = divmod(binascii.crc_hqx(data.translate(_REVERSED), CRC_START), 256)
     return _REVERSED[low] << 8 | _REVERSED[high]
 
 
 def with_check(data: bytes) -> bytes:
-    """Bytes of a frame of the UART, with its check."""
+    """Return bytes of a frame of the UART, with its check."""
     return data + crc(data).to_bytes(_CHECK_BYTES, "little")
 
 
 def read_request(address: int, n_words: int = 1, sequence: int = 0) -> bytes:
-    """A request over the UART for words that follow each other.
+    """Return a request over the UART for words that follow each other.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def read_request(address: int, n_words: int = 1, sequence: int = 0) -> bytes:
 
 
 def write_request(address: int, data: int, sequence: int = 0) -> bytes:
-    """A request over the UART to write a word.
+    """Return a request over the UART to write a word.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def write_request(address: int, data: int, sequence: int = 0) -> bytes:
 
 
 def decode_request(frame: bytes) -> Request:
-    """What a request over the UART asks for.
+    """Return what a request over the UART asks for.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def decode_request(frame: bytes) -> Request:
 
 
 def answer_length(request: bytes) -> int:
-    """Bytes of the answer to a request.
+    """Return bytes of the answer to a request.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def answer_length(request: bytes) -> int:
 
 
 def decode_answer(request: bytes, frame: bytes) -> Answer:
-    """What the core has answered to a request.
+    """Return what the core has answered to a request.
 
     Raises
     ------
@@ -173,12 +173,12 @@ def decode_answer(request: bytes, frame: bytes) -> Answer:
 
 
 def telemetry_length(n_words: int) -> int:
-    """Bytes of a frame of telemetry with so many words."""
+    """Return bytes of a frame of telemetry with so many words."""
     return 2 + _CHECK_BYTES + _WORD_BYTES * n_words
 
 
 def decode_telemetry(frame: bytes) -> tuple[int, tuple[int, ...]]:
-    """Sequence and words of a frame of telemetry.
+    """Return sequence and words of a frame of telemetry.
 
     Raises
     ------
@@ -194,14 +194,14 @@ def decode_telemetry(frame: bytes) -> tuple[int, tuple[int, ...]]:
 
 
 def encode_answer(request: Request, answer: Answer) -> bytes:
-    """The answer to a request, as the core sends it."""
+    """Return the answer to a request, as the core sends it."""
     header = 1 << FROM_CORE | request.type << TYPE_LOW | request.sequence
     words = b"".join(word.to_bytes(_WORD_BYTES, "little") for word in answer.words)
     return with_check(bytes([header]) + words + bytes([ERROR * answer.error]))
 
 
 def spi_read(address: int, n_words: int = 1) -> bytes:
-    """What to send over SPI to read words that follow each other.
+    """Return what to send over SPI to read words that follow each other.
 
     Raises
     ------
@@ -213,7 +213,7 @@ def spi_read(address: int, n_words: int = 1) -> bytes:
 
 
 def spi_write(address: int, data: int) -> bytes:
-    """What to send over SPI to write a word and to learn its status.
+    """Return what to send over SPI to write a word and to learn its status.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def spi_write(address: int, data: int) -> bytes:
 
 
 def decode_spi(sent: bytes, received: bytes) -> Answer:
-    """What came back over SPI while whole words of a read or a write were sent.
+    """Return what came back over SPI while whole words of a read or a write were sent.
 
     Raises
     ------
@@ -258,7 +258,7 @@ def _head(kind: Type, sequence: int, address: int) -> bytes:
 
 
 def _checked(frame: bytes) -> bytes:
-    """A frame without its check."""
+    """Return a frame without its check."""
     if crc(frame):
         raise FrameError("the check of a frame must be right")
     return frame[:-_CHECK_BYTES]

@@ -42,24 +42,24 @@ class LoopMap(RegisterMap):
 
     @property
     def core(self) -> LoopSpec:
-        """See `RegisterMap.core`."""
+        """The spec of the core, as of `RegisterMap.core`."""
         return self.loop
 
     @cached_property
     def core_ports(self) -> tuple[Port, ...]:
-        """See `RegisterMap.core_ports`: `enable` stays, as no program is to be needed to switch a drive off."""
+        """Ports of the core: `enable` stays, as no program is to be needed to switch a drive off."""
         written = {field.port for field in self.settings}
         return tuple(port for port in self.loop.ports if port.name not in written)
 
     @cached_property
     def ports(self) -> tuple[Port, ...]:
-        """See `RegisterMap.ports`."""
+        """Ports with the registers, as of `RegisterMap.ports`."""
         shown = (port for port in self.loop.outputs if port.held_by in (CONTROL, CURRENT) and not port.is_strobe)
         return (*super().ports, *shown)
 
     @property
     def quantities(self) -> tuple[tuple[str, float, str], ...]:
-        """See `RegisterMap.quantities`."""
+        """Quantities, as of `RegisterMap.quantities`."""
         entries = loop_entries(self.loop)
         units = {
             "current": ("amperes_per_lsb", "AMPERES_PER_LSB", "A"),
@@ -110,14 +110,14 @@ class LoopMap(RegisterMap):
         return gains.get(port.name, 0)
 
     def _whole(self, port: Port) -> Field:
-        """A port of a word or less."""
+        """Return a port of a word or less."""
         field = replace(_field(port), bits=port.width, signed=port.signed, reset=self._reset(port))
         if port.name == "current_limit":
             return replace(field, least=0, most=self.loop.form.current_limit)
         return field if port.width == WORD else _ranged(field)
 
     def _part(self, port: Port, shift: int) -> Field:
-        """A word of a port of two."""
+        """Return a word of a port of two."""
         if not shift:
             return _field(port)
         upper = replace(_field(port), shift=shift, bits=port.width - WORD, signed=port.signed)
@@ -129,13 +129,13 @@ def _field(port: Port) -> Field:
 
 
 def _ranged(field: Field) -> Field:
-    """What is written is held within what there are bits for."""
+    """Return what is written is held within what there are bits for."""
     most = (1 << (field.kept - field.signed)) - 1
     return replace(field, least=-most - 1 if field.signed else 0, most=most)
 
 
 def registers_of(spec: AnySpec) -> RegisterMap:
-    """All registers of a core.
+    """Return all registers of a core.
 
     Raises
     ------

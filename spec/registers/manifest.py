@@ -37,7 +37,7 @@ _KEYWORDS = frozenset(
 
 
 def check_module_name(name: str) -> str:
-    """`name`, if it can be the name of a Verilog module.
+    """Return `name`, if it can be the name of a Verilog module.
 
     Raises
     ------
@@ -52,12 +52,12 @@ def check_module_name(name: str) -> str:
 
 
 def described_port(port: Port) -> dict[str, Any]:
-    """What the manifest says of a port."""
+    """Return what the manifest says of a port."""
     return {key: getattr(port, key) for key in _OF_PORTS}
 
 
 def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
-    """All that a program or a driver must know of the exported core.
+    """Return all that a program or a driver must know of the exported core.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
 
 
 def _of_loop(spec: LoopSpec, name: str) -> dict[str, Any]:
-    """What a core with a control loop says beside its tachometer."""
+    """Return what a core with a control loop says beside its tachometer."""
     if name in {port.name for port in spec.ports}:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     found = manifest(spec.tachometer, name)
@@ -124,7 +124,7 @@ def _of_loop(spec: LoopSpec, name: str) -> dict[str, Any]:
 
 
 def _of_axes(spec: AxesSpec, name: str) -> dict[str, Any]:
-    """What a core of many axes says otherwise than one of one axis."""
+    """Return what a core of many axes says otherwise than one of one axis."""
     if name in {port.name for port in spec.ports}:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     alone, axis = spec.tachometer, spec.axis

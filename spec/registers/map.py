@@ -1,4 +1,4 @@
-"""What stands in which register of a core on a bus: the one list that gates, drivers and documents read.
+"""One map says which register of a core on a bus holds what; gates, drivers and documents read it.
 
 The registers follow from the ports of the core. A port of several bits has a register of its own, extended to 32 bits
 by its sign or by zeros, or two of them if it is wider; ports of one bit are flags of STATUS. Offsets are in bytes.
@@ -128,7 +128,7 @@ class Register:
 
     @property
     def reset(self) -> int:
-        """What is read after reset, before any capture."""
+        """The value that is read after reset, before any capture."""
         return sum(field.reset << field.low for field in self.fields)
 
 
@@ -171,7 +171,7 @@ class RegisterMap:
 
     @property
     def core(self) -> AnySpec:
-        """What the registers are of."""
+        """The spec that the registers are of."""
         return self.spec
 
     @property
@@ -221,7 +221,7 @@ class RegisterMap:
         return int.from_bytes(hashlib.sha256(json.dumps(described, sort_keys=True).encode()).digest()[:4], "big")
 
     def described(self) -> dict[str, Any]:
-        """What the manifest says of the registers."""
+        """Return what the manifest says of the registers."""
         widths = {port.name: port.width for port in self.ports}
         return {
             "word_bits": WORD,
@@ -289,7 +289,7 @@ class RegisterMap:
                 yield "STATUS", "Flags of what was captured.", tuple(self._flags()), more
 
     def _added(self) -> Iterable[Draft]:
-        """What a design around the core adds."""
+        """Return what a design around the core adds."""
         return ()
 
     def _flags(self) -> Iterable[Field]:

@@ -27,7 +27,7 @@ def test_table_of_a_situation(situation: Any) -> None:
 
 
 def cells(heading: str, name: str) -> list[str]:
-    """A row of the first table under a heading."""
+    """Return a row of the first table under a heading."""
     part = DOCS.split(f"## {heading}\n")[1].split("\n## ")[0]
     (line, *_) = [line for line in part.splitlines() if line.startswith(f"| {name} |")]
     return [cell.strip().strip("*") for cell in line.strip("|").split("|")[1:]]

@@ -12,7 +12,7 @@ PAGE = bench.PAGE.read_text("utf-8")
 
 
 def table(name: str, text: str = PAGE) -> list[list[str]]:
-    """Rows of a table of the page, without its head."""
+    """Return rows of a table of the page, without its head."""
     begin, end = text.index(f"<!-- {name} -->"), text.index(f"<!-- end of {name} -->")
     return [line.strip("| ").split(" | ") for line in text[begin:end].splitlines()[3:]]
 

@@ -55,7 +55,7 @@ def simulated(folder: Path, edges: Sequence[tuple[int, int]]) -> list[tuple[int,
 
 
 def expected(edges: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """The same by the method: edges over time between the last edges of two windows."""
+    """Return the same by the method: edges over time between the last edges of two windows."""
     now, windows = COUNTED, dict[int, list[tuple[int, int]]]()
     for gap, way in edges:
         now += gap

@@ -30,7 +30,7 @@ def counter(tmp_path: Path) -> str:
 
 
 def ghdl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int = 0) -> str:
-    """A VHDL file, and a program that stands for GHDL; it writes a choice as GHDL 2.0 does."""
+    """Return a VHDL file, and a program that stands for GHDL; it writes a choice as GHDL 2.0 does."""
     program, file = tmp_path / "ghdl", tmp_path / "chosen.vhd"
     program.write_text(GHDL.format(status=status))
     program.chmod(0o755)
@@ -41,7 +41,7 @@ def ghdl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int = 0) -> st
 
 @pytest.fixture
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """What was to be measured: nextpnr is not needed."""
+    """Return what was to be measured: nextpnr is not needed."""
     asked: list[Any] = []
 
     def measure(*words: Any) -> Measurement:

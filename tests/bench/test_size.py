@@ -16,7 +16,7 @@ SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 500))
 
 
 def step(kind: str, delay: float, source: str, sink: str) -> dict[str, Any]:
-    """A step of a path as nextpnr reports it; `source` and `sink` are `cell/PORT`."""
+    """Return a step of a path as nextpnr reports it; `source` and `sink` are `cell/PORT`."""
     ends = [dict(zip(("cell", "port"), end.split("/"), strict=True)) for end in (source, sink)]
     return {"type": kind, "delay": delay, "from": ends[0], "to": ends[1]}
 
@@ -58,7 +58,7 @@ REPORT = {
 
 
 def results(**changed: float) -> dict[tuple[str, str], Any]:
-    """Of the reference on all targets, at its bars but for what is changed on HX8K."""
+    """Return of the reference on all targets, at its bars but for what is changed on HX8K."""
     found = {
         "ECP5": {"COMB": 265, "FF": 260, "DP16KD": 0, "MULT": 0, "Fmax": 190.0, "latency": 4},
         "HX8K": {"LC": 340, "RAM": 0, "Fmax": 130.0, "latency": 4} | changed,

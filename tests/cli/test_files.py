@@ -13,7 +13,7 @@ from tachometry.cli.files import Outputs
 
 
 def everything(folder: Path) -> dict[str, str | None]:
-    """Contents of all files below a folder; None for folders."""
+    """Return contents of all files below a folder; None for folders."""
     return {str(p.relative_to(folder)): p.read_text() if p.is_file() else None for p in folder.rglob("*")}
 
 
@@ -103,7 +103,7 @@ def test_a_link_is_replaced_and_what_it_points_at_stays(tmp_path: Path) -> None:
 
 
 def in_a_child(folder: Path, work: Callable[[Outputs], None]) -> tuple[int, int]:
-    """A process that is within the block, its files not yet renamed; and what it waits for until it ends."""
+    """Return a process that is within the block, its files not yet renamed; and what it waits for until it ends."""
     ready, let = os.pipe(), os.pipe()
     child = os.fork()
     if child == 0:

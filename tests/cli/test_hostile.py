@@ -51,7 +51,7 @@ class Row(NamedTuple):
 
 
 def table() -> dict[str, list[Row]]:
-    """The rows by group: `[plan, generate]` has options for several commands, `[= plan]` whole command lines."""
+    """Return the rows by group: `[plan, generate]` has options for several commands, `[= plan]` whole command lines."""
     groups: dict[str, list[Row]] = {}
     before: list[str] = []
     group = ""
@@ -92,7 +92,7 @@ def contents(folder: Path) -> dict[str, tuple[int, int]]:
 
 
 def outcome(line: str) -> tuple[int, str, str]:
-    """Status, stdout and stderr of a command line."""
+    """Return status, stdout and stderr of a command line."""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = out, err
@@ -108,7 +108,7 @@ def outcome(line: str) -> tuple[int, str, str]:
 
 
 def wrong(row: Row, folder: Path) -> str | None:
-    """What is wrong with what a row does."""
+    """Return what is wrong with what a row does."""
     before = contents(folder)
     code, out, err = outcome(row.line)
     told = err.removesuffix("\n")
@@ -128,7 +128,7 @@ def limit() -> None:
 
 @contextlib.contextmanager
 def in_a_child(rows: list[Row], folder: Path) -> Iterator[int]:
-    """A process that writes what it finds of each row as a line; the descriptor to read it from."""
+    """Yield a process that writes what it finds of each row as a line; the descriptor to read it from."""
     read, write = os.pipe()
     child = os.fork()
     if child == 0:

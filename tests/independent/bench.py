@@ -90,19 +90,19 @@ int main() {
 
 
 def filled(text: str, **parts: str) -> str:
-    """A text with its @PARTS@."""
+    """Return a text with its @PARTS@."""
     for name, part in parts.items():
         text = text.replace(f"@{name}@", part)
     return text
 
 
 def outputs_of(manifest: Manifest) -> list[dict[str, Any]]:
-    """The outputs, in order."""
+    """Return the outputs, in order."""
     return [port for port in manifest["ports"] if port["direction"] == "output"]
 
 
 def shell(manifest: Manifest, strobes: Sequence[str] = _STROBES) -> str:
-    """Verilog around the core."""
+    """Return Verilog around the core."""
     outputs = outputs_of(manifest)
     pins = [port["name"] for port in manifest["ports"] if port["name"] in PINS]
     return filled(
@@ -138,7 +138,9 @@ def _rows(folder: Path, manifest: Manifest) -> list[Row]:
 
 
 def _of_bits(port: dict[str, Any], value: int) -> int:
-    """A value of a port; Verilator's $fdisplay also shows bits beside it, where the port is part of a wide register."""
+    """Return a value of a port; Verilator's $fdisplay also shows bits beside it, where the port is part of a wide
+    register.
+    """
     bits = port["width"]
     return wrapped(value, bits) if port["signed"] else value % (1 << bits)
 

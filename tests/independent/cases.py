@@ -35,7 +35,7 @@ class Case:
 
 
 def parameters(cases: Iterable[Case], nightly: Container[str] = ()) -> list[Any]:
-    """Cases as parameters of a test; those of the names in `nightly` are only in `make test-all`."""
+    """Return cases as parameters of a test; those of the names in `nightly` are only in `make test-all`."""
     mark = pytest.mark.nightly
     return [pytest.param(case, id=case.name, marks=mark if case.name in nightly else ()) for case in cases]
 
@@ -43,7 +43,7 @@ def parameters(cases: Iterable[Case], nightly: Container[str] = ()) -> list[Any]
 def _case(
     name: str, words: str, clocks: int = 6000, least: int = 1, turns: bool = True, within: int = 0, seed: str = ""
 ) -> Case:
-    """A case of words such as `tick=40 index=yes`; its name begins with that of the method."""
+    """Return a case of words such as `tick=40 index=yes`; its name begins with that of the method."""
     given = dict(word.split("=") for word in words.split())
     return Case(name, Settings(name.split("_")[0], {**_PLAIN, **given}), clocks, least, turns, within, seed)
 

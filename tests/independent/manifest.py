@@ -54,7 +54,7 @@ ACCELERATIONS = {"count/tick": "count/tick²", "rad/s": "rad/s²", "rev/s": "rev
 
 
 def parameter(settings: Settings, name: str, shown: object) -> object:
-    """The canonical value of a parameter; `shown` is what the manifest has."""
+    """Return the canonical value of a parameter; `shown` is what the manifest has."""
     word = WORDS[settings.method][name]
     if word in _FLAGS:
         return settings.flag(word)
@@ -90,7 +90,7 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
 
 
 def _canonical_quantity(settings: Settings, name: str, shown: object) -> object:
-    """The text of a quantity may be written in several ways: if it means the same, it is right."""
+    """Return the text of a quantity may be written in several ways: if it means the same, it is right."""
     quantities = {"max_speed": settings.max_speed, "lowpass": settings.lowpass, "adaptive": settings.target}
     wanted = {**quantities, "bandwidth": settings.bandwidth}[name]
     if wanted is None or shown is None:
@@ -103,7 +103,7 @@ def _canonical_quantity(settings: Settings, name: str, shown: object) -> object:
 
 
 def signed(limit: Fraction | int) -> int:
-    """Bits of a two's complement number that holds ±limit."""
+    """Return bits of a two's complement number that holds ±limit."""
     return int(limit).bit_length() + 1
 
 
@@ -148,7 +148,7 @@ class Expected:
         return max(self.settings.max_ticks * self.settings.tick // self.settings.period, least)
 
     def raised(self, asked: int, shown: int, spare: int = 0) -> int:
-        """A time in clocks as it is built: no shorter than a division, less so many timer periods.
+        """Return a time in clocks as it is built: no shorter than a division, less so many timer periods.
 
         In other units a division is shorter than the way to the velocity, by how much is not told.
         """
@@ -157,13 +157,13 @@ class Expected:
         return shown if not settings.own and asked <= shown <= most else most
 
     def max_time(self) -> int:
-        """Clocks of the longest measurement."""
+        """Return clocks of the longest measurement."""
         settings = self.settings
         asked = settings.max_ticks * settings.tick
         return self.raised(asked, self.manifest["max_time_cycles"]) if settings.method in ("t", "mt") else asked
 
     def full_scale(self, unit: str) -> object:
-        """The greatest velocity in a unit: a speed off by less than an LSB, or all that the bits can hold."""
+        """Return the greatest velocity in a unit: a speed off by less than an LSB, or all that the bits can hold."""
         settings, manifest = self.settings, self.manifest["velocity"]
         exact = settings.max_velocity * settings.lsb_per_count
         shown = manifest["full_scale"] * 2.0**settings.frac_bits
@@ -202,7 +202,7 @@ class Expected:
         return 1 << most.bit_length()
 
     def none(self) -> int:
-        """Magnitude of an absent bound: the greatest that its port shows."""
+        """Return magnitude of an absent bound: the greatest that its port shows."""
         settings, shown = self.settings, int(self.manifest["bounds"]["none"])
         if settings.own:
             return (self.greatest_bound << settings.frac_bits) - 1
@@ -213,7 +213,7 @@ class Expected:
         return shown if abs(shown - greatest) <= 2 else round(greatest)
 
     def recovery(self) -> int:
-        """docs/concepts/verification.md: all counters may have to wrap one after the other."""
+        """Return docs/concepts/verification.md: all counters may have to wrap one after the other."""
         settings = self.settings
         held = 1 << max(settings.filter - 1, 1).bit_length()
         lines = 2 + (held + settings.filter if settings.filter else 0) + 1
@@ -243,7 +243,7 @@ class Expected:
         return lines + tick + max(clocks + self.to_velocity, silence) + self.to_tick
 
     def entries(self) -> dict[str, Callable[[], object]]:
-        """What each entry must be."""
+        """Return what each entry must be."""
         settings, manifest = self.settings, self.manifest
         external = manifest.get("external_tick_cycles", {})
         return {
@@ -291,7 +291,7 @@ class Expected:
         return not gradually and not (settings.method == "rairan" and settings.paper_exact)
 
     def optional(self) -> dict[str, bool]:
-        """Entries that not every core has, and whether this one has them."""
+        """Return entries that not every core has, and whether this one has them."""
         settings = self.settings
         return {
             "bounds.none": settings.flag("bounds"),

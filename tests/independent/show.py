@@ -12,12 +12,12 @@ from reference.tsuji import Bound, Update
 
 
 def nearest(number: Fraction) -> int:
-    """⌊x + ½⌋."""
+    """Return ⌊x + ½⌋."""
     return math.floor(number + Fraction(1, 2))
 
 
 def limit_of(settings: Settings) -> float:
-    """The greatest magnitude that `velocity` can have."""
+    """Return the greatest magnitude that `velocity` can have."""
     return math.inf if settings.velocity_bits is None else (1 << settings.velocity_bits - 1) - 1
 
 
@@ -59,7 +59,7 @@ def check_updates(
     ticks: Sequence[Tick],
     slack: Fraction = Fraction(0),
 ) -> set[str]:
-    """Every update, its clock and all that comes with it, but `stalled`; which bounds have been absent."""
+    """Return every update, its clock and all that comes with it, but `stalled`; which bounds have been absent."""
     latency = manifest["latency_cycles"]
     late = latency["tick_latency"] + latency["tick_to_velocity"]
     assert [update.cause + late for update in updates[: len(rows)]] == [row["clock"] for row in rows]

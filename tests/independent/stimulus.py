@@ -18,7 +18,7 @@ class Lines:
     pulses: list[tuple[int, int, int]] = field(default_factory=list)  # clock, line (2: Z, 3: tick_in), clocks
 
     def play(self) -> Play:
-        """The levels of all lines, and how long each lasts."""
+        """Return the levels of all lines, and how long each lasts."""
         turned, toggles = self.phase, dict[int, list[int]]()
         for clock, line, length in [*self.glitches, *self.pulses]:
             for at in (clock, clock + length):
@@ -43,14 +43,14 @@ class Lines:
 
 
 def steady(at: int, gap: float, n: int, sign: int = 1) -> list[tuple[int, int]]:
-    """So many edges, the gap apart, after a clock."""
+    """Return so many edges, the gap apart, after a clock."""
     return [(at + round((k + 1) * gap), sign) for k in range(n)]
 
 
 def motion(
     rng: random.Random, tick: int, until: int, *, least: int = 1, turns: bool = True, within: int = 0, rests: int = 3
 ) -> list[tuple[int, int]]:
-    """Edges up to a clock: steady stretches at all speeds, jitter, bursts, reversals, dithering and short rests.
+    """Return edges up to a clock: steady stretches at all speeds, jitter, bursts, reversals, dithering and short rests.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def motion(
 def external(
     rng: random.Random, nominal: int, until: int, *, least: int, most: int, regular: bool
 ) -> Iterable[tuple[int, int, int]]:
-    """Rises of an external tick: regular ones, jittered ones, as close and as far apart as may be, and beyond.
+    """Return rises of an external tick: regular ones, jittered ones, as close and as far apart as may be, and beyond.
 
     `regular`: at multiples of the nominal tick only, some of which are left out.
     """

@@ -25,14 +25,14 @@ Generated = Callable[..., Path]
 
 
 def made(generated: Generated, case: Case) -> tuple[Path, Manifest]:
-    """The folder of a core, and its manifest."""
+    """Return the folder of a core, and its manifest."""
     words = case.settings.words
     folder = generated(case.name, "--method", case.settings.method, *arguments(words))
     return folder, json.loads((folder / f"{case.name}.json").read_text())
 
 
 def lines_of(case: Case, manifest: Manifest) -> Lines:
-    """A motion and a rest, with all else that the core has pins for."""
+    """Return a motion and a rest, with all else that the core has pins for."""
     settings, rng = case.settings, random.Random(case.seed or case.name)
     tick, hold = settings.tick, settings.filter
     lines = Lines(case.clocks + 3 * settings.max_ticks * tick, rng.randrange(4))
@@ -61,7 +61,7 @@ def lines_of(case: Case, manifest: Manifest) -> Lines:
 
 
 def model(case: Case, manifest: Manifest, front: Front) -> tuple[list[Update], list[Tick], list[int]]:
-    """Updates, ticks, and clocks of `tick_error` without its latency."""
+    """Return updates, ticks, and clocks of `tick_error` without its latency."""
     settings = case.settings
     if settings.method == "rairan":
         updates, ends = rairan_updates(settings, front)

@@ -28,7 +28,9 @@ LINES = {
 
 
 def two_counts(settings: Settings) -> list[Update]:
-    """Updates of method s for `s_long_time`, a tick of which is a clock: eq. (21) by hand, 2^20 terms being zeros."""
+    """Return updates of method s for `s_long_time`, a tick of which is a clock: eq. (21) by hand, 2^20 terms being
+    zeros.
+    """
     late, half = 2, Fraction(1, 2)  # clocks from the pin to the tick of its count
     length = SECOND - FIRST
     return [

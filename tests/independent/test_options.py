@@ -26,7 +26,7 @@ ENDS: dict[str, set[object]] = {
 
 
 def of(method: str) -> list[Settings]:
-    """The cores of a method."""
+    """Return the cores of a method."""
     return [settings for settings in ALL if settings.method == method]
 
 

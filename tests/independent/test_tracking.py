@@ -26,7 +26,7 @@ SPEEDS = {"track_rpm": (3001, 500), "track_rev": (625, 260)}
 
 
 def ramp(at: int, begin: Fraction, end: Fraction, clocks: int) -> list[tuple[int, int]]:
-    """Edges after a clock, between two speeds in edges per clock, at a constant acceleration."""
+    """Return edges after a clock, between two speeds in edges per clock, at a constant acceleration."""
     a = (end - begin) / clocks
     times = [(math.sqrt(begin**2 + 2 * a * k) - begin) / a for k in range(1, int((begin + end) / 2 * clocks) + 1)]
     return [(at + round(time), 1) for time in times]
@@ -75,23 +75,25 @@ class Motion:
         self.positions = list(accumulate(steps[clock] for clock in self.counts))
 
     def settled(self, part: int) -> list[Row]:
-        """The last updates of a part."""
+        """Return the last updates of a part."""
         begin, end = self.begins[part : part + 2]
         return [row for row in self.rows if begin < row["clock"] < end][-SETTLED:]
 
     def gap(self, part: int) -> int:
-        """Clocks from a count to the next, with the sign of the direction."""
+        """Return clocks from a count to the next, with the sign of the direction."""
         return self.gaps[part] * 4 // self.settings.decoding
 
     def place(self, row: Row, gap: int) -> Fraction:
-        """Counts at the end of the tick of an update: the edge of a count lies half a count before its position."""
+        """Return counts at the end of the tick of an update: the edge of a count lies half a count before its
+        position.
+        """
         last = row["clock"] - self.late
         known = bisect_right(self.counts, last) - 1
         sign = 1 if gap > 0 else -1
         return self.positions[known] - Fraction(sign, 2) + Fraction(last - self.counts[known], gap)
 
     def speed(self, row: Row) -> Fraction:
-        """On the ramp, in counts per tick, in the clock of an update."""
+        """Return on the ramp, in counts per tick, in the clock of an update."""
         edges = Fraction(1, self.gaps[0]) + self.acceleration * (row["clock"] - self.begins[1])
         return edges * self.settings.decoding / 4 * self.settings.tick
 

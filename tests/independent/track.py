@@ -11,7 +11,7 @@ from reference.tsuji import Update
 
 
 def track_updates(settings: Settings, ticks: Sequence[Tick]) -> list[Update]:
-    """An update for every tick; the speeds are known at rest, and where there are more counts than may be."""
+    """Return an update for every tick; the speeds are known at rest, and where there are more counts than may be."""
     found = []
     silent = settings.max_ticks  # before reset there was no count
     for tick in ticks:

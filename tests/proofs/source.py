@@ -19,7 +19,7 @@ from tachometry.sim.golden.methods import MODELS
 
 @contextmanager
 def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
-    """Within this context, `right` in the source of the class `box` reads `wrong`, wherever the class is used.
+    """Yield within this context, `right` in the source of the class `box` reads `wrong`, wherever the class is used.
 
     The text must stand in the source of its module exactly once.
     """

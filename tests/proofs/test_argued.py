@@ -28,22 +28,22 @@ def right(below: int, low: int, high: int, q: int) -> tuple[int, int]:
 
 
 def sign_alone(below: int, low: int, high: int, q: int) -> tuple[int, int]:
-    """`$56.Y[0] const1`."""
+    """Return `$56.Y[0] const1`."""
     return right(below, low, high, q)[0], (1 if twice(below, low, high) else q) ^ high
 
 
 def never_one(below: int, low: int, high: int, q: int) -> tuple[int, int]:
-    """`$49.A[0] const1` and `$50.A[0] const0`."""
+    """Return `$49.A[0] const1` and `$50.A[0] const0`."""
     return right(below, low, high, q)[0], q ^ (high & (1 - twice(below, low, high)))
 
 
 def of_low_alone(below: int, low: int, high: int, q: int) -> tuple[int, int]:
-    """`$65.A[0] const1`: `high` counts as 1 where bit 0 is told."""
+    """Return `$65.A[0] const1`: `high` counts as 1 where bit 0 is told."""
     return 1 - twice(below, low, 1), right(below, low, high, q)[1]
 
 
 def differing(name: str, bits: Bits) -> int:
-    """For how many N and m_s of a core the quotient is another one with these bits."""
+    """Return for how many N and m_s of a core the quotient is another one with these bits."""
     spec = next(case for case in CASES if case.name == name).spec
     assert isinstance(spec, STachometer)
     form = spec.reciprocal
@@ -88,7 +88,7 @@ Way = list[tuple[int, Instruction, bool]]  # where it begins, what it is, whethe
 
 
 def ways(code: tuple[Instruction, ...]) -> list[Way]:
-    """All ways through a program."""
+    """Return all ways through a program."""
     clocks, found = begins(code), []
     open_ways: list[tuple[int, Way]] = [(0, [])]
     while open_ways:
@@ -105,7 +105,7 @@ def ways(code: tuple[Instruction, ...]) -> list[Way]:
 
 
 def answers(way: Way) -> dict[Condition, bool]:
-    """What the conditions that it asks for are."""
+    """Return what the conditions that it asks for are."""
     return {Condition(item.steps): jumps for _, item, jumps in way if item.op == Op.JUMP}
 
 

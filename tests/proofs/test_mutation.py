@@ -33,7 +33,7 @@ CLOCKS = 200_000
 
 
 def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
-    """A reset, and then nothing."""
+    """Return a reset, and then nothing."""
     pins = np.zeros((n_clocks, 1), dtype=np.uint64)
     pins[0] = 1
     low = {name: np.zeros(1, dtype=np.uint8) for name in ("a", "b")}

@@ -34,7 +34,8 @@ class Front:
 
 
 def believed(changes: list[tuple[int, int]], n_clocks: int, clocks: int) -> tuple[dict[int, int], list[int]]:
-    """Levels that hold for so many clocks, by the clock of their first sample; and clocks in which others went back.
+    """Return levels that hold for so many clocks, by the clock of their first sample; and clocks in which others went
+    back.
 
     The line is unknown up to the first level that holds, whatever it does.
     """
@@ -53,7 +54,7 @@ def believed(changes: list[tuple[int, int]], n_clocks: int, clocks: int) -> tupl
 
 
 def count_of(decoding: int, old: tuple[int, int], new: tuple[int, int]) -> int:
-    """±1 or 0; a change of both lines or of none counts nothing."""
+    """Return ±1 or 0; a change of both lines or of none counts nothing."""
     turn = (CYCLE.index(new) - CYCLE.index(old)) % 4
     step = {1: 1, 3: -1}.get(turn, 0)
     of_a = new[0] != old[0]
@@ -62,7 +63,7 @@ def count_of(decoding: int, old: tuple[int, int], new: tuple[int, int]) -> int:
 
 
 def conditioned(settings: Settings, play: Play, latency: int) -> Front:
-    """Steps and errors; a level that is sampled in clock c acts in clock c + latency."""
+    """Return steps and errors; a level that is sampled in clock c acts in clock c + latency."""
     n_clocks = sum(clocks for clocks, _ in play)
     front, lines = Front(n_clocks), []
     for which in range(4):
@@ -92,7 +93,9 @@ def conditioned(settings: Settings, play: Play, latency: int) -> Front:
 
 
 def external_ends(rises: Iterable[int], n_clocks: int, fewest: int, most: int) -> tuple[list[int], list[int]]:
-    """Last clocks of windows that rises end, none shorter than `fewest` or longer than `most`; and of what is wrong."""
+    """Return last clocks of windows that rises end, none shorter than `fewest` or longer than `most`; and of what is
+    wrong.
+    """
     ends, wrong, before, waiting = [], [], -1, sorted(rises)
     for clock in range(n_clocks):
         rise = bool(waiting) and waiting[0] == clock
@@ -120,7 +123,7 @@ class Tick:
 
 
 def ticks_of(settings: Settings, front: Front, ends: list[int], most: int, held: bool = False) -> list[Tick]:
-    """Sampling periods that end with these clocks; `most` counts are shown.
+    """Return sampling periods that end with these clocks; `most` counts are shown.
 
     `held`: a sum that was once beyond stays there, as in periods that may be longer than nominal.
     """
@@ -142,7 +145,7 @@ def ticks_of(settings: Settings, front: Front, ends: list[int], most: int, held:
 
 
 def wrapped(number: int, bits: int) -> int:
-    """In two's complement."""
+    """Return in two's complement."""
     return (number + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
 
 

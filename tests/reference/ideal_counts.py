@@ -20,7 +20,7 @@ class Windows:
 
 
 def speeds() -> Iterator[tuple[int, int, int]]:
-    """(p, q, c): p/q counts per tick, not a whole number, from 1/100 to 40, and the phase c/q of a count."""
+    """Yield (p, q, c): p/q counts per tick, not a whole number, from 1/100 to 40, and the phase c/q of a count."""
     rng = np.random.default_rng(9)
     near = [
         (k * q + d, q) for k in (0, 1, 2, 7, 30) for q, d in ((1001, 125), (1001, 143), (1001, 870), (7, 3), (9, 5))
@@ -33,18 +33,18 @@ def speeds() -> Iterator[tuple[int, int, int]]:
 
 
 def positions(p: int, q: int, c: int, n_ticks: int) -> Ints:
-    """Counts since the start at the end of each tick, shape (n_ticks,)."""
+    """Return counts since the start at the end of each tick, shape (n_ticks,)."""
     return (np.arange(1, n_ticks + 1) * p + c) // q
 
 
 def from_ticks(position: Ints, ends: Ints) -> Windows:
-    """Windows from each of these ticks to the next."""
+    """Return windows from each of these ticks to the next."""
     m_e = np.diff(position, prepend=0)
     return Windows(np.diff(position[ends]), np.diff(ends), m_e[ends[:-1]], m_e[ends[1:]])
 
 
 def mt_windows(position: Ints, m_c: int) -> Windows:
-    """From a tick with a count to the first such tick at least m_c later; m_c = 1 is the T method below ω_u."""
+    """Return from a tick with a count to the first such tick at least m_c later; m_c = 1 is the T method below ω_u."""
     counted = np.flatnonzero(np.diff(position, prepend=0))
     ends = [counted[0]]
     while (following := np.searchsorted(counted, ends[-1] + m_c)) < len(counted):
@@ -53,7 +53,7 @@ def mt_windows(position: Ints, m_c: int) -> Windows:
 
 
 def s_windows(position: Ints) -> Windows:
-    """From alteration to alteration, once a pulse number has come twice and two windows are over."""
+    """Return from alteration to alteration, once a pulse number has come twice and two windows are over."""
     m_e = np.diff(position, prepend=0)
     last, usual, ends = m_e[0], m_e[0], []
     for tick, number in enumerate(m_e):

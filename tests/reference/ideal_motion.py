@@ -7,7 +7,7 @@ SUBCOUNTS = 1 << 20  # in a count
 
 
 def motion(n_ticks: int, max_count: int, seed: int) -> NDArray[np.int64]:
-    """Angles in 1/`SUBCOUNTS` at the start and at the end of every tick: all speeds, either way, and standstill.
+    """Return angles in 1/`SUBCOUNTS` at the start and at the end of every tick: all speeds, either way, and standstill.
 
     Steady for a while, at speeds from far below a count per tick to the greatest, then slowly changing, then at random.
     """

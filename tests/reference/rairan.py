@@ -11,7 +11,7 @@ from reference.tsuji import Bound, Update
 
 
 def estimate(kind: str, n_ep: int, n_dt: int) -> Fraction:
-    """Eqs. (2), (6) and (11): the upper end of the speed, the lower one, or their harmonic mean."""
+    """Compute eqs. (2), (6) and (11): the upper end of the speed, the lower one, or their harmonic mean."""
     if n_ep == 0:
         return Fraction(0)
     low = n_dt > 1 or n_ep == 1
@@ -43,7 +43,7 @@ class Lines:
 
 
 def table_1(pulses: Iterable[bool], dt: int, most_ep: float = math.inf, most_dt: float = math.inf) -> Iterator[Lines]:
-    """Table 1 to the letter, its lines by their numbers; counts of a core that is no paper end at the most."""
+    """Yield table 1 to the letter, its lines by their numbers; counts of a core that is no paper end at the most."""
     c_ep = c_dt = n_ep1 = clock = 0  # 1 and 2
     n_dt1 = 1
     for lep in pulses:  # 3
@@ -64,7 +64,7 @@ def table_1(pulses: Iterable[bool], dt: int, most_ep: float = math.inf, most_dt:
 
 
 def table_1_updates(settings: Settings, front: Front) -> tuple[list[Update], list[int]]:
-    """Each assignment of Table 1 is an update; and the ends of dt."""
+    """Return each assignment of Table 1 is an update; and the ends of dt."""
     pulses = (now in front.steps for now in range(front.n_clocks))
     rows = [*table_1(pulses, settings.tick, settings.max_count, settings.max_ticks)]
     shown, found = (0, 1), []
@@ -81,7 +81,7 @@ def table_1_updates(settings: Settings, front: Front) -> tuple[list[Update], lis
 
 
 def next_k(k: int, falling: bool, n: tuple[int, int], target: Fraction, greatest: int) -> tuple[int, bool]:
-    """k after a window of dt·2^k that measured Nep1 and Ndt1; and whether it falls to 0."""
+    """Return k after a window of dt·2^k that measured Nep1 and Ndt1; and whether it falls to 0."""
     n_ep, n_dt = n
     least = next(n for n in range(1, 10**6) if Fraction(1, 2 * n - 1) <= target)  # eq. (13)
     slow = min(least - 1, math.isqrt(1 << greatest)) + (k > 0)
@@ -207,7 +207,7 @@ class Rairan:
 
 
 def rairan_updates(settings: Settings, front: Front) -> tuple[list[Update], list[int]]:
-    """All updates, and the ends of all dt."""
+    """Return all updates, and the ends of all dt."""
     if settings.paper_exact:
         return table_1_updates(settings, front)
     core = Rairan(settings)

@@ -90,5 +90,5 @@ PAPER: dict[str, Sequence] = {
 
 
 def rounded(value: F, frac_bits: int) -> int:
-    """⌊2^f·x + ½⌋."""
+    """Return ⌊2^f·x + ½⌋."""
     return (value * 2 ** (frac_bits + 1) + 1) // 2

@@ -14,7 +14,7 @@ Words = Mapping[str, str]  # options without their dashes; a flag has the word "
 
 
 def arguments(words: Words) -> list[str]:
-    """The words as the command line takes them."""
+    """Return the words as the command line takes them."""
     flags = {"yes": "--{}", "no": "--no-{}"}
     return [
         part
@@ -37,7 +37,7 @@ class Settings:
         return int(self.words.get(name, default))
 
     def flag(self, name: str, default: bool = False) -> bool:
-        """Whether a flag is set."""
+        """Tell whether a flag is set."""
         return self.words.get(name, "yes" if default else "no") == "yes"
 
     @cached_property
@@ -105,7 +105,7 @@ class Settings:
         return self._whole("position-width", 32)
 
     def per_count(self, unit: str) -> Fraction:
-        """One count per tick in a unit: 1/(P·T_s) turns per second."""
+        """Return one count per tick in a unit: 1/(P·T_s) turns per second."""
         return Fraction(1) if unit == "count/tick" else PER_TURN[unit] / (self.counts_per_turn * self.tick_seconds)
 
     @cached_property
@@ -193,7 +193,7 @@ class Settings:
         return self._bandwidth("bandwidth") or Fraction(1000)
 
     def _bandwidth(self, name: str) -> Fraction | None:
-        """A bandwidth in rad/s; one in Hz is 2π times as many."""
+        """Return a bandwidth in rad/s; one in Hz is 2π times as many."""
         word = self.words.get(name)
         if word is None:
             return None

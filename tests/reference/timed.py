@@ -21,7 +21,7 @@ class Event:
 
 
 def events_of(settings: Settings, front: Front, ticks: list[Tick]) -> list[Event]:
-    """All that can matter, in order."""
+    """Return all that can matter, in order."""
     if settings.lattice:
         return [Event(i, tick.last, tick.count, True, not tick.count) for i, tick in enumerate(ticks)]
     ends = {tick.last: tick.empty for tick in ticks}
@@ -30,7 +30,8 @@ def events_of(settings: Settings, front: Front, ticks: list[Tick]) -> list[Event
 
 
 def ends_of(distance: int, off: Fraction, time: int, scale: int) -> tuple[Bound, Bound]:
-    """Speeds between which the truth is, for a distance, give or take `off`, between edges that `time` periods report.
+    """Return speeds between which the truth is, for a distance, give or take `off`, between edges that `time` periods
+    report.
 
     Each edge lies within a period before its count, so that the true time is up to one period shorter or longer.
     """
@@ -91,7 +92,7 @@ class Timed:
         self.found.append(Update(clock, speed, interval, forced, *bounds, known, others))
 
     def ends_of(self, distance: int, time: int) -> tuple[Bound, Bound]:
-        """The bounds of a measurement."""
+        """Return the bounds of a measurement."""
         return ends_of(distance, self.settings.edge_error, time, self.scale)
 
     def take(self, clock: int) -> None:
@@ -101,7 +102,7 @@ class Timed:
         self.begun = clock
 
     def nearest(self, speed: Fraction) -> Fraction:
-        """As the native output shows it; how many bits it has below another unit, is not known."""
+        """Return as the native output shows it; how many bits it has below another unit, is not known."""
         if not self.settings.native:
             return speed
         return Fraction(math.floor(speed * 2**self.settings.frac_bits + Fraction(1, 2)), 2**self.settings.frac_bits)
@@ -170,7 +171,7 @@ class Timed:
 
 
 def timed_updates(settings: Settings, front: Front, ticks: list[Tick], division: int) -> list[Update]:
-    """All updates of method t or mt."""
+    """Return all updates of method t or mt."""
     core = Timed(settings, division, {i: tick.last for i, tick in enumerate(ticks)})
     events = events_of(settings, front, ticks)
     for event in events:

@@ -39,7 +39,7 @@ class Update:
 
 
 def s_updates(settings: Settings, ticks: list[Tick]) -> list[Update]:
-    """Sec. V: windows from one pulse alteration to the next, eq. (17), or eq. (21) which halves their ends."""
+    """Return sec. V: windows from one pulse alteration to the next, eq. (17), or eq. (21) which halves their ends."""
     numbers = {-1: 0} | {i: tick.count for i, tick in enumerate(ticks)}
     found: list[Update] = []
     steady, opened = 0, -1
@@ -63,7 +63,7 @@ def s_updates(settings: Settings, ticks: list[Tick]) -> list[Update]:
 
 
 def m_updates(settings: Settings, ticks: list[Tick]) -> list[Update]:
-    """Eq. (6): the mean pulse number of the last n ticks, those before reset being empty."""
+    """Compute eq. (6): the mean pulse number of the last n ticks, those before reset being empty."""
     found, n, off = [], settings.average, 1 + settings.edge_error
     for i, tick in enumerate(ticks):
         total = sum(each.count for each in ticks[max(0, i - n + 1) : i + 1])

@@ -16,7 +16,7 @@ MAX_TICKS = 4
 
 
 def small(axes: int = 3, *, parallel: bool = False, most: int | None = 2, **options: Any) -> AxesSpec:
-    """A tick of 40 clocks, in which `most` counts are the most that are measured."""
+    """Return a tick of 40 clocks, in which `most` counts are the most that are measured."""
     timing = Timing(CLOCK_HZ, TICK_CYCLES, MAX_TICKS)
     speed = None if most is None else Speed(Fraction(most * CLOCK_HZ, 100 * TICK_CYCLES), "rev/s")
     alone = STachometer(encoder=Encoder(25), timing=timing, frac_bits=8, max_speed=speed, **options)
@@ -24,7 +24,9 @@ def small(axes: int = 3, *, parallel: bool = False, most: int | None = 2, **opti
 
 
 def motions(spec: AxesSpec, n_clocks: int = 2000) -> AxesTrace:
-    """Of each axis another one: counts, reversals, both lines at once, standstill; index lines are high at first."""
+    """Return of each axis another one: counts, reversals, both lines at once, standstill; index lines are high at
+    first.
+    """
     each = [stress(spec.tachometer, seed=7 + axis, n_edges=5 + 3 * axis) for axis in range(spec.axes)]
     high = [replace(trace, z=None if trace.z is None else 1 - trace.z) for trace in each]
     return AxesTrace.of(high).until(n_clocks)

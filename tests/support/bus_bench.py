@@ -63,7 +63,7 @@ async def drive(dut: Any, plan: dict[str, Any]) -> None:
 
 
 def batches(accesses: list[Any]) -> list[list[Any]]:
-    """Accesses that follow each other without idle clocks stay together."""
+    """Return accesses that follow each other without idle clocks stay together."""
     found: list[list[Any]] = []
     for access in accesses:
         if access[0] or not found:

@@ -6,7 +6,7 @@ from tachometry.cli.main import main
 
 
 def run(*args: object) -> int:
-    """Its exit status."""
+    """Return its exit status."""
     with pytest.raises(SystemExit) as stop:
         main([str(arg) for arg in args])
     assert isinstance(stop.value.code, int)

@@ -58,7 +58,9 @@ int main(int, char **argv) {{
 
 
 def clock_by_clock(component: wiring.Component, inputs: Sequence[Mapping[str, int]], outputs: Sequence[str]) -> Seen:
-    """What `support.simulate.clock_by_clock` does, in seconds, however many clocks there are; built once a design."""
+    """Return what `support.simulate.clock_by_clock` does, in seconds, however many clocks there are; built once a
+    design.
+    """
     pins = {name: Value.cast(member(component, name)) for name in sorted({name for row in inputs for name in row})}
     top = Module()
     top.submodules.component = component

@@ -87,7 +87,7 @@ class Beside(wiring.Component):
 
 
 def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, Table, list[dict[str, int]]]:
-    """Updates and control ticks at random, the greatest numbers among them: updates, ticks, inputs by clock.
+    """Return updates and control ticks at random, the greatest numbers among them: updates, ticks, inputs by clock.
 
     All numbers are 2^less times less than they can be.
     """
@@ -102,7 +102,7 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
     came = np.flatnonzero(rng.random(n_clocks) < rate)
 
     def numbers(n: int, most: int) -> Any:
-        """At random, of any size, and often the greatest."""
+        """Return at random, of any size, and often the greatest."""
         most = max(most >> less, 1)
         size = (most * 2.0 ** -rng.integers(0, 12, n)).astype(np.int64)
         found = rng.integers(-size - 1, size + 2).clip(-most, most)
@@ -132,7 +132,9 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
 
 
 def random_gains(form: ControlForm, rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
-    """Gains and limits of n control ticks by their ports: those of the options, none, the greatest, and others."""
+    """Return gains and limits of n control ticks by their ports: those of the options, none, the greatest, and
+    others.
+    """
     most = {GAIN_PORTS[term]: (form.most_gain, form.reset_gains[term]) for term in GAINS}
     most["current_limit"] = ((1 << form.current_limit.bit_length()) - 1, form.current_limit)
     return {
@@ -146,7 +148,7 @@ def random_gains(form: ControlForm, rng: np.random.Generator, n: int) -> dict[st
 
 
 def gains_of(columns: Mapping[str, np.ndarray]) -> list[Gains]:
-    """The same for the golden model."""
+    """Return the same for the golden model."""
     order = (*GAIN_PORTS.values(), "current_limit")
     return [Gains(*values) for values in zip(*(columns[name].tolist() for name in order), strict=True)]
 
@@ -166,7 +168,9 @@ def check(spec: LoopSpec, n_ticks: int = 300, seed: int = 1, less: int = 0) -> T
 
 
 def random_demands(spec: LoopSpec, rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
-    """What a command generator is told in n control ticks, for some of them the same; the greatest numbers among it."""
+    """Return what a command generator is told in n control ticks, for some of them the same; the greatest numbers among
+    it.
+    """
     found: dict[str, np.ndarray] = {}
     widths = {port.name: port.width for port in spec.ports if port.name.startswith("generator_")}
     for name, width in widths.items():
@@ -182,7 +186,7 @@ def random_demands(spec: LoopSpec, rng: np.random.Generator, n: int) -> dict[str
 
 
 def told(spec: LoopSpec, columns: Mapping[str, np.ndarray]) -> list[Command] | list[Demand]:
-    """What the golden model is told in each control tick."""
+    """Return what the golden model is told in each control tick."""
     if spec.command == "generator":
         order = [*(f"generator_{name}" for name in ("mode", "velocity", "acceleration", "amplitude", "rate")), "enable"]
         return [Demand(*values) for values in zip(*(columns[name].tolist() for name in order), strict=True)]
@@ -194,7 +198,9 @@ Case = tuple[PinTrace, list[Command] | list[Demand], list[Gains] | None, np.ndar
 
 
 def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> Case:
-    """A motion and commands for a core: pins, commands and gains by control tick, rows of a clock and all inputs."""
+    """Return a motion and commands for a core: pins, commands and gains by control tick, rows of a clock and all
+    inputs.
+    """
     rng = np.random.default_rng(seed)
     trace = stress(spec.tachometer, seed, n_edges)
     clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)

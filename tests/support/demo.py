@@ -37,7 +37,7 @@ def manifest_of(registers: DemoMap) -> dict[str, Any]:
 
 @cache
 def compiled(method: str = "m") -> BoardSimulation:
-    """It is shared: whoever uses it leaves it without telemetry."""
+    """Return it is shared: whoever uses it leaves it without telemetry."""
     return BoardSimulation(demo_map(method), uart())
 
 

@@ -6,5 +6,5 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def page(name: str) -> str:
-    """The text of a page by its path in docs/."""
+    """Return the text of a page by its path in docs/."""
     return (DOCS / name).read_text(encoding="utf-8")

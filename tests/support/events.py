@@ -1,4 +1,4 @@
-"""What random motions may cover, and what a run of them has."""
+"""Events say what random motions may cover, and what a run of them has."""
 
 import itertools
 from collections import Counter
@@ -107,7 +107,7 @@ def _count(found: NDArray[Any]) -> int:
 
 
 def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
-    """How often each event that only the method knows happened."""
+    """Tell how often each event that only the method knows happened."""
     m_e, updates = run.ticks.pulse_count, run.updates
     if isinstance(spec, MTachometer):
         n = spec.average
@@ -146,7 +146,7 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
 
 
 def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
-    """The same for the tracking method."""
+    """Return the same for the tracking method."""
     m_e, updates = run.ticks.pulse_count, run.updates
     n = len(updates.clock)
     rest = updates.forced & (updates.interval == spec.timing.max_ticks)
@@ -166,7 +166,7 @@ def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
 
 
 def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
-    """The same for the methods that measure times."""
+    """Return the same for the methods that measure times."""
     updates, n = run.updates, len(run.updates.clock)
     velocity, forced, interval = updates.velocity, updates.forced, updates.interval
     decay = forced & (interval < spec.max_periods) & (velocity != 0) if spec.decays else np.zeros(n, dtype=np.bool_)
@@ -193,7 +193,7 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
 
 
 def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
-    """How often each event of the coverage table happened."""
+    """Tell how often each event of the coverage table happened."""
     updates = run.updates
     sign = np.sign(updates.velocity)
     found = Counter(

@@ -84,7 +84,7 @@ Simulate = Callable[[str, list[str], str, NDArray[np.uint8], Path], NDArray[np.u
 
 
 def in_verilator(text: str, pins: list[str], output: str, levels: NDArray[np.uint8], folder: Path) -> NDArray[np.uint8]:
-    """What an output of the module `core` is in every clock; `levels` has a bit for each of its other inputs."""
+    """Return what an output of the module `core` is in every clock; `levels` has a bit for each of its other inputs."""
     (folder / "core.v").write_text(text)
     lint(["core.v"], "core", folder)
     verilate(["-O3", "--cc", "--prefix", "Vcore", "--Mdir", "made", "--top-module", "core", "core.v"], folder)
@@ -106,7 +106,7 @@ def in_verilator(text: str, pins: list[str], output: str, levels: NDArray[np.uin
 
 
 def in_icarus(text: str, pins: list[str], output: str, levels: NDArray[np.uint8], folder: Path) -> NDArray[np.uint8]:
-    """The same, as Verilog-2001 with -Wall, any warning an error."""
+    """Return the same, as Verilog-2001 with -Wall, any warning an error."""
     (folder / "core.v").write_text(text)
     connections = ", ".join(f".{pin}(pins[{bit}])" for bit, pin in enumerate(pins))
     parts = {"high": len(pins) - 1, "connections": connections, "output": output, "n_clocks": len(levels)}
@@ -122,7 +122,7 @@ def in_icarus(text: str, pins: list[str], output: str, levels: NDArray[np.uint8]
 
 
 def motion(n_clocks: int, seed: int) -> PinTrace:
-    """To and fro at several speeds, over the index, with jitter and glitches, for so many clocks."""
+    """Return to and fro at several speeds, over the index, with jitter and glitches, for so many clocks."""
     duration = n_clocks / SPEC.timing.clock_hz
     part = duration / 4
     speeds = f"sine:60rad/s:{7 / part}Hz:{part}s+constant:-9rad/s:{part}s+ramp:-9rad/s:90rad/s:{part}s"

@@ -66,7 +66,7 @@ class FakeTools:
         monkeypatch.setenv("PATH", "")
 
     def tell(self, name: str, **told: object) -> None:
-        """What a program shall do: `status`, `output`, and of nextpnr `fmax` and `logs` by seeds."""
+        """Set what a program shall do: `status`, `output`, and of nextpnr `fmax` and `logs` by seeds."""
         self._told[name] = self._told.get(name, {}) | told
         (self._folder / "told").write_text(json.dumps(self._told))
 

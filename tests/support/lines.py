@@ -1,4 +1,4 @@
-"""What virtual encoders put on their lines, decoded without the models under test."""
+"""The lines of virtual encoders are decoded here without the models under test."""
 
 import math
 from itertools import pairwise
@@ -32,7 +32,7 @@ def record(motion: str, **parameters: object) -> Encoding:
 
 
 def decode(recording: Recording, decoding: int) -> tuple[list[int], int]:
-    """Position after each row, and the number of illegal transitions."""
+    """Return position after each row, and the number of illegal transitions."""
     position, illegal = [0], 0
     rows = levels(recording)
     for before, now in pairwise(rows):

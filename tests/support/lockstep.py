@@ -34,12 +34,12 @@ MIN_TICKS, MIN_UPDATES = 2000, 200
 
 
 def fewest_ticks(method: str) -> int:
-    """Ticks that a random case has at least; long ones are fewer."""
+    """Return ticks that a random case has at least; long ones are fewer."""
     return MIN_TICKS // 5 if method == "track" else MIN_TICKS
 
 
 def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding, PinTrace]:
-    """A configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
+    """Return a configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
     rng = np.random.default_rng(seed)
     tick_cycles = int(rng.choice([1, 2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 16]))
     max_ticks = int(rng.choice([2, 3, 5, 10, 20]))
@@ -132,14 +132,14 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:
-    """Clocks of the glitch filter that are few or many beside those between two edges."""
+    """Return clocks of the glitch filter that are few or many beside those between two edges."""
     if method == "track":
         return 16 * clocks
     return min(clocks, tick_cycles) if method == "rairan" else clocks
 
 
 def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
-    """Options of the method."""
+    """Return options of the method."""
     if method == "s":
         return {"cancel": bool(rng.random() < 0.75)}
     if method == "track":
@@ -167,7 +167,7 @@ def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
-    """Velocity in another unit, with an LSB that it can have, or saturating."""
+    """Return velocity in another unit, with an LSB that it can have, or saturating."""
     unit = str(rng.choice(["count/tick"] * 4 + ["rad/s", "rev/s", "rpm"]))
     if unit != "count/tick":
         coarsest, finest = spec.frac_bits_range(unit)
@@ -185,7 +185,9 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
 
 
 def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator, earliest: int = 0) -> PinTrace:
-    """An external tick about as long as nominal: regular for a while, then not, then missing; some are the earliest."""
+    """Return an external tick about as long as nominal: regular for a while, then not, then missing; some are the
+    earliest.
+    """
     n = trace.n_clocks // tick_cycles + 1
     gaps = np.full(n, tick_cycles)
     gaps[n // 2 :] += rng.integers(-tick_cycles // 2, tick_cycles, n - n // 2)
@@ -213,7 +215,7 @@ def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter
 
 
 def _before_known(spec: TachometerSpec, trace: PinTrace) -> int:
-    """Counts until both lines have held a level for as long as the filter wants, which are not counted."""
+    """Return counts until both lines have held a level for as long as the filter wants, which are not counted."""
     if not spec.filter_clocks:
         return 0
     known = max(filter_line(*changes(trace, line), spec.filter_clocks)[0][0] for line in ("a", "b"))

@@ -96,7 +96,7 @@ void core_write(void *core, uint32_t offset, uint32_t value) { access(static_cas
 
 @cache
 def library(spec: TachometerSpec) -> Path:
-    """The library of a core, whose functions `HEADER` declares."""
+    """Return the library of a core, whose functions `HEADER` declares."""
     text = export(spec, NAME, "native")[f"{NAME}.v"]
     pins = " ".join(f"top.{pin.name} = level >> {bit} & 1;" for bit, pin in enumerate(spec.pins))
     compiler = build.compiler()
@@ -163,7 +163,7 @@ class Logged:
 
 
 def logged(file: Path) -> tuple[list[Logged], list[int]]:
-    """Accesses, and clocks of captures."""
+    """Return accesses, and clocks of captures."""
     found, captures = [], []
     for line in file.read_text().splitlines():
         if line.startswith("capture "):
@@ -175,7 +175,7 @@ def logged(file: Path) -> tuple[list[Logged], list[int]]:
 
 
 def check_golden(registers: RegisterMap, trace: PinTrace, file: Path) -> None:
-    """See that all accesses of a log were answered as the golden bank answers them."""
+    """Check that all accesses of a log were answered as the golden bank answers them."""
     found, captures = logged(file)
     answers = GoldenBank(registers, trace).answers([one.access for one in found], captures)
     assert found
@@ -184,7 +184,7 @@ def check_golden(registers: RegisterMap, trace: PinTrace, file: Path) -> None:
 
 
 def snapshots(registers: RegisterMap, found: Sequence[Logged]) -> list[dict[str, int]]:
-    """What the answers of all reads of captured registers say of the core's outputs, snapshot by snapshot."""
+    """Return what the answers of all reads of captured registers say of the core's outputs, snapshot by snapshot."""
     outputs = {port.name: port for port in registers.spec.outputs}
     words: list[dict[str, int]] = []
     for one in found:

@@ -14,12 +14,12 @@ nightly = pytest.mark.nightly
 
 
 def only(short: Iterable[Any], cases: Iterable[Any]) -> list[Any]:
-    """Parameters of a test: all cases, of which `make test` has only these."""
+    """Return parameters of a test: all cases, of which `make test` has only these."""
     kept = list(short)
     return [case if case in kept else pytest.param(case, marks=nightly) for case in cases]
 
 
 def only_rows(short: Iterable[tuple[Any, ...]], rows: Iterable[tuple[Any, ...]]) -> list[Any]:
-    """Rows of several parameters, of which `make test` has only these."""
+    """Return rows of several parameters, of which `make test` has only these."""
     kept = list(short)
     return [row if row in kept else pytest.param(*row, marks=nightly) for row in rows]

@@ -6,7 +6,7 @@ from tachometry.spec import METHODS, ParameterError, of_texts
 
 
 def had_by(method: str, texts: dict[str, str]) -> dict[str, str]:
-    """The same options, without bounds if the method has none, and with a tick long enough for it.
+    """Return the same options, without bounds if the method has none, and with a tick long enough for it.
 
     The tick, and the maximum time with it, is doubled until the method takes it.
     """

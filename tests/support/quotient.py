@@ -118,7 +118,7 @@ def every_quotient(
     towards: int = 0,
     every: int = 1,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """(base, N, m, velocity) of each `every`-th m with every N, from start to start as fast as can be.
+    """Return (base, N, m, velocity) of each `every`-th m with every N, from start to start as fast as can be.
 
     The base is one for which the ends of the window are within the range of m_e.
     """

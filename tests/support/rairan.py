@@ -13,20 +13,20 @@ DELAY = 4  # clocks from a step at the datapath to `velocity_valid`
 
 
 def make_spec(dt: int, max_ticks: int = 10, **options: Any) -> RairanTachometer:
-    """A core whose tick has so many clocks."""
+    """Return a core whose tick has so many clocks."""
     return RairanTachometer(
         encoder=Encoder(25), timing=Timing(1_000_000, dt, max_ticks), **({"frac_bits": 16} | options)
     )
 
 
 def steps_of(step: np.ndarray) -> Steps:
-    """Steps of every clock."""
+    """Return steps of every clock."""
     at, none = np.flatnonzero(step), np.empty(0, dtype=np.int64)
     return Steps(at, step[at].astype(np.int64), none, none, none)
 
 
 def golden_updates(spec: RairanTachometer, step: np.ndarray) -> Table:
-    """Updates that are caused in the clocks of these steps; `clock` is that of the cause."""
+    """Return updates that are caused in the clocks of these steps; `clock` is that of the cause."""
     delay = spec.registers_steps + DELAY
     updates = Model(spec).updates(None, steps_of(step), len(step) + delay)  # type: ignore[arg-type]
     updates.clock[:] -= delay
@@ -34,7 +34,7 @@ def golden_updates(spec: RairanTachometer, step: np.ndarray) -> Table:
 
 
 def random_steps(rng: np.random.Generator, n: int, dt: int, *, turns: float = 0.02) -> np.ndarray:
-    """Stretches of all speeds, regular and not, with reversals, dithering and rests; shape (n,), −1, 0 or +1."""
+    """Return stretches of all speeds, regular and not, with reversals, dithering and rests; shape (n,), −1, 0 or +1."""
     step = np.zeros(n, dtype=np.int64)
     at, sign = 0, 1
     while at < n:

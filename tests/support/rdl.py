@@ -9,7 +9,7 @@ from systemrdl.node import AddrmapNode
 
 
 def read_rdl(text: str, folder: Path) -> AddrmapNode:
-    """The address map of a text; anything that the compiler says is a failure."""
+    """Return the address map of a text; anything that the compiler says is a failure."""
     file = folder / "core.rdl"
     file.write_text(text, encoding="utf-8")
     said = io.StringIO()

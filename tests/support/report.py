@@ -9,7 +9,7 @@ from support.script import load
 
 
 def arguments(text: str, metavar: str) -> argparse.ArgumentParser:
-    """A command that takes names, and a page to write its tables into."""
+    """Return a command that takes names, and a page to write its tables into."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar=metavar, help="only these")
     parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose tables are replaced")
@@ -36,7 +36,9 @@ class Table:
 
 
 def chosen(what: str, words: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Those known that the words name, all if there are none; a word that is not known ends the command with 2."""
+    """Return those known that the words name, all if there are none; a word that is not known ends the command with
+    2.
+    """
     wanted, known = list(words), list(known)
     for word in wanted:
         if word not in known:

@@ -1,4 +1,4 @@
-"""What of RIO its plugins meet, as far as it is known from outside: names, and the C code around that of a plugin."""
+"""RIO is imitated as far as its plugins meet it: names, and the C code around that of a plugin."""
 
 import sys
 import types
@@ -39,7 +39,7 @@ class PluginBase:
 
 
 def loaded(text: str, clock_hz: int) -> Any:
-    """The plugin of this text, as a part of a configuration with this clock."""
+    """Return the plugin of this text, as a part of a configuration with this clock."""
     plugins = types.ModuleType("riocore.plugins")
     plugins.__dict__["PluginBase"] = PluginBase
     kept = {name: sys.modules.get(name) for name in ("riocore", "riocore.plugins")}
@@ -61,7 +61,8 @@ def hal_type(pin: Mapping[str, Any]) -> str:
 
 
 def component(plugin: Any) -> str:
-    """A program in C that reads what the FPGA sends, a frame a line, with index-enable before it, and prints all pins.
+    """Return a program in C that reads what the FPGA sends, a frame a line, with index-enable before it, and prints all
+    pins.
 
     An index-enable that a line does not set stays as it is. Scale and offset of the position come first.
     """

@@ -10,7 +10,7 @@ sys.path.append(str(FOLDER))  # they take from their neighbours
 
 
 def load(name: str) -> ModuleType:
-    """bench/NAME.py as a module."""
+    """Return bench/NAME.py as a module."""
     file = FOLDER / f"{name}.py"
     described = importlib.util.spec_from_file_location(f"bench_{name}", file)
     assert described is not None

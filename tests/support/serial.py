@@ -22,7 +22,7 @@ _MARGIN = 0.99  # clocks before sck rises in which miso is there: those of pads 
 
 
 class Host(ABC):
-    """What both have: levels of lines, and the accesses that they make.
+    """Holds the levels of lines, and the accesses that are made over them.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Host(ABC):
         self._changes: dict[str, list[tuple[int, int]]] = defaultdict(list)
 
     def sampled(self, time: float) -> int:
-        """The clock in which a change is sampled."""
+        """Return the clock in which a change is sampled."""
         return math.ceil(time) + (time == int(time) and int(self.rng.integers(2)))
 
     def put(self, line: str, clock: int, level: int) -> None:
@@ -52,7 +52,7 @@ class Host(ABC):
         self._changes[line].append((clock, level))
 
     def lines(self, n_clocks: int) -> dict[str, NDArray[np.uint8]]:
-        """Levels of each line in each clock."""
+        """Return levels of each line in each clock."""
         levels = {}
         for line, idle in self._idle.items():
             clocks, level = np.array([(-1, idle), *self._changes[line]]).T
@@ -66,7 +66,7 @@ class Host(ABC):
 
     @abstractmethod
     def check(self, output: NDArray[np.uint8], answers: Golden) -> None:
-        """What the core has sent, a level for each clock, must follow from what the accesses have answered."""
+        """Check that what the core has sent, a level for each clock, follows from the answers to the accesses."""
 
 
 class SpiHost(Host):
@@ -210,7 +210,7 @@ class UartHost(Host):
         self.quiet(frames.QUIET_BITS)
 
     def random_request(self, control: int, velocity: int, n_words: int, longest: int) -> bytes:
-        """A read of some words, often from the velocity on, or a write."""
+        """Return a read of some words, often from the velocity on, or a write."""
         rng, sequence = self.rng, int(self.rng.integers(frames.SEQUENCES))
         if rng.random() < 0.15:
             address = control if rng.random() < 0.7 else int(rng.integers(256))

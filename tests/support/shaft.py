@@ -52,7 +52,7 @@ class Double:
             self._sum, self._n = 0.0, 0
 
     def tick(self, position: int, speed: float, angle: float) -> float:
-        """A control tick."""
+        """Return a control tick."""
         if not self._spec.synchronised:
             self._observe(1, self._current)
         wanted = self._k_p * (angle - position * self._pitch) + self._k_v * (speed - self.y)
@@ -77,7 +77,7 @@ class Fixed:
         self.control.update(round(speed * self._per_speed))
 
     def tick(self, position: int, speed: float, angle: float) -> float:
-        """A control tick."""
+        """Return a control tick."""
         command = Command(round(angle * self._turn), round(speed * self._command))
         return self.control.tick(position, command) * self._amperes
 
@@ -112,7 +112,7 @@ class Course:
 
 
 def run(spec: LoopSpec, loop: Loop, duration: float, seed: int, noise: float = 0.02) -> Course:
-    """A shaft that follows 200/π·(1 − cos(πt/10)) rad/s with noise of the torque, measured by eq. (21).
+    """Return a shaft that follows 200/π·(1 − cos(πt/10)) rad/s with noise of the torque, measured by eq. (21).
 
     The control period is a tick. The disc's edges are uneven by 0.1 pitch, the driver has 0.1 ms, and the torque has
     white noise of `noise` Nm in each millisecond.

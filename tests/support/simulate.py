@@ -12,7 +12,7 @@ from amaranth.sim import Simulator
 
 
 def member(component: wiring.Component, name: str) -> Any:
-    """What `name` is of a component, or of its updates, whose strobe is `velocity_valid`; a path has dots."""
+    """Return what `name` is of a component, or of its updates, whose strobe is `velocity_valid`; a path has dots."""
     if "." in name or hasattr(component, name):
         return attrgetter(name)(component)
     updates = component.updates
@@ -99,7 +99,8 @@ Player = Callable[[wiring.Component, Sequence[Mapping[str, int]], Sequence[str]]
 
 
 def ticks(box: wiring.Component, m_e: Sequence[int], clocks: int) -> list[dict[str, int]]:
-    """Rows for a datapath that works on ticks: these pulse numbers at ticks so many clocks apart, the first at clock 1.
+    """Return rows for a datapath that works on ticks: these pulse numbers at ticks so many clocks apart, the first at
+    clock 1.
 
     A datapath that is told of a tick in the clock before it is told so.
     """

@@ -10,7 +10,7 @@ WINDOWS = 4  # to get in step, and then to be looked at
 
 @dataclass(frozen=True)
 class Steady:
-    """What Table 1 does once it is in step with the pulses.
+    """Computes Table 1 once it is in step with the pulses.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class Steady:
 
 
 def table1(period: int, dt: int, first_pulse: int) -> Steady:
-    """Pulses at `first_pulse` and every `period` after it, all in ts."""
+    """Return pulses at `first_pulse` and every `period` after it, all in ts."""
     duration = first_pulse + 2 * WINDOWS * (period + 2 * dt)
     rows = table1_rows(count(first_pulse, period), dt, duration)
     updates = [k for k, row in enumerate(rows) if row.new_n_dt1]

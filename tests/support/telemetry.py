@@ -14,7 +14,7 @@ _WORD_BYTES = 4
 
 @dataclass(frozen=True)
 class Sent:
-    """What was sent, and what arrives.
+    """Holds the frames that were sent, and those that arrive.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Sent:
 
 
 def frames_of(registers: HostRegisters, n_frames: int, seed: int) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
-    """Random words that the registers can show, but with their times in order, and the frames of them."""
+    """Return random words that the registers can show, but with their times in order, and the frames of them."""
     random = np.random.default_rng(seed)
     names = [register["name"] for register in registers.captured]
     words = np.zeros((n_frames, len(names)), dtype=np.uint32)
@@ -52,7 +52,7 @@ def frames_of(registers: HostRegisters, n_frames: int, seed: int) -> tuple[NDArr
 
 
 def damaged(registers: HostRegisters, n_frames: int, seed: int) -> Sent:
-    """A fifth of the frames has wrong bits, has lost bytes or all of them, or has others in front or within."""
+    """Return a fifth of the frames has wrong bits, has lost bytes or all of them, or has others in front or within."""
     words, frames = frames_of(registers, n_frames, seed)
     random = np.random.default_rng([seed, 1])
     length = frames.shape[1]
@@ -91,7 +91,7 @@ def damaged(registers: HostRegisters, n_frames: int, seed: int) -> Sent:
 
 
 def _checks(frames: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """CRC-16/MCRF4XX of each row, bit by bit."""
+    """Return CRC-16/MCRF4XX of each row, bit by bit."""
     reflected = int(f"{CRC_POLYNOMIAL:016b}"[::-1], 2)
     table: NDArray[np.uint16] = np.arange(256, dtype=np.uint16)
     for _ in range(8):

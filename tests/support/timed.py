@@ -19,7 +19,7 @@ Row = tuple[int, int, int, bool]  # clock of the cause, velocity, interval, forc
 
 
 def spec_of(method: str, **options: Any) -> TimedTachometer:
-    """Ticks of 20 clocks, a little more than a division takes, and at most 20 of them."""
+    """Return ticks of 20 clocks, a little more than a division takes, and at most 20 of them."""
     timing = Timing(100 * TICK, TICK, MAX_TICKS)
     spec = METHODS[method](**{"encoder": Encoder(25), "timing": timing, "frac_bits": FRAC_BITS, **options})
     assert isinstance(spec, TimedTachometer)
@@ -27,7 +27,9 @@ def spec_of(method: str, **options: Any) -> TimedTachometer:
 
 
 def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list[Row]:
-    """All updates; `counts` has the steps by their clocks, or on the lattice the pulse numbers by their ticks."""
+    """Return all updates; `counts` has the steps by their clocks, or on the lattice the pulse
+    numbers by their ticks.
+    """
     tick = spec.timing.tick_cycles
     rows = []
     for clock in range(n_clocks + spec.datapath_latency):
@@ -51,12 +53,14 @@ def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list
 
 
 def speed(counts: int, clocks: int) -> int:
-    """Raw velocity of some counts in so many clocks."""
+    """Return raw velocity of some counts in so many clocks."""
     return rounded(Fraction(counts * TICK, clocks), FRAC_BITS)
 
 
 def decay(last_count: int, velocity: int, until: int) -> list[Row]:
-    """The updates with which a velocity decays: at ticks without a count, 1½ counts over the time since the last."""
+    """Return the updates with which a velocity decays: at ticks without a count, 1½ counts over the time since the
+    last.
+    """
     rows = []
     for clock in range(last_count + TICK, until):
         if clock % TICK == TICK - 1:
@@ -68,6 +72,6 @@ def decay(last_count: int, velocity: int, until: int) -> list[Row]:
 
 
 def silence(last_count: int, until: int) -> list[Row]:
-    """The zeros that silence forces."""
+    """Return the zeros that silence forces."""
     ends = range(last_count + SILENCE, until, SILENCE)
     return [(end, 0, SILENCE, True) for end in ends]

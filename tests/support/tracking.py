@@ -17,7 +17,7 @@ from tachometry.spec.formats.tracking_program import TABLES, Program
 
 @dataclass(frozen=True)
 class Tick:
-    """What a tick brings to the program."""
+    """Holds the inputs that a tick brings to the program."""
 
     number: int = 0
     times: int = 0
@@ -63,7 +63,7 @@ class Interpreter:
         self.widest = 0  # bits of the widest number so far
 
     def fitting(self, value: int, what: object) -> int:
-        """The value, which fits a word."""
+        """Return the value, which fits a word."""
         width = (value if value >= 0 else ~value).bit_length() + 1
         self.widest = max(self.widest, width)
         assert width <= self.program.form.width, f"{what}: {value} has {width} bits, not {self.program.form.width}"
@@ -147,7 +147,7 @@ class Interpreter:
             self.ac = self.fitting(self._sum(now, x, tick), now)
 
     def _sum(self, now: Instruction, x: int, tick: Tick) -> int:
-        """What else is computed."""
+        """Return what else is computed."""
         op, steps = now.op, now.steps
         if op in (Op.INPUT, Op.ADD_INPUT, Op.SUB_INPUT):
             value = self._input(now.address, tick)
@@ -186,7 +186,7 @@ class Interpreter:
 
 
 def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tuple[Steps, NDArray[np.int64]]:
-    """Counts of random number, times and direction, and the last clock of every tick."""
+    """Return counts of random number, times and direction, and the last clock of every tick."""
     form = spec.form
     longest, shortest = spec.longest_tick, spec.min_tick_cycles if form.external else spec.timing.tick_cycles
     most = form.max_count
@@ -225,7 +225,7 @@ def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tu
 
 
 def ticks_of(spec: TrackTachometer, windows: Windows, core: Interpreter) -> Iterator[Tick]:
-    """These windows, as the front end of the program gives them; `core` runs each of them before the next."""
+    """Yield these windows, as the front end of the program gives them; `core` runs each of them before the next."""
     most = spec.max_count
     silent, before = spec.timing.max_ticks, Phase.REST
     for i, number in enumerate(windows.number):

@@ -50,7 +50,7 @@ endmodule
 
 
 def _ports(spec: AnySpec) -> tuple[list[Port], list[Port], list[str]]:
-    """Pins, outputs and strobes."""
+    """Return pins, outputs and strobes."""
     return list(spec.pins), list(spec.outputs), list(spec.strobes)
 
 
@@ -88,7 +88,7 @@ def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
 
 
 def play_in_icarus(spec: AnySpec, folder: Path, changes: np.ndarray, n_clocks: int) -> Run:
-    """The same with levels of all inputs: a row for each clock in which one changes, with the clock first."""
+    """Return the same with levels of all inputs: a row for each clock in which one changes, with the clock first."""
     rows = play(export(spec)["tachometer.v"], *_ports(spec), folder, changes, n_clocks)
     return observed(spec, n_clocks, rows)
 
@@ -102,7 +102,7 @@ def play(
     changes: np.ndarray,
     n_clocks: int,
 ) -> np.ndarray:
-    """Outputs of a module in each clock in which there is a strobe, behind the clock."""
+    """Return outputs of a module in each clock in which there is a strobe, behind the clock."""
     bench = _filled(
         _ICARUS,
         N_CLOCKS=n_clocks,

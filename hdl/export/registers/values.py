@@ -1,4 +1,4 @@
-"""What programs read of the captured registers: a value for every port, whether it takes one register or two."""
+"""Programs read a value for every port from the captured registers, whether it takes one register or two."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class CapturedValue:
 
 
 def captured_values(registers: RegisterMap) -> tuple[CapturedValue, ...]:
-    """Values that a capture takes, the first of them that whose first register captures."""
+    """Return values that a capture takes, the first of them that whose first register captures."""
     found: dict[str, list[Register]] = {}
     for register in registers:
         for field in register.fields:
@@ -55,7 +55,7 @@ def captured_values(registers: RegisterMap) -> tuple[CapturedValue, ...]:
 
 
 def is_whole(register: Register) -> bool:
-    """Whether a register has one field, of all of its bits; then the texts speak of the register alone."""
+    """Tell whether a register has one field, of all of its bits; then the texts speak of the register alone."""
     return [field.width for field in register.fields] == [WORD]
 
 

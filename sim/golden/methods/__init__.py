@@ -1,4 +1,4 @@
-"""Golden models, one for each method."""
+"""Each method has a golden model here."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Golden adaptive dt: which counts open windows, and how long dt is in each."""
+"""The golden adaptive dt says which counts open windows, and how long dt is in each."""
 
 from bisect import bisect_left
 
@@ -12,7 +12,9 @@ Ints = NDArray[np.int64]
 
 
 def next_shift(rule: AdaptiveDt, shift: int, n: int, *, high: bool, falling: bool) -> tuple[int, bool]:
-    """k of a window after one of dt·2^shift that measured Nep1 = n (high) or Ndt1 = n, and whether it falls to 0."""
+    """Return k of a window after one of dt·2^shift that measured Nep1 = n (high) or Ndt1 = n, and whether it falls to
+    0.
+    """
     wanted = rule.slow + (shift > 0)
     seldom = n * wanted <= 1 << shift if high else n << shift >= wanted
     enough = high and n >= rule.fewest
@@ -23,7 +25,8 @@ def next_shift(rule: AdaptiveDt, shift: int, n: int, *, high: bool, falling: boo
 
 
 def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tuple[Ints, Ints, Ints]:
-    """Nodes at which windows open, those at which they end, and k of each; a step per window, as k is a recursion.
+    """Return nodes at which windows open, those at which they end, and k of each; a step per window, as k is a
+    recursion.
 
     Parameters
     ----------

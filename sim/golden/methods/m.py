@@ -1,4 +1,4 @@
-"""Golden M method: eq. (6) of Tsuji 2009 as it stands in the paper."""
+"""The golden M method computes eq. (6) of Tsuji 2009 as it stands in the paper."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from tachometry.spec.core.tachometer import BOUNDS
 
 
 class Model:
-    """Golden model of the M method.
+    """Computes the M method.
 
     Parameters
     ----------
@@ -21,7 +21,9 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
-        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
+        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
+        it.
+        """
         n = self._spec.average
 
         m_e = ticks.pulse_count

@@ -1,4 +1,4 @@
-"""Golden M/T method: eqs. (13) to (16) of Tsuji 2009, window by window."""
+"""The golden M/T method computes eqs. (13) to (16) of Tsuji 2009, window by window."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from tachometry.spec import MTTachometer
 
 
 class Model:
-    """Golden model of the M/T method.
+    """Computes the M/T method.
 
     Parameters
     ----------
@@ -22,7 +22,9 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
+        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
+        it.
+        """
         spec = self._spec
         counts = Counts.of(spec, ticks, steps, n_clocks)
         n, period = len(counts.period), counts.period
@@ -52,7 +54,7 @@ class Model:
         return updates(spec, counts, with_silences(spec, counts, found), ticks)
 
     def _whole(self, counts: Counts, later: Ints) -> Ints:
-        """The count that closes the window of each opening one; `later`: the first one later than T_c.
+        """Return the count that closes the window of each opening one; `later`: the first one later than T_c.
 
         It is the first after a whole number of cycles, if the window has gone through one, and does not turn before.
         """
@@ -66,7 +68,7 @@ class Model:
         return np.where(through < cycle, later, np.minimum(np.minimum(whole, turn), latest))
 
     def _free(self, counts: Counts, first: NDArray[np.bool_]) -> Ints:
-        """The first count after each opening one with which a division can begin.
+        """Return the first count after each opening one with which a division can begin.
 
         What is being divided is the window that ended with the opening count, or the 0 forced before it.
         """
@@ -77,7 +79,9 @@ class Model:
         return np.searchsorted(clock, begun + self._spec.division_clocks)
 
     def _distance(self, size: Ints, opening: Ints, closing: Ints) -> Ints:
-        """Counts from the edge of an opening count to that of a closing one; on the lattice, the last of each tick."""
+        """Return counts from the edge of an opening count to that of a closing one; on the lattice, the last of each
+        tick.
+        """
         through = np.cumsum(size)
         whole = through[closing] - through[opening]
         if self._spec.paper_exact:

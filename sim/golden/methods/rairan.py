@@ -18,7 +18,7 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Windows:
-    """One row per window: from the count that opens it, or from reset, to the next that opens one.
+    """Has one row per window: from the count that opens it, or from reset, to the next that opens one.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Windows:
 
 
 def orbit(following: Ints, first: int) -> Ints:
-    """first, following[first], … without the last index, which follows itself.
+    """Return first, following[first], … without the last index, which follows itself.
 
     `jump` leads from a node as many nodes on as the path has, so that each step doubles the path.
     """
@@ -61,7 +61,7 @@ def orbit(following: Ints, first: int) -> Ints:
 
 
 def windows(spec: RairanTachometer, steps: Steps, n_clocks: int) -> Windows:
-    """All windows that are open in clocks 0 … n_clocks − 1."""
+    """Return all windows that are open in clocks 0 … n_clocks − 1."""
     counted = (steps.step != 0) & (steps.clock < n_clocks)
     at, sign = steps.clock[counted], steps.step[counted]
     n, dt, exact = len(at), spec.timing.tick_cycles, spec.paper_exact
@@ -101,7 +101,7 @@ def windows(spec: RairanTachometer, steps: Steps, n_clocks: int) -> Windows:
 
 @dataclass(frozen=True)
 class Events:
-    """One row per update: its outputs, and the clock that causes it."""
+    """Has one row per update: its outputs, and the clock that causes it."""
 
     clock: Ints
     n: Ints
@@ -119,18 +119,18 @@ class Events:
 
 
 def latest(marked: Bools, values: Ints, first: int) -> Ints:
-    """Value of the last marked row so far, `first` before there is one; shape (n,)."""
+    """Return value of the last marked row so far, `first` before there is one; shape (n,)."""
     row = np.maximum.accumulate(np.where(marked, np.arange(1, len(marked) + 1), 0))
     return np.append(first, values)[row]
 
 
 def counting(lengths: Ints) -> Ints:
-    """0 … length − 1 for each length, one after the other."""
+    """Return 0 … length − 1 for each length, one after the other."""
     return np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
 
 
 class Model:
-    """Golden model of the method of Rairán.
+    """Computes the method of Rairán.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class Model:
         self._spec = spec
 
     def windows(self, steps: Steps, n_clocks: int) -> tuple[Ints, Bools, Ints]:
-        """Last clocks of all ticks, whether Nep1 is saturated in them, and nominal ticks that they are long."""
+        """Return last clocks of all ticks, whether Nep1 is saturated in them, and nominal ticks that they are long."""
         found, dt = windows(self._spec, steps, n_clocks), self._spec.timing.tick_cycles
         nth = counting(found.n_dt)
         last = np.repeat(found.start, found.n_dt) + (nth + 1) * np.repeat(dt << found.shift, found.n_dt)
@@ -149,7 +149,9 @@ class Model:
         return last, beyond, np.repeat(1 << found.shift, found.n_dt)
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
+        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
+        it.
+        """
         spec = self._spec
         delay = spec.tick_latency + spec.datapath_latency
         found = windows(spec, steps, n_clocks - delay)
@@ -166,7 +168,7 @@ class Model:
         return Table(events.clock + delay, columns | self._bounds(events))
 
     def _bounds(self, events: Events) -> dict[str, NDArray[Any]]:
-        """n2 and n1 of a time that is a clock longer and shorter, rounded outward; all in eighths of a count."""
+        """Return n2 and n1 of a time that is a clock longer and shorter, rounded outward; all in eighths of a count."""
         spec, one = self._spec, self._spec.timing.tick_cycles
         if not spec.bounds:
             return {}
@@ -193,7 +195,7 @@ class Model:
         }
 
     def _alternating(self, found: Windows) -> tuple[Ints, Ints, Bools, Bools, Ints]:
-        """What can happen in a window, in order: the end of its first dt, then the count that ends it.
+        """Return what can happen in a window, in order: the end of its first dt, then the count that ends it.
 
         Clocks, Nep1 or Ndt1, whether it is Nep1, whether it happens, and direction; shape (2n,).
         """
@@ -212,7 +214,7 @@ class Model:
         )
 
     def _regime(self, value: Ints, is_nep: Bools, happens: Bools, anew: Bools) -> tuple[Bools, Ints, Bools]:
-        """Which events set n, n after each, and whether that is Nep1; `anew` are those that set n to 0."""
+        """Tell which events set n, n after each, and whether that is Nep1; `anew` are those that set n to 0."""
         # 1 for Nep1 ends the high regime, for Ndt1 it leaves it; what else happens sets it.
         sets_regime = happens & (is_nep | (value > 1) | anew)
         regime = latest(sets_regime, (is_nep & (value > 1)).astype(np.int64), 0) == 1
@@ -277,7 +279,7 @@ class Model:
         return Events(*rows, never, never, n_ep1, n_dt1, np.zeros_like(n_ep1), never, never, never)
 
     def _velocity(self, events: Events) -> Ints:
-        """n1, n2 or n3 with its sign, in counts per tick, correctly rounded."""
+        """Return n1, n2 or n3 with its sign, in counts per tick, correctly rounded."""
         estimate, n, high = self._spec.estimate, events.n, events.high
         n_ep, n_dt = np.where(high, n, 1), np.where(high, 1, np.maximum(n, 1))
         if estimate == "n1":

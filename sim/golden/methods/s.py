@@ -1,4 +1,4 @@
-"""Golden S method: the sums of Tsuji 2009, eqs. (17) and (21), as they stand in the paper."""
+"""The golden S method computes the sums of Tsuji 2009, eqs. (17) and (21), as they stand in the paper."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from tachometry.spec.core.tachometer import BOUNDS
 
 
 def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Pulse alterations of Tsuji 2009, Sec. V-A.
+    """Return pulse alterations of Tsuji 2009, Sec. V-A.
 
     alt(i) = m_e(i) ≠ m_e(i−1) and m_e(i) ≠ b, b = the pulse number of the last tick without an alteration, and 0 before
     the first tick.
@@ -36,7 +36,7 @@ def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
 def windows(
     alteration: NDArray[np.bool_], max_ticks: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-    """Closing tick i, length m_s and origin of every update.
+    """Return closing tick i, length m_s and origin of every update.
 
     A window closes at an alteration, which opens the next, or when it has grown to `max_ticks`: then it keeps its newer
     half, ⌊max_ticks/2⌋ ticks. The first opens at tick −1.
@@ -71,7 +71,7 @@ def windows(
 
 
 class Model:
-    """Golden model of the S method.
+    """Computes the S method.
 
     Parameters
     ----------
@@ -82,7 +82,9 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
-        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
+        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
+        it.
+        """
         spec, m_e = self._spec, ticks.pulse_count
         i, m_s, forced = windows(alterations(m_e), spec.timing.max_ticks)
         at = i + 1  # m_e(−1) = 0 comes first

@@ -1,4 +1,4 @@
-"""Golden T method: eq. (9) of Tsuji 2009, count by count."""
+"""The golden T method computes eq. (9) of Tsuji 2009, count by count."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from tachometry.spec import TTachometer
 
 
 class Model:
-    """Golden model of the T method.
+    """Computes the T method.
 
     Parameters
     ----------
@@ -21,7 +21,9 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
+        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
+        it.
+        """
         spec = self._spec
         counts = Counts.of(spec, ticks, steps, n_clocks)
         sign, gap = np.sign(counts.size), counts.gap

@@ -1,4 +1,4 @@
-"""What the golden models of the T and M/T methods share: counts and their times, silences, what the divider takes."""
+"""The golden models of T and M/T share this: counts and their times, silences, and the operands of the divider."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +18,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Counts:
-    """All counts of a run; and its timer periods, numbered from 0, in each of which there is one count at most.
+    """Holds all counts of a run, and its timer periods from 0 on, in each of which there is one count at most.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Counts:
 
     @classmethod
     def of(cls, spec: TimedTachometer, ticks: Table, steps: Steps, n_clocks: int) -> "Counts":
-        """The counts that the datapath sees within `n_clocks`: steps, or ticks that are not empty."""
+        """Return the counts that the datapath sees within `n_clocks`: steps, or ticks that are not empty."""
         if spec.on_lattice:
             period = np.flatnonzero(ticks.pulse_count)
             return cls(period, ticks.pulse_count[period], ticks.clock, len(ticks.clock))
@@ -45,7 +45,7 @@ class Counts:
         return cls(steps.clock[seen] + spec.tick_latency, steps.step[seen], None, n_clocks)
 
     def clock(self, period: Ints) -> Ints:
-        """Clocks of some periods."""
+        """Return clocks of some periods."""
         return period if self.clock_of is None else self.clock_of[period]
 
     @property
@@ -54,7 +54,7 @@ class Counts:
         return np.diff(self.period, prepend=-1)
 
     def silences(self, max_periods: int) -> Ints:
-        """Periods in which a 0 is forced."""
+        """Return periods in which a 0 is forced."""
         begin = np.append(-1, self.period)
         end = np.append(self.period, self.n_periods)
         long = np.flatnonzero(end - begin > max_periods)
@@ -64,7 +64,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Measurements:
-    """What the divider is given, one row each, in order.
+    """Holds the operands of the divider, one row each, in order.
 
     Parameters
     ----------
@@ -96,7 +96,9 @@ class Measurements:
         return Measurements(**columns)
 
     def with_more(self, more: "Measurements") -> "Measurements":
-        """The rows of both in order of their clocks; `more`, of which there are few, after those of the same clock."""
+        """Return the rows of both in order of their clocks; `more`, of which there are few, after those of the same
+        clock.
+        """
         at = np.searchsorted(self.clock, more.clock, side="right")
         columns: dict[str, Any] = {
             name: None if own is None else np.insert(own, at, vars(more)[name], axis=0)
@@ -106,12 +108,12 @@ class Measurements:
 
 
 def eighths(spec: TimedTachometer, counts: Any, side: int) -> Any:
-    """Counts in eighths, with what edges may be off by on this side, −1 or 1."""
+    """Return counts in eighths, with what edges may be off by on this side, −1 or 1."""
     return 8 * counts + side * int(8 * spec.edge_error)
 
 
 def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, Ints] | tuple[None, None]:
-    """`least` and `most` of distances between edges; each edge lies within a period before its count."""
+    """Return `least` and `most` of distances between edges; each edge lies within a period before its count."""
     if not spec.bounds:
         return None, None
     low, high = eighths(spec, distance, -1), eighths(spec, distance, 1)
@@ -122,14 +124,14 @@ def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, 
 
 
 def _between(spec: TimedTachometer, back: Ints, on: Ints, time: Ints) -> tuple[Ints, Ints] | tuple[None, None]:
-    """`least` and `most` of a shaft that may have gone so many counts back or on, in just this time."""
+    """Return `least` and `most` of a shaft that may have gone so many counts back or on, in just this time."""
     if not spec.bounds:
         return None, None
     return np.stack([eighths(spec, back, -1), time], axis=1), np.stack([eighths(spec, on, 1), time], axis=1)
 
 
 def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) -> Measurements:
-    """The measurements, and a forced 0 for every silence."""
+    """Return the measurements, and a forced 0 for every silence."""
     period = counts.silences(spec.max_periods)
     none = np.zeros(len(period), dtype=np.int64)
     time = np.full(len(period), spec.max_periods)
@@ -150,14 +152,14 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
 
 
 def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, NDArray[np.bool_]]:
-    """Velocity in counts per tick of a distance in half counts, saturated, and whether that changed it."""
+    """Return velocity in counts per tick of a distance in half counts, saturated, and whether that changed it."""
     exact = round_quotient(distance * spec.timer_periods, time, spec.native_frac_bits - 1)
     limit = spec.max_count << spec.native_frac_bits
     return np.clip(exact, -limit, limit), np.abs(exact) > limit
 
 
 def _asking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> tuple[Ints, Ints]:
-    """Ticks that compare, and the measurement before each, of those measurements whose velocity may decay.
+    """Return ticks that compare, and the measurement before each, of those measurements whose velocity may decay.
 
     A tick in whose window no count came compares, if nothing is being divided. A measurement that begins meanwhile
     takes the divider.
@@ -190,12 +192,14 @@ def _asking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: In
 
 
 def _greatest(spec: TimedTachometer, velocity: Ints, age: Ints) -> Ints:
-    """The greatest velocity of this sign after a silence; an edge may lie half a count off, so it allows 1½ counts."""
+    """Return the greatest velocity of this sign after a silence; an edge may lie half a count off, so it allows 1½
+    counts.
+    """
     return rounded(spec, 3 * np.where(velocity < 0, -1, 1), age)[0]
 
 
 def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: Ints, ticks: Table) -> Measurements:
-    """Ticks at which the velocity decays; `held` is the velocity after each measurement."""
+    """Return ticks at which the velocity decays; `held` is the velocity after each measurement."""
     clock, last = _asking(spec, counts, taken, held, ticks)
     velocity = held[last]
     period = np.searchsorted(ticks.clock, clock) if spec.on_lattice else clock
@@ -216,7 +220,7 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
-    """All updates with the velocity in counts per tick, as the datapath shows it."""
+    """Return all updates with the velocity in counts per tick, as the datapath shows it."""
     # A forced 0 takes the divider, if ticks are so short that it is still at work.
     finished = np.diff(taken.clock, append=np.iinfo(np.int64).max) >= spec.division_clocks
     held, saturated = rounded(spec, taken.distance, taken.time)
@@ -231,7 +235,7 @@ def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: T
 
 
 def _shown(spec: TimedTachometer, taken: Measurements, velocity: Ints, saturated: NDArray[np.bool_]) -> Table:
-    """Measurements as updates."""
+    """Return measurements as updates."""
     columns = {
         "velocity": velocity,
         "interval": taken.time,
@@ -242,7 +246,7 @@ def _shown(spec: TimedTachometer, taken: Measurements, velocity: Ints, saturated
 
 
 def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any]]:
-    """Bounds of the velocity in counts per tick, rounded outward."""
+    """Return bounds of the velocity in counts per tick, rounded outward."""
     found: dict[str, NDArray[Any]] = {"bounds_valid": taken.known}
     for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
         assert ends is not None

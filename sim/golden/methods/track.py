@@ -14,13 +14,13 @@ REST, BEGUN, TRACKS = range(3)
 
 
 def rounded(product: int, bits: int) -> int:
-    """A product over 2^bits; from the middle, up."""
+    """Return a product over 2^bits; from the middle, up."""
     return (product + (1 << bits >> 1)) >> bits
 
 
 @dataclass(frozen=True)
 class Windows:
-    """The counts of every tick.
+    """Holds the counts of every tick.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Windows:
 
     @classmethod
     def of(cls, steps: Steps, last: NDArray[np.int64]) -> "Windows":
-        """The counts of windows that end with the clocks `last`."""
+        """Return the counts of windows that end with the clocks `last`."""
         counted = (steps.step != 0) & (steps.clock <= (last[-1] if len(last) else -1))
         clock, step = steps.clock[counted], steps.step[counted]
         window = np.searchsorted(last, clock)
@@ -78,7 +78,7 @@ class Windows:
 
 
 class Recursion:
-    """The state, and what a tick makes of it; all numbers as `spec.formats.tracking` describes them.
+    """Keeps the state, and changes it in every tick; all numbers are as `spec.formats.tracking` describes them.
 
     Parameters
     ----------
@@ -144,11 +144,11 @@ class Recursion:
                 self._track(number, times, places)
 
     def _moved_by_v(self, times: int) -> int:
-        """v times the sum of some times."""
+        """Return v times the sum of some times."""
         return rounded(self.v * times, self._form.unit_bits)
 
     def _second(self, times: int, places: int) -> None:
-        """The speed from the first count to this one, coarser by some bits."""
+        """Take the speed from the first count to this one, coarser by some bits."""
         form = self._form
         gap = max(self.gap - times, self._constants["least_gap"])
         e = places - self.p
@@ -191,7 +191,7 @@ class Recursion:
         self.gap = 0
 
     def _reach(self, rate: int, most: int) -> int:
-        """x = λ·m·T_s, at most so much."""
+        """Return x = λ·m·T_s, at most so much."""
         return min(rounded(rate * self.gap, self._form.gap_bits - 1), most)
 
     @property
@@ -200,7 +200,7 @@ class Recursion:
         return self._reach(self._form.rates[self.level], self._form.most_x[self.level])
 
     def _remember(self, e: int, agile: bool) -> None:
-        """The mean error, and what follows for λ."""
+        """Keep the mean error, and what follows for λ."""
         form, share = self._form, self._level_reach >> 2
         self.mean += rounded((e - self.mean) * share, form.frac_bits)
         size = min(abs(self.mean), self._one)
@@ -215,7 +215,7 @@ class Recursion:
             self.age, self.level = 0, min(self.level + 1, LEVELS - 1)
 
     def _late(self) -> None:
-        """No count has come: p stays near the position, and a speed that leads away from it falls."""
+        """Keep p near the position where no count has come, and let a speed fall that leads away from it."""
         form = self._form
         sign = 1 if self.p >= 0 else -1
         if abs(self.p) < form.late_limit:
@@ -227,7 +227,7 @@ class Recursion:
 
 
 class Model:
-    """Golden model of the tracking method.
+    """Computes the tracking method.
 
     Parameters
     ----------
@@ -238,7 +238,9 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """All updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows it."""
+        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
+        it.
+        """
         spec, form = self._spec, self._spec.form
         windows = Windows.of(steps, ticks.clock - spec.tick_latency)
         state = Recursion(spec)

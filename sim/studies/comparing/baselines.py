@@ -1,4 +1,4 @@
-"""What others do with the same edges: float models of four methods in use, written from their published descriptions.
+"""Four methods in use are modelled in floats, from their published descriptions.
 
 Each reads the encoder once per control period, at period, 2 periods, ..., and gives a speed that holds until the next
 reading. Finite differences and the low-pass filter are as in SimpleFOC's documentation of its velocity filter, the
@@ -53,7 +53,7 @@ class Steps:
 
     @staticmethod
     def of_recording(recording: Recording, counts_per_rev: int, decoding: int = 4) -> "Steps":
-        """What an ideal decoder counts; a change of both lines at once counts as none."""
+        """Return what an ideal decoder counts; a change of both lines at once counts as none."""
         step, _ = decode(recording.a, recording.b, decoding)
         row = np.flatnonzero(step)
         return Steps(recording.time[row + 1], step[row], recording.duration, counts_per_rev)
@@ -79,12 +79,12 @@ class Estimate:
     velocity: FloatArray
 
     def at(self, t: ArrayLike) -> FloatArray:
-        """Speed in rad/s that holds at times `t` in seconds; 0 before the first."""
+        """Return speed in rad/s that holds at times `t` in seconds; 0 before the first."""
         return np.append(0.0, self.velocity)[np.searchsorted(self.time, t, side="right")]
 
 
 class Readings(NamedTuple):
-    """What a controller reads, once per control period.
+    """Holds the readings of a controller, one per control period.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Readings(NamedTuple):
 
 
 def read(steps: Steps, period_s: float) -> Readings:
-    """Readings at `period_s`, twice that, ..., up to the end.
+    """Return readings at `period_s`, twice that, ..., up to the end.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def read(steps: Steps, period_s: float) -> Readings:
 
 
 def clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
-    """What a clock of `clock_s` (s) shows at some times; a time within rounding of a clock edge is at the edge.
+    """Return what a clock of `clock_s` (s) shows at some times; a time within rounding of a clock edge is at the edge.
 
     Raises
     ------
@@ -139,13 +139,13 @@ def clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
 
 
 def _held(value: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
-    """Each value that is known, and in place of each other one the latest that is, or 0."""
+    """Return each value that is known, and in place of each other one the latest that is, or 0."""
     latest = np.maximum.accumulate(np.where(known, np.arange(1, len(value) + 1), 0))
     return np.append(0.0, value)[latest]
 
 
 def low_pass(value: ArrayLike, period_s: float, filter_s: float) -> FloatArray:
-    """First-order low-pass filter y = a y + (1 - a) x with a = filter_s / (filter_s + period_s), from y = 0."""
+    """Return first-order low-pass filter y = a y + (1 - a) x with a = filter_s / (filter_s + period_s), from y = 0."""
     if filter_s < 0:
         raise ValueError(f"time constant of the filter must be at least 0 s, not {filter_s} s")
     a = filter_s / (filter_s + period_s)
@@ -154,7 +154,7 @@ def low_pass(value: ArrayLike, period_s: float, filter_s: float) -> FloatArray:
 
 
 def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> Estimate:
-    """Counts of each period over the period, then a low-pass filter.
+    """Return counts of each period over the period, then a low-pass filter.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> 
 
 
 def timestamp_method(steps: Steps, period_s: float, timeout_s: float = 0.5, clock_s: float = 0.5e-6) -> Estimate:
-    """LinuxCNC's hostmot2: counts over the time between the latest counts, as two readings find them.
+    """Return LinuxCNC's hostmot2: counts over the time between the latest counts, as two readings find them.
 
     Without a new count the speed is bounded by one count since the latest, and is 0 from `timeout_s` on. After that,
     and at the start, the first reading with a new count gives only a time to measure from. One count back, after a
@@ -211,7 +211,7 @@ def timestamp_method(steps: Steps, period_s: float, timeout_s: float = 0.5, cloc
 
 
 def mixed_method(steps: Steps, period_s: float, timeout_s: float = 0.1, clock_s: float = 1e-6) -> Estimate:
-    """SimpleFOC's encoder: dN / (Ts + Th of the reading before - Th), held while there is no new count.
+    """Return SimpleFOC's encoder: dN / (Ts + Th of the reading before - Th), held while there is no new count.
 
     dN are the counts of the period Ts, Th is the age of the latest count at a reading. A measurement over less than
     half a period is left out, and the speed is 0 once Th is more than `timeout_s`. SimpleFOC controls with what
@@ -240,7 +240,7 @@ def mixed_method(steps: Steps, period_s: float, timeout_s: float = 0.1, clock_s:
 def tracking_loop(
     steps: Steps, period_s: float, bandwidth_rad_s: float = 1000.0, whole_counts: bool = True
 ) -> Estimate:
-    """A critically damped second-order loop that follows the count: kp = 2 bandwidth, ki = kp^2 / 4.
+    """Return a critically damped second-order loop that follows the count: kp = 2 bandwidth, ki = kp^2 / 4.
 
     At constant acceleration it shows the speed of 2 / bandwidth - period / 2 ago. moteus also limits the speed to an
     eighth of a revolution per period, which is left out.

@@ -24,7 +24,7 @@ _MUCH, _LITTLE = 0.25, 0.01
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """What a method shows.
+    """Holds the velocities that a method shows.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ class Score:
 
 
 def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
-    """What a core shows, by its golden model, which the hardware equals bit for bit."""
+    """Return what a core shows, by its golden model, which the hardware equals bit for bit."""
     return run_curve(name, spec, golden.run(spec, trace))
 
 
 def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
-    """What a core shows in a run."""
+    """Return what a core shows in a run."""
     updates = run.updates
     clock_hz = spec.timing.clock_hz
     velocity = updates.velocity.astype(np.float64) * spec.rad_per_s_per_lsb
@@ -87,7 +87,9 @@ def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
 
 
 def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float, earliest: float = 0.0) -> FloatArray:
-    """Evenly spaced instants, a tick apart or more, from when every curve has begun, and `earliest` (s), to the end."""
+    """Return evenly spaced instants, a tick apart or more, from when every curve has begun, and `earliest` (s), to the
+    end.
+    """
     begun = max((curve.estimate.time[0] for curve in curves if len(curve.estimate.time)), default=0.0)
     begun = max(begun, earliest)
     n = min(int((duration - begun) / tick_seconds), _MOST_INSTANTS)
@@ -95,13 +97,13 @@ def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: floa
 
 
 def rms_error(curve: Curve, instants: FloatArray, truth: FloatArray) -> float:
-    """RMS error of the held velocity, rad/s, at some instants (s), where the true speed is known."""
+    """Return RMS error of the held velocity, rad/s, at some instants (s), where the true speed is known."""
     error = curve.estimate.at(instants) - truth
     return float(np.sqrt(np.mean(error * error)))
 
 
 def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueSpeed | None) -> Score:
-    """How good a curve is at some evenly spaced instants (s)."""
+    """Tell how good a curve is at some evenly spaced instants (s)."""
     times = curve.measurement_time
     rms = worst = delay = None
     if true_speed is not None and len(instants):
@@ -127,7 +129,7 @@ def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueS
 
 
 def _says_something(error: FloatArray, left: FloatArray, delay: float) -> bool:
-    """Whether a delay is more than noise or an offset, which look like one while the speed rises.
+    """Tell whether a delay is more than noise or an offset, which look like one while the speed rises.
 
     It is if a quarter of the mean square error goes with it; or less, but more than twice what goes with an offset.
     """

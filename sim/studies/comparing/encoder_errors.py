@@ -37,7 +37,7 @@ class Counts:
 
     @staticmethod
     def of(encoding: Encoding) -> "Counts":
-        """Of a recording that begins at time 0 with the lines as they are."""
+        """Return of a recording that begins at time 0 with the lines as they are."""
         counts_per_rev = 4 * encoding.encoder.pulses_per_rev
         steps = Steps.of_recording(encoding.recording, counts_per_rev)
         disc = encoding.encoder.disc
@@ -47,7 +47,7 @@ class Counts:
         return Counts(steps, position + (steps.step < 0))
 
     def coordinate(self, offsets: FloatArray) -> FloatArray:
-        """Where the edge of each count lies, in counts, with an offset for each class."""
+        """Tell where the edge of each count lies, in counts, with an offset for each class."""
         return self.edge + offsets[self.edge % len(offsets)]
 
 
@@ -73,20 +73,20 @@ class Learned:
         return last
 
     def coordinate(self, counts: Counts) -> FloatArray:
-        """Where the edge of each count lies, by what was known when it came."""
+        """Tell where the edge of each count lies, by what was known when it came."""
         row = np.arange(len(counts.edge)) // self.every
         return np.asarray(counts.edge + self.history[row, counts.edge % self.history.shape[1]])
 
 
 def perfect_offsets(encoding: Encoding, classes: int) -> FloatArray:
-    """Mean displacement of the edges of each class, in counts, less the mean of all."""
+    """Return mean displacement of the edges of each class, in counts, less the mean of all."""
     of_disc = encoding.encoder.disc.offset
     found = np.resize(of_disc, math.lcm(len(of_disc), classes)).reshape(-1, classes).mean(axis=0)
     return np.asarray(found - found.mean())
 
 
 def learn(counts: Counts, classes: int = CYCLE, least_rate: float = 1 / 128, slowest_s: float = math.inf) -> Learned:
-    """Offsets from a running average of each gap's share of a round.
+    """Return offsets from a running average of each gap's share of a round.
 
     A *round* is as many counts in one direction as there are classes. At each count that completes one, the share of
     the gap before the count, its time over that of the round, is averaged: with 1/n in the n-th time, and never with
@@ -149,7 +149,7 @@ def by_counts(
 
 
 def by_tracking(counts: Counts, coordinate: FloatArray, tuning: Tuning) -> Estimate:
-    """The tracking recursion of docs/concepts/track.md, with coordinates for counts."""
+    """Return the tracking recursion of docs/concepts/track.md, with coordinates for counts."""
     steps, offset, state = counts.steps, coordinate - counts.edge, Recursion(tuning)
     ends = np.asarray(tuning.tick_seconds * np.arange(1, int(steps.duration / tuning.tick_seconds) + 1))
     until = np.searchsorted(steps.time, ends, side="right").tolist()
@@ -163,7 +163,7 @@ def by_tracking(counts: Counts, coordinate: FloatArray, tuning: Tuning) -> Estim
 
 
 def shifted(counts: Counts, forward: Sequence[float], backward: Sequence[float]) -> Counts:
-    """The same counts with edges that lie elsewhere, by so many counts for each class and direction of passage.
+    """Return the same counts with edges that lie elsewhere, by so many counts for each class and direction of passage.
 
     With hysteresis an edge comes later in either direction: forward > 0 and backward < 0. To first order, and by less
     than half of the gap to a neighbour.
@@ -181,6 +181,6 @@ def shifted(counts: Counts, forward: Sequence[float], backward: Sequence[float])
 
 
 def rms(estimate: Estimate, truth: FloatArray, instants: FloatArray) -> float:
-    """RMS error of the held velocity at some instants (s), rad/s."""
+    """Return RMS error of the held velocity at some instants (s), rad/s."""
     error: NDArray[np.float64] = estimate.at(instants) - truth
     return float(np.sqrt(np.mean(error * error)))

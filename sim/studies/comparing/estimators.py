@@ -1,4 +1,4 @@
-"""What textbooks do with the same edges: float models of three estimators, each from its paper.
+"""Three estimators of textbooks are modelled in floats, each from its paper.
 
 A polynomial through the latest edges by least squares, a window as long as a straight line allows, and a Kalman filter
 in its steady state. They read the encoder as those of `baselines` do, at period, 2 periods, ..., and are at rest at
@@ -31,7 +31,7 @@ def least_squares(
     timeout_s: float = 0.1,
     clock_s: float = 1e-7,
 ) -> Estimate:
-    """A polynomial of time through the latest edges by least squares; its slope at the reading is the speed.
+    """Return a polynomial of time through the latest edges by least squares; its slope at the reading is the speed.
 
     Brown, Schneider, Mulligan: Analysis of algorithms for velocity estimation from discrete position versus time data,
     IEEE Trans. Industrial Electronics 39(1), 1992; Merry, van de Molengraft, Steinbuch: Velocity and acceleration
@@ -98,7 +98,8 @@ def least_squares(
 def _fit(
     stamp: FloatArray, position: FloatArray, last: IntArray, n_used: IntArray, degree: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Polynomials through the edges up to each of `last`, and the unit of time (s) of each, which is what they span.
+    """Return polynomials through the edges up to each of `last`, and the unit of time (s) of each, which is what they
+    span.
 
     Time 0 is the latest edge, and the coefficient of the k-th power is in column k.
     """
@@ -126,7 +127,7 @@ def _fit(
 def adaptive_window(
     steps: Steps, period_s: float, noise_bound: float = 1.0, longest: int = 100, best_fit: bool = True
 ) -> Estimate:
-    """First-order adaptive windowing (FOAW): the slope over the longest window in which a straight line holds.
+    """Return first-order adaptive windowing (FOAW): the slope over the longest window in which a straight line holds.
 
     Janabi-Sharifi, Hayward, Chen: Discrete-time adaptive windowing for velocity estimation, IEEE Trans. Control Systems
     Technology 8(6), 2000. The window grows back from the latest reading, one period at a time, while a line through
@@ -179,7 +180,7 @@ def adaptive_window(
 
 
 def kalman_gains(index: float, order: int) -> tuple[float, float, float]:
-    """Gains of position, speed and acceleration of the Kalman filter in its steady state, per period.
+    """Return gains of position, speed and acceleration of the Kalman filter in its steady state, per period.
 
     They are those of the alpha-beta and the alpha-beta-gamma filter: Kalata, The tracking index, IEEE Trans. Aerospace
     and Electronic Systems 20(2), 1984; the equation of order 3 is that of Gray and Murray, same journal 29(3), 1993,
@@ -212,7 +213,8 @@ def kalman_gains(index: float, order: int) -> tuple[float, float, float]:
 
 
 def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: int = 2) -> Estimate:
-    """A Kalman filter in its steady state; what is measured is the count, with the noise of counting, 1/sqrt(12).
+    """Return a Kalman filter in its steady state; what is measured is the count, with the noise of counting,
+    1/sqrt(12).
 
     The acceleration is constant within each period. With order 2 it is random in each; its standard deviation a gives a
     bandwidth of about sqrt(a sqrt(12) / count in rad), rad/s. With order 3 it changes at random from each to the next,

@@ -200,7 +200,7 @@ BASELINES: dict[str, Baseline] = {
 
 
 def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
-    """What a baseline with options is in words, and its model.
+    """Return what a baseline with options is in words, and its model.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
 
 
 def baseline_curve(name: str, recording: Recording, counts_per_rev: int, decoding: int) -> Curve:
-    """What a baseline shows, with an ideal decoder.
+    """Return what a baseline shows, with an ideal decoder.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def baseline_curve(name: str, recording: Recording, counts_per_rev: int, decodin
 
 
 def steps_curve(name: str, steps: Steps) -> Curve:
-    """What a baseline shows of steps; errors as of `baseline_curve`."""
+    """Return what a baseline shows of steps; errors as of `baseline_curve`."""
     what, model = baseline_model(name)
     estimate = model(steps)
     if len(estimate.time) < 2:
@@ -248,7 +248,7 @@ def steps_curve(name: str, steps: Steps) -> Curve:
 
 
 def settings(method: str) -> list[str]:
-    """Names of a baseline with all settings that are tried for the best, its usual one first."""
+    """Return names of a baseline with all settings that are tried for the best, its usual one first."""
     found = [method]
     for swept in BASELINES[method].swept:
         for values in product(*(texts.split() for texts in swept.values())):

@@ -21,7 +21,7 @@ _NUMBERS = {"jitter": "jitter", "nonuniformity": "nonuniformity", "phase-error":
 
 @dataclass(frozen=True)
 class Situation:
-    """What a table of all situations has a row for.
+    """Describes a row of the table of all situations.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Situation:
         return f'--motion "{self.motion}" --from {self.start}{faults}'
 
     def record(self, seed: int) -> Encoding:
-        """What the encoder records, with a seed for all that is random."""
+        """Return what the encoder records, with a seed for all that is random."""
         numbers = {_NUMBERS[name]: float(text) for name, text in self.faults.items() if name in _NUMBERS}
         vibration = self.faults.get("vibration")
         encoder = VirtualEncoder(

@@ -23,7 +23,7 @@ SETTLED_S = 0.1
 
 @dataclass(frozen=True)
 class Cost:
-    """What a setting costs.
+    """Holds the cost of a setting.
 
     Parameters
     ----------
@@ -42,7 +42,9 @@ class Cost:
 
 
 def core_settings(method: str) -> list[tuple[str, dict[str, str]]]:
-    """Names of a core's method with all settings that are tried, and their options; as it is if there are none."""
+    """Return names of a core's method with all settings that are tried, and their options; as it is if there are
+    none.
+    """
     if method not in CORES:
         return [(method, {})]
     option, values = CORES[method]
@@ -50,7 +52,7 @@ def core_settings(method: str) -> list[tuple[str, dict[str, str]]]:
 
 
 def possible(curves: Iterable[Callable[[], Curve]]) -> Iterable[Curve]:
-    """Curves of all settings that can be.
+    """Return curves of all settings that can be.
 
     A setting can be wrong for a core or an encoder, or have periods that are too long for the motion.
 
@@ -73,7 +75,7 @@ def possible(curves: Iterable[Callable[[], Curve]]) -> Iterable[Curve]:
 
 
 def best(curves: Iterable[Curve], instants: FloatArray, true_speed: TrueSpeed) -> Curve:
-    """The curve with the least RMS error at some instants (s), those before its first value left out.
+    """Return the curve with the least RMS error at some instants (s), those before its first value left out.
 
     Raises
     ------
@@ -92,13 +94,14 @@ def best(curves: Iterable[Curve], instants: FloatArray, true_speed: TrueSpeed) -
 
 
 def error_of(curve: Curve, instants: FloatArray, truth: FloatArray) -> float | None:
-    """RMS error from the first value on; None if there is none by then."""
+    """Return RMS error from the first value on; None if there is none by then."""
     begun = int(np.searchsorted(instants, curve.estimate.time[0])) if len(curve.estimate.time) else len(instants)
     return rms_error(curve, instants[begun:], truth[begun:]) if begun < len(instants) else None
 
 
 def triangle(speed_rad_s: float) -> str:
-    """The motion that tells delays: the speed goes to and fro between half of it and all of it, 10 times a second.
+    """Return the motion that tells delays: the speed goes to and fro between half of it and all of it, 10 times a
+    second.
 
     It begins with `SETTLED_S` at half of the speed.
     """
@@ -108,7 +111,7 @@ def triangle(speed_rad_s: float) -> str:
 
 
 def equivalent_delay(curve: Curve, instants: FloatArray, true_speed: TrueSpeed) -> float:
-    """The delay in seconds with which an otherwise perfect method would have the curve's RMS error.
+    """Return the delay in seconds with which an otherwise perfect method would have the curve's RMS error.
 
     That is the RMS error over the RMS acceleration. On a ramp it is the lag; and it is defined as well for methods that
     follow ramps without a lag, which pay where the acceleration changes.
@@ -129,7 +132,7 @@ Judged = tuple[FloatArray, TrueSpeed]  # instants in seconds, and the true speed
 
 
 def cost(method: str, still: Curve, moving: Curve, judged: Judged, judged_moving: Judged) -> Cost | None:
-    """What a setting costs: its error in one motion, its delay in another; None if it has no value by then."""
+    """Return what a setting costs: its error in one motion, its delay in another; None if it has no value by then."""
     instants, true_speed = judged
     rms = error_of(still, instants, true_speed(instants))
     if rms is None or not len(moving.estimate.time):
@@ -138,7 +141,7 @@ def cost(method: str, still: Curve, moving: Curve, judged: Judged, judged_moving
 
 
 def front(costs: Iterable[Cost]) -> list[Cost]:
-    """The settings with which no other has both less error and less delay, by their delays."""
+    """Return the settings with which no other has both less error and less delay, by their delays."""
     kept: list[Cost] = []
     for cost in sorted(costs, key=lambda cost: (cost.delay, cost.rms)):
         if not kept or cost.rms < kept[-1].rms:

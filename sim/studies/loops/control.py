@@ -58,7 +58,7 @@ class Load:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What the shaft is to do, and what disturbs it.
+    """Describes how the shaft is to move, and what disturbs it.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Task:
     noise: float = 0.0
 
     def course(self, motor: Motor, seed: int) -> Course:
-        """The tables of a run."""
+        """Return the tables of a run."""
         time = np.arange(max(math.ceil(self.motion.duration / _PERIOD - 1e-9), 1) + 1) * _PERIOD
         time = np.minimum(time, self.motion.duration)
         load = self.noise * np.random.default_rng([seed, 1]).standard_normal(len(time))
@@ -95,7 +95,7 @@ class Task:
 
 
 def edges_of(encoder: VirtualEncoder) -> Edges:
-    """The disc of a virtual encoder, and its jitter as a displacement of each passage."""
+    """Return the disc of a virtual encoder, and its jitter as a displacement of each passage."""
     jitter = encoder.jitter * np.random.default_rng([encoder.seed, 2]).standard_normal(_PASSAGES)
     return Edges(np.asarray(encoder.disc.offset), jitter)
 
@@ -155,19 +155,19 @@ class Setting:
         return simulation_of(self.gates or self.spec)
 
     def run(self, simulation: Simulation, seed: int, log: float = LOG_SECONDS) -> Log:
-        """The log of a run with a seed, which every random number depends on."""
+        """Return the log of a run with a seed, which every random number depends on."""
         if isinstance(simulation, GateLoop):
             return self.through(simulation, seed, log)[0]
         edges = edges_of(replace(self.encoder, seed=seed))
         return simulation.run(self.motor, edges, self.gains, self.task.course(self.motor, seed), log=log)
 
     def through(self, simulation: GateLoop, seed: int, log: float = LOG_SECONDS) -> tuple[Log, Through]:
-        """The same of a controller in gates, and what went through it."""
+        """Return the same of a controller in gates, and what went through it."""
         edges, course = edges_of(replace(self.encoder, seed=seed)), self.task.course(self.motor, seed)
         return simulation.run(self.motor, edges, course, feed_forward=self.gains.feed_forward, log=log)
 
     def outcome(self, log: Log) -> Outcome:
-        """What came of a run."""
+        """Return what came of a run."""
         until = self.task.motion.duration if self.task.load is None else self.task.load.begin
         late = (log["time"] >= self.begin) & (log["time"] < until)
         error = (log["speed"] - log["command"])[late]
@@ -182,7 +182,7 @@ class Setting:
 
 
 def sound(current: FloatArray, seconds: float) -> float:
-    """The RMS of a current, sampled every so many seconds, above 50 Hz."""
+    """Return the RMS of a current, sampled every so many seconds, above 50 Hz."""
     spectrum = np.abs(np.fft.rfft(current - current.mean()))
     loud = np.fft.rfftfreq(len(current), seconds) > _SOUND_HZ
     return float(np.sqrt(2 * np.sum(spectrum[loud] ** 2)) / len(current))
@@ -196,7 +196,9 @@ def _dip(log: Log, load: Load) -> float:
 
 
 def as_shown(log: Log, rad_per_count: float, rate: float = 30.0, period: float = 1e-3) -> FloatArray:
-    """The speed by the M method every `period` through a low-pass filter of `rate` rad/s, as in Figs. 13 and 14."""
+    """Return the speed by the M method every `period` through a low-pass filter of `rate` rad/s, as in Figs. 13 and
+    14.
+    """
     every = round(period / (log["time"][1] - log["time"][0]))
     measured = np.diff(log["position"][::every], prepend=0.0) * rad_per_count / period
     kept, found, state = math.exp(-rate * period), [], 0.0
@@ -207,7 +209,7 @@ def as_shown(log: Log, rad_per_count: float, rate: float = 30.0, period: float =
 
 
 def mean(outcomes: Sequence[Outcome]) -> Outcome:
-    """The mean of outcomes, but the largest deviation of all."""
+    """Return the mean of outcomes, but the largest deviation of all."""
     dips = [one.dip for one in outcomes if one.dip is not None]
     return Outcome(
         rms=float(np.mean([one.rms for one in outcomes])),
@@ -220,12 +222,12 @@ def mean(outcomes: Sequence[Outcome]) -> Outcome:
 
 @functools.lru_cache(maxsize=32)
 def simulation_of(spec: TachometerSpec | LoopSpec) -> Any:
-    """The compiled simulation of a core: a `GateLoop` if it has its loop in gates, else a `LoopSimulation`."""
+    """Return the compiled simulation of a core: a `GateLoop` if it has its loop in gates, else a `LoopSimulation`."""
     return GateLoop(spec) if isinstance(spec, LoopSpec) else LoopSimulation(spec)
 
 
 def in_gates(setting: Setting) -> Setting:
-    """The same loop with its controller in gates; products are formed bit by bit where that is fast enough.
+    """Return the same loop with its controller in gates; products are formed bit by bit where that is fast enough.
 
     Raises
     ------
@@ -266,7 +268,7 @@ def in_gates(setting: Setting) -> Setting:
 
 
 def each_seed(setting: Setting, seeds: Sequence[int], jobs: int | None = None) -> Iterator[Log]:
-    """Logs of a setting in the order of the seeds, run in so many threads, by default one for each core."""
+    """Yield logs of a setting in the order of the seeds, run in so many threads, by default one for each core."""
     simulation = setting.simulation
     with ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
         try:
@@ -279,5 +281,5 @@ def each_seed(setting: Setting, seeds: Sequence[int], jobs: int | None = None) -
 
 
 def outcome_of(setting: Setting, seeds: Sequence[int], jobs: int | None = None) -> Outcome:
-    """The mean outcome of a setting."""
+    """Return the mean outcome of a setting."""
     return mean([setting.outcome(log) for log in each_seed(setting, seeds, jobs)])

@@ -73,7 +73,7 @@ def _code() -> str:
 
 
 def run_packed(code: str, packed: bytes) -> Row:
-    """The row of a pickled point, on any machine with the same code: the figures of `FIGURES`, and `point`.
+    """Return the row of a pickled point, on any machine with the same code: the figures of `FIGURES`, and `point`.
 
     Raises
     ------
@@ -91,12 +91,12 @@ def run_packed(code: str, packed: bytes) -> Row:
 
 
 def row_of(outcome: Outcome) -> dict[str, Any]:
-    """The columns of an outcome."""
+    """Return the columns of an outcome."""
     return {column: getattr(outcome, name) for name, (column, _) in FIGURES.items()}
 
 
 def seeds_from(first: int, count: int) -> tuple[int, ...]:
-    """So many seeds, one after the other.
+    """Return so many seeds, one after the other.
 
     Raises
     ------

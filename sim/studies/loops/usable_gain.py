@@ -75,7 +75,9 @@ TICKS = {
 
 
 def core(kind: Kind, seconds: float, decoding: int = 4) -> TachometerSpec:
-    """The core of a kind at a control tick: at one clock per tick with bits that keep the LSB below 2^-6 rad/s."""
+    """Return the core of a kind at a control tick: at one clock per tick with bits that keep the LSB below 2^-6
+    rad/s.
+    """
     clock, tick = TICKS[seconds]
     if seconds < kind.shortest:
         clock, tick = TICKS[20e-6]
@@ -86,7 +88,7 @@ def core(kind: Kind, seconds: float, decoding: int = 4) -> TachometerSpec:
 
 
 def gains_of(kind: Kind, kv: float, seconds: float) -> Gains:
-    """Gains as in the paper's Fig. 15: k_p = (k_v/2)², G = 2·k_v."""
+    """Return gains as in the paper's Fig. 15: k_p = (k_v/2)², G = 2·k_v."""
     filter_rate = 2 * kv if kind.filtered else float("inf")
     return Gains(
         position=(kv / 2) ** 2, velocity=kv, observer=2 * kv, filter=filter_rate, seconds=seconds, way=kind.way
@@ -94,20 +96,22 @@ def gains_of(kind: Kind, kv: float, seconds: float) -> Gains:
 
 
 def setting(kind: Kind, kv: float, seconds: float, encoder: VirtualEncoder, decoding: int = 4) -> Setting:
-    """The loop with a gain: 39 rad/s, and 0.2 Nm for 0.2 s."""
+    """Return the loop with a gain: 39 rad/s, and 0.2 Nm for 0.2 s."""
     spec, gains = core(kind, seconds, decoding), gains_of(kind, kv, seconds)
     return Setting(spec=spec, gains=gains, task=TASK, motor=MOTOR, encoder=encoder, begin=0.5)
 
 
 def is_usable(outcome: Outcome) -> bool:
-    """Whether nothing is heard, and the loop does not swing: the current stays below its limit, the speed close."""
+    """Tell whether nothing is heard, and the loop does not swing: the current stays below its
+    limit, the speed close.
+    """
     return outcome.sound <= SOUND and outcome.limited == 0 and outcome.largest <= DEVIATION
 
 
 def usable(
     at: Callable[[float], Setting], seeds: Sequence[int], jobs: int | None = None
 ) -> tuple[float, Outcome] | None:
-    """The greatest of `GAINS` that is usable, and its outcome; None if the least is not.
+    """Return the greatest of `GAINS` that is usable, and its outcome; None if the least is not.
 
     It is found by bisection with the first two seeds. From there on gains go down until one is usable with all seeds.
     """
@@ -126,7 +130,7 @@ def usable(
 
 
 def variants(base: Setting) -> Iterator[tuple[str, Setting]]:
-    """What a loop depends on that the paper does not say, one thing changed at a time."""
+    """Yield what a loop depends on that the paper does not say, one thing changed at a time."""
     gains, motor = base.gains, base.motor
     yield "as assumed", base
     yield "k_v on the velocity before the filter", replace(base, gains=replace(gains, on_filtered=False))

@@ -34,7 +34,7 @@ _LOCAL: dict[str, Any] = {
 
 
 def require() -> None:
-    """See that the extra is there: distributed, pyarrow and cryptography."""
+    """Check that the extra is there: distributed, pyarrow and cryptography."""
     for name in ("distributed", "pyarrow", "cryptography"):
         try:
             __import__(name)
@@ -46,7 +46,7 @@ def require() -> None:
 
 @contextmanager
 def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
-    """A client of a scheduler, or, without an address, of so many processes here, by default one for each core.
+    """Yield a client of a scheduler, or, without an address, of so many processes here, by default one for each core.
 
     Whoever may talk to a Dask scheduler or worker may run Python there. The processes here talk to nobody else: by TLS,
     with certificates that are made for them and only live in their memory.
@@ -89,7 +89,7 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
 
 
 async def _greet(scheduler: str) -> None:
-    """See that a scheduler answers: a client has no patience's end where one accepts and says nothing."""
+    """Check that a scheduler answers: a client has no patience's end where one accepts and says nothing."""
     from distributed import Security
     from distributed.comm import connect
 
@@ -103,7 +103,7 @@ async def _greet(scheduler: str) -> None:
 
 @contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
-    """What is started in the meantime takes no notice of Ctrl-C: this process ends it in order."""
+    """Yield what is started in the meantime takes no notice of Ctrl-C: this process ends it in order."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -115,7 +115,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
 
 
 def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweeping.sweep") -> Iterator[Row]:
-    """Rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
+    """Yield rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
 
     They are run by the function `run_packed` of a module of sim.studies, `study`.
 

@@ -150,7 +150,7 @@ class Results:
         self._n_kept = len(table)
 
     def _begin_journal(self) -> None:
-        """An empty journal; the old one's rows are in the file."""
+        """Begin an empty journal; the old one's rows are in the file."""
         assert self._path is not None
         self._close_journal()
         path = self._path.with_name(f".{self._path.name}.new")
@@ -185,7 +185,7 @@ class Results:
                 self._lock.release()
 
     def columns(self, *names: str) -> dict[str, list[Any]]:
-        """Columns of this sweep's points that have a row, in order."""
+        """Return columns of this sweep's points that have a row, in order."""
         self.save()
         row = {point: k for k, point in enumerate(self._table["point"].to_pylist())}
         found = self._table.take([row[point] for point in self._points if point in row])
@@ -198,7 +198,7 @@ def _schema(values: Iterable[str]) -> pa.Schema:
 
 
 def _made_by() -> str:
-    """What rows here are made by: the code of all of them, and that of those with an engine."""
+    """Return what rows here are made by: the code of all of them, and that of those with an engine."""
     return f"{code_digest()} {code_digest(hardware=True)}"
 
 
@@ -215,7 +215,9 @@ def _read(path: Path) -> pa.Table:
 
 
 def _read_journal(path: Path) -> list[Row]:
-    """Rows of a journal after its first line, the code; the last line may not be whole, even if it is the first."""
+    """Return rows of a journal after its first line, the code; the last line may not be whole, even if it is the
+    first.
+    """
     whole = path.read_text(encoding="ascii").split("\n")[:-1]
     rows: list[Row] = [json.loads(line) for line in whole[1:]]
     if rows:

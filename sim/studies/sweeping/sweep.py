@@ -212,7 +212,7 @@ def _sources(place: Path) -> list[Path]:
 
 
 def run_packed(code: str, packed: bytes) -> Row:
-    """`run_point` of a pickled point, on any machine with the same code.
+    """Return `run_point` of a pickled point, on any machine with the same code.
 
     Raises
     ------
@@ -277,7 +277,7 @@ def run_point(point: Point) -> Row:
 
 
 def _core(spec: TachometerSpec) -> Row:
-    """Columns of the configuration."""
+    """Return columns of the configuration."""
 
     def seconds(clocks: int | None) -> float | None:
         return None if clocks is None else float(spec.seconds(clocks))
@@ -313,7 +313,7 @@ def _core(spec: TachometerSpec) -> Row:
 
 
 def _encoder(encoder: VirtualEncoder) -> Row:
-    """Columns of the encoder and what is wrong with it."""
+    """Return columns of the encoder and what is wrong with it."""
     vibration, bounce = encoder.vibration, encoder.bounce
     return {
         "vibration_rad": None if vibration is None else vibration.amplitude_rad,

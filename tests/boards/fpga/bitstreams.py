@@ -77,7 +77,7 @@ EDGE, REST = 43, 300  # clocks between two edges, and those in which the FPGA co
 
 
 def stimulus(request: bytes, begin: int, end: int) -> list[tuple[int, int, int]]:
-    """A shaft that turns forward, and a request to the core."""
+    """Return a shaft that turns forward, and a request to the core."""
     bit_cycles = 12
     bits = "".join(f"0{f'{byte:08b}'[::-1]}1" for byte in request)
     line = "1" * begin + "".join(bit * bit_cycles for bit in bits)

@@ -24,7 +24,7 @@ def register(data: int, out: int, **other: str) -> dict[str, Any]:
 
 
 def netlist() -> dict[str, Any]:
-    """A block RAM of which three bits are read, their registers, and a gate behind these."""
+    """Return a block RAM of which three bits are read, their registers, and a gate behind these."""
     ways = {"REGMODE_A": "NOREG", "REGMODE_B": "NOREG"}
     memory = cell(
         "DP16KD",

@@ -20,7 +20,7 @@ def report(achieved: float, constraint: float = 27.0, **others: float) -> dict[s
 
 
 def refused(check: Callable[..., object], *args: object) -> str:
-    """Why something is refused; empty if it is not."""
+    """Tell why something is refused; empty if it is not."""
     try:
         check(*args)
     except ValueError as error:

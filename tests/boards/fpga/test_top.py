@@ -89,7 +89,7 @@ class Loop(wiring.Component):  # type: ignore[misc]
 
 
 def captures(levels: str) -> str:
-    """What a capture pin says of levels, clock by clock."""
+    """Return what a capture pin says of levels, clock by clock."""
     pin, found = CapturePin(), []
 
     async def bench(ctx: Any) -> None:

@@ -128,7 +128,7 @@ def test_a_snapshot_cannot_be_changed() -> None:
 
 
 def memory(described: dict[str, Any]) -> tuple[dict[int, int], Callable[[int, int], None]]:
-    """A board that shows what its registers are after reset."""
+    """Return a board that shows what its registers are after reset."""
     words: dict[int, int] = {}
     for register in described["registers"]["map"]:
         words[register["offset"]] = sum(field["reset"] << field["low"] for field in register["fields"])

@@ -18,7 +18,7 @@ ROWS = 10_000  # more than a group
 
 
 def frame_of(registers: DemoMap, time: float, **values: int) -> Frame:
-    """A frame in which ports show these values, and others 0."""
+    """Return a frame in which ports show these values, and others 0."""
     host = HostRegisters(manifest_of(registers))
     words = []
     for register in registers:

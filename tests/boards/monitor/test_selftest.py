@@ -33,7 +33,7 @@ class Line:
 
 @cache
 def seen() -> dict[str, tuple[Any, ...]]:
-    """What each step is given to compare, by the names of the steps."""
+    """Return what each step is given to compare, by the names of the steps."""
     found: dict[str, tuple[Any, ...]] = {}
     right = selftest._compared
 

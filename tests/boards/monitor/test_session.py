@@ -70,7 +70,7 @@ def session_of(cable: Cable, told: list[str] | None = None, **more: Any) -> sess
 
 
 def until(watched: session.Session, fine: Callable[[list[Frame]], bool]) -> list[Frame]:
-    """Frames up to what is waited for; a board that never does it fails the test."""
+    """Return frames up to what is waited for; a board that never does it fails the test."""
     found: list[Frame] = []
     end = time.monotonic() + 60
     while time.monotonic() < end:

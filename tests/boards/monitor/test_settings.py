@@ -1,4 +1,4 @@
-"""Settings of the emulator as people write them."""
+"""Reads settings of the emulator as people write them."""
 
 import pytest
 

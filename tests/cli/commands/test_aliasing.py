@@ -14,7 +14,7 @@ SLOW = "--ppr 500 --clock 20kHz --tick 1ms --engine pysim".split()
 
 
 def last_lines(text: str) -> str:
-    """What stands below the table, in one line."""
+    """Return what stands below the table, in one line."""
     return " ".join(text[text.index("WARNING") :].split())
 
 

@@ -42,7 +42,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def refused(capsys: pytest.CaptureFixture[str], folder: Path, *words: object) -> str:
-    """What is said of a command that is refused; it leaves nothing."""
+    """Return what is said of a command that is refused; it leaves nothing."""
     assert run(*words) == 2
     out, err = capsys.readouterr()
     assert out == ""

@@ -44,7 +44,7 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 @pytest.fixture(scope="module")
 def cluster_here() -> Iterator[LocalCluster]:
-    """A scheduler with a worker, in threads of this process."""
+    """Yield a scheduler with a worker, in threads of this process."""
     with LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
     ) as local:

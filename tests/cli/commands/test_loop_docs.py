@@ -28,13 +28,13 @@ COMMANDS = [
 
 
 def figures(found: Outcome) -> list[float]:
-    """What a row says of an outcome."""
+    """Return what a row says of an outcome."""
     assert found.dip is not None
     return [float(f"{value:.3g}") for value in (found.rms, found.largest, found.dip, found.sound)]
 
 
 def cells(*begin: str) -> list[str]:
-    """The other cells of the only row that begins so."""
+    """Return the other cells of the only row that begins so."""
     (line,) = [line for line in MEASURED.splitlines() if line.startswith(f"| {' | '.join(begin)} | ")]
     return line.strip("| ").split(" | ")[len(begin) :]
 

@@ -36,14 +36,14 @@ LINE = re.compile(r"\d+\.\d{3} s, speed -?[\d.e+-]+ rad/s, position -?\d+ counts
 
 @pytest.fixture
 def manifest(tmp_path: Path) -> Path:
-    """That of the board that tests tell what to do."""
+    """Return that of the board that tests tell what to do."""
     path = tmp_path / "demo.json"
     path.write_text(json.dumps(manifest_of(demo_map())), encoding="utf-8")
     return path
 
 
 def error(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """What a wrong command line says in its last line."""
+    """Return what a wrong command line says in its last line."""
     assert run("monitor", *words) == 2
     told = capsys.readouterr().err.splitlines()[-1]
     assert told.startswith("tachometry: error: ")
@@ -100,7 +100,7 @@ def test_a_recording(suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[
 
 @contextmanager
 def started(*words: object) -> "Iterator[subprocess.Popen[str]]":
-    """The command in a process of its own, which does not outlive the test."""
+    """Yield the command in a process of its own, which does not outlive the test."""
     command = [sys.executable, "-m", "tachometry", "monitor", *map(str, words)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:

@@ -25,7 +25,7 @@ SPEC = STachometer(
 
 
 def tables(text: str) -> tuple[dict[str, str], list[str], list[list[str]]]:
-    """The rows of the configuration, the heads of the second table and its rows."""
+    """Return the rows of the configuration, the heads of the second table and its rows."""
     first, second, *_ = text.split("\n\n")
     rows = [re.split(r" {2,}", line.strip(), maxsplit=1) for line in first.splitlines()]
     heads, *lines = (re.split(r" {2,}", line.strip()) for line in second.splitlines())

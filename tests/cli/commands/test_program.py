@@ -26,7 +26,7 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeTools:
 
 
 def built(folder: str, board: str, name: str) -> Path:
-    """A bitstream and its manifest."""
+    """Return a bitstream and its manifest."""
     file = Path(folder, name)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text("bits")

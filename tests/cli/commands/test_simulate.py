@@ -41,7 +41,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def summary(text: str) -> dict[str, str]:
-    """Value of each row of the table."""
+    """Return value of each row of the table."""
     rows = (line.strip().split("  ", 1) for line in text.splitlines() if "  " in line.strip())
     return {name: value.strip() for name, value in rows}
 

@@ -32,7 +32,7 @@ def rows(path: Path) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[list[str]]:
-    """A scheduler with a worker, in threads of this process."""
+    """Yield a scheduler with a worker, in threads of this process."""
     with LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
     ) as local:

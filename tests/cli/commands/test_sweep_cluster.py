@@ -68,7 +68,7 @@ class Trace:
 
 
 def begun(result: Path, *options: str, trace: Trace | None = None) -> subprocess.Popen[str]:
-    """The command, in a process group of its own, as a shell has it."""
+    """Return the command, in a process group of its own, as a shell has it."""
     preload = {} if trace is None else {"DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{trace.script}"]'}
     return subprocess.Popen(
         [*COMMAND, *SWEEP, "--results", str(result), *options],
@@ -81,7 +81,7 @@ def begun(result: Path, *options: str, trace: Trace | None = None) -> subprocess
 
 
 def kept(result: Path) -> list[str]:
-    """Rows of the journal: the line of each that is whole."""
+    """Return rows of the journal: the line of each that is whole."""
     journal = result.with_name(f".{result.name}.new")
     return journal.read_text().split("\n")[1:-1] if journal.exists() else []
 

@@ -51,7 +51,7 @@ def run(folder: Path, simulator: str, *more: str) -> subprocess.CompletedProcess
 
 
 def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
-    """What the bench says, empty if it passes; tachometry is not there."""
+    """Return what the bench says, empty if it passes; tachometry is not there."""
     done = run(folder, simulator, *more)
     said = done.stdout + done.stderr
     assert done.returncode in (0, 1), said

@@ -23,7 +23,9 @@ from tachometry.spec import METHODS, MTachometer
 
 @pytest.fixture
 def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
-    """Only one or two configurations of every method, with the shortest ticks, whose motions are short; how many."""
+    """Return only one or two configurations of every method, with the shortest ticks, whose motions are short; how
+    many.
+    """
     number: int = getattr(request, "param", 2)
 
     def short(method: str) -> list[tuple[str, ...]]:

@@ -16,7 +16,7 @@ CLOCKS, SEEDS = 2500, range(6)
 
 
 def random_accesses(registers: RegisterMap, seed: int, n_clocks: int) -> tuple[list[Access], list[int]]:
-    """Accesses and captures, some of them in clocks one after the other, some rare."""
+    """Return accesses and captures, some of them in clocks one after the other, some rare."""
     rng = np.random.default_rng(seed)
     clocks = np.flatnonzero(rng.random(n_clocks - 1) < rng.choice([0.03, 0.3, 1]))
     words = (1 << registers.address_width - 2) - 1

@@ -86,7 +86,7 @@ class Planned:
 
 
 def wired(bus: str) -> str:
-    """The core on the bus, and what its lines are connected to."""
+    """Return the core on the bus, and what its lines are connected to."""
     ports = [port for port in BUSES[bus].ports(MAP) if port.name != CAPTURE.name]
 
     def declared(port: Port) -> str:
@@ -99,7 +99,7 @@ def wired(bus: str) -> str:
 
 
 def plan(seed: int, bus: str, number: int) -> list[Planned]:
-    """Random accesses: reads of all addresses, there or not, and writes, most of them refused."""
+    """Return random accesses: reads of all addresses, there or not, and writes, most of them refused."""
     rng = np.random.default_rng([seed, len(bus)])
     words = 1 << MAP.address_width - 2
     velocity, control, counters = (MAP[name].offset // 4 for name in ("VELOCITY", "CONTROL", "COUNTERS"))
@@ -122,7 +122,9 @@ def plan(seed: int, bus: str, number: int) -> list[Planned]:
 
 
 def motion(seed: int, n_clocks: int) -> tuple[PinTrace, list[int]]:
-    """Fast and slow, to and fro, with glitches, missing ticks and illegal transitions; and clocks of captures."""
+    """Return fast and slow, to and fro, with glitches, missing ticks and illegal transitions; and
+    clocks of captures.
+    """
     part = n_clocks / SPEC.timing.clock_hz / 4
     bounce = Bounce(3, 2e-6)
     encoder = VirtualEncoder(8, jitter=0.3, illegal=0.005, bounce=bounce, index=True, seed=seed)
@@ -142,7 +144,7 @@ def write_design(folder: Path) -> None:
 
 
 def play(folder: Path, simulator: str, seed: int, number: int, clocks_each: int) -> dict[str, str]:
-    """What is wrong on each bus after so many accesses, each with about so many clocks."""
+    """Return what is wrong on each bus after so many accesses, each with about so many clocks."""
     n_clocks = number * clocks_each
     trace, captures = motion(seed, n_clocks)
     plans = {bus: plan(seed, bus, number) for bus in NAMES}
@@ -184,7 +186,7 @@ def different(
     golden: GoldenBank,
     captures: list[int],
 ) -> str:
-    """The first answer that differs from that of the golden model; empty if there is none."""
+    """Return the first answer that differs from that of the golden model; empty if there is none."""
     done: list[tuple[Access, bool, int | None, bool]] = []
     for kind in (0, 1):
         of_kind = [one for one in planned if (one.data is not None) == bool(kind)]

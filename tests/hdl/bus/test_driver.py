@@ -73,7 +73,7 @@ int main(int count, char **words) {
 
 @cache
 def case() -> tuple[TachometerSpec, PinTrace]:
-    """A core with every option that adds a register, on a shaft that turns either way, with noise."""
+    """Return a core with every option that adds a register, on a shaft that turns either way, with noise."""
     spec, _, trace = random_case(16, "m")
     assert spec.index
     assert spec.bounds

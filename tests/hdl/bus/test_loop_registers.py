@@ -28,7 +28,7 @@ SPECS = {
 
 
 def random_accesses(registers: LoopMap, seed: int, n_clocks: int) -> tuple[list[Access], list[int]]:
-    """Writes to what can be written, and reads of all, some in clocks one after the other, and captures."""
+    """Return writes to what can be written, and reads of all, some in clocks one after the other, and captures."""
     rng = np.random.default_rng(seed)
     words = (1 << registers.address_width - 2) - 1
     named = {one.name: one.offset // 4 for one in registers}
@@ -67,7 +67,9 @@ Rows = list[dict[str, int]]
 
 
 def case(spec: LoopSpec, seed: int, n_clocks: int) -> tuple[LoopMap, PinTrace, list[Access], list[int], Rows]:
-    """A random motion, accesses and captures; and inputs that change, by clock, by their names in a native port."""
+    """Return a random motion, accesses and captures; and inputs that change, by clock, by their names in a native
+    port.
+    """
     registers = LoopMap(spec.tachometer, spec)
     trace = stress(spec.tachometer, seed, 12)
     trace = PinTrace(trace.clock, trace.a, trace.b, n_clocks)

@@ -32,7 +32,7 @@ def test_an_edge_is_in_the_tick_that_ends_pin_to_count_after_it() -> None:
     spec = small()
 
     def counted(clock: int) -> list[int]:
-        """Pulse numbers of all axes in the second tick, of edges in a clock."""
+        """Return pulse numbers of all axes in the second tick, of edges in a clock."""
         low = np.zeros(2, dtype=np.uint8)
         pins = PinTrace(np.array([0, clock]), a=np.array([0, 1], dtype=np.uint8), b=low, n_clocks=4 * TICK_CYCLES)
         run = golden.run(spec, AxesTrace((pins,) * spec.axes))

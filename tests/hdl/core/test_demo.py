@@ -25,7 +25,7 @@ CORES = {
 
 
 def random_steps(registers: DemoMap, seed: int) -> list[Step]:
-    """Settings that change at random instants."""
+    """Return settings that change at random instants."""
     spec = registers.spec
     rng = np.random.default_rng(seed)
 

@@ -14,7 +14,7 @@ CLOCKS, SEEDS = 3000, range(8)
 
 
 def random_changes(seed: int) -> list[Change]:
-    """Settings of all kinds, some of which make the errors overlap."""
+    """Return settings of all kinds, some of which make the errors overlap."""
     rng = np.random.default_rng(seed)
     changes = []
     for clock in np.sort(rng.choice(np.arange(-1, CLOCKS), rng.integers(1, 12), replace=False)).tolist():
@@ -32,7 +32,7 @@ def random_changes(seed: int) -> list[Change]:
 
 
 def emulated(changes: list[Change], n_clocks: int, lines_per_rev: int | None) -> list[tuple[int, ...]]:
-    """Levels of the gates' lines in each clock."""
+    """Return levels of the gates' lines in each clock."""
     rows: list[dict[str, int]] = [{"jump": 0} for _ in range(n_clocks)]
     for change in changes:
         if change.clock + 1 < n_clocks:
@@ -56,7 +56,7 @@ def test_lines_are_those_of_the_golden_model(seed: int) -> None:
 
 
 def edges(settings: EmulatorSettings, n_clocks: int) -> tuple[np.ndarray, np.ndarray]:
-    """Clocks of the edges of A and of B."""
+    """Return clocks of the edges of A and of B."""
     trace = GoldenEmulator().trace([Change(-1, settings)], n_clocks)
     return tuple(trace.clock[1:][np.diff(line.astype(int)) != 0] for line in (trace.a, trace.b))
 

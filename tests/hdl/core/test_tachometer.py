@@ -23,7 +23,7 @@ def make_spec(tick_cycles: int, max_ticks: int = 4) -> STachometer:
 
 
 def trace_of(changes: list[tuple[int, int]], n_clocks: int, start: int = 0) -> PinTrace:
-    """Pins that advance by so many quarters at such clocks."""
+    """Return pins that advance by so many quarters at such clocks."""
     quarters = np.cumsum([start] + [by for _, by in changes]) % 4
     a, b = np.array([QUARTERS[k] for k in quarters], dtype=np.uint8).T
     return PinTrace(np.array([0] + [clock for clock, _ in changes]), a, b, n_clocks)

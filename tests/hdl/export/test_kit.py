@@ -91,7 +91,7 @@ def test_the_smoke_test_fails_on_a_wrong_core(tmp_path: Path) -> None:
 
 
 def flip_flops(verilog: str) -> dict[str, str]:
-    """Paths of the synchronisers' flip-flops from the top, with a slash, and their attributes."""
+    """Return paths of the synchronisers' flip-flops from the top, with a slash, and their attributes."""
     modules = dict(re.findall(r"^module (\S+?) ?\(.*?$(.*?)^endmodule", verilog, re.MULTILINE | re.DOTALL))
 
     def below(module: str, path: str) -> dict[str, str]:
@@ -193,7 +193,7 @@ def test_fusesoc_finds_what_programs_need(tmp_path: Path) -> None:
 
 
 def keys(item: object, path: str = "") -> set[str]:
-    """Paths of all keys: `velocity.width`, `ports[].name`."""
+    """Return paths of all keys: `velocity.width`, `ports[].name`."""
     if isinstance(item, dict):
         below = [keys(value, f"{path}.{key}" if path else key) for key, value in item.items()]
         return {f"{path}.{key}" if path else key for key in item}.union(*below)

@@ -16,7 +16,7 @@ FILES = [path for folder in tachometry.hdl.__path__ for path in sorted(Path(fold
 
 
 def unnamed(source: str) -> list[int]:
-    """Lines of the signals and ports of memories whose names would be guessed."""
+    """Return lines of the signals and ports of memories whose names would be guessed."""
     tree = ast.parse(source)
     assigned = {
         id(node.value)

@@ -13,7 +13,7 @@ from tachometry.sim.golden.sampling import external_windows
 
 
 def ends(rises: list[int], n_clocks: int, min_cycles: int, max_cycles: int) -> tuple[list[int], list[int]]:
-    """Last clocks of windows and clocks with an error; a rise is given by the clock in which it is seen."""
+    """Return last clocks of windows and clocks with an error; a rise is given by the clock in which it is seen."""
     level = np.isin(np.arange(n_clocks) + 2, rises).astype(int).tolist()
     seen = clock_by_clock(
         ExternalTick(min_cycles, max_cycles), [{"tick_in": high} for high in level], ["last", "tick_error"]

@@ -16,7 +16,7 @@ from tachometry.spec import Encoder, STachometer, Timing
 
 
 def definition(levels: list[int], clocks: int) -> tuple[list[int], int]:
-    """What is believed in the clock after each, and how many levels went back.
+    """Return what is believed in the clock after each, and how many levels went back.
 
     −1 stands for nothing: no level has held long enough yet.
     """

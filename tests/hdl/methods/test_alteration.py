@@ -8,7 +8,7 @@ from tachometry.sim.golden.methods.s import alterations
 
 
 def literal(m_e: list[int]) -> list[bool]:
-    """The definition, tick by tick."""
+    """Return the definition, tick by tick."""
     previous = offset = 0
     found = []
     for number in m_e:

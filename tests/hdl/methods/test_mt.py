@@ -78,7 +78,7 @@ def test_silence_in_a_window() -> None:
 
 
 def windows(steps: dict[int, int], decoding: int = 4, min_time: int = 50) -> list[tuple[int, int, int]]:
-    """Clock, distance and time of the measurements with whole cycles; none of them is forced."""
+    """Return clock, distance and time of the measurements with whole cycles; none of them is forced."""
     encoder = Encoder(100 // decoding, decoding)
     spec = spec_of("mt", encoder=encoder, min_time=min_time, whole_cycles=True, bound_decay=False)
     found = []

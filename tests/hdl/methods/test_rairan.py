@@ -37,7 +37,9 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
 
 
 def steps(dt: int = 6, n: int = 2500) -> np.ndarray:
-    """Backwards at first, at gaps that end with dt, and some just longer than dt after short ones; then anything."""
+    """Return backwards at first, at gaps that end with dt, and some just longer than dt after short ones; then
+    anything.
+    """
     gaps = np.repeat([dt, max(dt // 3, 1), dt + 2, max(dt // 2, 1), 5 * dt, 4 * dt + 1, max(dt // 3, 1), dt], 7)
     regular = np.zeros(gaps.sum() + 1, dtype=np.int64)
     regular[np.cumsum(gaps)] = -1
@@ -67,7 +69,9 @@ def test_every_estimate(estimate: str, frac_bits: int) -> None:
 
 
 def steady_steps(dt: int, n: int = 10_000) -> np.ndarray:
-    """Constant speeds, for as long as it takes k to follow, with rests and reversals, and what is not regular."""
+    """Return constant speeds, for as long as it takes k to follow, with rests and reversals, and
+    what is not regular.
+    """
     rng = np.random.default_rng(7)
     gaps = [dt / 5, 3 * dt, dt / 2, 0.9 * dt, 20 * dt, 2 * dt, 8 * dt, 1, dt, 0.38 * dt, 0.5 * dt, 2 * dt, 0.78 * dt]
     signs, at = [], []

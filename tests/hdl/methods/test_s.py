@@ -13,7 +13,7 @@ OUTPUTS = ["velocity_valid", "velocity", "interval", "forced"]
 
 
 def datapath_spec(*, cancel: bool = True, serial: bool = True, frac_bits: int = 16) -> STachometer:
-    """|m_e| up to 4; the spec takes the serial or the pipelined scaler by the length of a tick."""
+    """Return |m_e| up to 4; the spec takes the serial or the pipelined scaler by the length of a tick."""
     timing = Timing(clock_hz=1_000_000, tick_cycles=16 if serial else 4, max_ticks=MAX_TICKS)
     speed = Speed(Fraction(4_000_000, 100 * timing.tick_cycles), "rev/s")
     spec = STachometer(encoder=Encoder(25), timing=timing, frac_bits=frac_bits, max_speed=speed, cancel=cancel)
@@ -22,7 +22,7 @@ def datapath_spec(*, cancel: bool = True, serial: bool = True, frac_bits: int = 
 
 
 def run(spec: STachometer, m_e: list[int]) -> list[dict[str, int]]:
-    """What is shown from the first tick on."""
+    """Return what is shown from the first tick on."""
     pause = [{"tick": 0}] * (spec.timing.tick_cycles - 2)
     rows: list[dict[str, int]] = []
     for number in m_e:

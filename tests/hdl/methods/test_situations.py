@@ -34,7 +34,7 @@ class Update:
 
 
 def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
-    """Updates of these pulse numbers."""
+    """Return updates of these pulse numbers."""
     names = ["velocity_valid", "velocity", "velocity_lower", "velocity_upper", "interval", "bounds_valid"]
     box = DATAPATHS[spec.method](spec)
     seen = clock_by_clock(box, ticks(box, m_e, T), names)[1:]
@@ -49,7 +49,7 @@ def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
 
 
 def longest(spec: TachometerSpec) -> int:
-    """Ticks within which the velocity is 0 after the last count: what the parameters promise."""
+    """Return ticks within which the velocity is 0 after the last count: what the parameters promise."""
     return spec.average if isinstance(spec, MTachometer) else 3 * MAX_TICKS // 2
 
 

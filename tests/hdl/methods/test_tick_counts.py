@@ -33,7 +33,9 @@ SHOWN = ["number", "times", "places", "elapsed", "quiet", "counted", "length"]
 
 
 def expected(counts: Mapping[int, int], lengths: list[int], tracks: list[bool]) -> list[Row]:
-    """What the counts are after each tick; `counts` has the steps by their clocks, `tracks` what is known in a tick."""
+    """Return what the counts are after each tick; `counts` has the steps by their clocks, `tracks` what is known in a
+    tick.
+    """
     rows: list[Row] = []
     begin, silent = 0, MAX_TICKS
     alone = True  # only the last count of a tick is used
@@ -53,7 +55,7 @@ def expected(counts: Mapping[int, int], lengths: list[int], tracks: list[bool]) 
 def run(
     form: Tracking, counts: Mapping[int, int], lengths: list[int], tracks: list[bool] | None = None
 ) -> list[dict[str, int]]:
-    """What is shown two clocks after each tick, and until the next; `tracks` is that of the clock after each."""
+    """Return what is shown two clocks after each tick, and until the next; `tracks` is that of the clock after each."""
     tracks = tracks or [True] * len(lengths)
     ends = (np.cumsum(lengths) - 1).tolist()
     rows = [{"tick": 0, "step": counts.get(clock, 0), "tracks": 1} for clock in range(ends[-1] + 3)]
@@ -80,7 +82,7 @@ def check(
 
 
 def begun(*counts: tuple[int, int]) -> dict[int, int]:
-    """Counts of the third tick, behind two with one each, so that all of them are used."""
+    """Return counts of the third tick, behind two with one each, so that all of them are used."""
     return {3: 1, T + 3: 1} | {2 * T + clock: step for clock, step in counts}
 
 

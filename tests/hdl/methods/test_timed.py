@@ -13,7 +13,7 @@ METHODS = ["t", "mt"]
 
 
 def timed(method: str, **options: Any) -> TimedTachometer:
-    """A measurement with each count, if they are not too close."""
+    """Return a measurement with each count, if they are not too close."""
     return spec_of(method, **options, **({"min_time": 1} if method == "mt" else {}))
 
 

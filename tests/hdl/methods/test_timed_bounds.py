@@ -20,7 +20,9 @@ NAMES = [*OUTPUTS[1:], *BOUNDS, "bounds_valid"]
 
 
 def counts(seed: int) -> NDArray[np.int64]:
-    """A step for every clock: steady and fast, in either direction, over one edge, and silence up to three times."""
+    """Return a step for every clock: steady and fast, in either direction, over one edge, and silence up to three
+    times.
+    """
     rng = np.random.default_rng(seed)
     step = np.zeros(CLOCKS, np.int64)
     at, way = 100, 1

@@ -52,7 +52,7 @@ class Resettable(Elaboratable):
 
 
 def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[dict[str, int]]:
-    """Inputs of every clock, until the last update has come."""
+    """Return inputs of every clock, until the last update has come."""
     rows = [{"step": 0, "tick": 0, "rst": 0} for _ in range(int(last[-1]) + spec.datapath_latency + 1)]
     for clock, step in zip(steps.clock.tolist(), steps.step.tolist(), strict=True):
         rows[clock]["step"] = step
@@ -66,7 +66,7 @@ def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> lis
 
 
 def updates_of(spec: TrackTachometer, rows: Sequence[Mapping[str, int]], play: Player = COMPILED) -> Iterator[Update]:
-    """All updates; from one to the next the outputs stay."""
+    """Yield all updates; from one to the next the outputs stay."""
     names = [*NAMES, *(["updates.p.stamp"] if spec.stamp_width else [])]
     seen = play(Resettable(track.TrackMethod(spec)), rows, ["velocity_valid", *names])
     held = dict.fromkeys(names, 0)
@@ -79,7 +79,7 @@ def updates_of(spec: TrackTachometer, rows: Sequence[Mapping[str, int]], play: P
 
 
 def golden(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[Update]:
-    """The updates of the golden model, `datapath_latency` after every tick."""
+    """Return the updates of the golden model, `datapath_latency` after every tick."""
     through = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, last, side="right")]
     found = Model(spec).updates(Table(last + spec.tick_latency, {"position": through}), steps, int(last[-1]) + 1)
     columns = [found[name].astype(int).tolist() for name in NAMES]
@@ -87,7 +87,7 @@ def golden(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list
 
 
 def regular(spec: TrackTachometer, speed: float, n_ticks: int, begin: int = 0) -> tuple[Steps, NDArray[np.int64]]:
-    """A constant speed in counts per tick, and ticks as long as nominal."""
+    """Return a constant speed in counts per tick, and ticks as long as nominal."""
     cycles = spec.timing.tick_cycles
     last = (np.arange(n_ticks) + 1) * cycles - 1
     clock = np.round(begin + (0.3 + np.arange(int(abs(speed) * n_ticks) + 1)) * cycles / abs(speed)).astype(np.int64)

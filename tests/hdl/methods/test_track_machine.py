@@ -45,7 +45,7 @@ class Script(Program):
 
 
 def spec_of(external: bool, bandwidth: int = 200) -> TrackTachometer:
-    """A core; words have 26 bits and more."""
+    """Return a core; words have 26 bits and more."""
     return TrackTachometer(
         encoder=Encoder(100),
         timing=Timing(1_000_000, 1200, 10),
@@ -59,12 +59,14 @@ def spec_of(external: bool, bandwidth: int = 200) -> TrackTachometer:
 
 
 def script(code: Sequence[Step], words: Sequence[int], spec: TrackTachometer) -> Script:
-    """A program of some steps on a memory of some words."""
+    """Return a program of some steps on a memory of some words."""
     return Script(spec.form, Fraction(1), 0, code, words)
 
 
 def words(rng: np.random.Generator, width: int) -> list[int]:
-    """Random contents: words of all sizes whose sums fit; constants are not negative, and the first of them is 0."""
+    """Return random contents: words of all sizes whose sums fit; constants are not negative, and the first of them is
+    0.
+    """
 
     def word(sign: int) -> int:
         return sign * int(rng.integers(0, 1 << int(rng.integers(1, width - 3)))) - (sign < 0)
@@ -74,7 +76,7 @@ def words(rng: np.random.Generator, width: int) -> list[int]:
 
 
 def template(op: Op, rng: np.random.Generator, width: int) -> list[Step]:
-    """Some steps with an operation, and with operands that may be too large for it."""
+    """Return some steps with an operation, and with operands that may be too large for it."""
     states, constants = (rng.integers(*ends, 4).tolist() for ends in ((0, STATES), (ZERO + 1, TABLES)))
     any_word = int(rng.choice([*states, *constants]))
     factor = [Do(Op.LOAD, constants[0]), Do(Op.TO_MQ)]
@@ -114,7 +116,9 @@ OPERATIONS = [op for op in Op if op not in (Op.JUMP, Op.OUT, Op.WAIT)]
 
 
 def random_steps(rng: np.random.Generator, held: Sequence[int], spec: TrackTachometer, n: int) -> list[Step]:
-    """Some steps in whose operands and results nothing is too large, whatever was before, with ways to choose from."""
+    """Return some steps in whose operands and results nothing is too large, whatever was before, with ways to choose
+    from.
+    """
     steps: list[Step] = []
     while len(steps) < n:
         some = template(OPERATIONS[int(rng.integers(len(OPERATIONS)))], rng, spec.form.width)
@@ -130,7 +134,7 @@ def random_steps(rng: np.random.Generator, held: Sequence[int], spec: TrackTacho
 
 
 def tick(spec: TrackTachometer, rng: np.random.Generator) -> Tick:
-    """Random inputs; places are as odd or even as the number."""
+    """Return random inputs; places are as odd or even as the number."""
     form = spec.form
     number = int(rng.integers(0, form.max_count + 1))
     return Tick(
@@ -174,7 +178,7 @@ def check(program: Program, ticks: Sequence[Tick], moved_width: int, play: Playe
 
 
 def check_random(seed: int) -> set[Op]:
-    """A random program, thrice; the operations in it."""
+    """Return a random program, thrice; the operations in it."""
     rng = np.random.default_rng(seed)
     spec = spec_of(external=bool(seed % 2), bandwidth=int(rng.choice([50, 200, 500])))
     held = words(rng, spec.form.width)
@@ -194,7 +198,7 @@ def test_random_programs() -> None:
 def check_program(
     external: bool = True, n_ticks: int = 60, seed: int = 1, *, play: Player = compiled.clock_by_clock, **options: Any
 ) -> set[Instruction]:
-    """The program itself, on hostile counts that come as soon as they may; its jumps that went only one way."""
+    """Return the program itself, on hostile counts that come as soon as they may; its jumps that went only one way."""
     spec = replace(spec_of(external), **options)
     rng = np.random.default_rng(seed)
     windows = Windows.of(*hostile(spec, rng, n_ticks))

@@ -34,13 +34,13 @@ class Shown:
     beyond: Floats
 
     def after(self, tick: float) -> "Shown":
-        """Those of later ticks."""
+        """Return those of later ticks."""
         later = self.tick > tick
         return Shown(self.tick[later], self.velocity[later], self.position[later], self.beyond[later])
 
 
 def shown(spec: TrackTachometer, ticks: Floats, ways: NDArray[Any], n_ticks: int, lengths: Any = None) -> Shown:
-    """What the core shows, which is what the golden model shows; edges with their times in nominal ticks.
+    """Return what the core shows, which is what the golden model shows; edges with their times in nominal ticks.
 
     A way of 2 or −2 changes both lines.
     """
@@ -60,7 +60,7 @@ def shown(spec: TrackTachometer, ticks: Floats, ways: NDArray[Any], n_ticks: int
 
 
 def at(*parts: tuple[float, float]) -> tuple[Floats, NDArray[np.int64]]:
-    """Times and ways of the counts of constant speeds, each for so many ticks; a speed of 0 has none."""
+    """Return times and ways of the counts of constant speeds, each for so many ticks; a speed of 0 has none."""
     times, ways, now, place = [], [], 0.0, 0.3
     for speed, ticks in parts:
         moved = place + speed * ticks
@@ -74,7 +74,7 @@ def at(*parts: tuple[float, float]) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def settled(found: Shown, velocity: float, share: float) -> int:
-    """Ticks of these in which the velocity was last off by more than a share."""
+    """Return ticks of these in which the velocity was last off by more than a share."""
     wrong = np.flatnonzero(np.abs(found.velocity - velocity) > share * abs(velocity))
     return int(found.tick[wrong[-1]] - found.tick[0]) if len(wrong) else 0
 

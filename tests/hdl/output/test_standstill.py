@@ -20,7 +20,7 @@ WIDTH = 4
 
 
 def numbers(max_ticks: int, most: int = 3) -> list[int]:
-    """Steady numbers, single ones, and silences of about the maximum time, after a reset as well."""
+    """Return steady numbers, single ones, and silences of about the maximum time, after a reset as well."""
     rng = np.random.default_rng(max_ticks)
     found = [0] * (max_ticks + 1)
     while len(found) < 30 * max_ticks:
@@ -31,7 +31,7 @@ def numbers(max_ticks: int, most: int = 3) -> list[int]:
 
 
 def expected(m_e: list[int], max_ticks: int, length: list[int]) -> list[int]:
-    """Tick by tick: the silence so far, with the tick before the first, is longer than the maximum time."""
+    """Return tick by tick: the silence so far, with the tick before the first, is longer than the maximum time."""
     silence, found = 1, []
     for number, n_ticks in zip(m_e, length, strict=True):
         silence = 0 if number else silence + n_ticks

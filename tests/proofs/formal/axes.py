@@ -50,7 +50,7 @@ class Counted(wiring.Component):
 
 
 def _counts(name: str, axes: int, slots: int, n_rounds: int) -> Proof:
-    """PX: every step of an axis is in its own sum, and in no other."""
+    """Return PX: every step of an axis is in its own sum, and in no other."""
     parameters = {"AXES": axes, "SLOTS": slots, "ROUNDS": n_rounds, "COUNT_WIDTH": n_rounds.bit_length() + 1}
     probes = {
         "core_slot": "rounds.slot",
@@ -64,7 +64,7 @@ def _counts(name: str, axes: int, slots: int, n_rounds: int) -> Proof:
 
 
 def _positions(name: str, axes: int, tick_cycles: int) -> Proof:
-    """PX: every count that is handed over is in the position of its axis at its tick, and in no other."""
+    """Return PX: every count that is handed over is in the position of its axis at its tick, and in no other."""
     timing = Timing(4 * tick_cycles, tick_cycles, 2)
     speed = Speed.parse("1rev/s")
     alone = STachometer(encoder=Encoder(1), timing=timing, max_speed=speed, position_width=8, frac_bits=4)

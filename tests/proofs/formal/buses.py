@@ -44,7 +44,7 @@ _AXI_LITE_PROBES = {
 
 
 def _on(bus: str, checker: str, bridge_probes: dict[str, str], depth: int) -> Proof:
-    """PB and the properties of the bus: what a master sees of the registers of a small core of the M method."""
+    """Return PB and the properties of the bus: what a master sees of the registers of a small core of the M method."""
     parameters = {
         "IDENTIFICATION": IDENTIFICATION,
         "CONFIGURATION": RegisterMap(_SPEC).configuration,

@@ -30,7 +30,7 @@ from tachometry.spec.language.units import signed_width
 def core(
     tick_cycles: int, max_ticks: int = 4, max_count: int | None = None, decoding: int = 4, **options: Any
 ) -> STachometer:
-    """A spec by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each."""
+    """Return a spec by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each."""
     # One revolution a tick is as many counts as the encoder has, and one revolution a second a count a tick.
     return STachometer(
         encoder=Encoder(1, decoding),
@@ -72,14 +72,14 @@ _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_
 
 
 def _sum(spec: STachometer) -> tuple[dict[str, int], dict[str, str]]:
-    """The sum of a window's steps: how it is kept, and where."""
+    """Return the sum of a window's steps: how it is kept, and where."""
     start = raised_for(spec.longest_tick, spec.max_count)
     width = signed_width(spec.longest_tick + start)
     return {"START": start, "SUM_WIDTH": width}, {"core_sum": f"pulse_counter.{'raised' if start else 'count'}"}
 
 
 def front(name: str, spec: STachometer) -> Proof:
-    """P1, P2, P3, P6: the front end."""
+    """Return P1, P2, P3, P6: the front end."""
     kept, probes = _sum(spec)
     parameters = kept | {
         "DECODING": spec.encoder.decoding,
@@ -96,7 +96,7 @@ def front(name: str, spec: STachometer) -> Proof:
 
 
 def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_table: int | None = None) -> Proof:
-    """P4, P5 and standstill: the S method, from ticks to updates."""
+    """Return P4, P5 and standstill: the S method, from ticks to updates."""
     with patch("tachometry.spec.methods.s.MAX_TABLE", max_table or 2048):
         latency, serial, used = spec.tick_to_velocity, spec.serial, spec.reciprocal
     carried = {}
@@ -127,7 +127,7 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
 
 
 def m_method(name: str, spec: MTachometer) -> Proof:
-    """The M method, from ticks to updates."""
+    """Return the M method, from ticks to updates."""
     parameters = {
         "N": spec.average,
         "MAX_COUNT": spec.max_count,
@@ -149,7 +149,7 @@ def m_method(name: str, spec: MTachometer) -> Proof:
 
 
 def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Proof:
-    """The carried reciprocal."""
+    """Return the carried reciprocal."""
     with patch("tachometry.spec.methods.s.MAX_TABLE", max_table or 2048):
         carried = spec.reciprocal
     assert isinstance(carried, CarriedSpec)
@@ -163,12 +163,12 @@ def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Pr
 
 
 def small(**options: Any) -> STachometer:
-    """A core whose whole S method is within reach of a SAT solver."""
+    """Return a core whose whole S method is within reach of a SAT solver."""
     return core(**{"tick_cycles": 2, "max_count": 1, "frac_bits": 4, "position_width": 8} | options)
 
 
 def small_m(average: int) -> MTachometer:
-    """A core of the M method, a tick a clock, with bounds."""
+    """Return a core of the M method, a tick a clock, with bounds."""
     s = small(tick_cycles=1, bounds=True)
     return MTachometer(
         encoder=s.encoder,
@@ -202,7 +202,7 @@ _RAIRAN_PROBES = {
 
 
 def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof:
-    """PR: the method of Rairán, from steps to updates."""
+    """Return PR: the method of Rairán, from steps to updates."""
     spec = RairanTachometer(**counting(tick_cycles, max_ticks, max_count))
     assert spec.max_count == max_count, spec.max_count
     parameters = {
@@ -217,8 +217,8 @@ def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof
 
 
 def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proof:
-    """From any state of the flip-flops the properties hold again, and the `lemmas` on what the checker takes from the
-    core.
+    """Return from any state of the flip-flops the properties hold again, and the `lemmas` on what the checker takes
+    from the core.
 
     Neither core nor checker is reset, so what holds in one clock after any state holds in all that follow.
     """

@@ -47,13 +47,13 @@ _PROBES = {
 
 
 def _packed(term: Term) -> int:
-    """A byte for each n from 1 on, or the one."""
+    """Return a byte for each n from 1 on, or the one."""
     values = _FORM.terms[term].values
     return values[0] if len(values) == 1 else sum(value << 8 * n for n, value in enumerate(values, 1))
 
 
 def _control(name: str, checker: str, form: ControlForm) -> Proof:
-    """PC: no state and no sum wraps, and what is computed is what the equations say."""
+    """Return PC: no state and no sum wraps, and what is computed is what the equations say."""
     parameters = {
         "VELOCITY_WIDTH": form.velocity_width,
         "V": form.velocity_limit,

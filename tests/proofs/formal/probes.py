@@ -12,12 +12,12 @@ STANDSTILL_PROBES = {
 
 
 def within(block: str, probes: dict[str, str], there: bool) -> dict[str, str]:
-    """Probes to wires of a generate block, if it is there."""
+    """Return probes to wires of a generate block, if it is there."""
     return {f"{block}.{wire}": path for wire, path in probes.items() if there}
 
 
 def counting(tick_cycles: int, max_ticks: int, max_count: int) -> dict[str, Any]:
-    """Parameters of a core with so many clocks and at most so many counts a tick."""
+    """Return parameters of a core with so many clocks and at most so many counts a tick."""
     return {
         "encoder": Encoder(1, 4),
         "timing": Timing(4 * tick_cycles, tick_cycles, max_ticks),

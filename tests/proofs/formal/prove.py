@@ -95,7 +95,7 @@ class Proof:
     box: Callable[[], wiring.Component] | None = None
 
     def exported(self) -> str:
-        """The Verilog of the core, as the mutants of this moment have it."""
+        """Return the Verilog of the core, as the mutants of this moment have it."""
         if self.box is not None:
             return str(verilog.convert(self.box(), name="tachometer", emit_src=False))
         if self.max_table is None:
@@ -115,7 +115,7 @@ class Result:
 
 
 def _path(verilog: str, path: str) -> str:
-    """A signal's path in the flattened netlist; instances whose name was taken have a number at their end."""
+    """Return a signal's path in the flattened netlist; instances whose name was taken have a number at their end."""
     *instances, signal = path.split(".")
     real = "tachometer"
     for instance in instances:

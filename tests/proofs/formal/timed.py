@@ -53,7 +53,7 @@ def timed(
     max_ticks: int = 4,
     **options: Any,
 ) -> Proof:
-    """PT: the T and the M/T method, from steps and ticks to updates."""
+    """Return PT: the T and the M/T method, from steps and ticks to updates."""
     spec = method(**counting(tick_cycles, max_ticks, max_count), **options)
     assert spec.max_count == max_count, spec.max_count
     mt = isinstance(spec, MTTachometer)
@@ -100,7 +100,7 @@ _CYCLES_GIVEN = {"cycles": "lemma_waived lemma_counted lemma_one_way"}
 
 
 def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
-    """The same in parts, as quotients so far from the upset are beyond the solver.
+    """Return the same in parts, as quotients so far from the upset are beyond the solver.
 
     From any state that is given which holds some clocks before the end; at the end what is shown is of a division that
     began since then; and what such a division shows is right, by induction.

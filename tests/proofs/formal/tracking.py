@@ -16,7 +16,7 @@ _PROBES = {f"core_{name}": f"open_{name}" for name in ("number", "times", "place
 
 
 def _counts(name: str, longest_tick: int, max_count: int, max_ticks: int) -> Proof:
-    """PK: the counts of a tick, alone, as a whole core has longer ticks than a solver can look at."""
+    """Return PK: the counts of a tick, alone, as a whole core has longer ticks than a solver can look at."""
     form = replace(_SPEC.form, longest_tick=longest_tick, max_count=max_count, external=True)
     parameters = {
         "MAX_COUNT": max_count,

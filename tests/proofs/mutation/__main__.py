@@ -21,13 +21,13 @@ LEAST = 0.99  # of the mutants that are not equivalent
 
 
 def _cells(scores: list[Score]) -> tuple[int, ...]:
-    """Numbers of all mutants, and of those that were killed, are equivalent, were argued, and survive."""
+    """Return numbers of all mutants, and of those that were killed, are equivalent, were argued, and survive."""
     numbers = [(one.mutants, one.killed, one.equivalent, one.argued, len(one.survivors)) for one in scores]
     return tuple(sum(column) for column in zip(*numbers, strict=True))
 
 
 def _share(scores: list[Score]) -> float:
-    """How many were killed of those that are not equivalent."""
+    """Tell how many were killed of those that are not equivalent."""
     mutants, killed, equivalent, argued, _ = _cells(scores)
     return killed / (mutants - equivalent - argued)
 
@@ -51,7 +51,7 @@ def _judge_group(group: str, pool: Executor, page: Path | None) -> list[Score]:
 
 
 def main(words: list[str]) -> bool:
-    """Whether enough mutants of every group were killed; prints the tables."""
+    """Tell whether enough mutants of every group were killed; prints the tables."""
     given = arguments(__doc__ or "", "GROUP").parse_args(words)
     known = [group for group in GROUPS if any(case.group == group for case in (*CASES, *BOXES))]
     groups = chosen("group", given.names, known)

@@ -171,7 +171,7 @@ ARGUED = {
 
 
 def argued(core: str, mutant: Mutant) -> bool:
-    """Whether an argument covers a mutant of a core."""
+    """Tell whether an argument covers a mutant of a core."""
     place = f".{mutant.place}"
     lines = [_line(*source.split(":")) for source in mutant.lines if source.startswith("hdl/")] or [""]
     return any(key[0] == core and key[1] in lines and place.endswith(f".{key[2]}") for key in ARGUED)

@@ -37,7 +37,7 @@ class AxesCase(Case):
         return core_of(self.spec)
 
     def play(self, n_clocks: int) -> Stimulus:
-        """Motions, bursts and noise, with resets in the middle."""
+        """Return motions, bursts and noise, with resets in the middle."""
         rng = np.random.default_rng(1)
         spec, pins = self.spec, list[NDArray[np.uint64]]()
         traces, starts = list[AxesTrace](), list[int]()

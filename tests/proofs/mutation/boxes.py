@@ -103,7 +103,7 @@ class Box(Case):
         return Pins(tuple(replace(port, signed=False) for port in inputs), tuple(outputs))
 
     def play(self, n_clocks: int) -> Stimulus:
-        """The encoder turns, with resets in the middle, and the bus is used all the time."""
+        """Return the encoder turns, with resets in the middle, and the bus is used all the time."""
         rng = np.random.default_rng(1)
         n_clocks *= _LONGER if self.demo else 1
         of_core = stimulus(self.spec, n_clocks).pins[:n_clocks, 0]
@@ -117,13 +117,13 @@ class Box(Case):
 
 
 def _held(rng: np.random.Generator, width: int, begins: NDArray[np.bool_]) -> NDArray[np.uint64]:
-    """A random word that changes where something begins."""
+    """Return a random word that changes where something begins."""
     words = rng.integers(0, 1 << width, len(begins), dtype=np.uint64)
     return words[np.maximum.accumulate(np.where(begins, np.arange(len(begins)), 0))]
 
 
 def _address(rng: np.random.Generator, registers: RegisterMap, begins: NDArray[np.bool_], low: int) -> Lines:
-    """Addresses, among them often those that matter most, and data of which some are small."""
+    """Return addresses, among them often those that matter most, and data of which some are small."""
     width = registers.address_width - 2
     address = _held(rng, width, begins)
     often = np.array([registers[name].offset // 4 for name in ("VELOCITY", "CONTROL", "COUNTERS")], dtype=np.uint64)
@@ -137,7 +137,7 @@ def _bits(condition: NDArray[np.bool_]) -> NDArray[np.uint64]:
 
 
 def _rare(rng: np.random.Generator, n_clocks: int, rates: Sequence[float] = (0.02, 0.2, 0.5)) -> NDArray[np.bool_]:
-    """Random clocks, at rates that change."""
+    """Return random clocks, at rates that change."""
     rate = np.repeat(rng.choice(rates, -(-n_clocks // 2000)), 2000)[:n_clocks]
     return rng.random(n_clocks) < rate
 
@@ -164,7 +164,7 @@ def _native(rng: np.random.Generator, registers: RegisterMap, n_clocks: int) -> 
 
 
 def _two_clocks(rng: np.random.Generator, n_clocks: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """The first clock of accesses of two clocks, and the second."""
+    """Return the first clock of accesses of two clocks, and the second."""
     first = _rare(rng, n_clocks)
     for clock in np.flatnonzero(first).tolist():
         if first[max(clock - 1, 0)] and clock:
@@ -240,7 +240,7 @@ def _uart(rng: np.random.Generator, registers: RegisterMap, n_clocks: int) -> Li
 
 
 def _settings(rng: np.random.Generator, registers: RegisterMap, n_clocks: int) -> Lines:
-    """Settings of all kinds, reads of all registers, and telemetry now and then."""
+    """Return settings of all kinds, reads of all registers, and telemetry now and then."""
     writable = [register for register in registers if register.writable]
     line = np.ones(n_clocks, dtype=np.uint64)
     at = (frames.QUIET_BITS + 4) * _BIT_CYCLES

@@ -50,7 +50,9 @@ class Pins:
         return self.places[-1][0] + 1
 
     def words(self, n_clocks: int, levels: Mapping[str, NDArray[Any]]) -> NDArray[np.uint64]:
-        """What is played, shape (n_clocks, n_words), from the level of each input in every clock; others are 0."""
+        """Return what is played, shape (n_clocks, n_words), from the level of each input in every clock; others are
+        0.
+        """
         found = np.zeros((n_clocks, self.n_words), dtype=np.uint64)
         for port, (word, bit) in zip(self.inputs, self.places, strict=True):
             if port.name in levels:
@@ -90,11 +92,11 @@ class Case:
         return Tachometer(self.spec)
 
     def play(self, n_clocks: int) -> Stimulus:
-        """What is played on the mutants."""
+        """Return what is played on the mutants."""
         return stimulus(self.spec, n_clocks)
 
     def right(self, trace: Any) -> Run:
-        """What the golden model says of a part of what is played."""
+        """Return what the golden model says of a part of what is played."""
         return golden.run(self.spec, trace)
 
     @property
@@ -119,7 +121,7 @@ def _case(
     decoding: int = 4,
     **options: Any,
 ) -> Case:
-    """A core by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each.
+    """Return a core by its numbers: ticks of `tick_cycles` clocks, and speeds of at most `max_count` counts in each.
 
     None: a count in every clock, so that a velocity of few bits may saturate.
     """

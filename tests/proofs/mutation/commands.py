@@ -74,7 +74,7 @@ class GeneratorCase(Case):
         return Pins(tuple(ports["input"]), tuple(ports["output"]))
 
     def play(self, n_clocks: int) -> Stimulus:
-        """Ticks and demands, with a reset now and then."""
+        """Return ticks and demands, with a reset now and then."""
         rng = np.random.default_rng(1)
         least = generator_clocks(GENERATED.multiplier)
         tick = np.cumsum(least + rng.integers(0, 2, n_clocks // least))

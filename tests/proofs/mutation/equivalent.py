@@ -84,12 +84,12 @@ _TOGETHER = 8  # mutants for one run of Yosys
 
 
 def _chunks(word: int, width: int) -> str:
-    """A number as CXXRTL has it."""
+    """Return a number as CXXRTL has it."""
     return f"value<{width}>{{{', '.join(f'{word >> low & 0xFFFFFFFF:#x}u' for low in range(0, width, 32))}}}"
 
 
 def watched(ports: Pins, cut: Opened, n_mutants: int, pins: NDArray[np.uint64]) -> NDArray[np.bool_]:
-    """Which bits of the registers each mutant was seen to set differently, shape (n_mutants, bits)."""
+    """Tell which bits of the registers each mutant was seen to set differently, shape (n_mutants, bits)."""
     registers, memories = list(enumerate(cut.registers)), list(enumerate(cut.memories))
     place = np.cumsum([0, *(register.width for _, register in registers)])
     more = _WATCH.format(
@@ -141,7 +141,7 @@ def watched(ports: Pins, cut: Opened, n_mutants: int, pins: NDArray[np.uint64]) 
 
 
 def _named(texts: list[str], cut: Opened) -> list[str]:
-    """Lines of Verilog with the registers that they name, less those that name one which is not there."""
+    """Return lines of Verilog with the registers that they name, less those that name one which is not there."""
 
     def register(found: re.Match[str]) -> str:
         name = f".{found[2]}"
@@ -153,7 +153,9 @@ def _named(texts: list[str], cut: Opened) -> list[str]:
 
 
 def _miter(ports: Pins, cut: Opened, number: int, differ: NDArray[np.bool_], more: list[str]) -> str:
-    """Core and mutant, with the registers that they share and those that they do not, and whether anything is wrong."""
+    """Return core and mutant, with the registers that they share and those that they do not, and whether anything is
+    wrong.
+    """
     pins = [port.name for port in ports.inputs]
     inputs = ["input clk", *(f"input [{port.width - 1}:0] {port.name}" for port in ports.inputs)]
     lines = ["reg begun = 0;"]
@@ -206,7 +208,7 @@ def _miter(ports: Pins, cut: Opened, number: int, differ: NDArray[np.bool_], mor
 
 
 def _holds(verdict: Path, left: Path) -> bool:
-    """What ABC says, which is not asked if nothing is left of what differs."""
+    """Return what ABC says, which is not asked if nothing is left of what differs."""
     if verdict.exists():
         return verdict.read_text().startswith(_PROVEN)
     return "connect \\wrong 1'0" in left.read_text()
@@ -215,7 +217,9 @@ def _holds(verdict: Path, left: Path) -> bool:
 def equivalent(
     case: Case, flat: str, group: list[Mutant], pins: NDArray[np.uint64], folder: Path, pool: Executor
 ) -> list[bool]:
-    """Whether each mutant is proven to show at every output in every clock what the core shows, whatever the inputs."""
+    """Tell whether each mutant is proven to show at every output in every clock what the core shows, whatever the
+    inputs.
+    """
     cut = opened(flat, group, folder)
     many = bool(cut.memories) or sum(register.width for register in cut.registers) > _SHARED
     differ = watched(case.pins, cut, len(group), pins[: 10 * _WATCHED if many else _WATCHED])

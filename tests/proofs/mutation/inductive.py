@@ -60,14 +60,14 @@ def _ports(name: str, cut: Opened) -> str:
 
 
 def _lemmas(cut: Opened, known: Known) -> str:
-    """A module that says whether the lemmas hold."""
+    """Return a module that says whether the lemmas hold."""
     right = " && ".join(f"({lemma})" for lemma in known.lemmas)
     head = f"module lemmas({_ports('core_q', cut)}, output hold);"
     return "\n".join([head, *known.definitions, f"assign hold = {right};", "endmodule", ""])
 
 
 def _step(ports: Pins, cut: Opened) -> str:
-    """Core and mutant in a clock."""
+    """Return core and mutant in a clock."""
     pins = [port.name for port in ports.inputs]
     head = [f"input [{port.width - 1}:0] {port.name}" for port in ports.inputs]
     head += [
@@ -117,7 +117,7 @@ def proven(
     folder: Path,
     pool: Executor,
 ) -> list[bool]:
-    """Whether each mutant is proven to show what the core shows.
+    """Tell whether each mutant is proven to show what the core shows.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def proven(
     yosys(_MAKE, folder)
 
     def asked(part: list[tuple[str, str]], seconds: int = _SECONDS) -> list[bool]:
-        """Whether each of some proofs succeeds."""
+        """Tell whether each of some proofs succeeds."""
         own = Path(tempfile.mkdtemp(dir=folder))
         (own / "step.il").write_text((folder / "step.il").read_text())
         script = ["read_rtlil step.il", "design -save all"]

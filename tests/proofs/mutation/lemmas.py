@@ -12,7 +12,7 @@ from tachometry.spec.methods.timed import TimedTachometer
 
 
 def lemmas(spec: TachometerSpec) -> list[str]:
-    """Those for a core."""
+    """Return those for a core."""
     if isinstance(spec, STachometer):
         return [*_tick(spec), *_window(spec)]
     if isinstance(spec, TimedTachometer):
@@ -21,7 +21,7 @@ def lemmas(spec: TachometerSpec) -> list[str]:
 
 
 def known(spec: TachometerSpec) -> Known | None:
-    """What a step of induction needs; None if that is not known of the method."""
+    """Return what a step of induction needs; None if that is not known of the method."""
     return track_lemmas.known(spec) if isinstance(spec, TrackTachometer) else None
 
 
@@ -30,7 +30,7 @@ def _within(name: str, limit: object, middle: int = 0) -> str:
 
 
 def _tick(spec: STachometer) -> list[str]:
-    """A window has no more counts than clocks."""
+    """Return a window has no more counts than clocks."""
     cycles = spec.timing.tick_cycles
     if cycles >= 16:
         return []  # the sampling clock is no counter
@@ -46,7 +46,7 @@ def _tick(spec: STachometer) -> list[str]:
 
 
 def _window(spec: STachometer) -> list[str]:
-    """Inside a window all pulse numbers but the first and the last are equal."""
+    """Return inside a window all pulse numbers but the first and the last are equal."""
     longest = spec.timing.max_ticks
     counts = ("pulse_counter.pulse_count", "alteration.offset", "interval.opening")
     return [
@@ -56,7 +56,7 @@ def _window(spec: STachometer) -> list[str]:
 
 
 def _gap(spec: TimedTachometer) -> list[str]:
-    """The last count's age, and its sign, which counts for nothing if it is too old."""
+    """Return the last count's age, and its sign, which counts for nothing if it is too old."""
     longest = spec.max_periods
     return [
         f"{{gap_timer.age}} >= 1 && {{gap_timer.age}} <= {longest} && {{longest}} == ({{gap_timer.age}} == {longest})",

@@ -67,11 +67,11 @@ class LoopCase(Case):
         return LoopCore(self.spec)
 
     def right(self, trace: Any) -> Run:
-        """What the golden models say."""
+        """Return what the golden models say."""
         return run_loop(self.spec, trace.pins, trace.commands, golden.tables)
 
     def play(self, n_clocks: int) -> Stimulus:
-        """Motions, bursts and noise, with resets in the middle, and one in each clock of a program."""
+        """Return motions, bursts and noise, with resets in the middle, and one in each clock of a program."""
         rng = np.random.default_rng(1)
         pins, traces, starts = list[NDArray[np.uint64]](), list[Commanded](), list[int]()
         done = 0
@@ -106,7 +106,7 @@ class LoopCase(Case):
         return noise(spec, rng, int(rng.integers(4, 20 * longest)), 20, still=bool(rng.random() < 0.2))
 
     def _commanded(self, trace: PinTrace, rng: np.random.Generator) -> tuple[NDArray[np.uint64], list[Command]]:
-        """Words of every clock, and the commands that are taken: in all other clocks there are others."""
+        """Return words of every clock, and the commands that are taken: in all other clocks there are others."""
         spec = self.spec
         clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
         levels: dict[str, NDArray[np.int64]] = {}
@@ -160,7 +160,7 @@ def _case(
     kind: type[LoopSpec] = LoopSpec,
     **loop: Any,
 ) -> LoopCase:
-    """A core with few bits: at most two counts in a tick, and gains near 1."""
+    """Return a core with few bits: at most two counts in a tick, and gains near 1."""
     tachometer = METHODS[method](
         encoder=Encoder(1),
         timing=Timing(4 * tick_cycles, tick_cycles, max_ticks),

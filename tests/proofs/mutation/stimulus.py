@@ -54,7 +54,7 @@ class Stimulus:
 def noise_lines(
     rng: np.random.Generator, n_clocks: int, n_lines: int, n_parts: int = 20, factor: float = 1
 ) -> NDArray[np.uint8]:
-    """Levels of lines that change at random, at rates of their own that change now and then."""
+    """Return levels of lines that change at random, at rates of their own that change now and then."""
     rates = [factor * rate for rate in (*_RATES, 0.0)]
     rate = np.repeat(rng.choice(rates, (n_lines, n_parts)), -(-n_clocks // n_parts), axis=1)[:, :n_clocks]
     changes = np.cumsum(rng.random((n_lines, n_clocks)) < rate, axis=1)
@@ -64,7 +64,7 @@ def noise_lines(
 def noise(
     spec: TachometerSpec, rng: np.random.Generator, n_clocks: int, n_parts: int = 20, *, still: bool = False
 ) -> PinTrace:
-    """Such lines; those of the shaft stand still if wanted."""
+    """Return such lines; those of the shaft stand still if wanted."""
     cycles = spec.timing.tick_cycles
     factor = 1 if cycles <= _LONG else float(rng.choice([1, 10 / cycles, 10 / cycles, 30 / cycles]))
     lines = noise_lines(rng, n_clocks, len(LINES), n_parts, factor)
@@ -74,7 +74,9 @@ def noise(
 
 
 def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """Some edges as fast as the filter lets them, some slow, back and forth, in no order; silences; regular ticks."""
+    """Return some edges as fast as the filter lets them, some slow, back and forth, in no order; silences; regular
+    ticks.
+    """
     cycles = spec.timing.tick_cycles
     parts = 40 if cycles <= _LONG else 20
     longest = cycles * spec.timing.max_ticks
@@ -95,7 +97,7 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
 
 
 def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """One to two counts per tick for ever, with edges that are off by some of a count for a while, or rattle."""
+    """Return one to two counts per tick for ever, with edges that are off by some of a count for a while, or rattle."""
     n, gap = 400, spec.timing.tick_cycles / rng.uniform(1, 2)
     off = np.repeat(rng.choice([0, 0, 0, 0.15, 0.25, 0.35], n // 20), 20) + rng.uniform(0, 0.05) * rng.standard_normal(
         n
@@ -111,7 +113,9 @@ def steady(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
 
 
 def steps(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """Ticks with as many counts as the one before, for a while, and then with any others: windows of all lengths."""
+    """Return ticks with as many counts as the one before, for a while, and then with any others: windows of all
+    lengths.
+    """
     longest = spec.timing.max_ticks
     most = min(spec.timing.tick_cycles, (spec.max_count + 1) * 4 // spec.encoder.decoding)
     lasts = rng.integers(1, longest + 2, _STEPS)
@@ -120,7 +124,7 @@ def steps(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
 
 
 def hard(spec: STachometer, form: Reciprocal) -> PinTrace:
-    """Windows of all lengths with the quotients nearest to a tie: only they show the last bits of a product.
+    """Return windows of all lengths with the quotients nearest to a tie: only they show the last bits of a product.
 
     Before each window, and inside, all ticks have b counts: (d0 + d1)/(2·m_s) is of the first and the last, eq. (21).
     """
@@ -142,7 +146,7 @@ def hard(spec: STachometer, form: Reciprocal) -> PinTrace:
 
 
 def _of_counts(spec: TachometerSpec, counts: NDArray[np.int64], earlier: int = 0) -> PinTrace:
-    """Ticks with so many edges each, spread evenly, and some clocks earlier."""
+    """Return ticks with so many edges each, spread evenly, and some clocks earlier."""
     cycles = spec.timing.tick_cycles
     edges = [
         tick * cycles - earlier + (2 * np.arange(abs(number)) + 1) * cycles // (2 * abs(number))
@@ -157,13 +161,15 @@ def _of_counts(spec: TachometerSpec, counts: NDArray[np.int64], earlier: int = 0
 
 
 def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
-    """Lines that change in nearly every clock, until the filter's count of them is at its end, and a tick that does."""
+    """Return lines that change in nearly every clock, until the filter's count of them is at its end, and a tick that
+    does.
+    """
     changes = rng.random((4, _RATTLE if spec.filter_clocks else _RATTLE // 20)) < np.array([[0.9], [0.9], [0.9], [1]])
     return _trace(spec, (np.cumsum(changes, axis=1) % 2).astype(np.uint8))
 
 
 def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
-    """Motions that end in each of the clocks about the end of a tick, and about an update, and a whole one."""
+    """Return motions that end in each of the clocks about the end of a tick, and about an update, and a whole one."""
     found = []
     for before in range(-3, 10):
         for of_tick in (True, False):
@@ -176,12 +182,12 @@ def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
 
 
 def _levels(clock: NDArray[np.int64], quarter: NDArray[np.int64], n_clocks: int) -> NDArray[np.uint8]:
-    """A + 2 B in every clock, from the quarters of a period that begin in some; both lines are low before."""
+    """Return a + 2 B in every clock, from the quarters of a period that begin in some; both lines are low before."""
     return quadrature(np.append(0, quarter)[np.searchsorted(clock, np.arange(n_clocks), side="right")])
 
 
 def _trace(spec: TachometerSpec, level: NDArray[np.uint8]) -> PinTrace:
-    """The trace with these levels of A, B, Z and the tick, as far as they are there."""
+    """Return the trace with these levels of A, B, Z and the tick, as far as they are there."""
     names = _lines(spec)
     rows = level[[LINES.index(name) for name in names]]
     clock = np.flatnonzero(np.append(True, (rows[:, 1:] != rows[:, :-1]).any(axis=0)))
@@ -189,12 +195,12 @@ def _trace(spec: TachometerSpec, level: NDArray[np.uint8]) -> PinTrace:
 
 
 def _lines(spec: TachometerSpec) -> list[str]:
-    """Inputs that are no clock and no reset, in the order of the ports."""
+    """Return inputs that are no clock and no reset, in the order of the ports."""
     return [port.name for port in spec.ports if port.name in LINES]
 
 
 def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
-    """Motions, bursts and noise in turns, at least `n_clocks` of them, or ten times as many with long ticks."""
+    """Return motions, bursts and noise in turns, at least `n_clocks` of them, or ten times as many with long ticks."""
     rng = np.random.default_rng(seed)
     pins: list[NDArray[np.uint8]] = []
     traces: list[PinTrace] = []

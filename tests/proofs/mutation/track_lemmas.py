@@ -37,7 +37,7 @@ def begins(code: tuple[Instruction, ...]) -> list[int]:
 
 
 def _definitions(spec: TrackTachometer) -> list[str]:
-    """The program, the clocks of its instructions, and those of them that each stage of the machine has."""
+    """Return the program, the clocks of its instructions, and those of them that each stage of the machine has."""
     code = spec.program.instructions
     address = max(len(code).bit_length(), (TABLES * 2 - 1).bit_length())
     layout = _layout(address)
@@ -66,7 +66,9 @@ def _definitions(spec: TrackTachometer) -> list[str]:
 
 
 def _left(spec: TrackTachometer, start: int) -> list[str]:
-    """The clocks that are left of a tick: that is what an external tick counts; else each state has its number."""
+    """Return the clocks that are left of a tick: that is what an external tick counts; else each state has its
+    number.
+    """
     if spec.max_tick_cycles:
         return ["wire signed [15:0] left = $signed({sampling_clock.left});"]
     states = SamplingClock(spec.timing.tick_cycles).states
@@ -84,7 +86,7 @@ def _left(spec: TrackTachometer, start: int) -> list[str]:
 
 
 def _lemmas(spec: TrackTachometer) -> list[str]:
-    """Those for a core."""
+    """Return those for a core."""
     width = _layout(max(len(spec.program.instructions).bit_length(), (TABLES * 2 - 1).bit_length())).size
     more = Shape.cast(_layout(1).members["more"]).width
     fetched, held, active = (f"{{datapath.machine.{name}}}" for name in ("fetched", "held", "active"))
@@ -127,5 +129,5 @@ def _lemmas(spec: TrackTachometer) -> list[str]:
 
 
 def known(spec: TrackTachometer) -> Known:
-    """All of it."""
+    """Return all of it."""
     return Known(_definitions(spec), _lemmas(spec))

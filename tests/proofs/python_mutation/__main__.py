@@ -26,7 +26,7 @@ _WARM = ("numpy", "click", "rich.console", "rich.table", "amaranth.back.verilog"
 
 
 def main(words: list[str]) -> bool:
-    """Whether enough mutants were killed; prints the tables."""
+    """Tell whether enough mutants were killed; prints the tables."""
     parser = argparse.ArgumentParser(prog="python -m proofs.python_mutation", description=__doc__)
     parser.add_argument("--mutants", type=int, default=1000, metavar="N", help="so many of all")
     parser.add_argument("--seed", type=int, default=1, help="which ones")
@@ -61,7 +61,7 @@ def main(words: list[str]) -> bool:
 
 
 def report(verdicts: list[Verdict], page: Path | None = None) -> bool:
-    """Whether enough were killed, after the table and the survivors."""
+    """Tell whether enough were killed, after the table and the survivors."""
     table = Table("room", "mutants", "killed", "of these by timeout", "argued by hand", "survivors", "score")
     fine = True
     for room in ROOMS:

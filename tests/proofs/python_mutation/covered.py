@@ -39,7 +39,7 @@ class Contexts:
             self.found.pop(report.nodeid, None)
 
     def lines(self) -> Covered:
-        """What every test ran; "" is what ran when modules were imported."""
+        """Return what every test ran; "" is what ran when modules were imported."""
         self._cov.stop()
         data = self._cov.get_data()
         self.found[""] = {"seconds": 0.0, "lines": {}}
@@ -55,7 +55,7 @@ class Contexts:
 
 
 def covered(root: Path, files: Sequence[str], tests: Sequence[str], folder: Path) -> Covered:
-    """What the tests cover; a file in the folder keeps it as long as no source and no test changes."""
+    """Return what the tests cover; a file in the folder keeps it as long as no source and no test changes."""
     folder.mkdir(parents=True, exist_ok=True)
     texts = [path.read_bytes() for path in sorted([*(root / "tests").rglob("*.py"), *(root / file for file in files)])]
     key = hashlib.sha256(b"\0".join([*texts, repr(tests).encode()])).hexdigest()[:16]
@@ -76,7 +76,7 @@ def covered(root: Path, files: Sequence[str], tests: Sequence[str], folder: Path
 
 
 def with_imports(root: Path, found: Covered) -> Covered:
-    """Also the files that the file of a test imports: it may use what was computed when they were imported.
+    """Return also the files that the file of a test imports: it may use what was computed when they were imported.
 
     Who imports a package as a whole looks at all of its files.
     """
@@ -98,7 +98,7 @@ def with_imports(root: Path, found: Covered) -> Covered:
 
 
 def chosen_for(found: Covered, file: str, line: int, budget: float) -> list[str]:
-    """Tests that run a line or its file, as many as take `budget` seconds.
+    """Return tests that run a line or its file, as many as take `budget` seconds.
 
     What is computed once, by an import or by another test, is not run again where it matters. So the tests of the file
     that take next to no time come first, then the others of the line, then those of the file. Of every test function

@@ -64,7 +64,7 @@ class Verdict:
 
 
 def _child(root: Path, mutant: Mutant, tests: Sequence[str], scratch: Path) -> int:
-    """Exit status of pytest in this process, which ends with it."""
+    """Return exit status of pytest in this process, which ends with it."""
     os.setsid()
     quiet = os.open(os.devnull, os.O_RDWR)
     for number in (0, 1, 2):
@@ -81,7 +81,7 @@ def judge_all(
     folder: Path,
     told: Callable[[Verdict], None],
 ) -> list[Verdict]:
-    """Verdicts of all mutants, each with its tests and the seconds that these take without a mutant.
+    """Return verdicts of all mutants, each with its tests and the seconds that these take without a mutant.
 
     Whatever is imported is shared by all forks, so the caller must not have imported what is mutated.
     """

@@ -84,7 +84,7 @@ class Mutant:
 
 
 def changes(node: ast.AST) -> list[ast.AST]:
-    """What a node may become."""
+    """Return what a node may become."""
     found: list[ast.AST] = []
     if isinstance(node, ast.Compare) and len(node.ops) == 1:
         found += [_with(node, ops=[new()]) for new in _COMPARED[type(node.ops[0])]]
@@ -118,7 +118,7 @@ def _with(node: ast.AST, **fields: object) -> ast.AST:
 
 
 def _readable(node: ast.AST) -> bool:
-    """Whether a node only makes a text that people read."""
+    """Tell whether a node only makes a text that people read."""
     if isinstance(node, ast.JoinedStr | ast.Raise | ast.Assert | ast.arg):
         return True
     if isinstance(node, ast.Call):
@@ -128,7 +128,7 @@ def _readable(node: ast.AST) -> bool:
 
 
 def nodes(tree: ast.Module) -> Iterator[tuple[int, ast.AST, str]]:
-    """All nodes that may change, with their number and the name of what they are in."""
+    """Yield all nodes that may change, with their number and the name of what they are in."""
     numbers = {id(node): number for number, node in enumerate(ast.walk(tree))}
 
     def inside(node: ast.AST, where: str) -> Iterator[tuple[int, ast.AST, str]]:
@@ -148,7 +148,7 @@ _NAMED = (ast.FunctionDef, ast.ClassDef)
 
 
 def mutants_of(root: Path, file: str) -> list[Mutant]:
-    """All mutants of a file."""
+    """Return all mutants of a file."""
     tree = ast.parse((root / file).read_text(encoding="utf-8"))
     found, times = [], Counter[str]()
     for number, node, where in nodes(tree):
@@ -167,21 +167,23 @@ def _short(node: ast.AST) -> str:
 
 
 def files(root: Path) -> list[str]:
-    """All files that are mutated."""
+    """Return all files that are mutated."""
     paths = [root / path for room in ROOMS.values() for path in room]
     found = [file for path in paths for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path])]
     return [str(file.relative_to(root)) for file in found if file.name != "__init__.py"]
 
 
 def sample(root: Path, n: int, seed: int) -> list[Mutant]:
-    """So many mutants of all files, at random; whether one is among them hardly depends on what else there is."""
+    """Return so many mutants of all files, at random; whether one is among them hardly depends on
+    what else there is.
+    """
     everything = [mutant for file in files(root) for mutant in mutants_of(root, file)]
     chosen = sorted(everything, key=lambda mutant: hashlib.sha256(f"{seed} {mutant.name}".encode()).digest())[:n]
     return sorted(chosen, key=lambda mutant: (mutant.file, mutant.place, mutant.variant))
 
 
 def mutated(root: Path, mutant: Mutant) -> ast.Module:
-    """The syntax tree of the file with the change."""
+    """Return the syntax tree of the file with the change."""
     tree = ast.parse((root / mutant.file).read_text(encoding="utf-8"))
     old = next(node for number, node in enumerate(ast.walk(tree)) if number == mutant.place)
     new = changes(old)[mutant.variant]
@@ -196,5 +198,5 @@ def mutated(root: Path, mutant: Mutant) -> ast.Module:
 
 
 def lines_of(mutants: Sequence[Mutant]) -> set[tuple[str, int]]:
-    """The lines that they change."""
+    """Return the lines that they change."""
     return {(mutant.file, mutant.line) for mutant in mutants}

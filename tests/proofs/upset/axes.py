@@ -23,7 +23,7 @@ SPEC = AxesSpec(
 
 
 def _trace(spec: AxesSpec, seed: int) -> AxesTrace:
-    """A motion for each axis, and index lines that rise now and then."""
+    """Return a motion for each axis, and index lines that rise now and then."""
     rng = np.random.default_rng(seed)
     found = []
     for axis in range(spec.axes):
@@ -35,7 +35,7 @@ def _trace(spec: AxesSpec, seed: int) -> AxesTrace:
 
 
 def _from(trace: PinTrace, clock: int) -> PinTrace:
-    """The trace from a clock on."""
+    """Return the trace from a clock on."""
     row = int(np.searchsorted(trace.clock, clock, side="right")) - 1
     at = np.maximum(trace.clock[row:] - clock, 0)
     lines = {name: line[row:] for name, line in trace.lines.items()}
@@ -43,13 +43,13 @@ def _from(trace: PinTrace, clock: int) -> PinTrace:
 
 
 def _columns(spec: AxesSpec) -> list[tuple[str, str]]:
-    """What is compared, and the strobe with which it is."""
+    """Return what is compared, and the strobe with which it is."""
     found = [(name, strobe) for strobe, names in spec.strobes.items() for name in (strobe, *names)]
     return [(name, strobe) for name, strobe in found if not name.startswith(_OF_POSITION)]
 
 
 def _dense(spec: AxesSpec, run: Run, first: int) -> NDArray[np.int64]:
-    """What is shown in every clock, with its strobe, else 0; the run begins in clock `first`."""
+    """Return what is shown in every clock, with its strobe, else 0; the run begins in clock `first`."""
     found = np.zeros((first + run.n_clocks, len(_columns(spec))), dtype=np.int64)
     for place, (name, strobe) in enumerate(_columns(spec)):
         table = run.tables[strobe]

@@ -33,7 +33,7 @@ _OF_POSITION = ("position", "index_position", "swallowed_edges")
 
 
 def spec_of(method: str) -> TachometerSpec:
-    """A core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends."""
+    """Return a core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends."""
     options: dict[str, Any] = {
         "encoder": Encoder(500, 4),
         "timing": Timing(5_000_000, TICK_CYCLES, MAX_TICKS),
@@ -44,7 +44,8 @@ def spec_of(method: str) -> TachometerSpec:
 
 
 def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
-    """Speeds of up to 2.5 counts per tick either way, a new one every few ticks; stops longer than the maximum time.
+    """Return speeds of up to 2.5 counts per tick either way, a new one every few ticks; stops longer than the maximum
+    time.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
 
 
 def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
-    """What is shown in every clock, by output, but for the position; shape (n_clocks,).
+    """Return what is shown in every clock, by output, but for the position; shape (n_clocks,).
 
     The age is that of the clocks of ticks, 0 in others.
     """
@@ -129,7 +130,9 @@ class Campaign:
 
 
 def _expected(spec: TachometerSpec, trace: PinTrace, phase: int) -> NDArray[np.int64]:
-    """What the golden model shows whose windows end in clocks `phase`, `phase` + T …; outputs in order of the ports."""
+    """Return what the golden model shows whose windows end in clocks `phase`, `phase` + T …; outputs in order of the
+    ports.
+    """
     last = np.arange(phase, trace.n_clocks - spec.tick_latency, spec.timing.tick_cycles, dtype=np.int64)
     with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
         found = dense(spec, golden.run(spec, trace))
@@ -141,7 +144,7 @@ def _compared(spec: TachometerSpec) -> list[str]:
 
 
 def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Clocks after which the outputs must be right if there was an upset in these clocks.
+    """Return clocks after which the outputs must be right if there was an upset in these clocks.
 
     What forgets only gradually forgets all at rest: when there is no count for the maximum time, and before it there
     was one that is surely right.
@@ -231,7 +234,7 @@ def play(
 
 
 def by_register(campaign: Campaign) -> Iterator[tuple[str, int]]:
-    """Registers by the longest time that an upset of theirs was seen, longest first."""
+    """Yield registers by the longest time that an upset of theirs was seen, longest first."""
     names = campaign.bits.names
     longest: dict[str, int] = {}
     for bit, clocks in zip(campaign.bit.tolist(), campaign.clocks.tolist(), strict=True):

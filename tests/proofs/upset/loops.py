@@ -61,14 +61,14 @@ class CommandedTrace:
     commands: dict[str, NDArray[np.int64]]  # with the clock from which each is there as `clock`
 
     def command(self, clock: NDArray[np.int64]) -> Sequence[Command]:
-        """What is commanded in these clocks."""
+        """Return what is commanded in these clocks."""
         row = np.searchsorted(self.commands["clock"], clock, side="right") - 1
         rows = zip(*(self.commands[name][row].tolist() for name in _COMMANDS), strict=True)
         return [Command(*command) for command in rows]
 
 
 def _forgets(spec: LoopSpec) -> int:
-    """Control ticks without a current after which less than half a unit is left of the greatest number of w.
+    """Return control ticks without a current after which less than half a unit is left of the greatest number of w.
 
     e^(−G·t) is left of y and of z, and once more as one drives the other.
     """
@@ -77,7 +77,7 @@ def _forgets(spec: LoopSpec) -> int:
 
 
 def _trace(spec: LoopSpec, seed: int) -> CommandedTrace:
-    """A motion, and new commands every few control ticks."""
+    """Return a motion, and new commands every few control ticks."""
     rng = np.random.default_rng(seed)
     pins = motion(spec.tachometer, _CYCLES, seed)
     at = np.arange(0, pins.n_clocks, spec.period)
@@ -111,7 +111,7 @@ class _Right:
 
     @classmethod
     def of(cls, spec: LoopSpec, trace: CommandedTrace, ticks: int, control_ticks: int, away: int) -> "_Right":
-        """With windows and control ticks of these phases, and a position that is so many counts off."""
+        """Return with windows and control ticks of these phases, and a position that is so many counts off."""
         alone = spec.tachometer
         last = np.arange(ticks, trace.n_clocks - alone.tick_latency, alone.longest_tick, dtype=np.int64)
         with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
@@ -122,7 +122,7 @@ class _Right:
         return cls(clock, control(spec, clock, places.position + away, updates, trace.command(clock)))
 
     def dense(self, first: int, n: int) -> NDArray[np.int64]:
-        """In every one of these clocks, 0 where nothing strobes."""
+        """Return in every one of these clocks, 0 where nothing strobes."""
         found = np.zeros((n, len(_COMPARED)), dtype=np.int64)
         for place, clock in enumerate((self.ticks, self.currents.clock)):
             found[clock[(clock >= first) & (clock < first + n)] - first, place] = 1
@@ -133,8 +133,9 @@ class _Right:
 
 
 def _allowed(spec: LoopSpec, trace: CommandedTrace) -> NDArray[np.int64]:
-    """Clocks after which all must be right: the tachometer is first, then control ticks come again, and then the
-    current has not been enabled for as long as y and z take to forget."""
+    """Return clocks after which all must be right: the tachometer is first, then control ticks come again, and then the
+    current has not been enabled for as long as y and z take to forget.
+    """
     own = spec.tachometer.recovery_clocks
     assert own is not None
     counters = own + (1 << (spec.period - 1).bit_length()) + 2 * spec.period

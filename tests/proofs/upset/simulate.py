@@ -93,7 +93,7 @@ class Upsettable:
     def runs(
         self, clock: NDArray[np.int64], bit: NDArray[np.int64], length: int
     ) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.int64]]]:
-        """Of each upset its number, the clocks since it in which outputs changed, and the outputs.
+        """Yield of each upset its number, the clocks since it in which outputs changed, and the outputs.
 
         Parameters
         ----------
@@ -122,7 +122,7 @@ class Upsettable:
 
 
 def _state(wires: list[tuple[str, int]], memories: list[tuple[str, int, int]]) -> str:
-    """The text of `State` and of what goes with it."""
+    """Return the text of `State` and of what goes with it."""
     flips, first = [], 0
     for name, width in wires:
         flips.append(

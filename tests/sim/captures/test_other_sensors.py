@@ -15,12 +15,12 @@ CLOCK_HZ, TICK = 100_000, 100
 
 
 def edges(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Times with at least 20 clocks between them, in seconds, the first not at 0."""
+    """Return times with at least 20 clocks between them, in seconds, the first not at 0."""
     return np.cumsum(rng.integers(20, 400, n)) / CLOCK_HZ
 
 
 def counts(recording: Recording, sensor: str, decoding: int) -> tuple[np.ndarray, np.ndarray]:
-    """Counts of each tick, and the clocks at which the tick ended."""
+    """Return counts of each tick, and the clocks at which the tick ended."""
     spec = of_texts(
         "s", {"ppr": "36", "clock": "100kHz", "tick": str(TICK), "max-time": "5000", "decoding": str(decoding)}
     )
@@ -29,7 +29,7 @@ def counts(recording: Recording, sensor: str, decoding: int) -> tuple[np.ndarray
 
 
 def in_ticks(times: np.ndarray, steps: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Sums of steps up to each end, from the times alone."""
+    """Return sums of steps up to each end, from the times alone."""
     seen = np.ceil(times * CLOCK_HZ - 1e-6)
     return np.diff([steps[seen <= end].sum() for end in ends], prepend=0)
 
@@ -47,7 +47,7 @@ def test_every_pulse_is_a_count_forward(decoding: int, start: int) -> None:
 
 
 def steps() -> tuple[Recording, np.ndarray, np.ndarray]:
-    """Pulses on the step line, with a direction that changes between them; the times and signs of the steps."""
+    """Return pulses on the step line, with a direction that changes between them; the times and signs of the steps."""
     rng = np.random.default_rng(3)
     times = edges(rng, 900).reshape(300, 3)  # the direction, the rise, the fall
     forward = rng.integers(0, 2, 300)

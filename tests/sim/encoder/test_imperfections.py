@@ -146,7 +146,7 @@ def test_gaussian_reaches_its_tails() -> None:
 
 
 def pulses(encoding: Encoding, line: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Widths and centres of a line's pulses in electrical degrees since time 0, at 1 rev/s."""
+    """Return widths and centres of a line's pulses in electrical degrees since time 0, at 1 rev/s."""
     time, change = encoding.recording.time[1:], np.diff((encoding.recording.level & line).astype(int))
     rise, fall = time[change > 0], time[change < 0]
     rise = rise[rise < fall[-1]]
@@ -210,7 +210,7 @@ def test_bounce_is_chatter_after_each_edge() -> None:
 
 
 def golden_run(encoding: Encoding, clock_hz: int, filter_clocks: int = 0) -> tuple[Run, NDArray[np.int64]]:
-    """The core's golden model, and the true position that each tick should show."""
+    """Return the core's golden model, and the true position that each tick should show."""
     spec = STachometer(encoder=SpecEncoder(PPR), timing=Timing(clock_hz, 100, 10), filter_clocks=filter_clocks)
     run = golden.run(spec, encoding.recording.place(clock_hz))
     sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / clock_hz

@@ -25,7 +25,7 @@ SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
 
 
 def turning(n_clocks: int, spacing: int = 7) -> PinTrace:
-    """Edges in order, `spacing` clocks apart, and once an illegal one."""
+    """Return edges in order, `spacing` clocks apart, and once an illegal one."""
     clock = np.arange(0, n_clocks, spacing)
     phase = np.arange(len(clock)) + 2 * (clock > n_clocks // 2) - 3 * (clock > n_clocks * 3 // 4)
     a, b = (np.isin(phase % 4, levels).astype(np.uint8) for levels in ((1, 2), (2, 3)))

@@ -21,7 +21,7 @@ EVERY_CLOCK._libraries = SKIPPING._libraries  # which are the same
 
 
 def turning(distances: list[int], number: int, then: int) -> PinTrace:
-    """So many edges, clocks apart by turns, and what follows the last."""
+    """Return so many edges, clocks apart by turns, and what follows the last."""
     clock = np.cumsum(np.append(0, np.resize(distances, number - 1)))
     level = np.arange(number) % 4
     a, b = (np.isin(level, high).astype(np.uint8) for high in ((1, 2), (2, 3)))
@@ -68,13 +68,13 @@ def test_ticks_of_two_clocks_have_nothing_to_skip() -> None:
 
 
 def slow_shaft(method: str, **texts: str) -> tuple[TachometerSpec, PinTrace]:
-    """A core with long ticks, and edges with seconds between them."""
+    """Return a core with long ticks, and edges with seconds between them."""
     spec = of_texts(method, {"ppr": "16", "clock": "1MHz", "tick": "1ms", **texts})
     return spec, turning([1500, 40_000, 150, 2_500_000, 990], 40, 3_000_000)
 
 
 def slow(method: str) -> tuple[TachometerSpec, PinTrace]:
-    """Of the method, or of one with ticks so long that they are counted."""
+    """Return of the method, or of one with ticks so long that they are counted."""
     return slow_shaft("s", tick="5ms", **{"max-time": "50ms"}) if method == "long" else slow_shaft(method)
 
 

@@ -23,7 +23,7 @@ IDEAL = VirtualEncoder(500)
 def driven(
     current: FloatArray, motor: Motor, encoder: VirtualEncoder = IDEAL, simulation: LoopSimulation | None = None
 ) -> Log:
-    """A run without control: a current (A) for each millisecond."""
+    """Return a run without control: a current (A) for each millisecond."""
     zero = np.zeros(len(current) + 1)
     course = Course(seconds=1e-3, speed=zero, angle=zero, load=zero, current=np.append(current, 0.0))
     return (simulation or simulation_of(S_CORE)).run(motor, edges_of(encoder), IDLE, course)

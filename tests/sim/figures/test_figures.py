@@ -40,7 +40,7 @@ LOOPS = [name for name, entry in FIGURES.items() if entry.compiled]
 
 @functools.cache
 def computed(name: str) -> Result:
-    """A figure without its hardware, which tests/test_lockstep.py holds against the golden models."""
+    """Return a figure without its hardware, which tests/test_lockstep.py holds against the golden models."""
     return FIGURES[name].compute(Lab(hdl=False, whole=False))
 
 
@@ -55,7 +55,7 @@ def test_figure_agrees_with_what_its_paper_says(name: str) -> None:
 
 
 def wrong_equation(right: Any, factor: float) -> Any:
-    """What computes another number: resolutions and times as well, if there are several."""
+    """Return what computes another number: resolutions and times as well, if there are several."""
 
     def wrong(*values: Any) -> Any:
         found = right(*values)
@@ -67,7 +67,7 @@ def wrong_equation(right: Any, factor: float) -> Any:
 
 
 def wrong_table(factor: float) -> Any:
-    """Table 1 with dt twice as long and updates by the other event, or with the floor of the counts."""
+    """Return table 1 with dt twice as long and updates by the other event, or with the floor of the counts."""
 
     def wrong(pulses: Iterable[int], dt: int, duration: int) -> list[Row]:
         if factor > 1:

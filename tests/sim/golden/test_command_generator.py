@@ -16,7 +16,7 @@ FORM = USUAL.generator
 
 
 def states(form: GeneratorForm, demands: list[Demand], position: int = 0) -> np.ndarray:
-    """Place, speed and change in each control tick, in counts and control ticks."""
+    """Return place, speed and change in each control tick, in counts and control ticks."""
     generator = command_generator.Generator(form)
     found = []
     for demand in [Demand(enable=False), *demands]:

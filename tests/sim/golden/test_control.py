@@ -20,7 +20,7 @@ CORE = STachometer(
 
 
 def loop(gain: int, **options: Any) -> LoopSpec:
-    """The gains of Fig. 15."""
+    """Return the gains of Fig. 15."""
     rest = {"position_gain": Fraction(gain**2, 4), "observer": Fraction(2 * gain)} | options
     return LoopSpec(tachometer=CORE, velocity_gain=Fraction(gain), **rest)
 

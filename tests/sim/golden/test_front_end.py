@@ -24,7 +24,7 @@ def steps_of(clock: list[int], step: list[int], index: list[int] | None = None, 
 
 
 def line(*rises_and_falls: int, n_clocks: int) -> NDArray[np.uint8]:
-    """Levels of every clock; the line is low first, and changes in these clocks."""
+    """Return levels of every clock; the line is low first, and changes in these clocks."""
     level = np.zeros(n_clocks, dtype=np.uint8)
     for clock in rises_and_falls:
         level[clock:] ^= 1
@@ -139,7 +139,7 @@ def test_the_filter_passes_what_holds_long_enough() -> None:
 
 
 def left_first(clock: list[int], step: list[int], last: list[int], limit: int) -> list[int]:
-    """The same step by step: the sign with which the sum of a window leaves ±limit for the first time."""
+    """Return the same step by step: the sign with which the sum of a window leaves ±limit for the first time."""
     found, window, total = [0] * len(last), 0, 0
     for at, one in zip(clock, step, strict=True):
         while window < len(last) and at > last[window]:

@@ -22,13 +22,13 @@ OUTPUTS: tuple[dict[str, str], ...] = (
 
 
 def spec_of(**options: str) -> TachometerSpec:
-    """6.25 rev/s are a count per tick."""
+    """Return 6.25 rev/s are a count per tick."""
     texts = CORE | {"tick": "1600", "max-time": "16000"}
     return of_texts("s", texts | {name.replace("_", "-"): text for name, text in options.items()})
 
 
 def fastest(sign: int, n_clocks: int) -> PinTrace:
-    """A count in every clock."""
+    """Return a count in every clock."""
     level = quadrature(sign * np.arange(n_clocks))
     return PinTrace(np.arange(n_clocks), level & np.uint8(1), level >> np.uint8(1), n_clocks)
 

@@ -25,7 +25,7 @@ def spec_of(lowpass: Fraction, max_ticks: int = 500, frac_bits: int = 16) -> STa
 
 
 def through(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, rests: bool = False) -> Table:
-    """What the filter of a core makes of velocities, each so many ticks after the one before."""
+    """Return what the filter of a core makes of velocities, each so many ticks after the one before."""
     return filtered(spec, *far_apart(spec, velocity, elapsed, rests))
 
 
@@ -37,7 +37,7 @@ def far_apart(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, rest
 
 
 def velocities(spec: STachometer, rng: np.random.Generator, n: int) -> np.ndarray:
-    """Full swings, steps by one LSB, noise; and 0 at the end."""
+    """Return full swings, steps by one LSB, noise; and 0 at the end."""
     most = spec.max_count << spec.frac_bits
     parts = [
         np.where(np.arange(n) % 40 < 20, most, -most),
@@ -50,7 +50,7 @@ def velocities(spec: STachometer, rng: np.random.Generator, n: int) -> np.ndarra
 
 
 def check_faithful(spec: STachometer) -> float:
-    """The greatest error in LSB."""
+    """Return the greatest error in LSB."""
     rng = np.random.default_rng(1)
     velocity = velocities(spec, rng, 800)
     longest = spec.timing.max_ticks

@@ -10,7 +10,7 @@ NONE = np.empty(0, dtype=np.int64)
 
 
 def ordered(rng: np.random.Generator, n: int, most: int) -> NDArray[np.int64]:
-    """So many different numbers, in order."""
+    """Return so many different numbers, in order."""
     return np.cumsum(rng.integers(1, most + 1, n)) - 5
 
 

@@ -18,7 +18,7 @@ LAST_WORD = (1 << 32) - 1
 
 
 def pins(n_counts: int = COUNTS, z: tuple[int, ...] = (), n_clocks: int = 10 * COUNTS + 20) -> PinTrace:
-    """Lines that turn backwards, and an index line that changes in clocks 5 after a count."""
+    """Return lines that turn backwards, and an index line that changes in clocks 5 after a count."""
     quarter = np.minimum(np.arange(2 * n_clocks // 10), 2 * n_counts)
     clock = np.append(0, 4 + 5 * np.arange(len(quarter) - 1))
     level = quadrature(-((quarter + 1) // 2))
@@ -36,18 +36,18 @@ class Bank:
         self.bank = GoldenBank(self.map, trace)
 
     def ask(self, *asked: tuple[int, str, int | None], captures: tuple[int, ...] = ()) -> list[int | None]:
-        """What accesses read; each is its clock, the register, and what is written or None."""
+        """Return what accesses read; each is its clock, the register, and what is written or None."""
         accesses = [Access(clock, self.map[name].offset // 4, data) for clock, name, data in asked]
         answers = self.bank.answers(accesses, captures)
         assert not any(error for _, error in answers)
         return [data for data, _ in answers]
 
     def at(self, clock: int, *names: str) -> list[int | None]:
-        """What registers show of one clock, in which the input captures."""
+        """Return what registers show of one clock, in which the input captures."""
         return self.ask((0, "CONTROL", 2), *((clock + 1, name, None) for name in names), captures=(clock,))[1:]
 
     def flag(self, word: int | None, name: str) -> int:
-        """A flag of STATUS, or a counter, in what was read."""
+        """Return a flag of STATUS, or a counter, in what was read."""
         assert word is not None
         register = "COUNTERS" if name in self.map.counted else "STATUS"
         (field,) = (field for field in self.map[register].fields if field.name == name)

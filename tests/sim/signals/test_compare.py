@@ -13,7 +13,7 @@ N_ROWS = 4
 
 
 def spec_of(method: str) -> TachometerSpec:
-    """A core with as many outputs as the method can have."""
+    """Return a core with as many outputs as the method can have."""
     bounds = METHODS[method].has_bounds
     options: dict[str, object] = {"bounds": bounds, "age": True, "index": True, "filter_clocks": 2, "unit": "rpm"}
     own: dict[str, object] = {"adaptive": Fraction(1, 10)} if method == "rairan" else {"max_tick_cycles": 2000}
@@ -21,7 +21,7 @@ def spec_of(method: str) -> TachometerSpec:
 
 
 def run_of(spec: TachometerSpec) -> Run:
-    """A run with some rows in every table, and another number in every cell."""
+    """Return a run with some rows in every table, and another number in every cell."""
     numbers = iter(range(10**6))
     tables = {}
     for strobe, names in spec.strobes.items():
@@ -31,12 +31,12 @@ def run_of(spec: TachometerSpec) -> Run:
 
 
 def cells(spec: TachometerSpec) -> list[tuple[str, str]]:
-    """Every column of every table."""
+    """Return every column of every table."""
     return [(strobe, name) for strobe, names in spec.strobes.items() for name in ("clock", *names)]
 
 
 def with_cell(run: Run, strobe: str, name: str, row: int, change: int) -> Run:
-    """The run with another number in one cell."""
+    """Return the run with another number in one cell."""
     table = run.tables[strobe]
     column = table[name].copy()
     column[row] ^= change

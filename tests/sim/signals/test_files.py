@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and the tables in them."""
+"""Files appear whole or not at all."""
 
 from pathlib import Path
 

@@ -23,7 +23,7 @@ IN_WORDS = {"max-time", "min-time", "max-speed", "frac-bits", "velocity-width"}
 
 
 def shown(name: str, value: str) -> str:
-    """What is in the words of a configuration; empty if it cannot be told."""
+    """Return what is in the words of a configuration; empty if it cannot be told."""
     if value == "" or name in IN_WORDS:
         return ""
     if value.startswith("yes "):

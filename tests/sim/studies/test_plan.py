@@ -22,14 +22,14 @@ def with_max_ticks(max_ticks: int, *, cancel: bool = True) -> STachometer:
 
 
 def updates_of(spec: STachometer, m_e: NDArray[np.int64]) -> Table:
-    """What the golden model makes of pulse numbers; `clock` is the tick that caused the update."""
+    """Return what the golden model makes of pulse numbers; `clock` is the tick that caused the update."""
     ticks = Table(np.arange(len(m_e)), {"pulse_count": m_e})
     updates = Model(spec).updates(ticks, None, len(m_e) + spec.datapath_latency)
     return updates.having(clock=updates.clock - spec.datapath_latency)
 
 
 def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Table, NDArray[np.float64]]:
-    """Settled updates at a speed in counts per tick, to the count, and their errors in the same unit."""
+    """Return settled updates at a speed in counts per tick, to the count, and their errors in the same unit."""
     position = (np.arange(n_ticks + 1) * units.numerator + units.denominator // 3) // units.denominator
     updates = updates_of(spec, np.diff(position))
     updates = updates.rows(updates.clock > 200)  # more than two windows, and two equal pulse numbers

@@ -35,7 +35,7 @@ def spec_of(method: str) -> TachometerSpec:
 
 
 def speeds() -> list[float]:
-    """In counts per tick, from 1/100 to 20, none of them special, some close to multiples."""
+    """Return in counts per tick, from 1/100 to 20, none of them special, some close to multiples."""
     near = [k + d for k in (1, 2, 7) for d in (-0.013, 0.003, 0.029)]
     return [*(10 ** np.random.default_rng(5).uniform(-2, 1.3, 40)).tolist(), *near]
 

@@ -41,7 +41,7 @@ class Measured:
 
 @functools.cache
 def measured() -> Measured:
-    """Speeds from 1/8 to 10, all that a whole number of ts makes, the ends of all intervals among them."""
+    """Return speeds from 1/8 to 10, all that a whole number of ts makes, the ends of all intervals among them."""
     periods = np.arange(DT // 10, 8 * DT + 1)
     periods = periods[(periods < 2 * DT) | (periods % 7 == 0) | (periods % DT < 3) | (periods % DT == DT - 1)]
     rows = []

@@ -20,13 +20,13 @@ LEVELS = np.array([0, 1, 3, 2], dtype=np.uint8)  # A + 2 B in the quarters
 
 
 def pins(edges: NDArray[np.int64], n_clocks: int) -> PinTrace:
-    """Lines with an edge at each of these clocks, forward."""
+    """Return lines with an edge at each of these clocks, forward."""
     level = LEVELS[np.arange(len(edges) + 1) & 3]
     return PinTrace(np.append(0, edges), level & 1, level >> 1, n_clocks)
 
 
 def settled_n1(spec: RairanTachometer, edges: NDArray[np.int64], windows: int = 8) -> NDArray[np.float64]:
-    """n1 of all updates after so many dt or counts, whichever is longer."""
+    """Return n1 of all updates after so many dt or counts, whichever is longer."""
     period = int(np.diff(edges).max())
     run = golden.run(spec, pins(edges, int(edges[-1])))
     late = run.updates.clock > edges[0] + windows * max(spec.timing.tick_cycles, period)

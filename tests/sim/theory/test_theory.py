@@ -31,7 +31,7 @@ def measure(
 
 
 def speeds_over_four_decades() -> list[float]:
-    """Unit velocities from 1/100 to 100, none of them special, some close to multiples and halves."""
+    """Return unit velocities from 1/100 to 100, none of them special, some close to multiples and halves."""
     rng = np.random.default_rng(20)
     near = [k + d for k in (1, 2, 7, 30) for d in (-0.0021, 0.0023, 0.01, -0.04, 0.45, 0.52)]
     return [*(10 ** rng.uniform(-2, 2, size=60)).tolist(), *near]

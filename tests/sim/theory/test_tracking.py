@@ -65,14 +65,16 @@ class Decisions(Recursion):
         self.ticks += 1
 
     def reaches(self, value: float, limit: float) -> bool:
-        """Decide."""
+        """Return decide."""
         number = len(self.closeness)
         self.closeness.append((abs(value - limit) / limit if limit else math.inf, self.ticks, number))
         return super().reaches(value, limit) != (number in self.turned)
 
 
 def deviations(spec: TrackTachometer, trace: PinTrace, recursion: Recursion) -> NDArray[np.float64]:
-    """Velocity, acceleration and fine position of the golden model less those of the recursion, in LSB: (3, n)."""
+    """Return velocity, acceleration and fine position of the golden model less those of the recursion, in LSB: (3,
+    n).
+    """
     steps, (last, _) = decoded(spec, trace), windows(spec, trace)
     tables = golden.tables(spec, trace)
     ticks, updates = tables["tick"], tables["velocity_valid"]
@@ -93,7 +95,7 @@ def deviations(spec: TrackTachometer, trace: PinTrace, recursion: Recursion) -> 
 
 
 def greatest_deviation(spec: TrackTachometer, trace: PinTrace) -> tuple[float, int]:
-    """The greatest of all, with as few decisions turned over as need be, and how many these are."""
+    """Return the greatest of all, with as few decisions turned over as need be, and how many these are."""
     turned: frozenset[int] = frozenset()
     while True:
         recursion = Decisions(Tuning.of(spec), turned=turned)

@@ -20,7 +20,7 @@ REACHES = [0.02, 0.1, 0.3]
 
 
 def states(x: float, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Place, velocity and acceleration of the recursion after each count, in counts and gaps, shape (n, 3)."""
+    """Return place, velocity and acceleration of the recursion after each count, in counts and gaps, shape (n, 3)."""
     tuning = Tuning(
         bandwidth=x / GAP,
         least_memory=0.5,
@@ -82,7 +82,7 @@ def test_bandwidth(x: float) -> None:
 
 
 def worst_velocity(x: float, n: int) -> float:
-    """What n errors of 1 or −1 cause if each has the worse sign."""
+    """Return what n errors of 1 or −1 cause if each has the worse sign."""
     impulse = np.zeros(n)
     impulse[0] = 1
     answer = states(x, impulse)[:, 1]

@@ -16,7 +16,7 @@ ROUNDING = 1e-9
 
 
 def windows(kind: Callable[..., Windows], *arguments: int, below: float = math.inf) -> Iterator[tuple[float, Windows]]:
-    """Speed in unit velocities and windows of each ideal encoder with some hundred counts."""
+    """Yield speed in unit velocities and windows of each ideal encoder with some hundred counts."""
     for p, q, c in speeds():
         if p / q < below:
             yield p / q, kind(positions(p, q, c, N_TICKS), *arguments)

@@ -30,7 +30,7 @@ CORE = STachometer(
 
 
 def random_spec(seed: int, gains: str = "fixed") -> LoopSpec:
-    """Gains, motors, clocks and units of all sizes."""
+    """Return gains, motors, clocks and units of all sizes."""
     rng = np.random.default_rng(seed)
 
     def about(middle: float, decades: float) -> Fraction:
@@ -65,7 +65,7 @@ SPECS = [spec for seed in range(12) if (spec := random_spec(seed)).form]
 
 
 def with_gains(form: ControlForm, raw: Mapping[Term, int]) -> ControlForm:
-    """A form whose gains are inputs, with these gains; its formats are those of the options all the same."""
+    """Return a form whose gains are inputs, with these gains; its formats are those of the options all the same."""
     terms = {term: replace(form.terms[term], values=(one << form.gain_shift,)) for term, one in raw.items()}
     made = replace(form, terms=form.terms | terms)
     for name in ("most_error", "most_total", "word_width"):

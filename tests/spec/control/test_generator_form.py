@@ -22,7 +22,7 @@ SPECS = [
 
 
 def bits_of(*values: int) -> int:
-    """Bits of a signed word that holds these and the negative ones."""
+    """Return bits of a signed word that holds these and the negative ones."""
     return max(value.bit_length() for value in values) + 1
 
 

@@ -32,13 +32,13 @@ SPECS = [SPEC, replace(SPEC, tachometer=IN_RAD_PER_S, multiplier="parallel", per
 
 
 def described(spec: LoopSpec) -> dict[str, Any]:
-    """Entries of the manifest, as whoever reads the file has them."""
+    """Return entries of the manifest, as whoever reads the file has them."""
     found: dict[str, Any] = json.loads(json.dumps(manifest(spec, "loop")))["loop"]
     return found
 
 
 def amperes(spec: LoopSpec, command: Command) -> float:
-    """The current of a control tick at rest."""
+    """Return the current of a control tick at rest."""
     entry = described(spec)["current"]
     loop = Control(spec.form)
     loop.tick(0, command)
@@ -100,7 +100,7 @@ def test_the_demands_of_a_generator(spec: LoopSpec) -> None:
     position = described(spec)["command_position"]["counts_per_lsb"]
 
     def gone(demand: Demand, n: int) -> list[float]:
-        """Position in counts after each control tick."""
+        """Return position in counts after each control tick."""
         generator, found = Generator(spec.generator), []
         for _ in range(n):
             generator.tick(0, demand)

@@ -76,13 +76,14 @@ def test_the_fastest_filter_is_2_pi_times_the_clock() -> None:
 
 
 def silence(max_ticks: int, tick: int) -> int:
-    """What counts the ticks of a silence may wrap first."""
+    """Return what counts the ticks of a silence may wrap first."""
     return (2 ** max_ticks.bit_length() + 1) * tick
 
 
 def test_recovery() -> None:
     """docs/concepts/verification.md: the synchroniser, the step, the open window and a whole one, what the method
-    remembers or a silence, and the tick; counters wrap first."""
+    remembers or a silence, and the tick; counters wrap first.
+    """
     for tick, begun in ((1, 2), (2, 2), (3, 3), (4, 5), (20, 33)):
         spec = spec_of(tick)
         assert spec.recovery_clocks == 2 + 1 + begun + silence(10, tick) + 2

@@ -21,12 +21,12 @@ from tachometry.spec.formats.velocity_output import VelocityOutput
 
 
 def bits_of(greatest: int) -> int:
-    """The least number of bits, unsigned."""
+    """Return the least number of bits, unsigned."""
     return next(bits for bits in count() if 2**bits > greatest)
 
 
 def wrong_quotients(form: Reciprocal, q: list[int]) -> int:
-    """How many N/(2^s·m) come out wrong, to the nearest, down or up; q(m) is that of the list."""
+    """Tell how many N/(2^s·m) come out wrong, to the nearest, down or up; q(m) is that of the list."""
     wrong = 0
     for m, entry in enumerate(q, 1):
         for numerator in range(-form.max_numerator, form.max_numerator + 1):
@@ -210,7 +210,7 @@ def test_a_window_that_goes_on_within_the_table_is_no_preset() -> None:
 
 
 def alpha(bandwidth: Fraction, seconds: Fraction) -> Fraction:
-    """1 − e^(−G·T), to 60 digits."""
+    """Return 1 − e^(−G·T), to 60 digits."""
     with localcontext() as context:
         context.prec = 60
         power = bandwidth * seconds

@@ -16,7 +16,7 @@ def spec_of(tick: int = 960, **options: Any) -> STachometer:
 
 
 def per_count(unit: str) -> Fraction:
-    """A count in 20 µs of 2000 a revolution is 25 rev/s."""
+    """Return a count in 20 µs of 2000 a revolution is 25 rev/s."""
     return 25 * UNITS[unit]
 
 

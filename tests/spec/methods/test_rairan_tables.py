@@ -48,7 +48,7 @@ def test_n3_is_looked_up_by_the_pulses_of_a_tick_too() -> None:
 
 
 def bounds_of(spec: RairanTachometer, n: int, k: int, high: bool) -> tuple[int, int, int]:
-    """Lower, upper and loose bound of Ndt1 = n, or of Nep1 = n + 1, with dt·2^k; in counts per tick."""
+    """Return lower, upper and loose bound of Ndt1 = n, or of Nep1 = n + 1, with dt·2^k; in counts per tick."""
     f, off, none = spec.frac_bits, spec.edge_error, spec.absent_bound
     clock = Fraction(1, spec.timing.tick_cycles << k)
 

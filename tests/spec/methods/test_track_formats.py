@@ -15,7 +15,7 @@ from tachometry.spec.formats.tracking_program import Program
 
 
 def drawn(seed: int) -> Tracking:
-    """Ticks from 2^8 clocks on, up to a thousand counts in each, bandwidths over five decades."""
+    """Return ticks from 2^8 clocks on, up to a thousand counts in each, bandwidths over five decades."""
     rng = np.random.default_rng(seed)
     external = bool(rng.random() < 0.5)
     tick = int(2 ** rng.uniform(8.2, 17))
@@ -37,7 +37,7 @@ def drawn(seed: int) -> Tracking:
 
 
 def few(seed: int) -> Tracking:
-    """Few counts in short ticks with great bandwidths, so that small terms are the greatest."""
+    """Return few counts in short ticks with great bandwidths, so that small terms are the greatest."""
     rng, form = np.random.default_rng(seed), drawn(seed)
     tick = int(rng.integers(257, 400))
     return replace(
@@ -57,7 +57,7 @@ Made = Callable[[int], Tracking]
 
 
 def for_each(n: int, *kinds: Made) -> Callable[[Callable[[Tracking], None]], Callable[[Made], None]]:
-    """A test of n cores of each kind, which tells the one that fails."""
+    """Return a test of n cores of each kind, which tells the one that fails."""
 
     def decorated(check: Callable[[Tracking], None]) -> Callable[[Made], None]:
         @pytest.mark.parametrize("made", kinds)
@@ -161,7 +161,9 @@ def test_the_unit_of_time(form: Tracking) -> None:
 
 
 def gains(form: Tracking) -> list[tuple[int, float]]:
-    """Ticks from count to count, and d = 1 − θ, with the least bandwidth: in each, the fewest of the most x, none."""
+    """Return ticks from count to count, and d = 1 − θ, with the least bandwidth: in each, the fewest of the most x,
+    none.
+    """
     slowest = 10 if form.growing else 1
     per_tick = float(form.bandwidth) * form.tick_cycles / form.clock_hz / slowest
     forgets = (1 - float(form.least_memory)) * (0.2 if form.growing else 1)

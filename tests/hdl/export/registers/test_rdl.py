@@ -28,7 +28,7 @@ ONES = (1 << 32) - 1
 
 @cache
 def case(method: str, seed: int) -> tuple[RegisterMap, PinTrace, list[dict[str, int]]]:
-    """A random core, its pins, and these as rows of clocks."""
+    """Return a random core, its pins, and these as rows of clocks."""
     spec, _, trace = random_case(seed, method)
     spec = replace(spec, velocity_width=40) if (method, seed) == WIDE else spec
     n_clocks = min(trace.n_clocks, CLOCKS)
@@ -40,7 +40,7 @@ def case(method: str, seed: int) -> tuple[RegisterMap, PinTrace, list[dict[str, 
 
 
 def plan(registers: list[RegNode], n_clocks: int) -> list[tuple[int, RegNode, int | None]]:
-    """Clocks, registers and what is written: resets, writes of every register, and then rounds of reads."""
+    """Return clocks, registers and what is written: resets, writes of every register, and then rounds of reads."""
     # From the last to the first: what a capture takes is 0 until the first of it is read.
     found: list[tuple[int, RegNode, int | None]] = [(clock, one, None) for clock, one in enumerate(registers[::-1], 1)]
     steps = [(one, data) for one in registers for data in (ONES, None, 0, None)]

@@ -15,7 +15,7 @@ from tachometry.spec import Encoder, MTachometer, STachometer, TachometerSpec, T
 
 
 def ticks_of(angle: NDArray[np.int64]) -> Table:
-    """What an ideal encoder shows of it, a tick in every clock."""
+    """Return what an ideal encoder shows of it, a tick in every clock."""
     m_e = np.diff(angle // SUBCOUNTS)
     return Table(np.arange(len(m_e)), {"pulse_count": m_e})
 
@@ -28,7 +28,7 @@ M = MTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 32, 500), bounds=
 def true_travel(
     spec: TachometerSpec, angle: NDArray[np.int64], at: NDArray[np.int64], m_s: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Twice the angle travelled in the windows that close with the ticks `at`, in 1/`SUBCOUNTS`.
+    """Return twice the angle travelled in the windows that close with the ticks `at`, in 1/`SUBCOUNTS`.
 
     The angles begin a tick before the first that is counted. Eq. (21) is the mean of two windows, of which one lies a
     tick before the other.
@@ -39,7 +39,7 @@ def true_travel(
 
 
 def displaced(spec: TachometerSpec, angle: NDArray[np.int64], seed: int) -> NDArray[np.int64]:
-    """How much later than that of an ideal disc each edge comes: half because of the disc, half of the lines."""
+    """Tell how much later than that of an ideal disc each edge comes: half because of the disc, half of the lines."""
     rng = np.random.default_rng(seed)
     most = int(spec.edge_error * SUBCOUNTS) // 2
     disc = rng.choice([0, most], 101) if seed % 2 else rng.integers(0, most + 1, 101)
@@ -47,7 +47,7 @@ def displaced(spec: TachometerSpec, angle: NDArray[np.int64], seed: int) -> NDAr
 
 
 def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000) -> tuple[int, float]:
-    """Every window of random motions; how many there were, and how near the truth came to a bound, in counts."""
+    """Return every window of random motions; how many there were, and how near the truth came to a bound, in counts."""
     windows, nearest = 0, 1.0
     for seed in range(n_motions):
         angle = motion(n_ticks + 1, spec.max_count, seed)

@@ -27,7 +27,7 @@ def make_spec(**options: Any) -> TTachometer:
 
 
 def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> Table:
-    """Updates by the clocks of their causes; `counts` has the steps by their clocks."""
+    """Return updates by the clocks of their causes; `counts` has the steps by their clocks."""
     at = np.array(sorted(counts), dtype=np.int64)
     steps = Steps(at, np.array([counts[clock] for clock in at.tolist()], dtype=np.int64), NONE, NONE, NONE)
     ticks, _ = count(spec, steps, np.arange(TICK - 1, n_clocks, TICK))
@@ -36,7 +36,7 @@ def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> T
 
 
 def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> list[Update]:
-    """Those of the naive model."""
+    """Return those of the naive model."""
     words = {"clock": str(100 * TICK), "tick": str(TICK), "max-time": str(TICK * MAX_TICKS), "ppr": "25"}
     words |= {"timer": spec.timer, "frac-bits": str(spec.frac_bits), "edge-error": str(spec.edge_error)}
     settings = Settings("t", words | {"bound-decay": "yes" if spec.bound_decay else "no"})
@@ -58,12 +58,12 @@ def test_a_velocity_decays_by_an_lsb_at_least(timer: str) -> None:
 
 
 def rounded(value: Fraction, frac_bits: int) -> Fraction:
-    """To the nearest multiple of 2^−f, ties upward."""
+    """Return to the nearest multiple of 2^−f, ties upward."""
     return Fraction(math.floor(value * 2**frac_bits + Fraction(1, 2)), 2**frac_bits)
 
 
 def random_counts(seed: int, spec: TTachometer, n_clocks: int) -> dict[int, int]:
-    """Stretches of counts in one direction at least a division apart, with silences of all lengths."""
+    """Return stretches of counts in one direction at least a division apart, with silences of all lengths."""
     rng = np.random.default_rng(seed)
     counts, clock, sign = {}, int(rng.integers(1, 3 * TICK)), 1
     least = TICK if spec.on_lattice else spec.division_clocks

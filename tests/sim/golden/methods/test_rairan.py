@@ -22,7 +22,7 @@ from tachometry.spec.methods.adaptive import parse_target
 
 
 def held(updates: Table, name: str, n: int, first: int) -> np.ndarray:
-    """An output of the method at every ts, in time with its cause."""
+    """Return an output of the method at every ts, in time with its cause."""
     row = np.searchsorted(updates.clock, np.arange(n), side="right")
     return np.append(first, updates[name])[row]
 
@@ -76,7 +76,7 @@ def test_it_does_what_is_described_clock_by_clock(dt: int, bound_decay: bool) ->
 
 
 def steady_steps(rng: np.random.Generator, n: int, dt: int) -> np.ndarray:
-    """Stretches of many counts at all speeds, so that dt settles, with reversals and rests; shape (n,)."""
+    """Return stretches of many counts at all speeds, so that dt settles, with reversals and rests; shape (n,)."""
     step, at, sign = np.zeros(n, dtype=np.int64), 0, 1
     while at < n:
         gap = max(1.0, dt * 10 ** rng.uniform(-1.3, 1.3))
@@ -110,7 +110,7 @@ def test_orbit_follows_to_the_end() -> None:
 
 
 def pulses(period: Fraction, n: int, sign: int = 1) -> np.ndarray:
-    """A count every so many clocks, in n clocks."""
+    """Return a count every so many clocks, in n clocks."""
     step = np.zeros(n, dtype=np.int64)
     at = (np.arange(1, int(n / period)) * period.numerator) // period.denominator
     step[at] = sign
@@ -189,7 +189,7 @@ def seen(step: np.ndarray, **options: object) -> Table:
 
 
 def at_clock(updates: Table, clock: int) -> float:
-    """The held velocity in counts per dt."""
+    """Return the held velocity in counts per dt."""
     row = np.searchsorted(updates.clock, clock, side="right")
     return float(np.append(0, updates.velocity)[row]) / 2**16
 

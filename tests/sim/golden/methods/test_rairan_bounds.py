@@ -12,7 +12,7 @@ FRAC_BITS = 10
 
 
 def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float, float]:
-    """Updates that were looked at, the mean width of their bounds, and that of [n2, n1], where both are finite.
+    """Return updates that were looked at, the mean width of their bounds, and that of [n2, n1], where both are finite.
 
     A count is seen in the first clock after it. What is measured goes from the true time of a count to that of the next
     (Ndt1), or to the last clock of dt, and between two counts in one direction the shaft turns evenly.

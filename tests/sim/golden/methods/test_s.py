@@ -29,7 +29,7 @@ def as_ticks(m_e: list[int]) -> Table:
 
 
 def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
-    """(tick, m_s, forced, stalled, raw velocity) of every update; `stalled` is that of the tick."""
+    """Return (tick, m_s, forced, stalled, raw velocity) of every update; `stalled` is that of the tick."""
     s_model, ticks = model(max_ticks, **options), as_ticks(m_e)
     found = s_model.updates(ticks, None, 1 << 40)
     cause = (found.clock - s_model._spec.datapath_latency) // 16
@@ -49,7 +49,7 @@ def test_the_papers_sequences(name: str, cancel: bool) -> None:
 
 
 def definition(m_e: list[int], max_ticks: int, cancel: bool) -> list[tuple[int, int, bool, bool, int]]:
-    """Those of the naive model; S rests if nothing was counted in a forced window."""
+    """Return those of the naive model; S rests if nothing was counted in a forced window."""
     words = {"tick": "16", "max-time": str(16 * max_ticks), "cancel": "yes" if cancel else "no"}
     found = s_updates(Settings("s", words), [Tick(i, number, False, 0, not number) for i, number in enumerate(m_e)])
     quiet = [not any(m_e[max(one.cause - one.interval, 0) : one.cause + 1]) for one in found]

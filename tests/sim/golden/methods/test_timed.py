@@ -20,7 +20,7 @@ EXTERNAL = {"ppr": "500", "timer": "tick", "external-tick": "yes"}
 
 
 def rms(spec: TachometerSpec, motion: str, begin: float, end: float, jitter: float = 0.03) -> tuple[float, Table]:
-    """RMS of the error of the held velocity in rad/s from `begin` to `end` in seconds, and all updates."""
+    """Return RMS of the error of the held velocity in rad/s from `begin` to `end` in seconds, and all updates."""
     encoding = VirtualEncoder(2500, jitter=jitter, seed=1).record(parse_motion(motion))
     updates = golden.run(spec, encoding.recording.place(spec.timing.clock_hz)).updates
     instants = np.arange(begin, end, 1e-5)
@@ -46,7 +46,7 @@ def test_a_stop_is_seen() -> None:
 
 
 def counting(n_ticks: int, tick: int, gap: int) -> PinTrace:
-    """Steady counts, and external ticks."""
+    """Return steady counts, and external ticks."""
     clock = np.arange(0, n_ticks * tick, gap)
     level = quadrature(np.arange(len(clock)))
     trace = PinTrace(clock, level & np.uint8(1), level >> np.uint8(1), n_ticks * tick)

@@ -10,7 +10,7 @@ from tachometry.spec import of_texts
 
 
 def places(start: str, gap: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Clocks and positions of counts, at last with `gap` clocks in between."""
+    """Return clocks and positions of counts, at last with `gap` clocks in between."""
     clock = np.round(np.arange(1, 1500) * gap).astype(np.int64)
     forward = np.arange(1, 1500)
     if start == "reversal":

@@ -21,7 +21,7 @@ RANDOM = MTTachometer(encoder=Encoder(500), timing=Timing(1_000_000, TICK, 500),
 
 
 def random_counts(n: int, seed: int) -> tuple[Ints, Ints]:
-    """Clocks of counts from one to some hundred clocks apart, and steps with few or with many reversals."""
+    """Return clocks of counts from one to some hundred clocks apart, and steps with few or with many reversals."""
     rng = np.random.default_rng(seed)
     gaps = np.concatenate([10 ** rng.uniform(0, 2.2) * rng.uniform(0.3, 1.7, 50) for _ in range(n // 50)])
     gaps[rng.random(n) < 0.003] += 500 * TICK
@@ -30,7 +30,7 @@ def random_counts(n: int, seed: int) -> tuple[Ints, Ints]:
 
 
 def windows(spec: MTTachometer, clock: Ints, step: Ints) -> tuple[Ints, Ints]:
-    """Which counts open and close the measurements of the golden model."""
+    """Tell which counts open and close the measurements of the golden model."""
     none, n_clocks = np.empty(0, np.int64), int(clock[-1]) + 10 * TICK
     tick = np.arange(TICK - 1, n_clocks, TICK)
     ticks = Table(tick + spec.tick_latency, {"pulse_count": np.zeros(len(tick), np.int64)})
@@ -93,7 +93,7 @@ DRIVE = {"ppr": "500", "clock": "10MHz", "tick": "100us", "min-time": "300us"}
 
 
 def errors(speed: float, **options: str) -> Any:
-    """Errors of the updates in rad/s; the lines are 20 degrees apart from their places, and as much too wide."""
+    """Return errors of the updates in rad/s; the lines are 20 degrees apart from their places, and as much too wide."""
     encoder = VirtualEncoder(500, phase_error_deg=20, duty_error_deg=20)
     recording = encoder.record(parse_motion(f"constant:{speed}rad/s:50ms")).recording
     spec = of_texts("mt", DRIVE | options)

@@ -34,7 +34,7 @@ def raw_difference(steps: Steps, period: float) -> Estimate:
 
 
 def slow_loop(steps: Steps, period: float) -> Estimate:
-    """Stable at PERIOD."""
+    """Return stable at PERIOD."""
     return tracking_loop(steps, period, bandwidth_rad_s=200)
 
 
@@ -59,7 +59,7 @@ def random_steps(seed: int) -> Steps:
 
 
 def true_and_measured(motion: str, method: Method, period: float, from_s: float) -> tuple[FloatArray, FloatArray]:
-    """True speed and error of the measured one at each reading after some time, rad/s."""
+    """Return true speed and error of the measured one at each reading after some time, rad/s."""
     encoding = record(motion, pulses_per_rev=CPR // 4)
     estimate = method(Steps.of_recording(encoding.recording, CPR), period)
     late = estimate.time > from_s
@@ -71,7 +71,7 @@ def true_and_measured(motion: str, method: Method, period: float, from_s: float)
 
 
 def readings(steps: Steps, clock: float) -> list[tuple[int, int, int]]:
-    """Clock, count and clock of the latest count at each reading, after those at time 0."""
+    """Return clock, count and clock of the latest count at each reading, after those at time 0."""
     found, seen, count, latest = [(0, 0, 0)], 0, 0, 0
     for k in range(1, round(steps.duration / PERIOD) + 1):
         while seen < len(steps.time) and steps.time[seen] <= k * PERIOD:

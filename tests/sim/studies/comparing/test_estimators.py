@@ -32,7 +32,7 @@ def random_steps(seed: int) -> Steps:
 
 
 def counts_of(*per_period: int) -> Steps:
-    """So many counts in each period, in its middle."""
+    """Return so many counts in each period, in its middle."""
     time = np.repeat((np.arange(len(per_period)) + 0.5) * PERIOD, np.abs(per_period))
     step = np.repeat(np.sign(per_period), np.abs(per_period))
     return Steps(time, step.astype(np.int64), len(per_period) * PERIOD, CPR)
@@ -42,7 +42,7 @@ def counts_of(*per_period: int) -> Steps:
 
 
 def naive_fit(steps: Steps, edges: int, order: int, timeout: float, clock: float) -> list[float]:
-    """One reading after the other, by `numpy.polyfit`, counts/s."""
+    """Return one reading after the other, by `numpy.polyfit`, counts/s."""
     position = np.cumsum(steps.step) - steps.step / 2
     stamp = np.floor(steps.time / clock + 1e-6) * clock
     speeds = []
@@ -147,7 +147,7 @@ def test_the_window_on_a_noiseless_ramp_is_the_longest_and_after_a_change_of_spe
 
 
 def riccati(index: float, order: int) -> FloatArray:
-    """The gain of the filter of equal noise in a unit of time, after so long that it does not change."""
+    """Return the gain of the filter of equal noise in a unit of time, after so long that it does not change."""
     move = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]])[:order, :order]
     push = np.array([[0.5], [1], [1]])[:order]
     covariance = np.eye(order)

@@ -14,7 +14,7 @@ from tachometry.sim.studies.sweeping import cluster
 
 
 def listening() -> list[tuple[str, int]]:
-    """Addresses at which this process and those that it has started accept connections."""
+    """Return addresses at which this process and those that it has started accept connections."""
     here = psutil.Process(os.getpid())
     processes = [here, *here.children(recursive=True)]
     found = [connection for process in processes for connection in process.net_connections("inet")]
@@ -22,7 +22,7 @@ def listening() -> list[tuple[str, int]]:
 
 
 def answer(address: tuple[str, int], *, tls: bool) -> bytes:
-    """What a stranger is told who asks for a page."""
+    """Return what a stranger is told who asks for a page."""
     context = ssl.create_default_context()
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE

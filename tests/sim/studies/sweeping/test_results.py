@@ -121,7 +121,7 @@ def test_a_file_that_cannot_be_written_leaves_the_journal(tmp_path: Path, monkey
 
 @contextmanager
 def files_up_to(size: int) -> Iterator[None]:
-    """What goes beyond so many bytes of a file cannot be written, as on a full disk."""
+    """Yield what goes beyond so many bytes of a file cannot be written, as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

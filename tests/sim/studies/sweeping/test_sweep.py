@@ -124,7 +124,7 @@ def test_only_the_same_code_runs_a_point() -> None:
 
 
 def of_tachometry(module: str) -> Path | None:
-    """The file of a module of ours."""
+    """Return the file of a module of ours."""
     found = ROOT.joinpath(*module.split(".")[1:])
     if not module.startswith("tachometry."):
         return None
@@ -132,7 +132,7 @@ def of_tachometry(module: str) -> Path | None:
 
 
 def needed(start: Path, *without: Path) -> set[Path]:
-    """Files that a file imports, and what they import, but for those of some folders."""
+    """Return files that a file imports, and what they import, but for those of some folders."""
     found, new = set[Path](), {start}
     while new:
         found |= new
@@ -146,7 +146,7 @@ def needed(start: Path, *without: Path) -> set[Path]:
 
 
 def covered(monkeypatch: pytest.MonkeyPatch, *, hardware: bool) -> set[Path]:
-    """What the digest of the code reads."""
+    """Return what the digest of the code reads."""
     read, read_bytes = set[Path](), Path.read_bytes
 
     def seen(path: Path) -> bytes:
