@@ -10,7 +10,7 @@ import click
 from pages import markdown, write
 
 from tachometry.boards.fpga.boards import BOARDS
-from tachometry.cli.group import cli
+from tachometry.cli.group import COMMANDS, load
 from tachometry.cli.options.option import Option
 from tachometry.hdl.export.registers.files import tables
 from tachometry.sim.studies.sweeping.sweep import COLUMNS
@@ -173,7 +173,7 @@ def options() -> str:
         "groups Encoder, Timing, Core, Method, Motion and Encoder faults mean the same in every command.\n",
     ]
     seen: set[str] = set()
-    for name, command in cli.commands.items():
+    for name, command in ((name, load(name)) for name in COMMANDS):
         parts.append(f"## tachometry {name}\n\n{(command.short_help or '').strip()}\n")
         groups: dict[str, list[list[str]]] = {}
         with command.make_context(name, [], resilient_parsing=True) as context:

@@ -1,23 +1,47 @@
 """The command `tachometry` with all of its commands, and what their errors say."""
 
 from collections.abc import Sequence
+from importlib import import_module
 
 import click
 
-from tachometry.cli.commands.build import build
-from tachometry.cli.commands.compare import compare
-from tachometry.cli.commands.figures import figures
-from tachometry.cli.commands.generate import generate
-from tachometry.cli.commands.loop import loop
-from tachometry.cli.commands.monitor import monitor
-from tachometry.cli.commands.plan import plan
-from tachometry.cli.commands.program import program
-from tachometry.cli.commands.replay import replay
-from tachometry.cli.commands.simulate import simulate
-from tachometry.cli.commands.sweep import sweep
-from tachometry.cli.commands.verify import verify
 from tachometry.cli.environment import DISK, writable_caches
 from tachometry.cli.options.option import told
+
+COMMANDS = {
+    "plan": "Show what a core can measure: resolution and time over speed.",
+    "generate": "Write a core as Verilog, with its manifest, constraints and FuseSoC file.",
+    "simulate": "Run a core on a virtual encoder, against the golden model and the truth.",
+    "replay": "Run a core on captured encoder signals, against the golden model.",
+    "compare": "Compare methods on the same edges.",
+    "sweep": "Run methods over ranges of options and speeds, on all processors.",
+    "loop": "Close a velocity loop about a core: motor, observer, controller.",
+    "figures": "Draw the papers' figures anew, and say which agree.",
+    "verify": "Hold all engines against the golden models, in many configurations.",
+    "build": "Build a core for a board: a bitstream, or a project for the vendor's tools.",
+    "program": "Load a bitstream into a board.",
+    "monitor": "Show, record and test what a board measures, also a simulated one.",
+}
+
+
+def load(name: str) -> click.Command:
+    """Import a command, which has the name of its file."""
+    command: click.Command = getattr(import_module(f"tachometry.cli.commands.{name}"), name)
+    return command
+
+
+class _Commands(click.Group):
+    """Loads a command by its name when it is called, so that the help of all of them is quick."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        return load(name) if name in COMMANDS else None
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
 
 class Refused(Exception):
@@ -25,6 +49,7 @@ class Refused(Exception):
 
 
 @click.group(
+    cls=_Commands,
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
@@ -49,20 +74,6 @@ def cli(context: click.Context) -> None:
     interrupted, 141 nobody reads the output.
     """
     context.with_resource(writable_caches())
-
-
-cli.add_command(plan)
-cli.add_command(generate)
-cli.add_command(simulate)
-cli.add_command(replay)
-cli.add_command(compare)
-cli.add_command(sweep)
-cli.add_command(loop)
-cli.add_command(figures)
-cli.add_command(verify)
-cli.add_command(build)
-cli.add_command(program)
-cli.add_command(monitor)
 
 
 def run(args: Sequence[str]) -> int:

@@ -29,7 +29,6 @@ _SERIAL = ("uart", "spi")  # buses that leave the FPGA over a few pins
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Build a core for a board: a bitstream, or a project for the vendor's tools.",
     epilog=f"""{boards_help()}
 
 \b

@@ -31,7 +31,6 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Compare methods on the same edges.",
     epilog=f"""{FORMS}
 
 \b

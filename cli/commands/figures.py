@@ -22,7 +22,6 @@ _SUMMARY = "claims.csv"
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Draw the papers' figures anew, and say which agree.",
     epilog="""\b
 Examples:
   tachometry figures

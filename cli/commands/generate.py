@@ -51,7 +51,6 @@ Equal options give equal files, byte for byte, on every machine.
 @click.command(
     cls=GroupedCommand,
     help=_HELP,
-    short_help="Write a core as Verilog, with its manifest, constraints and FuseSoC file.",
     epilog=f"""{FORMS}
 
 \b

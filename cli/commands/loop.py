@@ -28,7 +28,6 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 @click.command(
     cls=VaryingCommand,
     points=loop_options,
-    short_help="Close a velocity loop about a core: motor, observer, controller.",
     epilog=f"""{FORMS}
 
 \b

@@ -21,7 +21,6 @@ _GROUP = "Monitor"
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Show, record and test what a board measures, also a simulated one.",
     epilog="""\b
 PORT is one of:
   /dev/ttyUSB1, COM5, ...  the serial port of a board, with its --manifest

@@ -27,7 +27,6 @@ _SLOWEST = 1e-9  # counts per tick; keeps every number printable
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Show what a core can measure: resolution and time over speed.",
     epilog="""\b
 Examples:
   tachometry plan --ppr 500 --max-speed 400rad/s

@@ -13,7 +13,6 @@ from tachometry.cli.options.option import FilePath, GroupedCommand, option
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Load a bitstream into a board.",
     epilog=f"""{boards_help()}
 
 \b

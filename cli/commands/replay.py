@@ -24,7 +24,6 @@ if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs nei
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Run a core on captured encoder signals, against the golden model.",
     epilog="""\b
 Examples:
   tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv

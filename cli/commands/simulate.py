@@ -24,7 +24,6 @@ if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs nei
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Run a core on a virtual encoder, against the golden model and the truth.",
     epilog=f"""{FORMS}
 
 \b

@@ -38,7 +38,6 @@ METRICS = {
 @click.command(
     cls=VaryingCommand,
     points=point_options,
-    short_help="Run methods over ranges of options and speeds, on all processors.",
     epilog=f"""{FORMS}
 
 \b

@@ -39,7 +39,6 @@ class _Configuration:
 
 @click.command(
     cls=GroupedCommand,
-    short_help="Hold all engines against the golden models, in many configurations.",
     epilog="""\b
 Examples:
   tachometry verify
