@@ -174,7 +174,7 @@ def options() -> str:
     ]
     seen: set[str] = set()
     for name, command in ((name, load(name)) for name in COMMANDS):
-        parts.append(f"## tachometry {name}\n\n{(command.short_help or '').strip()}\n")
+        parts.append(f"## tachometry {name}\n\n{COMMANDS[name]}\n")
         groups: dict[str, list[list[str]]] = {}
         with command.make_context(name, [], resilient_parsing=True) as context:
             for parameter in command.get_params(context):
