@@ -1,13 +1,11 @@
 """What all tests share."""
 
 import os
-import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support.nightly import nightly
 
 # Compiled cores stay in the checkout.
 os.environ.setdefault("TACHOMETRY_CACHE", str(Path(__file__).parent.parent / "build" / "cache"))
@@ -18,12 +16,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark those that break the source on purpose, see `support.nightly`."""
+    """Mark what is nightly by its former name, too."""
     for item in items:
-        if re.search("mutant|_caught$|_noticed$", item.name.partition("[")[0]):
-            item.add_marker(nightly)
         if item.get_closest_marker("nightly"):
-            item.add_marker("long")  # the mark by its former name
+            item.add_marker("long")
 
 
 @pytest.fixture

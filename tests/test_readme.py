@@ -17,8 +17,8 @@ ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
 
 RUN_BY = "make test"  # this is part of it
-# Half of the time; they run for less in the test without a compiler, and in tests/cli/commands/test_verify.py.
-SLOW = ("make demo", "tachometry verify ")
+# Most of the time; they run for less in the test without a compiler, and in those of their commands.
+SLOW = ("make demo", *(f"tachometry {name} " for name in ("verify", "plan", "sweep", "figures")))
 
 
 def blocks(language: str, text: str = TEXT) -> list[str]:

@@ -48,6 +48,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
+@nightly
 def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["mt"])
     assert "| mt, all | 40 |" in (total := capsys.readouterr().out.splitlines()[-1])
@@ -60,6 +61,7 @@ def test_a_motion_that_ends_about_the_first_update_has_a_clock() -> None:
     assert min(trace.n_clocks for trace in ending(box.spec, np.random.default_rng(1))) == 1
 
 
+@nightly
 def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A few of them; the core is that of the golden model, with its commands."""
     monkeypatch.setattr(proofs.mutation.score, "CLOCKS", 30_000)
@@ -140,6 +142,7 @@ def test_all_registers_of_lemmas_are_there(monkeypatch: pytest.MonkeyPatch, tmp_
         one_of_track(tmp_path)
 
 
+@nightly
 def test_registers_power_up_as_in_the_core(tmp_path: Path) -> None:
     """Those of which an output is mutated too: an initial value of 1 is not lost."""
     case = next(case for case in CASES if case.name == "s, carried")

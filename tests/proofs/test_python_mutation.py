@@ -45,6 +45,7 @@ def test_a_change_elsewhere_does_not_change_what_is_drawn(tmp_path: Path) -> Non
     assert before <= after
 
 
+@nightly  # what the arguments are of is drawn by `make mutate` only
 def test_every_argument_is_of_a_mutant() -> None:
     assert ARGUED.keys() <= {mutant.name for file in files(ROOT) for mutant in mutants_of(ROOT, file)}
 

@@ -24,12 +24,14 @@ def test_outputs_are_right_again_in_time(method: str) -> None:
     assert campaign.clocks.max() > campaign.spec.timing.tick_cycles
 
 
+@nightly
 def test_what_a_rest_leaves_is_noticed() -> None:
     """A program that does not forget the level of λ at rest."""
     with mutant(TrackMachine, "m.d.sync += level.eq(self._next_level(now.address, level))", "pass"):
         assert not upsets("track", 330).fine
 
 
+@nightly
 def test_sum_that_is_carried_along_is_noticed() -> None:
     with mutant(MovingSum, *RECURSIVE_SUM):
         assert not upsets("m", 700).fine
@@ -53,6 +55,7 @@ def test_a_control_loop_is_right_again_in_time() -> None:
     assert campaign.ticks.max() > 20  # z forgets when there is no current
 
 
+@nightly
 def test_a_control_clock_that_stands_beyond_its_end_is_noticed() -> None:
     with mutant(ControlClock, "left.eq(left - 1)", "left.eq(left - (left < max(self._first, self._period)))"):
         assert not loops.upsets("loop", 20, only="control__clock_2e_left").fine

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from distributed import LocalCluster
 from support import command
+from support.nightly import nightly
 
 from tachometry.sim.engines import build
 from tachometry.sim.engines.loop import COLUMNS
@@ -94,6 +95,7 @@ def test_all_cores_of_this_machine_run_loops(monkeypatch: pytest.MonkeyPatch) ->
     assert asked == [(None, None), (None, 3)]
 
 
+@nightly  # tests/sim/engines/test_gate_loop.py runs the same gates without the command
 def test_a_controller_in_gates(tmp_path: Path) -> None:
     gains = "--kp 1600 --kv 80 --observer 160 --current-limit 8A --seeds 1".split()
     for name, more in (("gates", ["--gates"]), ("double", [])):

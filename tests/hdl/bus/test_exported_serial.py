@@ -49,6 +49,8 @@ def test_over_spi(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
     over_spi(simulate, n_accesses, tmp_path)
 
 
+# The exported core is the same as over SPI, and tests/hdl/bus/test_uart.py has the line.
+@nightly
 @pytest.mark.parametrize(("simulate", "n_accesses"), SIMULATORS)
 def test_over_uart(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
     over_uart(simulate, n_accesses, tmp_path)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.control import SMALL
+from support.nightly import nightly
 from support.simulate import clock_by_clock
 from support.verilog import play
 
@@ -111,6 +112,7 @@ def check(spec: LoopSpec, seed: int, n_clocks: int = 1400) -> None:
     compare(registers, trace, accesses, captures, [(row["bus.read_data"], bool(row["bus.error"])) for row in seen])
 
 
+@nightly  # tests/hdl/core/test_loop_core.py reads the exported loop, and the test below has its registers
 def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     """On the native bus, with a serial multiplier and units of another kind."""
     tachometer = replace(CORE.tachometer, unit="rad/s", max_speed=None, frac_bits=12)

@@ -72,7 +72,8 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
 @pytest.mark.parametrize(
     ("spec", "n_motions"),
     [
-        (S, 36),
+        # Of ideal discs; bounds with an edge error, below, contain these.
+        pytest.param(S, 36, marks=nightly),
         pytest.param(PLAIN, 36, marks=nightly),
         *(pytest.param(replace(M, average=of), 4, marks=nightly) for of in (1, 8, 5)),
     ],

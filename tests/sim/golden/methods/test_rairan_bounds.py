@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from support.nightly import only
+from support.nightly import nightly, only
 from support.rairan import golden_updates, make_spec, random_steps
 
 FINE = 64  # parts of a clock in which the true times of the counts are known
@@ -58,6 +58,7 @@ def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float,
     return len(rows), float(width.mean()), float((n_ep / n_dt)[finite].mean() - n2.mean())
 
 
+@nightly  # the adaptive dt of 8 clocks below has the same bounds
 def test_they_enclose_the_true_mean_speed_of_a_million_windows() -> None:
     """And the wider a clock is in dt, the wider are they than [n2, n1]."""
     found = [enclosed(dt, n, seed=1) for dt, n in ((1, 10**6), (2, 2 * 10**6), (3, 2 * 10**6), (8, 3 * 10**6))]
