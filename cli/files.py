@@ -47,7 +47,8 @@ class Outputs:
         self._staging: dict[Path, Path] = {}
         self._locks: list[int] = []
         self._current: Path | None = None
-        self._check({_real(path) for path in inputs})
+        self._inputs = {_real(path) for path in inputs}
+        self._check()
 
     def __getitem__(self, what: str) -> Path:
         """Where to write the output `what` for now."""
@@ -81,13 +82,20 @@ class Outputs:
             raise
         self._remove_staging()
 
-    def _check(self, inputs: set[Path]) -> None:
+    def add(self, targets: Mapping[str, Path]) -> None:
+        """Take more targets, whose names follow only from what is written; errors are those of the others."""
+        self._targets |= {what: _real(path) for what, path in targets.items()}
+        self._check()
+        for target in self._targets.values():
+            self._stage(target)
+
+    def _check(self) -> None:
         taken: dict[str, str] = {}
         for what, target in self._targets.items():
             other = taken.setdefault(os.path.normcase(target), what)
             if other != what:
                 raise ValueError(f"{other} and {what} must be different files, not both {target}")
-            if target in inputs:
+            if target in self._inputs:
                 raise ValueError(f"{what} must be another file than the input {target}")
             if target.exists() and not target.is_file():
                 raise ValueError(f"{what} must be a file, which {target} is not")

@@ -15,6 +15,7 @@ from tachometry.cli.options.board import board_argument, boards_help, default_fo
 from tachometry.cli.options.core import board_core_options
 from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.reports.terminal import print_rows
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
@@ -139,7 +140,6 @@ def _made(board: Board, name: str, built: Built) -> dict[str, Any]:
 
 
 def _print(board: Board, built: Built, seconds: float) -> None:
-    from tachometry.cli.reports.terminal import print_rows
 
     rows = [("board", board.title)]
     rows += [(kind, f"{used:,} of {there:,}") for kind, (used, there) in built.cells.items() if there]

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.commands.comparing import costs, given, tuned
 from tachometry.cli.files import Outputs
@@ -18,15 +18,17 @@ from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.reports.compare import print_comparison, shown_time, write_comparison, write_costs
+from tachometry.cli.reports.run import merged_edges, print_warnings
+from tachometry.cli.reports.terminal import progress_bar
+from tachometry.hdl.export import export
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.signals.recording import Recording
+from tachometry.sim.studies.comparing.compare import TrueSpeed, common_instants, score
+from tachometry.sim.studies.comparing.rivals import BASELINES, baseline_model
+from tachometry.sim.studies.comparing.tune import Cost
+from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, Measurement, measure_core, versions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import parse_time
-
-if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.encoder.virtual import Encoding
-    from tachometry.sim.signals.recording import Recording
-    from tachometry.sim.studies.comparing.compare import TrueSpeed
-    from tachometry.sim.studies.comparing.tune import Cost
-    from tachometry.sim.studies.size import Measurement
 
 
 @click.command(
@@ -130,9 +132,6 @@ def compare(
     the true speed that comes closest. It is left out where it says nothing: at constant speed, and where noise hides
     it. A capture does not tell the true speed, so there are no errors.
     """
-    from tachometry.sim.studies.comparing.compare import common_instants, score
-    from tachometry.sim.studies.comparing.rivals import BASELINES, baseline_model
-
     files = {"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}
     inputs = tables if capture is None else [capture]
     outputs = Outputs({name: path for name, path in files.items() if path is not None}, inputs=inputs)
@@ -179,7 +178,6 @@ def compare(
 
             save_comparison(path, spec, curves, scores, instants, source.true_speed)
     print_comparison(scores, sizes, named, n_tried, spec.shown_unit)
-    from tachometry.cli.reports.run import merged_edges, print_warnings
 
     clock_hz = spec.timing.clock_hz
     print_warnings(merged_edges(source.recording, clock_hz, int(duration * clock_hz)))
@@ -222,8 +220,6 @@ def _tradeoff(path: Path, spec: TachometerSpec, costs: dict[str, list[Cost]], sp
 
 def _tools() -> dict[str, str]:
     """Return versions of what measures sizes."""
-    from tachometry.sim.studies.size import versions
-
     try:
         return versions()
     except RuntimeError as error:
@@ -232,12 +228,6 @@ def _tools() -> dict[str, str]:
 
 def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
     """Return COMB, FF and Fmax of the cores on an ECP5, by name."""
-    from rich.progress import MofNCompleteColumn, TextColumn
-
-    from tachometry.cli.reports.terminal import progress_bar
-    from tachometry.hdl.export import export
-    from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core
-
     specs = {name: spec for name, spec in named.specs.items() if spec is not None}
     sizes = {}
     with progress_bar("measuring sizes", len(specs), MofNCompleteColumn(), TextColumn("cores")) as report:

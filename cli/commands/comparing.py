@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.options.core import Make
 from tachometry.cli.options.methods import Methods
+from tachometry.cli.reports.terminal import progress_bar
+from tachometry.sim.encoder.motion import FloatArray, parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.studies.comparing.compare import Curve, TrueSpeed, common_instants, core_curve
+from tachometry.sim.studies.comparing.rivals import baseline_curve, settings
+from tachometry.sim.studies.comparing.tune import SETTLED_S, TUNED, Cost, best, core_settings, cost, possible, triangle
 from tachometry.spec import Encoder, TachometerSpec
-
-if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.encoder.motion import FloatArray
-    from tachometry.sim.signals.recording import Recording
-    from tachometry.sim.studies.comparing.compare import Curve, TrueSpeed
-    from tachometry.sim.studies.comparing.tune import Cost
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,6 @@ class Setting:
         ValueError
             If its options are wrong, or do not fit the recording.
         """
-        from tachometry.sim.signals.recording import PinTrace
-        from tachometry.sim.studies.comparing.compare import core_curve
-        from tachometry.sim.studies.comparing.rivals import baseline_curve
-
         if self.spec is None:
             return baseline_curve(self.name, recording, self.encoder.counts_per_rev, self.encoder.decoding)
         return core_curve(self.name, self.spec, PinTrace.of(recording, self.spec))
@@ -58,9 +57,6 @@ def given(named: Methods, encoder: Encoder) -> list[Setting]:
 
 def _tried(setting: Setting, make: Make, *, of_cores: bool) -> list[Setting]:
     """Return all settings of a method; one if it is given with options, and of a core that is not to be tuned."""
-    from tachometry.sim.studies.comparing.rivals import settings
-    from tachometry.sim.studies.comparing.tune import TUNED, core_settings
-
     if ":" in setting.name:
         return [setting]
     if setting.spec is None:
@@ -77,10 +73,6 @@ def _tried(setting: Setting, make: Make, *, of_cores: bool) -> list[Setting]:
 
 def _counted(settings: dict[str, list[Setting]], verb: str) -> Iterator[tuple[str, Iterator[Setting]]]:
     """Yield methods with their settings one by one; a progress bar counts these."""
-    from rich.progress import MofNCompleteColumn, TextColumn
-
-    from tachometry.cli.reports.terminal import progress_bar
-
     n_done, total = 0, sum(len(tried) for tried in settings.values())
     with progress_bar(verb, total, MofNCompleteColumn(), TextColumn("settings")) as report:
 
@@ -108,8 +100,6 @@ def tuned(
     ValueError
         If a method has no setting that can be.
     """
-    from tachometry.sim.studies.comparing.tune import best, possible
-
     specs: dict[str, TachometerSpec | None] = {}
     n_tried = {}
     settings = {setting.name: _tried(setting, make, of_cores=False) for setting in given(named, encoder)}
@@ -136,13 +126,6 @@ def costs(
     ValueError
         If the shaft does not move.
     """
-    import numpy as np
-
-    from tachometry.sim.encoder.motion import parse_motion
-    from tachometry.sim.encoder.virtual import VirtualEncoder
-    from tachometry.sim.studies.comparing.compare import common_instants
-    from tachometry.sim.studies.comparing.tune import SETTLED_S, cost, triangle
-
     speed = float(np.sqrt(np.mean(true_speed(instants) ** 2)))
     if not speed:
         raise ValueError("--motion must move the shaft where there is a --tradeoff")

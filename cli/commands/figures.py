@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from rich.text import Text
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
+from tachometry.cli.reports.terminal import print_table, progress_bar, stdout_console
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.sim.figures.lab import Lab
@@ -55,7 +57,6 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
 
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """
-    from tachometry.cli.reports.terminal import progress_bar
     from tachometry.sim.figures.drawing import write_claims, write_data, write_figure
     from tachometry.sim.figures.lab import Lab
 
@@ -102,9 +103,6 @@ def _within(report: Callable[[float], None] | None, before: float, entry: Entry)
 
 
 def _print(results: dict[str, Result], labs: dict[str, Lab], directory: Path) -> None:
-    from rich.text import Text
-
-    from tachometry.cli.reports.terminal import print_table, stdout_console
 
     heads, rows = ("figure", "paper", "agrees", "hardware"), []
     for name, result in results.items():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -14,17 +13,19 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.reports.axes import print_axes_core
+from tachometry.cli.reports.core import print_core
+from tachometry.cli.reports.loop import print_loop_core
 from tachometry.hdl.export import export
 from tachometry.hdl.export.files import CORE_FILES
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import AxesSpec, TachometerSpec
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
 from tachometry.spec.registers.manifest import check_module_name
-
-if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.encoder.virtual import Encoding
 
 
 def _listed(files: Mapping[str, str]) -> str:
@@ -133,8 +134,12 @@ def generate(
         bench = _bench(spec, name, bus, record)
     elif record is not None:
         raise ValueError("--motion must be given together with --testbench")
-    texts = export(spec, name, bus, baud, target) | bench
-    with Outputs({file: directory / file for file in texts}, inputs=tables) as outputs:
+    core = f"{name}.v"
+    with Outputs(
+        {core: directory / core}, inputs=tables
+    ) as outputs:  # a folder that cannot be written is found at once
+        texts = export(spec, name, bus, baud, target) | bench
+        outputs.add({file: directory / file for file in texts})
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in texts:
@@ -149,7 +154,6 @@ def _bench(spec: AnySpec, name: str, bus: str, record: Callable[[TachometerSpec]
         raise ValueError("--testbench must not be given together with --axes: it is of one axis")
     if isinstance(spec, LoopSpec) and bus != "none":
         raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
-    from tachometry.sim.testbench.vectors import cocotb_bench
 
     alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
     return cocotb_bench(spec, name, None if record is None else record(alone).recording)
@@ -157,14 +161,8 @@ def _bench(spec: AnySpec, name: str, bus: str, record: Callable[[TachometerSpec]
 
 def _print(spec: AnySpec, bus: str) -> None:
     if isinstance(spec, AxesSpec):
-        from tachometry.cli.reports.axes import print_axes_core
-
         print_axes_core(spec)
     elif isinstance(spec, LoopSpec):
-        from tachometry.cli.reports.loop import print_loop_core
-
         print_loop_core(spec, bus)
     else:
-        from tachometry.cli.reports.core import print_core
-
         print_core(spec, bus)

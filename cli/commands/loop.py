@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.closed_loop import loop_options
 from tachometry.cli.options.motion import FORMS, tables_of
 from tachometry.cli.options.option import option, output
+from tachometry.cli.reports.closed_loop import print_loop, print_loops, write_log, write_loops
 from tachometry.cli.reports.streams import INTERRUPTED
+from tachometry.cli.reports.terminal import PerSecond, progress_bar
 from tachometry.cli.sweeping.command import VaryingCommand
+from tachometry.cli.sweeping.loops import Loops, loops_of
 from tachometry.cli.sweeping.settings import Settings
+from tachometry.sim.engines import build
+from tachometry.sim.engines.loop import Log
+from tachometry.sim.studies.loops.control import Outcome, each_seed, mean
+from tachometry.sim.studies.loops.loops import LoopPoint, row_of
+from tachometry.sim.studies.sweeping.sweep import Row
 from tachometry.spec.language.units import plural
-
-if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.cli.sweeping.loops import Loops
-    from tachometry.sim.engines.loop import Log
-    from tachometry.sim.studies.loops.control import Outcome
-    from tachometry.sim.studies.loops.loops import LoopPoint
-    from tachometry.sim.studies.sweeping.sweep import Row
 
 
 @click.command(
@@ -106,10 +108,6 @@ def loop(
     Several methods, or axes with --vary, are run on all cores, which needs the extra `sweep`. Equal options give equal
     files. It needs a C++ compiler.
     """
-    from tachometry.cli.reports.closed_loop import print_loop, print_loops, write_log, write_loops
-    from tachometry.cli.sweeping.loops import loops_of
-    from tachometry.sim.engines import build
-
     if jobs is not None and scheduler is not None:
         raise ValueError("--jobs must not be given together with --scheduler")
     if jobs is not None and jobs < 1:
@@ -153,11 +151,6 @@ def loop(
 
 def _alone(point: LoopPoint, jobs: int | None) -> tuple[Log, list[Outcome]]:
     """Return the log with the first seed, and what came of all."""
-    from rich.progress import MofNCompleteColumn, TextColumn
-
-    from tachometry.cli.reports.terminal import progress_bar
-    from tachometry.sim.studies.loops.control import each_seed
-
     first: Log = {}
     outcomes = []
     with progress_bar("running", len(point.seeds), MofNCompleteColumn(), TextColumn("seeds")) as report:
@@ -170,17 +163,12 @@ def _alone(point: LoopPoint, jobs: int | None) -> tuple[Log, list[Outcome]]:
 
 
 def _mean(outcomes: list[Outcome]) -> Row:
-    from tachometry.sim.studies.loops.control import mean
-    from tachometry.sim.studies.loops.loops import row_of
 
     return row_of(mean(outcomes))
 
 
 def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, Row]:
     """Return rows of all points, in their order."""
-    from rich.progress import MofNCompleteColumn, TextColumn
-
-    from tachometry.cli.reports.terminal import PerSecond, progress_bar
     from tachometry.sim.studies.sweeping import cluster
 
     cluster.require()

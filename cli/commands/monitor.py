@@ -9,10 +9,15 @@ from pathlib import Path
 import click
 
 from tachometry.boards.fpga.boards import BOARDS
+from tachometry.boards.monitor.columns import columns
+from tachometry.boards.monitor.session import Session
+from tachometry.boards.monitor.settings import emulator_settings
+from tachometry.cli.commands import monitoring
 from tachometry.cli.commands.monitored import SIMULATED, attached, simulated
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import CoreTexts, optional_core_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
+from tachometry.cli.reports.monitor import State, display
 from tachometry.spec.language.units import parse_time
 from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
 
@@ -128,12 +133,7 @@ def monitor(
     else:
         target = attached(port, core, manifest)
 
-    from tachometry.boards.monitor.columns import columns
     from tachometry.boards.monitor.recorder import Recorder
-    from tachometry.boards.monitor.session import Session
-    from tachometry.boards.monitor.settings import emulator_settings
-    from tachometry.cli.commands import monitoring
-    from tachometry.cli.reports.monitor import State, display
 
     if serve is not None:
         return monitoring.serve(target, serve, seconds)

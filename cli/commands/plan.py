@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import Make, core_and_make_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
+from tachometry.cli.reports.plan import print_plan, print_plans
+from tachometry.sim.studies.plan import Plan, dense_speeds, plan_at, write_plan, write_plans
 from tachometry.spec import Speed, TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.units import SpeedUnit
-
-if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from tachometry.sim.studies.plan import Plan
 
 _ROWS = 12
 _SLOWEST = 1e-9  # counts per tick; keeps every number printable
@@ -73,11 +70,6 @@ def plan(
     low, high, unit = _range(spec, speeds)
     named = None if methods is None else named_methods(methods, make)
 
-    import numpy as np
-
-    from tachometry.cli.reports.plan import print_plan, print_plans
-    from tachometry.sim.studies.plan import dense_speeds, plan_at, write_plan, write_plans
-
     rows = np.geomspace(low, high, _ROWS)
     with outputs:
         if targets:
@@ -100,8 +92,6 @@ def plan(
 
 def _plans(named: Methods | None, speed: NDArray[np.float64]) -> dict[str, Plan]:
     """Return plans of all methods at these speeds, rad/s; none without a list."""
-    from tachometry.sim.studies.plan import plan_at
-
     specs = {} if named is None else named.specs
     return {name: plan_at(spec, speed) for name, spec in specs.items() if spec is not None}
 

@@ -9,6 +9,7 @@ import click
 from tachometry.boards.fpga.board import Board
 from tachometry.cli.options.board import board_argument, boards_help, default_folder
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.reports.terminal import activity
 
 
 @click.command(
@@ -36,7 +37,6 @@ def program(board: Board, place: Path | None, flash: bool) -> int:
     of an iCEBreaker always goes to its flash memory.
     """
     from tachometry.boards.fpga.loader import bitstream, load
-    from tachometry.cli.reports.terminal import activity
 
     file = bitstream(board, default_folder(board) if place is None else place)
     with activity() as say:

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from tachometry.cli.commands.running import refuse_plot, run_and_report, run_axes_and_report
+from tachometry.cli.commands.running import Window, refuse_plot, run_and_report, run_axes_and_report
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import axes_options
 from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import engine_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, output_options
+from tachometry.sim.signals.recording import Recording
 from tachometry.spec import AxesSpec, CoreSpec
-
-if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
-    from tachometry.cli.commands.running import Window
-    from tachometry.sim.signals.recording import Recording
 
 
 @click.command(

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tachometry.cli.files import Outputs
+from tachometry.cli.reports.axes import print_axes_summary
+from tachometry.cli.reports.run import interrupted, print_summary
+from tachometry.cli.reports.terminal import clocks_progress
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.axes import AxesTrace, Trace
+from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.lockstep import Lockstep, lockstep
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.language.units import format_time
-
-if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
-    from tachometry.sim.encoder.virtual import Encoding
-    from tachometry.sim.signals.axes import Trace
-    from tachometry.sim.signals.recording import Recording
-    from tachometry.sim.signals.run import Run
-    from tachometry.sim.studies.lockstep import Lockstep
 
 Window = Callable[[CoreSpec, int], tuple[int, int]]
 
@@ -30,9 +31,6 @@ def run_and_report(
     window: Window,
 ) -> int:
     """Run hardware and golden model, write what is wanted, print the summary; the exit status."""
-    from tachometry.cli.reports.run import print_summary
-    from tachometry.sim.signals.recording import PinTrace
-
     trace = PinTrace.of(recording, spec)
     found, used = _played(spec, source, trace, truth, outputs, engine, window)
     print_summary(spec, found.actual, recording, truth, found.n_mismatches, found.first, used)
@@ -55,9 +53,6 @@ def run_axes_and_report(
     window: Window,
 ) -> int:
     """Return the same for many axes, with a recording, and what the shaft truly did, of each."""
-    from tachometry.cli.reports.axes import print_axes_summary
-    from tachometry.sim.signals.axes import AxesTrace
-
     trace = AxesTrace.placed(recordings, spec)
     found, used = _played(spec, source, trace, None, outputs, engine, window)
     print_axes_summary(spec, found, recordings, truths, used)
@@ -74,10 +69,6 @@ def _played(
     window: Window,
 ) -> tuple[Lockstep, str]:
     """Return what came of a trace, and what has simulated it; what is wanted is written."""
-    from tachometry.cli.reports.terminal import clocks_progress
-    from tachometry.sim.engines.pick import pick
-    from tachometry.sim.studies.lockstep import lockstep
-
     _require_a_tick(spec, source, trace)
     shown, chosen = window(spec, trace.n_clocks), pick(engine)
     with outputs:
@@ -90,7 +81,6 @@ def _played(
 
 
 def _status(found: Lockstep, wanted: int) -> int:
-    from tachometry.cli.reports.run import interrupted
 
     if found.n_mismatches:
         return 1

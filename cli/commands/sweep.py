@@ -7,18 +7,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, tables_of
 from tachometry.cli.options.option import FilePath, option, output
 from tachometry.cli.options.sweep import point_options
 from tachometry.cli.reports.streams import INTERRUPTED
+from tachometry.cli.reports.sweep import print_sweep
+from tachometry.cli.reports.terminal import PerSecond, progress_bar
 from tachometry.cli.sweeping.command import VaryingCommand
+from tachometry.cli.sweeping.points import Points, points_of
 from tachometry.cli.sweeping.settings import Settings
+from tachometry.sim.engines.pick import pick
 from tachometry.spec.language.units import parse_time, plural
 
 if TYPE_CHECKING:  # numpy, pyarrow and Dask are slow to import, and --help needs none of them
-    from tachometry.cli.sweeping.points import Points
     from tachometry.sim.studies.sweeping.results import Results
 
 # What a heat map can show: the column, what it is, and whether colours go by its logarithm. Columns of speeds are in
@@ -150,9 +154,6 @@ def sweep(
     if jobs is not None and jobs < 1:
         raise ValueError(f"--jobs must be at least 1, not {jobs}")
 
-    from tachometry.cli.reports.sweep import print_sweep
-    from tachometry.cli.sweeping.points import points_of
-    from tachometry.sim.engines.pick import pick
     from tachometry.sim.studies.sweeping.results import Results
 
     if engine == "auto":
@@ -191,9 +192,6 @@ def _run(
     results: Path | None,
 ) -> None:
     """Run the points that are missing; Ctrl-C ends it early."""
-    from rich.progress import MofNCompleteColumn, TextColumn
-
-    from tachometry.cli.reports.terminal import PerSecond, progress_bar
     from tachometry.sim.studies.sweeping import cluster
 
     if not missing:

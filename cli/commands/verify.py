@@ -12,18 +12,21 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from multiprocessing import Pool, parent_process
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+from rich.progress import MofNCompleteColumn, TextColumn
+from rich.text import Text
 
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
 from tachometry.cli.reports.streams import INTERRUPTED
+from tachometry.cli.reports.terminal import print_table, progress_bar, stdout_console
+from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.engines.pick import NAMES, pick, present
 from tachometry.sim.studies.axes import AXES, core_of
 from tachometry.sim.studies.pairs import configurations
+from tachometry.sim.studies.verify import Outcome
+from tachometry.sim.studies.verify import verify as verify_core
 from tachometry.spec import METHODS
-
-if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
-    from tachometry.sim.studies.verify import Outcome
 
 _VERIFICATION = "Verification"
 
@@ -91,8 +94,6 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
     Exit status 1 if any differs: the first motion on which it does is saved as a capture, and the command that replays
     it is printed.
     """
-    from tachometry.sim.engines.pick import NAMES, pick, present
-
     chosen = _listed("methods", methods, list(METHODS))
     used = present() if engines.strip() == "all" else _listed("engines", engines, list(NAMES))
     for engine in used:
@@ -139,11 +140,8 @@ class _Result:
 
 def _check(core: _Configuration, *, engines: list[str], clocks: int, seed: int, directory: Path) -> _Result:
     """Verify one configuration, and save what fails."""
-    from tachometry.sim.captures.sigrok import write_sr
-    from tachometry.sim.studies.verify import verify
-
     spec = core_of(core.words)
-    outcomes = verify(spec, engines, clocks, seed)
+    outcomes = verify_core(spec, engines, clocks, seed)
     failures = []
     for engine, outcome in outcomes.items():
         if (failure := outcome.failure) is None:
@@ -187,9 +185,6 @@ def _each(
 
 
 def _progress(n_cores: int) -> AbstractContextManager[Callable[[float], None] | None]:
-    from rich.progress import MofNCompleteColumn, TextColumn
-
-    from tachometry.cli.reports.terminal import progress_bar
 
     return progress_bar("verifying", n_cores, MofNCompleteColumn(), TextColumn("configurations"))
 
@@ -199,10 +194,6 @@ _HEADS = ("method", "engine", "configurations", "motions", "clocks", "ticks", "u
 
 def _print(found: list[_Result], methods: list[str], engines: list[str], *, whole: bool) -> bool:
     """Print the table and the verdict, if it is about the whole; whether anything differs."""
-    from rich.text import Text
-
-    from tachometry.cli.reports.terminal import print_table, stdout_console
-
     rows = []
     total = dict.fromkeys(_HEADS[3:], 0.0)
     for method in methods:

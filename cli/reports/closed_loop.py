@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.text import Text
 
 from tachometry.cli.reports.terminal import print_table, stdout_console
+from tachometry.cli.sweeping.loops import Loops
+from tachometry.sim.engines.loop import Log
+from tachometry.sim.signals.files import write_csv
+from tachometry.sim.studies.loops.control import Outcome, mean
+from tachometry.sim.studies.loops.loops import FIGURES, LoopPoint, row_of
+from tachometry.sim.studies.sweeping.sweep import Row
 from tachometry.spec.language.units import plural
-
-if TYPE_CHECKING:
-    from tachometry.cli.sweeping.loops import Loops
-    from tachometry.sim.engines.loop import Log
-    from tachometry.sim.studies.loops.control import Outcome
-    from tachometry.sim.studies.loops.loops import LoopPoint
-    from tachometry.sim.studies.sweeping.sweep import Row
 
 _UNITS = {
     "time": "s",
@@ -35,9 +33,6 @@ _UNITS = {
 
 def print_loop(point: LoopPoint, outcomes: list[Outcome]) -> None:
     """Print a row per seed of one loop, and their mean."""
-    from tachometry.sim.studies.loops.control import mean
-    from tachometry.sim.studies.loops.loops import row_of
-
     rows = [(str(seed), *_cells(row_of(one))) for seed, one in zip(point.seeds, outcomes, strict=True)]
     if len(rows) > 1:
         rows.append(("mean", *_cells(row_of(mean(outcomes)))))
@@ -63,9 +58,6 @@ def print_loops(found: Loops, rows: Mapping[str, Row], seconds: float) -> None:
 
 def write_loops(path: Path, found: Loops, rows: Mapping[str, Row]) -> None:
     """Write a CSV with a row per loop: its method, its place on the axes, and the means of its seeds."""
-    from tachometry.sim.signals.files import write_csv
-    from tachometry.sim.studies.loops.loops import FIGURES
-
     columns = [column for column, _ in FIGURES.values()]
     axes = list(found.axes)
     table = (
@@ -81,21 +73,17 @@ def write_loops(path: Path, found: Loops, rows: Mapping[str, Row]) -> None:
 
 def write_log(path: Path, log: Log) -> None:
     """Write a CSV with a row per instant: what is commanded, what the motor does, what the controller knows."""
-    from tachometry.sim.signals.files import write_csv
-
     heads = [f"{name} ({_UNITS[name]})" for name in log]
     rows = zip(*(log[name].tolist() for name in log), strict=True)
     write_csv(path, heads, (tuple(f"{value:.9g}" for value in row) for row in rows))
 
 
 def _heads() -> list[str]:
-    from tachometry.sim.studies.loops.loops import FIGURES
 
     return [head for _, head in FIGURES.values()]
 
 
 def _cells(row: Row) -> list[str]:
-    from tachometry.sim.studies.loops.loops import FIGURES
 
     *figures, limited = (row[column] for column, _ in FIGURES.values())
     return [*("-" if value is None else f"{value:.3g}" for value in figures), f"{100 * limited:.3g}%"]

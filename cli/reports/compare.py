@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from rich.text import Text
 
 from tachometry.cli.options.methods import Methods
+from tachometry.cli.reports.terminal import print_table, stdout_console
+from tachometry.sim.signals.files import write_csv
+from tachometry.sim.studies.comparing.compare import Score
+from tachometry.sim.studies.comparing.tune import Cost, front
+from tachometry.sim.studies.size import Measurement
 from tachometry.spec.language.units import SpeedUnit, format_time
-
-if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
-    from tachometry.sim.studies.comparing.compare import Score
-    from tachometry.sim.studies.comparing.tune import Cost
-    from tachometry.sim.studies.size import Measurement
 
 _SPEEDS = ("rms", "max")  # of a score, in rad/s
 _SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
@@ -43,9 +44,6 @@ def print_comparison(
         Number of settings of which one is the best.
     unit : SpeedUnit
     """
-    from rich.text import Text
-
-    from tachometry.cli.reports.terminal import print_table, stdout_console
 
     def time(seconds: float | None) -> str:
         return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
@@ -86,8 +84,6 @@ def _size_cells(size: Measurement | None) -> list[str]:
 
 def write_comparison(path: Path, scores: list[Score], sizes: Mapping[str, Measurement], unit: SpeedUnit) -> None:
     """Write the table as CSV."""
-    from tachometry.sim.signals.files import write_csv
-
     names = [name for name in vars(scores[0]) if name != "what"]
     figures = list(_SIZE) if sizes else []
 
@@ -106,9 +102,6 @@ def write_comparison(path: Path, scores: list[Score], sizes: Mapping[str, Measur
 
 def write_costs(path: Path, costs: Mapping[str, Sequence[Cost]], unit: SpeedUnit) -> None:
     """Write what all settings cost as CSV; the last column tells those that are in the figure."""
-    from tachometry.sim.signals.files import write_csv
-    from tachometry.sim.studies.comparing.tune import front
-
     rows = [
         (cost.method, cost.name, unit.of(cost.rms), cost.delay, int(cost in shown))
         for tried in costs.values()

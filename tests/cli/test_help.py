@@ -117,16 +117,15 @@ def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture
     assert text.count("[default: bound-decay]") == 1
 
 
-@pytest.mark.parametrize("command", ["simulate", "build", "program", "loop"])
-def test_help_loads_nothing_heavy(command: str) -> None:
+def test_the_list_of_commands_loads_nothing_heavy() -> None:
     code = """
 import sys
 from tachometry.cli.main import main
 try:
-    main([sys.argv[1], "--help"])
+    main(["--help"])
 finally:
     heavy = {"numpy", "amaranth", "matplotlib", "rich", "distributed", "pyarrow", "amaranth_boards"} & set(sys.modules)
     assert not heavy, heavy
 """
-    done = subprocess.run([sys.executable, "-c", code, command], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -11,10 +11,11 @@ from typing import Any
 import pytest
 from support.command import run
 
+from tachometry.cli.commands import plan
 from tachometry.cli.environment import writable_caches
 from tachometry.cli.reports.streams import printable
 from tachometry.cli.reports.terminal import print_rows, print_table
-from tachometry.sim.studies import plan
+from tachometry.sim.studies import plan as study
 
 PLAN = ["plan", "--ppr", "500"]
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()"]
@@ -137,7 +138,7 @@ def test_a_home_that_cannot_be_written(
         Path(os.environ["XDG_CACHE_HOME"], "of the tools").write_text("")
         return real(*words)
 
-    real = plan.plan_at
+    real = study.plan_at
     monkeypatch.setattr(plan, "plan_at", within)
     assert run(*PLAN) == 0
     assert capsys.readouterr().err == ""

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from support.command import run
 
+from tachometry.cli.commands import compare as command
 from tachometry.sim.studies import size as synthesis
 from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.spec import METHODS, TachometerSpec
@@ -110,8 +111,8 @@ def test_sizes(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: 
     def measured(spec: TachometerSpec, *_: object, **__: object) -> synthesis.Measurement:
         return synthesis.Measurement({"COMB": 100 + len(spec.method), "FF": 50, "Fmax": 123.4}, "")
 
-    monkeypatch.setattr(synthesis, "versions", lambda: {"yosys": "0.70"})
-    monkeypatch.setattr(synthesis, "measure_core", measured)
+    monkeypatch.setattr(command, "versions", lambda: {"yosys": "0.70"})
+    monkeypatch.setattr(command, "measure_core", measured)
     assert run("compare", *CORE, *MOTION, "--methods", "s,odrive", "--size", "--csv", tmp_path / "c.csv") == 0
     heads, s, odrive, *_ = capsys.readouterr().out.splitlines()
     assert heads.split()[-3:] == ["COMB", "FF", "Fmax"]
