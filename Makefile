@@ -98,7 +98,7 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
 docs: $(LINKED) ## the pages of options, ports and registers, written to docs/reference
-	$(BIN)/python bench/reference.py
+	$(BIN)/python bench/reference_pages.py
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	$(BIN)/pdoc --docformat numpy -o build/api $(addprefix tachometry.,$(LAYERS)) \

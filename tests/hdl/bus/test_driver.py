@@ -187,11 +187,11 @@ def test_the_example_of_the_page_is_strict_c(tmp_path: Path) -> None:
     """Compiled for the core of the page, whose registers the page shows."""
     page = docs.page("reference/registers.md")
     (example,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
-    files = register_files(RegisterMap(of_texts("s", load("reference").SPEED)), "speed")
+    files = register_files(RegisterMap(of_texts("s", load("reference_pages").SPEED)), "speed")
     for file, text in {**files, "main.c": example}.items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     build.run([*build.compiler(), *STRICT, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
-    assert tables(RegisterMap(of_texts("s", load("reference").SPEED))).replace("## ", "### ") in page
+    assert tables(RegisterMap(of_texts("s", load("reference_pages").SPEED))).replace("## ", "### ") in page
 
 
 def test_the_compiler_reads_the_numbers_of_the_map(tmp_path: Path) -> None:
