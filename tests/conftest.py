@@ -1,4 +1,4 @@
-"""What all tests share."""
+"""All tests share these fixtures and hooks."""
 
 import os
 import signal

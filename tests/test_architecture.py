@@ -158,3 +158,12 @@ def test_naive_models_of_tests_import_nothing_that_is_tested() -> None:
 def test_files_can_be_read_on_a_few_screens(layer: str) -> None:
     for file in (ROOT / layer).rglob("*.py"):
         assert len(file.read_text(encoding="utf-8").splitlines()) <= 400, file
+
+
+def test_docstrings_begin_with_a_sentence() -> None:
+    for file in (file for room in (*LAYERS, "bench", "package", "tests") for file in (ROOT / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                words = (ast.get_docstring(node) or "").split()
+                assert words[:1] not in (["What"], ["See"]), (file, node)
+                assert words[:2] != ["The", "same"], (file, node)

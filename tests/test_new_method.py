@@ -61,7 +61,7 @@ class XMethod(MMethod):
 
 
 class Wrong(XMethod):
-    """The same with an output that is wrong."""
+    """Gives an output that is wrong."""
 
     def elaborate(self, platform: object) -> Module:
         m = super().elaborate(platform)

@@ -1,4 +1,4 @@
-"""What the manifest must say, computed from the words of the command line; and that nothing in it goes unchecked."""
+"""The manifest is computed from the words of the command line, and nothing in it goes unchecked."""
 
 import math
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""What the ports must show of measurements: rounding, units, saturation, bounds and the low-pass filter."""
+"""The ports must show measurements with rounding, units, saturation, bounds and the low-pass filter."""
 
 import math
 from bisect import bisect_right

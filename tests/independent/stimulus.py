@@ -9,7 +9,7 @@ from reference.front import CYCLE, Play
 
 @dataclass
 class Lines:
-    """What happens on the lines, by clock."""
+    """Holds the changes of the lines, by clock."""
 
     n_clocks: int
     phase: int = 0  # where the lines stand at first, in the cycle of forward motion

@@ -1,4 +1,4 @@
-"""What takes millions of clocks: the longest tick, and the longest measurement, in Verilator."""
+"""The longest tick and the longest measurement take millions of clocks, in Verilator."""
 
 import json
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What tracking shows whatever its filter does: when, how long after the last count, at rest and beyond its limits."""
+"""Some outputs of tracking do not depend on its filter: times, ages, rest and limits."""
 
 from collections.abc import Sequence
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""What CI proves, `make formal-quick`."""
+"""CI proves `make formal-quick`."""
 
 from proofs.formal.cases import PROOFS, QUICK
 

@@ -13,7 +13,7 @@ Play = list[tuple[int, Level]]  # how many clocks each level is held, from the f
 
 @dataclass
 class Front:
-    """What the front end makes of the lines, by clocks of the core.
+    """Holds the steps that the front end makes of the lines, by clocks of the core.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ def estimate(kind: str, n_ep: int, n_dt: int) -> Fraction:
 
 @dataclass(frozen=True)
 class Lines:
-    """What Table 1 holds after a ts.
+    """Holds the entries of Table 1 after a ts.
 
     Parameters
     ----------

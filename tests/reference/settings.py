@@ -1,4 +1,4 @@
-"""What a core was asked for, read from the words of the command line without the program that is tested."""
+"""The words of the command line are read here without the program that is tested."""
 
 import math
 from collections.abc import Mapping
@@ -177,7 +177,7 @@ class Settings:
 
     @cached_property
     def edge_error(self) -> Fraction:
-        """What the distance of two edges may be off by, in counts: whole eighths, the word or more. E of tracking."""
+        """The error of the distance of two edges, in counts: whole eighths, the word or more. E of tracking."""
         if self.method == "track":
             return Fraction(self.words.get("edge-error", "0.4"))
         return Fraction(math.ceil(8 * Fraction(self.words.get("edge-error", "0"))), 8)
@@ -244,7 +244,7 @@ class Settings:
 
     @cached_property
     def target(self) -> Fraction | None:
-        """What the error of eq. (13) may be, for an adaptive dt."""
+        """The greatest error of eq. (13), for an adaptive dt."""
         word = self.words.get("adaptive")
         return None if word is None else Fraction(word.removesuffix("%")) / (100 if word.endswith("%") else 1)
 

@@ -58,7 +58,7 @@ def test_equal_options_give_equal_bitstreams(name: str, bus: str, tmp_path: Path
 
 @pytest.mark.parametrize("name", OF_EVERY_FAMILY)
 def test_a_clock_that_is_too_fast_fails(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same design, held against four hundred megahertz: no tool and no log says that it is good for that."""
+    """A design is held against four hundred megahertz: no tool and no log says that it is good for that."""
     monkeypatch.setattr(builder, "SEEDS", range(1, 3))
     board, bus = BOARDS[name], bus_of("uart")
     assert bus is not None

@@ -1,4 +1,4 @@
-"""What nextpnr says of the timing: recorded logs, and what would be violations in them."""
+"""Timing is read from recorded logs of nextpnr, and from logs with violations."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What is put on boards: ports on the pins that the boards have for them, and projects for the vendors' tools."""
+"""Ports are on the pins that boards have for them, and vendors' tools get projects."""
 
 import os
 import subprocess

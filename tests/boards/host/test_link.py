@@ -1,4 +1,4 @@
-"""What comes over a bad line: every damaged frame is rejected, every loss is counted, and no other is shown."""
+"""On a bad line every damaged frame is rejected, every loss is counted, and no other is shown."""
 
 from functools import cache
 
@@ -31,7 +31,7 @@ def sent(n_bytes: int, seed: int) -> Sent:
 
 
 def check_line(n_bytes: int, seed: int) -> None:
-    """What the receiver makes of what arrives, in pieces that begin and end anywhere."""
+    """Feed the receiver in pieces that begin and end anywhere."""
     line = sent(n_bytes, seed)
     receiver = link.Receiver(registers(), frame_clocks=FRAME_CLOCKS)
     for start in range(0, len(line.data), CHUNK):

@@ -35,7 +35,7 @@ class Registers:
 
 
 def test_settings() -> None:
-    """What is written while frozen, and what is refused before anything is."""
+    """Settings are written while frozen, and refused before anything is written."""
     there = Registers()
     client, form = there.client, there.spec.form
     client.enable(True)

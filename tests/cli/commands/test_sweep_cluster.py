@@ -46,7 +46,7 @@ if not hasattr(sweep, "traced"):
 
 
 class Trace:
-    """What workers have run, and how many points they may."""
+    """Holds the points that workers have run, and how many they may."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder / "trace"

@@ -1,4 +1,4 @@
-"""What a sweep is given: axes and options, from texts and files."""
+"""A sweep takes axes and options from texts and files."""
 
 import re
 from pathlib import Path
@@ -41,7 +41,7 @@ def read(folder: Path, text: str) -> Settings:
     ],
 )
 def test_values_of_an_axis(text: str, values: list[str | None], tmp_path: Path) -> None:
-    """The same from the command line and from a file."""
+    """Command line and file give the same values."""
     name, _, right = text.partition("=")
     assert vary(text) == {name: values}
     assert read(tmp_path, f'[vary]\n{name} = "{right}"').vary == {name: values}

@@ -85,7 +85,7 @@ class Restarted(AxesTachometer):
 
 
 def test_a_reset_clears_what_is_in_memory() -> None:
-    """What is in the memories when a reset comes does not matter."""
+    """The content of the memories at a reset does not matter."""
     spec = small(2, index=True)
     trace, names = motions(spec, 900), [port.name for port in spec.outputs]
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]

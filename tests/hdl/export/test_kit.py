@@ -1,4 +1,4 @@
-"""What lies beside the Verilog: it names what is there, and it runs."""
+"""The files beside the Verilog name what is there, and run."""
 
 import fnmatch
 import json

@@ -53,7 +53,7 @@ def test_step_by_step_where_there_is_time() -> None:
 
 
 def test_reset_forgets() -> None:
-    """What was counted before a reset is forgotten, though the memory keeps it."""
+    """Counts before a reset are forgotten, though the memory keeps them."""
     dut = ResetInserter(reset := Signal())(m_method.MovingSum(5, count_width=4, sum_width=7))
     seen: list[int] = []
 

@@ -1,4 +1,4 @@
-"""What only the M/T method does."""
+"""The M/T method has rules that no other has."""
 
 from typing import Any
 

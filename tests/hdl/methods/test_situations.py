@@ -1,4 +1,4 @@
-"""What users complain of elsewhere: the methods that work on ticks at reversals, at rest and after it, by the gates."""
+"""Users complain elsewhere of reversals and of rest: here are the methods that work on ticks, by their gates."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""What only the T method does."""
+"""The T method has rules that no other has."""
 
 from support.timed import TICK, run, spec_of, speed
 

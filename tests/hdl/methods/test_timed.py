@@ -1,4 +1,4 @@
-"""What every method that measures times promises, clock by clock: docs/concepts/timed.md."""
+"""Every method that measures times keeps the promises of docs/concepts/timed.md, clock by clock."""
 
 from typing import Any
 
@@ -56,7 +56,7 @@ def test_standstill(method: str, sign: int) -> None:
 
 
 def check_greatest_speed(method: str, sign: int = 1) -> None:
-    """What is too fast is held there, whichever way; what is slower is not."""
+    """Check that a speed that is too high is held at the limit, whichever way, and a lower one is not."""
     spec = timed(method, bound_decay=False, max_speed=Speed.parse("2rev/s"))
     assert spec.saturates
     # As many as a window takes; two counts.

@@ -1,4 +1,4 @@
-"""What the tracking method does where users complain of others: at rest, at reversals, at steps, and when counts go."""
+"""Users complain of other trackers at rest, at reversals, at steps, and when counts are lost: here is this one."""
 
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is proven of the counters of many axes."""
+"""These proofs are about the counters of many axes."""
 
 from functools import partial
 

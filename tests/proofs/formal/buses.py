@@ -1,4 +1,4 @@
-"""What is proven of registers on buses."""
+"""These proofs are about registers on buses."""
 
 from proofs.formal.prove import Proof
 

@@ -1,4 +1,4 @@
-"""What is proven of which core."""
+"""Each proof is about some core: the table says which."""
 
 from dataclasses import replace
 from typing import Any

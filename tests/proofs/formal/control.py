@@ -1,4 +1,4 @@
-"""What is proven of the control loop."""
+"""These proofs are about the control loop."""
 
 from dataclasses import replace
 from functools import partial

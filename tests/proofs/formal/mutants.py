@@ -1,4 +1,4 @@
-"""What each proof refutes."""
+"""Each proof must refute mutants, listed here."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""What more than one kind of core has: what checkers look at, and numbers that are small enough for a SAT solver."""
+"""Checkers look at these signals; the numbers are small enough for a SAT solver."""
 
 from typing import Any
 

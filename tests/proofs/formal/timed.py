@@ -1,4 +1,4 @@
-"""What is proven of the T and the M/T method."""
+"""These proofs are about the T and the M/T method."""
 
 from dataclasses import replace
 from typing import Any

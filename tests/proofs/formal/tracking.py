@@ -1,4 +1,4 @@
-"""What is proven of the tracking method: the counts of a tick."""
+"""These proofs are about the counts of a tick of the tracking method."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""What is mutated beside the methods: registers, bridges, and the demo with its emulator and telemetry.
+"""Registers, bridges and the demo with its emulator and telemetry are mutated beside the methods.
 
 The tests of these boxes hold them against their golden models; here it is counted which mutants what is played there
 tells from the right one. The accesses do not wait for answers where these come after a number of clocks that is known.

@@ -1,4 +1,4 @@
-"""What is mutated: small cores in which, method by method, all hardware is there."""
+"""Small cores are mutated, in which, method by method, all hardware is there."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -41,7 +41,7 @@ _VERDICT = re.compile(r"SAT proof finished - (no )?model found|(Interrupted SAT 
 
 
 class Known(NamedTuple):
-    """What is known of a core, in Verilog, with its registers.
+    """Holds the lemmas about a core, in Verilog, with its registers.
 
     Members
     -------

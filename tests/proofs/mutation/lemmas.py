@@ -1,4 +1,4 @@
-"""What makes proofs about mutants short, and is proven with them.
+"""Lemmas make proofs about mutants short, and are proven with them.
 
 In Verilog; `{name}` is a register of the core by name, which may be the end of a path, `[name]` that of the mutant.
 """

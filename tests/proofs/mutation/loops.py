@@ -135,7 +135,7 @@ class _Short(LoopSpec):
 
     @property
     def longest(self) -> int:
-        """See `LoopSpec.longest`."""
+        """The longest interval, as of `LoopSpec.longest`."""
         return 3
 
 

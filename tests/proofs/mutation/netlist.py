@@ -45,7 +45,7 @@ class Mutant:
 
     @property
     def place(self) -> str:
-        """What is wrong, and of what line of the HDL: wire or cell and port, mode, line."""
+        """The place of the fault: wire or cell and port, mode, line of the HDL."""
         wire = self.option("wire") or f"{self.option('cell').replace('$flatten', '')}.{self.option('port')}"
         return f"{wire.replace(chr(92), '')}[{self.option('wirebit') or self.option('portbit')}] {self.option('mode')}"
 

@@ -1,4 +1,4 @@
-"""What becomes of the mutants of a core."""
+"""The mutants of a core are judged here."""
 
 import tempfile
 from concurrent.futures import Executor
@@ -22,7 +22,7 @@ CLOCKS = 400_000  # of the stimulus
 
 @dataclass(frozen=True)
 class Score:
-    """What became of the mutants of a core: numbers of them, and the survivors that nothing shows to be equivalent."""
+    """Counts the mutants of a core, and holds the survivors that nothing shows to be equivalent."""
 
     case: Case
     mutants: int

@@ -1,4 +1,4 @@
-"""What is played on the mutants: many short motions with a reset before each, in the middle of the one before.
+"""Many short motions are played on the mutants, with a reset before each, in the middle of the one before.
 
 The first begins as the core powers up, without a reset.
 """
@@ -25,7 +25,7 @@ _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
 
 class Part(Protocol):
-    """What is played from one reset to the next."""
+    """Holds the motion from one reset to the next."""
 
     @property
     def n_clocks(self) -> int:

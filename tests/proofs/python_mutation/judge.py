@@ -37,7 +37,7 @@ class Changed(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: types.ModuleType | None = None
     ) -> importlib.machinery.ModuleSpec | None:
-        """See importlib."""
+        """Find the module, as importlib says."""
         if fullname != self._name:
             return None
         spec = importlib.machinery.PathFinder.find_spec(fullname, path)
@@ -55,7 +55,7 @@ class Changed(MetaPathFinder):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of a mutant: `killed`, `timeout`, `survived`, or `untested` if no test runs its line."""
+    """Holds the fate of a mutant: `killed`, `timeout`, `survived`, or `untested` if no test runs its line."""
 
     mutant: Mutant
     what: str

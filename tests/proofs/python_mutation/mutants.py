@@ -74,7 +74,7 @@ class Mutant:
 
     @property
     def name(self) -> str:
-        """What tells it from others, whatever lines are added elsewhere."""
+        """The name that tells it from others, whatever lines are added elsewhere."""
         return f"{self.file}: {self.where}: {self.change}"
 
     @property

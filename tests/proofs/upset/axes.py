@@ -58,7 +58,7 @@ def _dense(spec: AxesSpec, run: Run, first: int) -> NDArray[np.int64]:
 
 
 def upsets(n: int, seed: int = 1, only: str = "") -> Campaign:
-    """See `campaign.upsets`."""
+    """Run a campaign, as `campaign.upsets` does."""
     spec, trace = SPEC, _trace(SPEC, seed)
     core = Upsettable(spec, trace)
     bound = spec.recovery_clocks

@@ -99,7 +99,7 @@ def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What became of the upsets of a core.
+    """Holds the outcome of the upsets of a core.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class Campaign:
 
     @property
     def ticks(self) -> NDArray[np.float64]:
-        """The same in ticks, of those that were seen."""
+        """The times in ticks, of those that were seen."""
         return self.clocks[self.clocks > 0] / self.spec.timing.tick_cycles
 
 

@@ -104,7 +104,7 @@ def _trace(spec: LoopSpec, seed: int) -> CommandedTrace:
 
 @dataclass(frozen=True)
 class _Right:
-    """What the golden models show: the clocks of control ticks, and the rows of `current_valid`."""
+    """Holds the outputs of the golden models: the clocks of control ticks, and the rows of `current_valid`."""
 
     ticks: NDArray[np.int64]
     currents: Table
@@ -147,7 +147,7 @@ def _allowed(spec: LoopSpec, trace: CommandedTrace) -> NDArray[np.int64]:
 
 
 def upsets(name: str, n: int, seed: int = 1, only: str = "") -> Campaign:
-    """See `campaign.upsets`; `name` is one of `LOOPS`."""
+    """Run a campaign, as `campaign.upsets` does; `name` is one of `LOOPS`."""
     spec = LOOPS[name]
     trace = _trace(spec, seed)
     core = Upsettable(spec, trace)  # type: ignore[arg-type]

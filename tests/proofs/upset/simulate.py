@@ -33,7 +33,7 @@ _ROWS = 1 << 21
 
 @dataclass(frozen=True)
 class Bits:
-    """What can be upset.
+    """Lists the bits that can be upset.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is said of captures that are wrong."""
+"""Captures that are wrong are refused in a line."""
 
 import gzip
 import re

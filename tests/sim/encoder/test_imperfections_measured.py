@@ -1,4 +1,4 @@
-"""What a core measures of the lines of every imperfection, by its golden model."""
+"""A core measures the lines of every imperfection, by its golden model."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What describes a core and what golden models make of pins cannot be changed by whom it is given to."""
+"""Descriptions of cores and results of golden models cannot be changed by whom they are given to."""
 
 import dataclasses
 import sys

@@ -1,4 +1,4 @@
-"""What a figure leaves out must not be seen."""
+"""A figure leaves out only what cannot be seen."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What lockstep makes of an engine that is interrupted; the engine is the golden model itself."""
+"""Lockstep may be interrupted; the engine is the golden model itself."""
 
 from typing import Any
 

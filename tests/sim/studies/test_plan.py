@@ -1,4 +1,4 @@
-"""What a plan promises, measured on the golden model with ideal pulse numbers."""
+"""A plan keeps its promises, measured on the golden model with ideal pulse numbers."""
 
 from dataclasses import replace
 from fractions import Fraction as F

@@ -1,4 +1,4 @@
-"""What plans of all methods promise, measured on their golden models with the virtual encoder."""
+"""Plans of all methods keep their promises, measured on the golden models with the virtual encoder."""
 
 from fractions import Fraction
 from typing import Any

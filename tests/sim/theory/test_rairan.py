@@ -176,7 +176,7 @@ def test_bound_of_n1_is_that_of_the_classical_methods() -> None:
 
 
 def test_doubling_dt_never_helps_low_speeds_nor_harms_high_ones() -> None:
-    """What an adaptive dt·2^k relies on: eq. (13) has its maximum, 1/3, at ω_lim; eq. (1) says what it costs."""
+    """An adaptive dt·2^k relies on this: eq. (13) has its maximum, 1/3, at ω_lim; eq. (1) says what it costs."""
     doublings = np.arange(-8, 9)
     for speed in np.random.default_rng(5).uniform(0.5, 2, 300):
         ratio = speed * 2.0**doublings

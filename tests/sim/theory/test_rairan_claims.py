@@ -1,4 +1,4 @@
-"""What Rairán 2013 says of its estimates, measured on the golden model: bounds at all phases, and a lock."""
+"""Words of Rairán 2013 about its estimates are measured on the golden model: bounds at all phases, and a lock."""
 
 import math
 from dataclasses import replace

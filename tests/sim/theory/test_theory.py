@@ -1,4 +1,4 @@
-"""What the papers say of the S method, measured on the golden model with the virtual encoder."""
+"""Words of the papers about the S method are measured on the golden model with the virtual encoder."""
 
 import math
 

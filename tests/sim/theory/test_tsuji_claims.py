@@ -1,4 +1,4 @@
-"""What Tsuji 2009 says of its figures, computed from the equations."""
+"""Words of Tsuji 2009 about its figures are computed from the equations."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What the manifest says of the units of a loop, against what the golden loop does with numbers in them."""
+"""The units of a loop in the manifest are those in which the golden loop works."""
 
 import json
 import math

@@ -100,7 +100,7 @@ def test_recovery() -> None:
 
 
 def test_ticks_between_a_cause_and_its_update() -> None:
-    """What is caused by a tick has passed this one; what is caused by a count has not."""
+    """An update that a tick causes has passed this one; one that a count causes has not."""
 
     def ticks(spec: STachometer | MTachometer | TTachometer) -> int:
         shortest = spec.timing.tick_cycles if spec.max_tick_cycles is None else spec.min_tick_cycles

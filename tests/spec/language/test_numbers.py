@@ -1,4 +1,4 @@
-"""What follows from the parameters of every core, found by trying or told by hand."""
+"""Numbers follow from the parameters of every core, found by trying or told by hand."""
 
 import math
 from fractions import Fraction

@@ -145,7 +145,7 @@ def check_client(registers: RegisterMap, text: str, folder: Path) -> None:
 
 
 def check_driver(registers: RegisterMap, text: str, folder: Path) -> None:
-    """The same of its struct; tests/hdl/bus/test_driver.py runs it."""
+    """Check its struct; tests/hdl/bus/test_driver.py runs it."""
     struct = text[text.index("struct spindle_snapshot {") :]
     members = dict(reversed(row) for row in re.findall(r"^  (\w+) (\w+);$", struct[: struct.index("};")], re.MULTILINE))
     spec = registers.spec

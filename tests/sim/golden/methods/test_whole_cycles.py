@@ -103,7 +103,7 @@ def errors(speed: float, **options: str) -> Any:
 
 @pytest.mark.parametrize("decoding", ["4", "2"])
 def test_phase_and_duty_errors_cancel(decoding: str) -> None:
-    """What is left is the clock that an edge is late."""
+    """The error that is left is the clock that an edge is late."""
     for speed in (217.0, 87.0):
         spec = of_texts("mt", DRIVE | {"decoding": decoding, "whole-cycles": "yes"})
         (resolution,) = plan_at(spec, np.array([speed])).resolution

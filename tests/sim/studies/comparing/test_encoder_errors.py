@@ -1,4 +1,4 @@
-"""What is learned of a disc from its own edges, and what it is good for."""
+"""A disc is learned from its own edges, which has some use."""
 
 from typing import Any
 

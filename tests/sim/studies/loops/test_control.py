@@ -1,4 +1,4 @@
-"""What is measured of a control loop, and what the paper's observer is worth there."""
+"""Control loops are measured, with and without the paper's observer."""
 
 import math
 import threading
