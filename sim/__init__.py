@@ -1,1 +1,0 @@
-"""Golden models, engines and studies hold the hardware against the papers."""

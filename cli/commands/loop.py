@@ -22,7 +22,7 @@ from tachometry.cli.sweeping.settings import Settings
 from tachometry.sim.engines import build
 from tachometry.sim.engines.loop import Log
 from tachometry.sim.studies.loops.control import Outcome, each_seed, mean
-from tachometry.sim.studies.loops.loops import LoopPoint, row_of
+from tachometry.sim.studies.sweeping.loops import LoopPoint, row_of
 from tachometry.sim.studies.sweeping.sweep import Row
 from tachometry.spec.language.units import plural
 
@@ -179,7 +179,7 @@ def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, R
             cluster.cluster(scheduler, jobs) as client,
             progress_bar("running", len(found.points), *columns) as report,
         ):
-            for row in cluster.rows(client, found.points, "loops.loops"):
+            for row in cluster.rows(client, found.points, "sweeping.loops"):
                 rows[row["point"]] = row
                 if report is not None:
                     report(len(rows))

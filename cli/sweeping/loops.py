@@ -8,7 +8,7 @@ from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.methods import listed_methods
 from tachometry.cli.sweeping.points import Found
 from tachometry.cli.sweeping.settings import Settings, Text, arguments
-from tachometry.sim.studies.loops.loops import LoopPoint, seeds_from
+from tachometry.sim.studies.sweeping.loops import LoopPoint, seeds_from
 from tachometry.spec import METHODS, methods_with, of_texts
 
 _MOST = 100_000  # points

@@ -18,7 +18,7 @@ from tachometry.sim.plots.style import (
     save_figure,
 )
 from tachometry.sim.studies.loops.control import Setting
-from tachometry.sim.studies.loops.loops import FIGURES
+from tachometry.sim.studies.sweeping.loops import FIGURES
 from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, read_nearest
 
 Log = Mapping[str, FloatArray]

@@ -1,17 +1,12 @@
 """Ports of the exported core of one axis."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
+from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, held, pin, strobe
 
-if TYPE_CHECKING:
-    from tachometry.spec.core.tachometer import TachometerSpec
 
-
-def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:
+def ports_of(spec: Numbers, own: Iterable[Port]) -> tuple[Port, ...]:
     """Return all ports of a core, in the order of the exported module; those of options and methods come last."""
     return (
         pin("clk", "Clock; all outputs change at its rising edge."),
@@ -73,8 +68,7 @@ def ports_of(spec: TachometerSpec) -> tuple[Port, ...]:
                 "maximum time.",
             ),
         ),
-        *spec.bound_ports,
-        *spec.method_ports,
+        *own,
         *_if(spec.index, strobe(INDEX, "One clock for every rising edge of z.")),
         *_if(
             spec.index,

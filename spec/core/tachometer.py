@@ -279,7 +279,7 @@ class TachometerSpec(Numbers, HasPorts):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Ports of the exported core, in order."""
-        return ports_of(self)
+        return ports_of(self, (*self.bound_ports, *self.method_ports))
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from tachometry.spec.language.units import plural
 if TYPE_CHECKING:
     from distributed import Client
 
-    from tachometry.sim.studies.loops.loops import LoopPoint
+    from tachometry.sim.studies.sweeping.loops import LoopPoint
     from tachometry.sim.studies.sweeping.sweep import Point, Row
 
 _PATIENCE = 10.0  # seconds until a scheduler has answered

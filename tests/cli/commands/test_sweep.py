@@ -105,7 +105,7 @@ def test_options_are_for_the_methods_that_have_them(
 def test_what_cannot_be_of_all_methods_is_left_out(scheduler: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert run(*CORE, "--external-tick", "--motion", "stop:50ms", "--vary", "tick=1ms,2ms", *scheduler) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "rairan: left out: --method must be another than rairan for an external tick" in told
+    assert "rairan: left out: method must be another than rairan for an external tick" in told
     assert "(method rairan, tick=1ms)" in told
     assert "10 points" in told
 
