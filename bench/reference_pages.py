@@ -10,7 +10,7 @@ import click
 from pages import markdown, write
 
 from tachometry.boards.fpga.boards import BOARDS
-from tachometry.cli.group import COMMANDS, load
+from tachometry.cli.commands import COMMANDS, load
 from tachometry.cli.options.option import Option
 from tachometry.hdl.export.registers.files import tables
 from tachometry.sim.studies.sweeping.sweep import COLUMNS

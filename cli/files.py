@@ -1,19 +1,21 @@
-"""Outputs that appear whole and all together, or not at all."""
+"""Outputs appear whole and all together, or not at all; caches have a folder that can be written."""
 
+import errno
 import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from tachometry.cli.environment import DISK
-
 if sys.platform != "win32":
     import fcntl
 
+# What the system says of a disk that takes no more.
+DISK = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO))
 _PREFIX = ".tachometry-"
 _NEW, _OLD = "new", "old"
 
@@ -216,3 +218,29 @@ def _real(path: Path) -> Path:
 
 def _unwritable(target: Path, error: OSError) -> OSError:
     return OSError(f"cannot write {target}: {error.strerror or error}")
+
+
+@contextmanager
+def writable_caches() -> Iterator[None]:
+    """Check that the tools find a cache that can be written: where the user's cannot, a folder that ends with this.
+
+    Yosys, Matplotlib and compilers have caches of their own there.
+    """
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    try:
+        os.makedirs(cache, exist_ok=True)
+        writable = os.access(cache, os.W_OK | os.X_OK)
+    except OSError:
+        writable = False
+    if writable:
+        yield
+        return
+    names = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "MPLCONFIGDIR")
+    before = {name: os.environ.get(name) for name in names}
+    with tempfile.TemporaryDirectory(prefix="tachometry-", ignore_cleanup_errors=True) as folder:
+        os.environ.update(dict.fromkeys(names, folder))
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                os.environ.pop(name) if value is None else os.environ.update({name: value})

@@ -57,7 +57,7 @@ class _Interrupts:
 
 
 def _run(args: Sequence[str], interrupts: _Interrupts) -> int:
-    from tachometry.cli.group import Refused, run
+    from tachometry.cli.commands import Refused, run
 
     interrupts.ready()
     try:

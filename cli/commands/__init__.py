@@ -1,1 +1,113 @@
-"""The commands of `tachometry`."""
+"""The command `tachometry` with all of its commands, and what their errors say."""
+
+from collections.abc import Sequence
+from importlib import import_module
+
+import click
+
+from tachometry.cli.files import DISK, writable_caches
+from tachometry.cli.options.option import told
+
+COMMANDS = {
+    "plan": "Show what a core can measure: resolution and time over speed.",
+    "generate": "Write a core as Verilog, with its manifest, constraints and FuseSoC file.",
+    "simulate": "Run a core on a virtual encoder, against the golden model and the truth.",
+    "replay": "Run a core on captured encoder signals, against the golden model.",
+    "compare": "Compare methods on the same edges.",
+    "sweep": "Run methods over ranges of options and speeds, on all processors.",
+    "loop": "Close a velocity loop about a core: motor, observer, controller.",
+    "figures": "Draw the papers' figures anew, and say which agree.",
+    "verify": "Hold all engines against the golden models, in many configurations.",
+    "build": "Build a core for a board: a bitstream, or a project for the vendor's tools.",
+    "program": "Load a bitstream into a board.",
+    "monitor": "Show, record and test what a board measures, also a simulated one.",
+}
+
+
+def load(name: str) -> click.Command:
+    """Import a command, which has the name of its file."""
+    command: click.Command = getattr(import_module(f"tachometry.cli.commands.{name}"), name)
+    return command
+
+
+class _Commands(click.Group):
+    """Loads a command by its name when it is called, so that the help of all of them is quick."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        return load(name) if name in COMMANDS else None
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+class Refused(Exception):
+    """Tells the user, by its message, that a request cannot be met."""
+
+
+@click.group(
+    cls=_Commands,
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="""\b
+Examples:
+  tachometry plan --ppr 500 --max-speed 400rad/s
+  tachometry generate --ppr 500 -o build
+  tachometry simulate --ppr 500 --clock 200kHz --tick 1ms \\
+      --motion ramp:0:40rad/s:500ms --plot ramp.png --save-capture ramp.sr
+  tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv
+
+`tachometry COMMAND --help` explains a command and all of its options.""",
+)
+@click.version_option(package_name="tachometry", message="%(prog)s %(version)s")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """Measure the speed of a servo drive in an FPGA: encoder pins in, velocity out.
+
+    Generates tachometer cores as Verilog, and compares every bit of them with a golden model, on the signals of a
+    virtual encoder or on those that a logic analyser has captured.
+
+    Exit status: 0 success, 1 hardware and golden model differ, 2 error, 70 a fault of tachometry itself, 130
+    interrupted, 141 nobody reads the output.
+    """
+    context.with_resource(writable_caches())
+
+
+def run(args: Sequence[str]) -> int:
+    """Run a command line; its exit status.
+
+    Raises
+    ------
+    Refused
+        If it is wrong, or cannot be done here.
+    """
+    try:
+        # Not `cli.main()`: it puts an empty line before the one on Ctrl-C.
+        with cli.make_context("tachometry", list(args)) as context:
+            return cli.invoke(context) or 0
+    except click.exceptions.Exit as exit:
+        return exit.exit_code
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else "tachometry"
+        raise Refused(f"{error.format_message()} (see {command} --help)") from error
+    except click.ClickException as error:
+        raise Refused(error.format_message()) from error
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise Refused(_of_system(error)) from error
+    except ValueError as error:
+        raise Refused(told(error)) from error
+    except (OverflowError, MemoryError) as error:
+        raise Refused(f"a number is too large for this computer: {error or type(error).__name__}") from error
+
+
+def _of_system(error: OSError) -> str:
+    if error.filename:
+        return f"{error.filename}: {error.strerror}"
+    if error.errno in DISK:
+        return f"cannot write standard output or a temporary file: {error.strerror}"
+    return str(error)

@@ -12,7 +12,7 @@ import pytest
 from support.command import run
 
 from tachometry.cli.commands import plan
-from tachometry.cli.environment import writable_caches
+from tachometry.cli.files import writable_caches
 from tachometry.cli.reports.streams import printable
 from tachometry.cli.reports.terminal import print_rows, print_table
 from tachometry.sim.studies import plan as study
@@ -52,7 +52,7 @@ main(sys.argv[2:])
 @pytest.mark.parametrize(
     "module",
     [
-        "tachometry.cli.group",
+        "tachometry.cli.commands",
         "tachometry.spec.methods",  # an import of an import
         "numpy",
     ],
