@@ -15,13 +15,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is nightly by its former name, too."""
-    for item in items:
-        if item.get_closest_marker("nightly"):
-            item.add_marker("long")
-
-
 @pytest.fixture
 def generated(tmp_path: Path) -> Callable[..., Path]:
     """Return the command `tachometry generate` in this process: the folder in which it has written a core's files."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 import pytest
 from support import command, docs
-from support.nightly import nightly
+from support.nightly import nightly, only
 
 from tachometry.cli.commands.loop import loop
 from tachometry.cli.options.closed_loop import loop_options
@@ -43,7 +43,13 @@ def numbers(cell: str) -> list[float]:
     return [float(number) for number in cell.replace(":", ",").split(", ")]
 
 
-@pytest.mark.parametrize("words", [words for words in COMMANDS if "--vary" not in words], ids=lambda words: words[-1])
+RUN = [words for words in COMMANDS if "--vary" not in words]
+
+
+# Gates have to be compiled; tests/sim/engines/test_gate_loop.py runs them.
+@pytest.mark.parametrize(
+    "words", only([words for words in RUN if "--gates" not in words], RUN), ids=lambda words: words[-1]
+)
 def test_commands_run(words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With one seed, for the time that it takes."""
     monkeypatch.chdir(tmp_path)
