@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tachometry.cli.options.core import core_click_options
+from tachometry.cli.options.loop import declared, texts_of
 from tachometry.cli.options.motion import Quantity, disc_options
 from tachometry.cli.options.option import all_of, option
 from tachometry.cli.options.sweep import by_name
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control.law import Law
+from tachometry.spec.control.motor import Motor
 from tachometry.spec.core.timing import whole_clocks
-from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.option import ParameterError, options_of, read_options
 from tachometry.spec.language.units import (
     BANDWIDTH,
-    CURRENT,
     TIME,
     TORQUE,
-    TORQUE_CONSTANT,
     format_time,
     parse_time,
     read_nearest,
@@ -36,41 +37,12 @@ MOST_SECONDS = 100.0
 _MOST_SPEED = 1e6  # rad/s
 
 _OPTIONS = [
-    option(_LOOP, "--kp", type=float, default=100.0, metavar="K_P", help="Gain of the position, in 1/s²."),
-    option(_LOOP, "--kv", type=float, default=30.0, metavar="K_V", help="Gain of the velocity, in 1/s."),
-    option(
-        _LOOP,
-        "--observer",
-        type=_RATE,
-        default="40rad/s",
-        metavar="BANDWIDTH",
-        help="Bandwidth G_dis of the disturbance observer, in rad/s, Hz or kHz.",
-    ),
-    option(
-        _LOOP,
-        "--velocity-filter",
-        metavar="[BANDWIDTH|none]",
-        help="Bandwidth G_v of the low-pass filter of the velocity, or none. [default: that of --observer; none with "
-        "method track]",
-    ),
-    option(
-        _LOOP,
-        "--synchronised/--no-synchronised",
-        default=True,
-        help="Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
-        "with the velocity that is held (Fig. 2).",
-    ),
+    *(declared(_MOTOR if about in options_of(Motor) else _LOOP, about) for about in options_of(Law)),
     option(
         _LOOP,
         "--measured-acceleration",
         is_flag=True,
         help="The observer works at every control tick, with the acceleration that method track measures.",
-    ),
-    option(
-        _LOOP,
-        "--control-period",
-        metavar="TIME",
-        help="Time between two control ticks, a whole number of clocks; a plain number is clocks. [default: one tick]",
     ),
     option(
         _LOOP,
@@ -86,23 +58,6 @@ _OPTIONS = [
     ),
     option(_LOOP, "--unfiltered", is_flag=True, help="K_V acts on the velocity before the low-pass filter."),
     option(_LOOP, "--feed-forward", is_flag=True, help="Add the acceleration of the command."),
-    option(
-        _LOOP,
-        "--current-limit",
-        type=Quantity(CURRENT, "A"),
-        default="20A",
-        metavar="CURRENT",
-        help="Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
-    ),
-    option(_MOTOR, "--inertia", type=float, default=0.003, metavar="J", help="Of shaft and load, in kg m²."),
-    option(
-        _MOTOR,
-        "--torque-constant",
-        type=Quantity(TORQUE_CONSTANT, "Nm/A"),
-        default="60.3mNm/A",
-        metavar="KT",
-        help="Torque constant K_t of the motor, in Nm/A or mNm/A.",
-    ),
     option(_MOTOR, "--driver-time", type=_TIME, default="100us", metavar="TIME", help="Time constant of the current."),
     option(_MOTOR, "--friction", type=_TORQUE, default="5mNm", metavar="TORQUE", help="Coulomb friction, Nm or mNm."),
     option(_MOTOR, "--viscous", type=float, default=0.0, metavar="B", help="Viscous friction in Nm/(rad/s)."),
@@ -132,16 +87,6 @@ _OPTIONS = [
 ]
 
 _LOOKS = 1000  # at the speed of a motion
-# Least and greatest, in the units of the options' helps.
-_SIZES = {
-    "kp": (1e-12, 1e12),
-    "kv": (1e-9, 1e9),
-    "observer": (1e-6, 1e9),
-    "inertia": (1e-12, 1e6),
-    "torque_constant": (1e-9, 1e6),
-    "current_limit": (1e-9, 1e9),
-}
-
 Make = Callable[[TachometerSpec], "Setting"]
 
 
@@ -156,12 +101,6 @@ def _load(text: str | None) -> Load | None:
     torque = read_nearest("torque of --load", parts[0], TORQUE, "Nm")
     begin, seconds = (float(parse_time("time of --load", part)) for part in parts[1:])
     return Load(torque=torque, begin=begin, seconds=seconds)
-
-
-def _filter(spec: TachometerSpec, text: str | None, observer: float) -> float:
-    if text is None:
-        return math.inf if spec.method == "track" else observer
-    return math.inf if text.strip() == "none" else read_nearest("velocity_filter", text, BANDWIDTH, "rad/s")
 
 
 def _setting_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -199,7 +138,6 @@ def _setting(
 
     if not (torque_noise >= 0 and math.isfinite(torque_noise)):
         raise ParameterError("torque_noise", f"must be at least 0 Nm, not {torque_noise:g}")
-    _check_sizes(given)
     task = Task(motion=parse_motion(motion), load=_load(load), noise=torque_noise)
     fastest = max(map(abs, task.motion.speed(np.linspace(0, task.motion.duration, _LOOKS)).tolist()))
     most = 2 * math.pi * spec.timing.clock_hz / spec.encoder.counts_per_rev
@@ -227,38 +165,24 @@ def _setting(
     return in_gates(setting) if gates else setting
 
 
-def _check_sizes(given: dict[str, float]) -> None:
-    """Refuse numbers that no drive has: they are slips of the pen."""
-    for name, (least, most) in _SIZES.items():
-        # What is 0, negative, or no number is told by what takes it.
-        if 0 < given[name] < least or most < given[name] < math.inf:
-            raise ParameterError(name, f"must be of a size from {least:g} to {most:g}, not {given[name]:g}")
-
-
 def _motor_and_gains(
     spec: TachometerSpec,
     *,
-    kp: float,
-    kv: float,
-    observer: float,
-    velocity_filter: str | None,
-    synchronised: bool,
     measured_acceleration: bool,
-    control_period: str | None,
     delay: str | None,
     unfiltered: bool,
     feed_forward: bool,
-    current_limit: float,
-    inertia: float,
-    torque_constant: float,
     driver_time: float,
     friction: float,
     viscous: float,
+    **of_law: str | bool | None,
 ) -> tuple[Any, Any]:
     from tachometry.sim.engines.loop import Gains, Motor, Observer
 
     if measured_acceleration and not hasattr(spec, "acceleration_per_lsb"):
         raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
+    law = Law(tachometer=spec, **read_options(Law, texts_of(Law, of_law)))
+    inertia, torque_constant = float(law.inertia), float(law.torque_constant)
     motor = Motor(
         inertia=inertia,
         torque_constant=torque_constant,
@@ -266,31 +190,27 @@ def _motor_and_gains(
         viscous=viscous,
         coulomb=friction,
     )
-    hz = spec.timing.clock_hz
-    clocks = spec.timing.tick_cycles if control_period is None else whole_clocks("control_period", control_period, hz)
-    late = 0 if delay is None else whole_clocks("delay", delay, hz)
-    if not 1 <= clocks <= hz:
-        raise ParameterError("control_period", f"must be from a clock to 1s, not {control_period or clocks}")
-    if not 0 <= late <= clocks:
+    late = 0 if delay is None else whole_clocks("delay", delay, spec.timing.clock_hz)
+    if not 0 <= late <= law.period:
         raise ParameterError(
-            "delay", f"must be at most a control tick, {format_time(spec.seconds(clocks))}, not {delay}"
+            "delay", f"must be at most a control tick, {format_time(spec.seconds(law.period))}, not {delay}"
         )
-    way = Observer.SYNCHRONISED if synchronised else Observer.CONVENTIONAL
+    way = Observer.SYNCHRONISED if law.synchronised else Observer.CONVENTIONAL
     if measured_acceleration:
         way = Observer.ACCELERATION
     gains = Gains(
-        position=kp,
-        velocity=kv,
-        observer=observer,
-        filter=_filter(spec, velocity_filter, observer),
-        seconds=float(spec.seconds(clocks)),
+        position=float(law.position_gain),
+        velocity=float(law.velocity_gain),
+        observer=float(law.observer),
+        filter=math.inf if law.filter is None else float(law.filter),
+        seconds=float(spec.seconds(law.period)),
         way=way,
         delay=float(spec.seconds(late)),
         on_filtered=not unfiltered,
         feed_forward=feed_forward,
         inertia=inertia,
         torque_constant=torque_constant,
-        current_limit=current_limit,
+        current_limit=float(law.current_limit),
     )
     return motor, gains
 

@@ -1,7 +1,7 @@
 """Options of cores with a control loop."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from tachometry.cli.options.option import all_of, option
@@ -12,11 +12,12 @@ from tachometry.spec.language.option import Option, options_of, read_options
 _LOOP = "Loop"
 
 
-def _declared(about: Option) -> Callable[[Any], Any]:
+def declared(group: str, about: Option) -> Callable[[Any], Any]:
+    """Return the option of the command line for one of a loop."""
     if about.flag:
-        return option(_LOOP, f"--{about.name}/--no-{about.name}", default=None, help=f"{about.help} {_default(about)}")
+        return option(group, f"--{about.name}/--no-{about.name}", default=None, help=f"{about.help} {_default(about)}")
     metavar = about.metavar or f"[{'|'.join(about.choices)}]"
-    return option(_LOOP, f"--{about.name}", metavar=metavar, help=f"{about.help} {_default(about)}")
+    return option(group, f"--{about.name}", metavar=metavar, help=f"{about.help} {_default(about)}")
 
 
 def _default(about: Option) -> str:
@@ -31,8 +32,18 @@ _OPTIONS = [
         help="Add a disturbance observer and a controller of position and velocity, with commands as inputs and the "
         "current as output.",
     ),
-    *(_declared(about) for about in options_of(LoopSpec)),
+    *(declared(_LOOP, about) for about in options_of(LoopSpec)),
 ]
+
+
+def texts_of(spec: type[Any], given: Mapping[str, str | bool | None]) -> dict[str, str]:
+    """Return the texts of the options of a class, by their names, from what the command line has by parameters."""
+    values = {about.name: given[about.parameter] for about in options_of(spec)}
+    return {
+        name: ("no", "yes")[value] if isinstance(value, bool) else value
+        for name, value in values.items()
+        if value is not None
+    }
 
 
 def loop_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -42,12 +53,7 @@ def loop_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def build(*, spec: CoreSpec, loop: bool, **others: Any) -> Any:
-        given = {about.name: others.pop(about.parameter) for about in options_of(LoopSpec)}
-        texts = {
-            name: ("no", "yes")[value] if isinstance(value, bool) else value
-            for name, value in given.items()
-            if value is not None
-        }
+        texts = texts_of(LoopSpec, {about.parameter: others.pop(about.parameter) for about in options_of(LoopSpec)})
         return command(spec=of_loop(spec, texts) if loop else _alone(spec, texts), **others)
 
     return all_of(_OPTIONS, build)

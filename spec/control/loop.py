@@ -11,25 +11,17 @@ from typing import Any
 from tachometry.spec.control.coefficients import control_form, extra_bits_of, ratios_of
 from tachometry.spec.control.form import ACCELERATION_WIDTH, ControlForm, Term, factor_bits
 from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
+from tachometry.spec.control.law import Law
 from tachometry.spec.control.ports import loop_ports
-from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.core.timing import Timing, whole_clocks
-from tachometry.spec.language.option import Derived, ParameterError, option, options_of, settle
+from tachometry.spec.language.option import ParameterError, option, options_of
 from tachometry.spec.language.port import HasPorts, Port
 from tachometry.spec.language.units import (
-    CURRENT,
     PI,
-    PLAIN,
-    TORQUE_CONSTANT,
-    Units,
-    parse_bandwidth,
     plural,
-    read_exactly,
     rounded,
 )
 from tachometry.spec.methods.axes import CoreSpec
 
-MAX_PERIOD = 1 << 24
 MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
 MAX_EXTRA_BITS = 24
 MAX_FACTOR_BITS = 40
@@ -46,42 +38,12 @@ _UNFILTERED = 3  # to load the velocity, to subtract, to store
 _LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 
-def _clocks(what: str, text: str) -> Derived:
-    return Derived(lambda spec: whole_clocks(what, text, spec.timing.clock_hz))
-
-
-def _positive(units: Units) -> Any:
-    return lambda what, text: read_exactly(what, text, units)
-
-
-def _filter(what: str, text: str) -> Fraction | None:
-    return None if text.strip().lower() == "none" else parse_bandwidth(what, text)
-
-
 @dataclass(frozen=True, kw_only=True)
-class LoopSpec(HasPorts):
+class LoopSpec(Law, HasPorts):
     """A tachometer with a disturbance observer and a controller of position and velocity; see `ControlForm`.
 
     Parameters
     ----------
-    tachometer : TachometerSpec
-        Of any method.
-    inertia : Fraction
-        J in kg m².
-    torque_constant : Fraction
-        K_t in Nm/A.
-    position_gain, velocity_gain : Fraction
-        k_p in 1/s² and k_v in 1/s.
-    observer : Fraction
-        G_dis in rad/s.
-    filter : Fraction or None
-        G_v in rad/s. None: y is the velocity.
-    current_limit : Fraction
-        In A.
-    period : int
-        Clocks between two control ticks.
-    synchronised : bool
-        Filter and observer work at the updates of the velocity, as in Fig. 11, not at every control tick, as in Fig. 2.
     current_width : int
         Bits of `current`.
     multiplier : str
@@ -98,79 +60,6 @@ class LoopSpec(HasPorts):
         If a parameter is out of range, the program is longer than the period, or a format is too wide.
     """
 
-    tachometer: TachometerSpec
-    inertia: Fraction = option(  # noqa: RUF009
-        None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", group=_GROUP, parse=_positive(PLAIN)
-    )
-    torque_constant: Fraction = option(  # noqa: RUF009
-        None,
-        "Torque constant K_t of the motor, in Nm/A or mNm/A.",
-        text="60.3mNm/A",
-        metavar="KT",
-        group=_GROUP,
-        parse=_positive(TORQUE_CONSTANT),
-    )
-    position_gain: Fraction = option(  # noqa: RUF009
-        None,
-        "Gain k_p of the position error, in 1/s²; 0: the velocity alone is controlled.",
-        text="100",
-        name="kp",
-        metavar="KP",
-        group=_GROUP,
-        parse=_positive(PLAIN),
-    )
-    velocity_gain: Fraction = option(  # noqa: RUF009
-        None,
-        "Gain k_v of the velocity error, in 1/s.",
-        text="30",
-        name="kv",
-        metavar="KV",
-        group=_GROUP,
-        parse=_positive(PLAIN),
-    )
-    observer: Fraction = option(  # noqa: RUF009
-        None,
-        "Bandwidth G_dis of the disturbance observer, in rad/s, Hz or kHz.",
-        text="40rad/s",
-        metavar="BANDWIDTH",
-        unit="rad/s",
-        group=_GROUP,
-        parse=parse_bandwidth,
-    )
-    filter: Fraction | None = option(  # noqa: RUF009
-        Derived(lambda spec: None if spec.tachometer.method == "track" else spec.observer),
-        "Bandwidth G_v of the low-pass filter of the velocity, or none.",
-        shown="that of --observer; none with method track",
-        name="velocity-filter",
-        metavar="[BANDWIDTH|none]",
-        unit="rad/s",
-        group=_GROUP,
-        parse=_filter,
-    )
-    current_limit: Fraction = option(  # noqa: RUF009
-        None,
-        "Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
-        text="20A",
-        metavar="CURRENT",
-        group=_GROUP,
-        parse=_positive(CURRENT),
-    )
-    period: int = option(
-        Derived(lambda spec: int(spec.timing.tick_cycles)),
-        "Time between two control ticks, a whole number of clocks; a plain number is clocks.",
-        shown="one tick",
-        name="control-period",
-        metavar="TIME",
-        unit="clocks",
-        group=_GROUP,
-        parse=_clocks,
-    )
-    synchronised: bool = option(
-        True,
-        "Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
-        "(Fig. 2).",
-        group=_GROUP,
-    )
     current_width: int = option(16, "Bits of current, 8 to 24.", metavar="N", group=_GROUP)
     multiplier: str = option(
         "serial",
@@ -192,16 +81,7 @@ class LoopSpec(HasPorts):
     )
 
     def __post_init__(self) -> None:
-        settle(self)
-        positive = ("inertia", "torque_constant", "velocity_gain", "observer", "current_limit")
-        for about in options_of(LoopSpec):
-            value = getattr(self, about.field)
-            if about.field in positive and value <= 0:
-                raise ParameterError(about.parameter, f"must be greater than 0, not {float(value):.9g}")
-        if self.position_gain < 0:
-            raise ParameterError("kp", f"must be at least 0, not {float(self.position_gain):.9g}")
-        if self.filter is not None and self.filter <= 0:
-            raise ParameterError("velocity_filter", f"must be greater than 0, not {float(self.filter):.9g}")
+        super().__post_init__()
         if not 8 <= self.current_width <= 24:
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:
@@ -210,8 +90,6 @@ class LoopSpec(HasPorts):
             raise ParameterError("command", f"must be ports or generator, not {self.command!r}")
         if self.gains not in FIXED_OR_INPUTS:
             raise ParameterError("gains", f"must be fixed or inputs, not {self.gains!r}")
-        if not 1 <= self.period <= MAX_PERIOD:
-            raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
         self._check_formats()
         if self.period < self.least_period:
             # Words are of other widths in a longer period, so this is not what this one would take.
@@ -256,11 +134,6 @@ class LoopSpec(HasPorts):
                 f"must be less with --loop here: words would have {width} bits, and {MAX_WORD_WIDTH} are the most; a "
                 "max_speed, a lower observer or lower gains help, too",
             )
-
-    @property
-    def timing(self) -> Timing:
-        """Clock, tick and maximum time of the tachometer."""
-        return self.tachometer.timing
 
     @property
     def method(self) -> str:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 from fractions import Fraction
@@ -124,6 +124,11 @@ def read_nearest(what: str, text: str, units: Units, default: str = "") -> float
     """Return the quantity in the first of the units as a float; arguments and errors as of `read_quantity`."""
     value, unit = read_quantity(what, text, units, default)
     return units[unit].nearest(value)
+
+
+def reader(units: Units) -> Callable[[str, str], Fraction]:
+    """Return a function that reads such a quantity exactly, for an option."""
+    return lambda what, text: read_exactly(what, text, units)
 
 
 def ratio(unit: str, other: str) -> Fraction | None:

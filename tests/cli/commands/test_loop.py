@@ -97,7 +97,7 @@ def test_all_cores_of_this_machine_run_loops(monkeypatch: pytest.MonkeyPatch) ->
 
 @nightly  # tests/sim/engines/test_gate_loop.py runs the same gates without the command
 def test_a_controller_in_gates(tmp_path: Path) -> None:
-    gains = "--kp 1600 --kv 80 --observer 160 --current-limit 8A --seeds 1".split()
+    gains = "--kp 1600 --kv 80 --observer 160rad/s --current-limit 8A --seeds 1".split()
     for name, more in (("gates", ["--gates"]), ("double", [])):
         assert run(*SHORT, *gains, *more, "--log", tmp_path / f"{name}.csv") == 0
     current = {}
@@ -112,20 +112,20 @@ def test_a_controller_in_gates(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--kv -1", "--kv must be at least 0, not -1"),
-        ("--observer 0", "--observer must be more than 0, not 0"),
-        ("--velocity-filter 0", "--velocity-filter must be more than 0, not 0"),
-        ("--velocity-filter some", "--velocity-filter must be a number in rad/s"),
+        ("--kv -1", "--kv must be greater than 0, not -1"),
+        ("--observer 0Hz", "--observer must be greater than 0, not 0"),
+        ("--velocity-filter 0Hz", "--velocity-filter must be greater than 0, not 0"),
+        ("--velocity-filter some", "--velocity-filter must be a number with one of the units rad/s"),
         ("--delay 30us", "--delay must be at most a control tick, 20us, not 30us"),
         ("--control-period 1ns", "--control-period must be a whole number of clocks"),
-        ("--control-period 2s", "--control-period must be from a clock to 1s, not 2s"),
+        ("--control-period 2s", "--control-period must be from 1 to 16777216 clocks, not "),
         ("--measured-acceleration", "--measured-acceleration must not be given with method s"),
         ("--load 1Nm:2s", "--load must be TORQUE:FROM:TIME, such as 0.2Nm:7s:500ms, not '1Nm:2s'"),
         ("--load 1Nm:41ms:1s", "--load must begin 2ms or more after --from, and within --motion"),
         ("--from 79ms", "--from must be from 0 to 2ms before the end of --motion, not 79ms"),
         ("--motion stop:101s", "--motion must last from 10ms to 100s in a loop, not 101s"),
         ("--torque-noise -1Nm", "--torque-noise must be at least 0 Nm, not -1"),
-        ("--inertia 0", "--inertia must be more than 0, not 0"),
+        ("--inertia 0", "--inertia must be greater than 0, not 0"),
         ("--friction -1Nm", "--friction must be at least 0, not -1"),
         ("--gates --delay 1us", "--delay must not be given together with --gates"),
         ("--gates --kv 0", "--kv must be greater than 0, not 0"),
@@ -135,7 +135,7 @@ def test_a_controller_in_gates(tmp_path: Path) -> None:
         ("--vary kv=1,2 --log log.csv", "--log must be of one loop on this machine"),
         ("--methods s,m --plot plot.png", "--vary must be given together with --plot of several loops"),
         ("--vary speed=1,2", "--vary must be of ppr, decoding, clock, "),
-        ("--vary kv=1,-2", "--kv must be at least 0, not -2 (method s, kv=-2)"),
+        ("--vary kv=1,-2", "--kv must be greater than 0, not -2 (method s, kv=-2)"),
         ("--min-time 1ms", "--min-time must be given with a method that has it: mt"),
         ("--methods s,x", "--methods must be of s, m, t, mt, rairan, track, or all, not 'x'"),
         ("--bounce 3:1ms", "No such option '--bounce'"),

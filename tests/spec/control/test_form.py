@@ -284,14 +284,23 @@ def test_a_coefficient_just_below_a_power_of_two_has_all_bits() -> None:
 
 
 def test_words_of_80_bits() -> None:
-    """Each doubling of a great gain takes one more."""
-    gain = next(
-        Fraction(2**n)
-        for n in range(80, 90)
-        if LoopSpec(tachometer=CORE, position_gain=Fraction(2**n)).form.word_width == 80
-    )
+    """Each doubling of a great inertia takes one more."""
+    core = replace(CORE, encoder=Encoder(1), frac_bits=24, position_width=48, max_speed=Speed.parse("1e6rad/s"))
+
+    def loop(inertia: int) -> LoopSpec:
+        return LoopSpec(
+            tachometer=core,
+            inertia=Fraction(inertia),
+            torque_constant=Fraction(1, 10**9),
+            position_gain=Fraction(10**12),
+            velocity_gain=Fraction(10**6),
+            filter=None,
+            current_limit=Fraction(10**9),
+        )
+
+    inertia = next(2**n for n in range(20) if loop(2**n).form.word_width == 80)
     with pytest.raises(ParameterError, match="words would have 81 bits, and 80 are the most"):
-        LoopSpec(tachometer=CORE, position_gain=2 * gain)
+        loop(2 * inertia)
 
 
 def test_times() -> None:

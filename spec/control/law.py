@@ -1,0 +1,147 @@
+"""The law of a control loop is declared once, for cores that have it in gates and for loops that are simulated."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tachometry.spec.control.motor import Motor
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.timing import Timing, whole_clocks
+from tachometry.spec.language.option import Derived, ParameterError, option, options_of, settle
+from tachometry.spec.language.units import CURRENT, PLAIN, parse_bandwidth, reader
+
+MAX_PERIOD = 1 << 24
+_GROUP = "Loop"
+# Least and greatest: beyond them no drive is, so they are slips of the pen.
+_SIZES = {
+    "kp": ("1e-12", "1e12"),
+    "kv": ("1e-9", "1e9"),
+    "observer": ("1e-6", "1e9"),
+    "inertia": ("1e-12", "1e6"),
+    "torque_constant": ("1e-9", "1e6"),
+    "current_limit": ("1e-9", "1e9"),
+}
+
+
+def _clocks(what: str, text: str) -> Derived:
+    return Derived(lambda law: whole_clocks(what, text, law.timing.clock_hz))
+
+
+def _filter(what: str, text: str) -> Fraction | None:
+    return None if text.strip().lower() == "none" else parse_bandwidth(what, text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law(Motor):
+    """Says how position and velocity are controlled, and how disturbances are observed.
+
+    Parameters
+    ----------
+    tachometer : TachometerSpec
+        Of any method.
+    position_gain, velocity_gain : Fraction
+        k_p in 1/s² and k_v in 1/s.
+    observer : Fraction
+        G_dis in rad/s.
+    filter : Fraction or None
+        G_v in rad/s. None: y is the velocity.
+    current_limit : Fraction
+        In A.
+    period : int
+        Clocks between two control ticks.
+    synchronised : bool
+        Filter and observer work at the updates of the velocity, as in Fig. 11, not at every control tick, as in Fig. 2.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range.
+    """
+
+    tachometer: TachometerSpec
+    position_gain: Fraction = option(  # noqa: RUF009
+        None,
+        "Gain k_p of the position error, in 1/s²; 0: the velocity alone is controlled.",
+        text="100",
+        name="kp",
+        metavar="KP",
+        group=_GROUP,
+        parse=reader(PLAIN),
+    )
+    velocity_gain: Fraction = option(  # noqa: RUF009
+        None,
+        "Gain k_v of the velocity error, in 1/s.",
+        text="30",
+        name="kv",
+        metavar="KV",
+        group=_GROUP,
+        parse=reader(PLAIN),
+    )
+    observer: Fraction = option(  # noqa: RUF009
+        None,
+        "Bandwidth G_dis of the disturbance observer, in rad/s, Hz or kHz.",
+        text="40rad/s",
+        metavar="BANDWIDTH",
+        unit="rad/s",
+        group=_GROUP,
+        parse=parse_bandwidth,
+    )
+    filter: Fraction | None = option(  # noqa: RUF009
+        Derived(lambda spec: None if spec.tachometer.method == "track" else spec.observer),
+        "Bandwidth G_v of the low-pass filter of the velocity, or none.",
+        shown="that of --observer; none with method track",
+        name="velocity-filter",
+        metavar="[BANDWIDTH|none]",
+        unit="rad/s",
+        group=_GROUP,
+        parse=_filter,
+    )
+    current_limit: Fraction = option(  # noqa: RUF009
+        None,
+        "Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
+        text="20A",
+        metavar="CURRENT",
+        group=_GROUP,
+        parse=reader(CURRENT),
+    )
+    period: int = option(
+        Derived(lambda spec: int(spec.timing.tick_cycles)),
+        "Time between two control ticks, a whole number of clocks; a plain number is clocks.",
+        shown="one tick",
+        name="control-period",
+        metavar="TIME",
+        unit="clocks",
+        group=_GROUP,
+        parse=_clocks,
+    )
+    synchronised: bool = option(
+        True,
+        "Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
+        "(Fig. 2).",
+        group=_GROUP,
+    )
+
+    def __post_init__(self) -> None:
+        settle(self)
+        for about in options_of(Law):
+            if about.parameter in _SIZES:
+                self._check_size(about.parameter, getattr(self, about.field))
+        if self.filter is not None and self.filter <= 0:
+            raise ParameterError("velocity_filter", f"must be greater than 0, not {float(self.filter):.9g}")
+        if not 1 <= self.period <= MAX_PERIOD:
+            raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
+
+    def _check_size(self, parameter: str, value: Fraction) -> None:
+        if parameter == "kp" and value <= 0:
+            if value < 0:
+                raise ParameterError(parameter, f"must be at least 0, not {float(value):.9g}")
+            return
+        if value <= 0:
+            raise ParameterError(parameter, f"must be greater than 0, not {float(value):.9g}")
+        least, most = _SIZES[parameter]
+        if not Fraction(least) <= value <= Fraction(most):
+            raise ParameterError(parameter, f"must be of a size from {least} to {most}, not {float(value):g}")
+
+    @property
+    def timing(self) -> Timing:
+        """Timing of the tachometer."""
+        return self.tachometer.timing

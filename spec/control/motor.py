@@ -1,0 +1,34 @@
+"""A motor is declared once, for cores with a control loop and for loops that are simulated."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tachometry.spec.language.option import option
+from tachometry.spec.language.units import PLAIN, TORQUE_CONSTANT, reader
+
+_GROUP = "Loop"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motor:
+    """Describes the motor as its controller knows it.
+
+    Parameters
+    ----------
+    inertia : Fraction
+        J in kg m².
+    torque_constant : Fraction
+        K_t in Nm/A.
+    """
+
+    inertia: Fraction = option(  # noqa: RUF009
+        None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", group=_GROUP, parse=reader(PLAIN)
+    )
+    torque_constant: Fraction = option(  # noqa: RUF009
+        None,
+        "Torque constant K_t of the motor, in Nm/A or mNm/A.",
+        text="60.3mNm/A",
+        metavar="KT",
+        group=_GROUP,
+        parse=reader(TORQUE_CONSTANT),
+    )
