@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from tachometry.cli.options.closed_loop import LOOP, loop_click_options, loop_options
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.methods import listed_methods
-from tachometry.cli.sweeping.points import Found
+from tachometry.cli.sweeping.points import Found, check_options
 from tachometry.cli.sweeping.settings import Settings, Text, arguments
 from tachometry.sim.studies.sweeping.loops import LoopPoint, seeds_from
-from tachometry.spec import METHODS, methods_with, of_texts
+from tachometry.spec import METHODS, of_texts
 
 _MOST = 100_000  # points
 
@@ -39,9 +39,7 @@ def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
     for name in settings.vary:
         if name not in options:
             raise ValueError(f"--vary must be of {', '.join(options)}, not {name!r}")
-    for name in (*settings.fixed, *settings.vary):
-        if (has := methods_with(name)) and not {method for _, method, _ in listed} & set(has):
-            raise ValueError(f"--{name} must be given with a method that has it: {', '.join(has)}")
+    check_options(settings, {method for _, method, _ in listed if method is not None})
     count = len(listed) * math.prod(map(len, settings.vary.values()))
     if count > _MOST:
         raise ValueError(f"--vary must give at most {_MOST} loops, not {count}")

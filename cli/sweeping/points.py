@@ -18,7 +18,7 @@ from tachometry.cli.sweeping.settings import Settings, Text, arguments
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Point
-from tachometry.spec import METHODS, TachometerSpec, methods_with, of_texts
+from tachometry.spec import METHODS, TachometerSpec, common_options, methods_with, of_texts
 from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, SpeedUnit, read_nearest
 
 Words = tuple[str, ...]
@@ -150,7 +150,21 @@ def has_option(settings: Settings, method: str, name: str) -> bool:
         return own_ticks
     if name == "tick" and own_ticks:
         return not ("dt" in settings.fixed or "dt" in settings.vary)
-    return not methods_with(name) or method in methods_with(name)
+    has = methods_with(name)
+    common = {about.name: about for about in common_options()}.get(name)
+    if common is None or method in has:
+        return not has or method in has
+    # Where another method has an option of this name, it is for this one only with the flag that it needs.
+    return not has or common.needs in settings.fixed or common.needs in settings.vary
+
+
+def check_options(settings: Settings, methods: set[str]) -> None:
+    """Refuse options that are for none of the methods, with a ValueError."""
+    needs = {about.name: f", or with --{about.needs}" for about in common_options() if about.needs}
+    for name in (*settings.fixed, *settings.vary):
+        if not any(has_option(settings, method, name) for method in methods) and (has := methods_with(name)):
+            has_it = ", ".join(has) + needs.get(name, "")
+            raise ValueError(f"--{name} must be given with a method that has it: {has_it}")
 
 
 def _check_axes(settings: Settings, methods: set[str]) -> None:
@@ -168,9 +182,7 @@ def _check_axes(settings: Settings, methods: set[str]) -> None:
             raise ValueError(f"--motion must have names in braces that are no option or column, not {name!r}")
         if name not in settings.vary:
             raise ValueError(f"--vary must have values for {{{name}}} of --motion, such as --vary {name}=1,2,5")
-    for name in (*settings.fixed, *settings.vary):
-        if (has := methods_with(name)) and not methods & set(has):
-            raise ValueError(f"--{name} must be given with a method that has it: {', '.join(has)}")
+    check_options(settings, methods)
 
 
 class _Maker:

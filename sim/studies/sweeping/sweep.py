@@ -308,6 +308,7 @@ def _core(spec: TachometerSpec) -> Row:
         "index_reset": spec.index_reset,
         "age": spec.age,
         "bounds": spec.bounds,
+        "edge_error": float(spec.edge_error) if spec.bounds else None,
         "lowpass_rad_s": None if spec.lowpass is None else float(spec.lowpass),
     } | own
 

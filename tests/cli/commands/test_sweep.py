@@ -110,6 +110,18 @@ def test_what_cannot_be_of_all_methods_is_left_out(scheduler: list[str], capsys:
     assert "10 points" in told
 
 
+def test_an_option_that_two_methods_have_in_two_ways(scheduler: list[str], tmp_path: Path) -> None:
+    """The error of edges belongs to the bounds of s, and is an option of its own of track."""
+    line = [*CORE, "--tick", "1ms", "--motion", "constant:20rad/s:50ms", *scheduler]
+    assert run(*line, "--methods", "s", "--bounds", "--edge-error", "0.5") == 0
+    results = tmp_path / "r.parquet"
+    line += ["--vary", "edge-error=0.1,0.5", "--results", str(results)]
+    assert run(*line, "--methods", "s,track", "--bounds") == 2  # track has no bounds
+    assert run(*line, "--methods", "s", "--bounds") == 0
+    assert sorted(pq.read_table(results).column("edge_error").to_pylist()) == [0.125, 0.5]  # in eighths
+    assert run(*line, "--methods", "s") == 2
+
+
 def test_the_hardware_in_lockstep(
     scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
