@@ -25,6 +25,33 @@ def _choose(m: Module, term: Signal, values: Mapping[Term, ValueLike], found: Si
             m.d.comb += found.eq(values[last])
 
 
+class _Taken:
+    """Holds the inputs that are taken with a tick, and the sum that becomes the current."""
+
+    def __init__(self, controller: "Controller") -> None:
+        self.due = Signal()
+        self.enabled = Signal()
+        self.velocity = Signal.like(controller.command_velocity, reset_less=True)
+        self.acceleration = Signal.like(controller.command_acceleration, reset_less=True)
+        # First the position error, then the sum.
+        self.total = Signal(signed(controller._form.total_width), reset_less=True)
+
+
+class _Steps:
+    """Holds the step of a product: a word is loaded, less is taken from it, it is multiplied, and stored."""
+
+    def __init__(self, form: ControlForm) -> None:
+        self.term = Signal(Term)
+        self.again = Signal()  # the next term begins
+        self.load = Signal()
+        self.subtract = Signal()
+        self.start = Signal()
+        self.stored = Signal()
+        self.finish = Signal()  # the sum is held within few bits
+        self.limit = Signal()  # and then within the limit
+        self.word = Signal(signed(form.word_width), reset_less=True)
+
+
 class Controller(wiring.Component):
     """Forms the products of `ControlForm` one by one at each control tick, and the current from them.
 
@@ -95,82 +122,86 @@ class Controller(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        form = self._form
-        # What is taken with a tick.
-        due = Signal()
-        enabled = Signal()
-        velocity = Signal.like(self.command_velocity, reset_less=True)
-        acceleration = Signal.like(self.command_acceleration, reset_less=True)
-        # First the position error, which wraps as positions do, then the sum that becomes the current.
-        total = Signal(signed(form.total_width), reset_less=True)
+        taken, steps = _Taken(self), _Steps(self._form)
+        step = self._multiply(m, steps)
+        self._sequence(m, steps)
+        self._load(m, taken, steps)
+        self._take(m, taken)
+        with m.If(steps.stored):
+            m.d.sync += steps.term.eq(steps.term + 1)
+        self._store(m, steps, step, taken)
+        with m.If(steps.finish):
+            m.d.sync += steps.term.eq(0)
+        self._finish(m, taken, steps)
+        return m
 
-        term = Signal(Term)
-        # In this order: a word is loaded, what is to be taken from it is, the product begins, and its result is stored.
-        again = Signal()
-        load = Signal()
-        subtract = Signal()
-        start = Signal()
-        stored = Signal()
-        # Then the sum is held within few bits, and within the limit.
-        finish = Signal()
-        limit = Signal()
-        word = Signal(signed(form.word_width), reset_less=True)
+    def _multiply(self, m: Module, steps: "_Steps") -> Value:
+        """Form a product of word and coefficient; return it, or the word where there is no filter."""
+        form = self._form
         box = SerialProduct if self._multiplier == "serial" else ParallelProduct
         m.submodules.product = product = box(form.word_width, form.factor_bits)
-        unfiltered = Term.FILTER not in form.terms
         m.d.comb += [
-            load.eq(self.tick | again),
-            product.start.eq(start),
-            product.word.eq(word),
-            product.factor.eq(self._factor(m, term, load)),
-            stored.eq(product.done),
+            steps.load.eq(self.tick | steps.again),
+            product.start.eq(steps.start),
+            product.word.eq(steps.word),
+            product.factor.eq(self._factor(m, steps.term, steps.load)),
+            steps.stored.eq(product.done),
         ]
-        step: Value = product.product
-        m.d.sync += start.eq(subtract)
-        if unfiltered:
-            skipped = Signal()
-            m.d.sync += [skipped.eq(subtract & (term == Term.FILTER)), start.eq(subtract & (term != Term.FILTER))]
-            m.d.comb += stored.eq(product.done | skipped)
-            step = Mux(skipped, word, product.product)
+        m.d.sync += steps.start.eq(steps.subtract)
+        if Term.FILTER in form.terms:
+            return product.product
+        skipped = Signal()
         m.d.sync += [
-            subtract.eq(load),
-            again.eq(stored & (term != Term.DISTURBANCE)),
-            finish.eq(stored & (term == Term.DISTURBANCE)),
-            limit.eq(finish),
-            self.valid.eq(limit),
+            skipped.eq(steps.subtract & (steps.term == Term.FILTER)),
+            steps.start.eq(steps.subtract & (steps.term != Term.FILTER)),
         ]
-        # A clock later, what is to be taken from it.
+        m.d.comb += steps.stored.eq(product.done | skipped)
+        return Mux(skipped, steps.word, product.product)
+
+    def _sequence(self, m: Module, steps: "_Steps") -> None:
+        """Go from step to step, and from term to term."""
+        last = steps.term == Term.DISTURBANCE
+        m.d.sync += [
+            steps.subtract.eq(steps.load),
+            steps.again.eq(steps.stored & (steps.term != Term.DISTURBANCE)),
+            steps.finish.eq(steps.stored & last),
+            steps.limit.eq(steps.finish),
+            self.valid.eq(steps.limit),
+        ]
+
+    def _load(self, m: Module, taken: "_Taken", steps: "_Steps") -> None:
+        """Load the word of a term, and a clock later take from it what is to be taken."""
         less_filter = Signal()
         less_velocity = Signal()
         less = Mux(less_filter, self.y << self._shift(Term.FILTER), 0)
         less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)
         m.d.sync += [
-            less_filter.eq(term == Term.FILTER),
-            less_velocity.eq(term == Term.VELOCITY),
+            less_filter.eq(steps.term == Term.FILTER),
+            less_velocity.eq(steps.term == Term.VELOCITY),
         ]
-        loaded = self._word(m, term, total, velocity, acceleration)
-        with m.If(load):
-            m.d.sync += word.eq(loaded)
-        with m.Elif(subtract):
-            m.d.sync += word.eq(word - less)
-        with m.If(self.tick):
-            difference = self.command_position - (self.position << form.position_bits)
-            m.d.sync += [
-                due.eq(self.due),
-                enabled.eq(self.enable),
-                velocity.eq(self.command_velocity),
-                acceleration.eq(self.command_acceleration),
-                total.eq(difference[: len(self.command_position)].as_signed()),
-            ]
-        with m.If(stored):
-            m.d.sync += term.eq(term + 1)
-        self._store(m, term, stored, step, due, total)
-        with m.If(finish):
-            m.d.sync += term.eq(0)
+        loaded = self._word(m, steps.term, taken)
+        with m.If(steps.load):
+            m.d.sync += steps.word.eq(loaded)
+        with m.Elif(steps.subtract):
+            m.d.sync += steps.word.eq(steps.word - less)
 
+    def _take(self, m: Module, taken: "_Taken") -> None:
+        """Take the inputs with a tick; the position error wraps as positions do."""
+        with m.If(self.tick):
+            difference = self.command_position - (self.position << self._form.position_bits)
+            m.d.sync += [
+                taken.due.eq(self.due),
+                taken.enabled.eq(self.enable),
+                taken.velocity.eq(self.command_velocity),
+                taken.acceleration.eq(self.command_acceleration),
+                taken.total.eq(difference[: len(self.command_position)].as_signed()),
+            ]
+
+    def _finish(self, m: Module, taken: "_Taken", steps: "_Steps") -> None:
+        """Hold the sum within as many bits as the limit has, without a carry; then only these are to be compared."""
+        form = self._form
         wanted = Signal(signed(form.total_width - GUARD_BITS))
-        m.d.comb += wanted.eq(total >> GUARD_BITS)
-        # First within as many bits as the limit has, without a carry; then there are only these to be compared.
+        m.d.comb += wanted.eq(taken.total >> GUARD_BITS)
         held, outside = saturate(m, wanted, (1 << form.current_limit.bit_length()) - 1)
         short = Signal.like(held, reset_less=True)
         beyond = Signal(reset_less=True)
@@ -179,10 +210,12 @@ class Controller(wiring.Component):
             limited, changed = self._limited(m, short)
         else:
             limited, changed = saturate(m, short, form.current_limit)
-        m.d.comb += self.clear.eq(stored & (term == Term.CURRENT) & due)
-        with m.If(limit):
-            m.d.sync += [self.current.eq(Mux(enabled, limited, 0)), self.saturated.eq((beyond | changed) & enabled)]
-        return m
+        m.d.comb += self.clear.eq(steps.stored & (steps.term == Term.CURRENT) & taken.due)
+        with m.If(steps.limit):
+            m.d.sync += [
+                self.current.eq(Mux(taken.enabled, limited, 0)),
+                self.saturated.eq((beyond | changed) & taken.enabled),
+            ]
 
     def _limited(self, m: Module, value: Signal) -> tuple[Signal, Signal]:
         """Return what `saturate` gives, with the limit that is an input."""
@@ -224,10 +257,10 @@ class Controller(wiring.Component):
         m.d.comb += [read.addr.eq(Cat(self.n, which)), read.en.eq(load)]
         return read.data
 
-    def _word(self, m: Module, term: Signal, total: Signal, velocity: Signal, acceleration: Signal) -> Value:
+    def _word(self, m: Module, term: Signal, taken: "_Taken") -> Value:
         """Return what a term multiplies, or what y is still to be taken from."""
         form = self._form
-        held, _ = saturate(m, total, form.most_error)
+        held, _ = saturate(m, taken.total, form.most_error)
         error = Signal.like(held, reset_less=True)
         m.d.sync += error.eq(held)
         fine = form.extra_bits
@@ -236,8 +269,8 @@ class Controller(wiring.Component):
             Term.OBSERVER: self.w,
             Term.CURRENT: self.current_sum,
             Term.POSITION: error,
-            Term.VELOCITY: velocity << (fine - form.command_bits),
-            Term.ACCELERATION: acceleration,
+            Term.VELOCITY: taken.velocity << (fine - form.command_bits),
+            Term.ACCELERATION: taken.acceleration,
             Term.DISTURBANCE: self.w,
         }
         word = Signal(signed(form.word_width), name="loaded")
@@ -248,8 +281,9 @@ class Controller(wiring.Component):
         found = self._form.terms.get(term)
         return 0 if found is None else found.shift
 
-    def _store(self, m: Module, term: Signal, stored: Value, step: Value, due: Signal, total: Signal) -> None:
+    def _store(self, m: Module, steps: "_Steps", step: Value, taken: "_Taken") -> None:
         """Add a product to what it belongs to."""
+        term, stored, due, total = steps.term, steps.stored, taken.due, taken.total
         # Where it goes is in registers: the term has been the same for some clocks.
         to_y = Signal()
         to_w = Signal()
