@@ -1,5 +1,7 @@
 """The low-pass filter for fluctuating measurement time."""
 
+from typing import Any
+
 from amaranth import Cat, Const, Module, Mux, Signal, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
@@ -9,6 +11,16 @@ from tachometry.hdl.output.update import update_stream
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats import low_pass
+
+
+class _Waiting:
+    """Holds the update that waits, and the ticks since the one before."""
+
+    def __init__(self, layout: Any, elapsed: UpdateAge) -> None:
+        self.waiting = Signal()
+        self.take = Signal()  # the filter begins with it
+        self.following = registers(layout, "following", reset_less=True)
+        self.interval = Signal.like(elapsed.age, reset_less=True)
 
 
 class LowPass(wiring.Component):
@@ -43,32 +55,37 @@ class LowPass(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        spec, layout = self._spec, self.updates.p.shape()
+        layout = self.updates.p.shape()
         filtered = registers(layout, "filtered")
         m.d.comb += self.filtered.p.eq(filtered)
-        extra, bits = spec.extra_bits, spec.factor_bits
 
         # Ticks since the update before, including one in its clock.
-        elapsed = UpdateAge(spec.max_interval)
+        elapsed = UpdateAge(self._spec.max_interval)
         m.submodules.elapsed = elapsed
         m.d.comb += [elapsed.tick.eq(self.tick), elapsed.update.eq(self.updates.valid)]
+        next_one = _Waiting(layout, elapsed)
+        self._wait(m, next_one, elapsed)
+        self._filter(m, next_one, filtered)
+        return m
 
-        # The update that waits.
-        waiting = Signal()
-        take = Signal()
-        following = registers(layout, "following", reset_less=True)
-        interval = Signal.like(elapsed.age, reset_less=True)
+    def _wait(self, m: Module, next_one: _Waiting, elapsed: UpdateAge) -> None:
+        """Keep the update that waits; one that comes meanwhile takes its place, and its ticks are added."""
+        waiting, take, interval = next_one.waiting, next_one.take, next_one.interval
         with m.If(take):
             m.d.sync += waiting.eq(0)
         with m.If(self.updates.valid):
             m.d.sync += [
                 waiting.eq(1),
-                following.eq(self.updates.p),
+                next_one.following.eq(self.updates.p),
                 # No overflow: those that wait have come since the filter began, fewer clocks ago than it can count.
                 interval.eq(elapsed.before + Mux(waiting & ~take, interval, 0)),
             ]
 
-        # The state, in 2^−extra of an LSB, and what it differs by from the update.
+    def _filter(self, m: Module, next_one: _Waiting, filtered: Any) -> None:
+        """Move the state, in 2^−extra of an LSB, towards the update, a bit of the factor a clock."""
+        spec, layout = self._spec, self.updates.p.shape()
+        extra, bits = spec.extra_bits, spec.factor_bits
+        take, following = next_one.take, next_one.following
         working = Signal()
         adding = Signal()
         rounding = Signal()
@@ -80,9 +97,9 @@ class LowPass(wiring.Component):
         step = Signal(range(bits + 2), reset_less=True)
         second = Signal(reset_less=True)
         clear = following.rests if self._clears else Const(0)
-        low, *high = self._factors(m, take, interval)
+        low, *high = self._factors(m, take, next_one.interval)
         last = step == bits + 1
-        m.d.comb += take.eq(waiting & ~working & ~adding)
+        m.d.comb += take.eq(next_one.waiting & ~working & ~adding)
         m.d.sync += [
             step.eq(step + 1),
             factor.eq(factor >> 1),
@@ -116,7 +133,6 @@ class LowPass(wiring.Component):
                 filtered.eq(update),
                 filtered.velocity.eq((y + (1 << (extra - 1))) >> extra),
             ]
-        return m
 
     def _factors(self, m: Module, take: Signal, interval: Signal) -> list[Signal]:
         """Return E of each table, valid in the clock after `take` and held until the next."""
