@@ -2,7 +2,8 @@
 
 import functools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,9 +13,6 @@ from click.core import ParameterSource
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-
-# Options of commands by what their values are called, for messages about these; filled as they are made.
-_OPTIONS: dict[str, str] = {}
 
 
 def told(error: ValueError) -> str:
@@ -35,7 +33,20 @@ def _shown(name: str) -> str:
     for about in of_field:
         if about.unit:
             return f"--{about.name}, in {about.unit},"
-    return f"--{of_field[0].name}" if of_field else _OPTIONS.get(parameter, name)
+    if of_field:
+        return f"--{of_field[0].name}"
+    context = click.get_current_context(silent=True)
+    of_command = [] if context is None else context.command.get_params(context)
+    return next((one.opts[0] for one in of_command if one.name == parameter), name)
+
+
+@contextmanager
+def options_named() -> Iterator[None]:
+    """Say of an option of the running command what is said of a parameter."""
+    try:
+        yield
+    except ParameterError as error:
+        raise ValueError(told(error)) from error
 
 
 class Option(click.Option):
@@ -60,8 +71,6 @@ class Option(click.Option):
         super().__init__(*args, **attributes)
         self.group = group
         self._asked = (help, metavar)
-        if self.name:
-            _OPTIONS[self.name] = self.opts[0]
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         help, metavar = self._asked
@@ -94,10 +103,15 @@ class GroupedCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         try:
-            return super().parse_args(ctx, args)
+            with options_named():
+                return super().parse_args(ctx, args)
         except click.UsageError as error:
             error.ctx = error.ctx or ctx  # the parser does not say of which command an option has no argument
             raise
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with options_named():
+            return super().invoke(ctx)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         found: list[click.Parameter] = []

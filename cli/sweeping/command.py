@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tachometry.cli.options.option import GroupedCommand
+from tachometry.cli.options.option import GroupedCommand, options_named
 from tachometry.cli.options.sweep import by_name
 from tachometry.cli.sweeping.settings import arguments, of_command_line, of_file
 
@@ -37,9 +37,10 @@ class VaryingCommand(GroupedCommand):
             return super().parse_args(ctx, args)
         options = by_name(self) | self._points()
         file = raw.get("file")
-        settings = of_command_line(raw, options)
-        if isinstance(file, str) and file:
-            settings = settings.over(of_file(Path(file), options))
+        with options_named():
+            settings = of_command_line(raw, options)
+            if isinstance(file, str) and file:
+                settings = settings.over(of_file(Path(file), options))
         ctx.obj = settings
         first = {name: text for name, text in settings.first().items() if name in options}
         words = [*arguments(first, options), *([file] if isinstance(file, str) else [])]

@@ -96,7 +96,7 @@ def test_the_core_of_a_setting_has_its_gains() -> None:
     for name, wrong in (("delay", {"delay": 1e-6}), ("unfiltered", {"on_filtered": False})):
         with pytest.raises(ParameterError, match=f"{name} must not be given together with --gates"):
             in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, **wrong)))
-    with pytest.raises(ParameterError, match="observer must be from"):
+    with pytest.raises(ParameterError, match="observer must be of a size from"):
         in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, observer=1e-9)))
 
 
