@@ -10,7 +10,7 @@ from pathlib import Path
 
 # What is mutated, by room: what describes cores, the golden models, and the comparison.
 ROOMS = {
-    "spec": ("spec",),
+    "spec": ("spec", "hdl/export"),  # and the files that are written of them
     "golden models": ("sim/golden",),
     "comparison": ("sim/signals/run.py", "sim/studies/lockstep.py"),
 }
