@@ -93,7 +93,7 @@ def _kind(about: declaration.Option) -> dict[str, Any]:
     if about.flag:
         return {"is_flag": True}
     choices = f"[{'|'.join(about.choices)}]" if about.choices else None
-    return {"type": click.STRING, "metavar": about.metavar or choices}
+    return {"type": click.STRING, "metavar": about.metavar or choices, "fractional": about.fractional}
 
 
 def _default(about: declaration.Option) -> str:

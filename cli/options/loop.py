@@ -17,7 +17,13 @@ def declared(group: str, about: Option) -> Callable[[Any], Any]:
     if about.flag:
         return option(group, f"--{about.name}/--no-{about.name}", default=None, help=f"{about.help} {_default(about)}")
     metavar = about.metavar or f"[{'|'.join(about.choices)}]"
-    return option(group, f"--{about.name}", metavar=metavar, help=f"{about.help} {_default(about)}")
+    return option(
+        group,
+        f"--{about.name}",
+        metavar=metavar,
+        fractional=about.fractional,
+        help=f"{about.help} {_default(about)}",
+    )
 
 
 def _default(about: Option) -> str:

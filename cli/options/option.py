@@ -58,6 +58,8 @@ class Option(click.Option):
         Heading of the group.
     help, metavar : str or callable
         A function is asked whenever the help is shown, of what may have been registered by then.
+    fractional : bool
+        Whether plain numbers need not be whole; so is every option of a float.
     """
 
     def __init__(
@@ -66,10 +68,12 @@ class Option(click.Option):
         group: str = "Other",
         help: str | Callable[[], str],
         metavar: str | Callable[[], str] | None = None,
+        fractional: bool = False,
         **attributes: Any,
     ) -> None:
         super().__init__(*args, **attributes)
         self.group = group
+        self.fractional = fractional or isinstance(self.type, click.types.FloatParamType)
         self._asked = (help, metavar)
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:

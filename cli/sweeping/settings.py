@@ -150,9 +150,7 @@ def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]
         if not item:
             raise ValueError(f"values of {name} must be separated by one comma, and none may be empty")
         if match := _RANGE.fullmatch(item):
-            found += _range(
-                name, item, match, whole=option is not None and not isinstance(option.type, click.types.FloatParamType)
-            )
+            found += _range(name, item, match, whole=option is not None and not getattr(option, "fractional", False))
         elif re.match(rf"{QUANTITY}\s*\.\.", item):
             raise ValueError(f"a range of {name} must be LO..HI:N, or LO..HI:Nlog, not {item!r}")
         else:

@@ -164,6 +164,11 @@ class Option:
         return self.default is MISSING
 
     @property
+    def fractional(self) -> bool:
+        """Whether it takes plain numbers that are not whole."""
+        return isinstance(self.default, Fraction | float)
+
+    @property
     def tested(self) -> tuple[str, ...]:
         """Values that pairwise tests use."""
         if self.tests is not None:

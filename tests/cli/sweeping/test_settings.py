@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tachometry.cli.commands.sweep import sweep
+from tachometry.cli.options.closed_loop import loop_options
 from tachometry.cli.options.sweep import by_name, point_options
 from tachometry.cli.sweeping.settings import Settings, arguments, of_command_line, of_file
 
@@ -34,6 +35,8 @@ def read(folder: Path, text: str) -> Settings:
         ("speed=-2..2:5", ["-2", "-1", "0", "1", "2"]),
         ("jitter=0..1:4", ["0", "0.333333333", "0.666666667", "1"]),
         ("average=1..4:10", ["1", "2", "3", "4"]),
+        ("edge-error=0..1:3", ["0", "0.5", "1"]),
+        ("damping=0..1:3", ["0", "0.5", "1"]),
         ("clock=1MHz..48MHz:2", ["1MHz", "48MHz"]),
         ("lowpass=none,100rad/s", [None, "100rad/s"]),
         ("motion=csv:../a.csv,stop:1s", ["csv:../a.csv", "stop:1s"]),
@@ -47,6 +50,11 @@ def test_values_of_an_axis(text: str, values: list[str | None], tmp_path: Path) 
     assert read(tmp_path, f'[vary]\n{name} = "{right}"').vary == {name: values}
     items = ", ".join(f'"{item}"' for item in right.split(","))
     assert read(tmp_path, f"[vary]\n{name} = [{items}]").vary == {name: values}
+
+
+@pytest.mark.parametrize("name", ["kp", "kv", "inertia", "viscous"])
+def test_a_range_of_a_loop_need_not_be_whole(name: str) -> None:
+    assert of_command_line({"vary": [f"{name}=1..2:3"]}, loop_options()).vary == {name: ["1", "1.5", "2"]}
 
 
 @pytest.mark.parametrize(
