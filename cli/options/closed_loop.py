@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tachometry.cli.options.core import core_click_options
-from tachometry.cli.options.loop import declared, texts_of
-from tachometry.cli.options.motion import Quantity, disc_options
-from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.motion import disc_options
+from tachometry.cli.options.option import all_of, declared, option, take_values
 from tachometry.cli.options.sweep import by_name
+from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control.law import Law
 from tachometry.spec.control.motor import Motor
 from tachometry.spec.core.timing import whole_clocks
-from tachometry.spec.language.option import ParameterError, options_of, read_options
+from tachometry.spec.language.option import ParameterError, options_of
 from tachometry.spec.language.units import (
-    BANDWIDTH,
     TIME,
     TORQUE,
+    Units,
     format_time,
+    number_reader,
     parse_time,
     read_nearest,
 )
@@ -32,7 +33,19 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.studies.loops.control import Load, Setting
 
 _LOOP, _MOTOR = "Controller", "Motor and load"
-_RATE, _TORQUE, _TIME = Quantity(BANDWIDTH, "rad/s"), Quantity(TORQUE, "Nm"), Quantity(TIME, "s")
+
+
+class Quantity(click.types.FloatParamType):
+    """A number, plain or with one of some units."""
+
+    def __init__(self, units: Units, default: str) -> None:
+        self._read = number_reader(units, default)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        return self._read(param.name if param and param.name else "number", str(value))
+
+
+_TORQUE, _TIME = Quantity(TORQUE, "Nm"), Quantity(TIME, "s")
 MOST_SECONDS = 100.0
 _MOST_SPEED = 1e6  # rad/s
 
@@ -109,8 +122,9 @@ def _setting_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     @functools.wraps(command)
-    def build(*, motion: str, seed: int, **given: Any) -> Any:
-        return command(lambda spec: _setting(spec, motion, seed, **given), motion, seed)
+    def build(*, motion: str, **given: Any) -> Any:
+        faults = take_values(EncoderOptions, given)
+        return command(lambda spec: _setting(spec, motion, faults, **given), motion, faults.get("seed", 0))
 
     return disc_options(all_of(_OPTIONS, build))
 
@@ -118,12 +132,8 @@ def _setting_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def _setting(
     spec: TachometerSpec,
     motion: str,
-    seed: int,
+    faults: Mapping[str, Any],
     *,
-    jitter: float,
-    nonuniformity: float,
-    phase_error_deg: float,
-    duty_error_deg: float,
     start: str,
     load: str | None,
     torque_noise: float,
@@ -152,14 +162,7 @@ def _setting(
         raise ValueError(f"--from must be from 0 to 2ms before the end of --motion, not {start}")
     if task.load is not None and not begin + 0.002 <= task.load.begin < duration:
         raise ValueError(f"--load must begin 2ms or more after --from, and within --motion, not {load}")
-    encoder = VirtualEncoder(
-        spec.encoder.pulses_per_rev,
-        jitter=jitter,
-        nonuniformity=nonuniformity,
-        phase_error_deg=phase_error_deg,
-        duty_error_deg=duty_error_deg,
-        seed=seed,
-    )
+    encoder = VirtualEncoder(spec.encoder.pulses_per_rev, **faults)
     motor, gains = _motor_and_gains(spec, **given)
     setting = Setting(spec=spec, gains=gains, task=task, motor=motor, encoder=encoder, begin=begin)
     return in_gates(setting) if gates else setting
@@ -175,13 +178,13 @@ def _motor_and_gains(
     driver_time: float,
     friction: float,
     viscous: float,
-    **of_law: str | bool | None,
+    **of_law: Any,
 ) -> tuple[Any, Any]:
     from tachometry.sim.engines.loop import Gains, Motor, Observer
 
     if measured_acceleration and not hasattr(spec, "acceleration_per_lsb"):
         raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
-    law = Law(tachometer=spec, **read_options(Law, texts_of(Law, of_law)))
+    law = Law(tachometer=spec, **take_values(Law, of_law))
     inertia, torque_constant = float(law.inertia), float(law.torque_constant)
     motor = Motor(
         inertia=inertia,

@@ -10,7 +10,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from tachometry.cli.options.option import Option, all_of, later, option
+from tachometry.cli.options.option import Option, all_of, default_of, kind_of, later, option
 from tachometry.spec import (
     METHODS,
     ParameterError,
@@ -47,9 +47,9 @@ def _made_common(declared: tuple[declaration.Option, ...]) -> tuple[click.Option
         Option(
             [f"--{about.name}", _argument(about.name)],
             group=about.group,
-            help=(about.help if about.flag else about.help + _default(about)) + _otherwise(about.name),
+            help=(about.help if about.flag else about.help + default_of(about)) + _otherwise(about.name),
             required=about.required,
-            **_kind(about),
+            **kind_of(about),
         )
         for about in declared
     )
@@ -58,7 +58,7 @@ def _made_common(declared: tuple[declaration.Option, ...]) -> tuple[click.Option
 def _otherwise(name: str) -> str:
     """Return what `--help` says of the methods that have a common option in another way."""
     own = {method: about for method in METHODS for about in own_options(method) if about.name == name}
-    return "".join(f" Method {method}: {about.help}{_default(about)}" for method, about in own.items())
+    return "".join(f" Method {method}: {about.help}{default_of(about)}" for method, about in own.items())
 
 
 def own_click_options() -> Sequence[click.Option]:
@@ -77,31 +77,16 @@ def own_click_options() -> Sequence[click.Option]:
 def _made_own(name: str, by_method: tuple[tuple[str, declaration.Option], ...]) -> click.Option:
     """Return the option of one or several methods: if they say different things of it, its help has all of them."""
     about = by_method[0][1]
-    alike = len({_default(one) for _, one in by_method}) == 1
+    alike = len({default_of(one) for _, one in by_method}) == 1
     said: dict[str, list[str]] = {}
     for method, one in by_method:
-        said.setdefault(one.help + _default(one) * (not alike), []).append(method)
+        said.setdefault(one.help + default_of(one) * (not alike), []).append(method)
     help_ = " ".join(f"{', '.join(methods)}: {text}" if len(said) > 1 else text for text, methods in said.items())
-    help_ += _default(about) * alike
+    help_ += default_of(about) * alike
     words = [f"--{name}/--no-{name}" if about.flag else f"--{name}", _argument(name)]
-    kind = {} if about.flag else _kind(about)
+    kind = {} if about.flag else kind_of(about)
     group = f"Method {' and '.join(method for method, _ in by_method)}"
     return Option(words, group=group, default=None, help=help_, **kind)
-
-
-def _kind(about: declaration.Option) -> dict[str, Any]:
-    if about.flag:
-        return {"is_flag": True}
-    choices = f"[{'|'.join(about.choices)}]" if about.choices else None
-    return {"type": click.STRING, "metavar": about.metavar or choices, "fractional": about.fractional}
-
-
-def _default(about: declaration.Option) -> str:
-    """Return what `--help` says of the default, behind the rest."""
-    shown = about.shown
-    if about.flag and about.shown is None and isinstance(about.default, bool):
-        shown = about.name if about.default else f"no-{about.name}"
-    return "" if shown is None else f" [default: {shown}]"
 
 
 def _argument(name: str) -> str:

@@ -1,33 +1,15 @@
 """Options of cores with a control loop."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
-from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.option import all_of, declared, option, take_texts
 from tachometry.spec import AxesSpec, CoreSpec, ParameterError
 from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.language.option import Option, options_of, read_options
+from tachometry.spec.language.option import options_of, read_options
 
 _LOOP = "Loop"
-
-
-def declared(group: str, about: Option) -> Callable[[Any], Any]:
-    """Return the option of the command line for one of a loop."""
-    if about.flag:
-        return option(group, f"--{about.name}/--no-{about.name}", default=None, help=f"{about.help} {_default(about)}")
-    metavar = about.metavar or f"[{'|'.join(about.choices)}]"
-    return option(
-        group,
-        f"--{about.name}",
-        metavar=metavar,
-        fractional=about.fractional,
-        help=f"{about.help} {_default(about)}",
-    )
-
-
-def _default(about: Option) -> str:
-    return f"[default: {about.name if about.flag else about.shown}]"
 
 
 _OPTIONS = [
@@ -42,16 +24,6 @@ _OPTIONS = [
 ]
 
 
-def texts_of(spec: type[Any], given: Mapping[str, str | bool | None]) -> dict[str, str]:
-    """Return the texts of the options of a class, by their names, from what the command line has by parameters."""
-    values = {about.name: given[about.parameter] for about in options_of(spec)}
-    return {
-        name: ("no", "yes")[value] if isinstance(value, bool) else value
-        for name, value in values.items()
-        if value is not None
-    }
-
-
 def loop_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Decorate a command, below that of the axes: `spec` is that of a core with a control loop, if there is to be
     one.
@@ -59,7 +31,7 @@ def loop_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def build(*, spec: CoreSpec, loop: bool, **others: Any) -> Any:
-        texts = texts_of(LoopSpec, {about.parameter: others.pop(about.parameter) for about in options_of(LoopSpec)})
+        texts = take_texts(LoopSpec, others)
         return command(spec=of_loop(spec, texts) if loop else _alone(spec, texts), **others)
 
     return all_of(_OPTIONS, build)

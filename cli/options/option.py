@@ -10,7 +10,10 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
+from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
+from tachometry.spec.language import option as declaration
+from tachometry.spec.language.option import options_of, read_options
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -25,11 +28,12 @@ def told(error: ValueError) -> str:
 
 def _shown(name: str) -> str:
     parameter = name.replace("-", "_")
-    declared = [*common_options(), *(about for method in METHODS for about in own_options(method))]
-    for about in declared:
+    of_methods = [about for method in METHODS for about in own_options(method)]
+    options = [*common_options(), *of_methods, *options_of(EncoderOptions)]
+    for about in options:
         if about.parameter == parameter:
             return f"--{about.name}"
-    of_field = [about for about in declared if about.field == parameter]
+    of_field = [about for about in options if about.field == parameter]
     for about in of_field:
         if about.unit:
             return f"--{about.name}, in {about.unit},"
@@ -137,6 +141,44 @@ class GroupedCommand(click.Command):
 def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Command]:
     """Decorate a command with an option in a group; defaults are shown."""
     return click.option(*names, cls=Option, group=group, show_default=True, **attributes)
+
+
+def declared(group: str, about: declaration.Option) -> Callable[[Command], Command]:
+    """Decorate a command with an option that a class declares; its value is a text, a flag's yes or no, or None."""
+    if about.flag:
+        return option(group, f"--{about.name}/--no-{about.name}", default=None, help=about.help + default_of(about))
+    return option(group, f"--{about.name}", help=about.help + default_of(about), **kind_of(about))
+
+
+def kind_of(about: declaration.Option) -> dict[str, Any]:
+    """Return what click is told of a declared option that is read later."""
+    if about.flag:
+        return {"is_flag": True}
+    choices = f"[{'|'.join(about.choices)}]" if about.choices else None
+    return {"type": click.STRING, "metavar": about.metavar or choices, "fractional": about.fractional}
+
+
+def default_of(about: declaration.Option) -> str:
+    """Return what `--help` says of the default, behind the rest."""
+    shown = about.shown
+    if about.flag and about.shown is None and isinstance(about.default, bool):
+        shown = about.name if about.default else f"no-{about.name}"
+    return "" if shown is None else f" [default: {shown}]"
+
+
+def take_values(spec: type[Any], given: dict[str, Any]) -> dict[str, Any]:
+    """Take the declared options of a class out of what click gives a command, and return the values of its fields."""
+    return read_options(spec, take_texts(spec, given))
+
+
+def take_texts(spec: type[Any], given: dict[str, Any]) -> dict[str, str]:
+    """Take the declared options of a class out of what click gives a command, as texts by their names."""
+    values = {about.name: given.pop(about.parameter, None) for about in options_of(spec)}
+    return {
+        name: ("no", "yes")[value] if isinstance(value, bool) else value
+        for name, value in values.items()
+        if value is not None
+    }
 
 
 def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.encoder import imperfections
 from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
-from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY, Bounce
+from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration
+from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
 from tachometry.spec.language.option import ParameterError
 
@@ -56,8 +57,8 @@ class _VibratingShaft:
 
 
 @dataclass(frozen=True)
-class VirtualEncoder:
-    """An incremental encoder with the faults of real ones.
+class VirtualEncoder(EncoderOptions):
+    """An incremental encoder with the faults of real ones, see `EncoderOptions`.
 
     Forward is A before B: the quarters k mod 4 = 0, 1, 2, 3 show (A, B) = 00, 10, 11, 01. Edge k, between the quarters
     k - 1 and k, lies at (k + offset[k mod 4 pulses_per_rev]) pitches of 2 pi / (4 pulses_per_rev) rad.
@@ -66,32 +67,8 @@ class VirtualEncoder:
     ----------
     pulses_per_rev : int
         Lines of the disc: pulses of A per revolution.
-    vibration : Vibration or None
-        Of the shaft; it is part of the truth.
-    jitter : float, from 0 to less than 0.5
-        Standard deviation of the Gaussian shift in time of each edge, as a fraction of its gap to the nearer of its
-        neighbours (edges, start and end of the recording). Shifts are clipped at 0.49 gaps: edges keep their order.
-    nonuniformity : float, from 0 to less than 0.5
-        The disc's offsets are uniform between plus and minus this many pitches.
-    illegal : float, from 0 to 1
-        Probability that an edge is late and comes at the instant of the next one, so that both lines change at once.
-        An edge is not late if the one before it is, or if the next one is of the same line, as after a reversal.
     start_angle_rad : float, rad
         Added to the angle of the motion. At 0, a motion from angle 0 begins exactly on edge 0, which has been passed.
-    seed : int, at least 0
-        Of all random numbers. Each imperfection has a stream of its own.
-    phase_error_deg : float, electrical degrees, more than -90 and less than 90
-        The centre of B's pulse comes this much later, forwards, than a quarter period after the centre of A's.
-    duty_error_deg : float, electrical degrees, more than -90 and less than 90
-        The pulses of both lines are this much wider than 180, and the pauses narrower. Phase error, duty error and
-        nonuniformity (a pitch is 90 degrees, and both edges of a state may be off) must add up to less than 90: then
-        no state vanishes. They are of the disc, hence part of the truth.
-    bounce : Bounce or None
-        After an edge the line falls back and returns so many times, at random moments within the bounce time or half
-        the time to the next edge of either line, whichever is less. Edges that come together do not bounce.
-    lost : float, from 0 to 1
-        Probability that a line misses a pulse: it stays low, and two edges are lost. A pulse that begins before the
-        recording or ends after it is not missed.
     index : bool
         Whether there is an index line Z: high once a turn, in the quarter that begins at shaft angle 0, and gated as
         usual: only while A and B are low.
@@ -103,36 +80,13 @@ class VirtualEncoder:
     """
 
     pulses_per_rev: int
-    vibration: Vibration | None = None
-    jitter: float = 0.0
-    nonuniformity: float = 0.0
-    illegal: float = 0.0
     start_angle_rad: float = 0.0
-    seed: int = 0
-    phase_error_deg: float = 0.0
-    duty_error_deg: float = 0.0
-    bounce: Bounce | None = None
-    lost: float = 0.0
     index: bool = False
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 1 <= self.pulses_per_rev <= MAX_PULSES_PER_REV:
             raise ParameterError("pulses_per_rev", f"must be from 1 to {MAX_PULSES_PER_REV}, not {self.pulses_per_rev}")
-        for name, value in (("jitter", self.jitter), ("nonuniformity", self.nonuniformity)):
-            if not 0 <= value < 0.5:
-                raise ParameterError(name, f"must be from 0 to less than 0.5, not {value}")
-        for name, value in (("illegal", self.illegal), ("lost", self.lost)):
-            if not 0 <= value <= 1:
-                raise ParameterError(name, f"must be from 0 to 1, not {value}")
-        for name, value in (("phase_error_deg", self.phase_error_deg), ("duty_error_deg", self.duty_error_deg)):
-            if not -90 < value < 90:
-                raise ParameterError(name, f"must be more than -90 and less than 90, not {value}")
-        errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * self.nonuniformity
-        if not errors < 90:
-            raise ValueError(
-                "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical "
-                f"degrees, not {errors:.6g}"
-            )
         if self.nonuniformity and self.pulses_per_rev > MAX_UNEVEN_PULSES:
             raise ParameterError(
                 "nonuniformity",
@@ -140,8 +94,6 @@ class VirtualEncoder:
             )
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
-        if self.seed < 0:
-            raise ParameterError("seed", f"must be at least 0, not {self.seed}")
 
     @cached_property
     def disc(self) -> Disc:

@@ -131,6 +131,18 @@ def reader(units: Units) -> Callable[[str, str], Fraction]:
     return lambda what, text: read_exactly(what, text, units)
 
 
+def number_reader(units: Units, default: str = "") -> Callable[[str, str], float]:
+    """Return a function that reads a number, plain or with one of the units, as a float, for an option."""
+
+    def read(what: str, text: str) -> float:
+        try:
+            return float(text)
+        except ValueError:
+            return read_nearest(what, text, units, default)
+
+    return read
+
+
 def ratio(unit: str, other: str) -> Fraction | None:
     """Tell how many of `unit` one of `other` is, exactly; None if there is no exact ratio."""
     for units in (TIME, FREQUENCY, SPEED, ANGLE):

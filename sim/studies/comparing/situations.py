@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tachometry.sim.encoder.motion import Vibration, parse_motion
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.spec.language.option import read_options
 from tachometry.spec.language.units import parse_time
 
 PULSES_PER_REV = 500
@@ -15,8 +17,6 @@ IDEAL: Mapping[str, str] = {}
 JITTER = {"jitter": "0.05"}
 REAL = {"jitter": "0.05", "nonuniformity": "0.1", "phase-error": "10"}
 BAD = {"jitter": "0.1", "nonuniformity": "0.2", "phase-error": "20"}
-
-_NUMBERS = {"jitter": "jitter", "nonuniformity": "nonuniformity", "phase-error": "phase_error_deg"}
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,8 @@ class Situation:
 
     def record(self, seed: int) -> Encoding:
         """Return what the encoder records, with a seed for all that is random."""
-        numbers = {_NUMBERS[name]: float(text) for name, text in self.faults.items() if name in _NUMBERS}
-        vibration = self.faults.get("vibration")
-        encoder = VirtualEncoder(
-            PULSES_PER_REV,
-            vibration=None if vibration is None else Vibration.parse(vibration),
-            seed=seed,
-            **numbers,  # type: ignore[arg-type]
-        )
+        values = read_options(EncoderOptions, {**self.faults, "seed": str(seed)})
+        encoder = VirtualEncoder(PULSES_PER_REV, **values)
         return encoder.record(parse_motion(self.motion))
 
 

@@ -1,0 +1,150 @@
+"""The options of the virtual encoder are declared once, for commands, sweeps and situations; --help needs no numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.units import DEGREES, FRACTION, number_reader
+
+if TYPE_CHECKING:  # numpy is slow to import
+    from tachometry.sim.encoder.imperfections import Bounce
+    from tachometry.sim.encoder.motion import Vibration
+
+_MOTION, _FAULTS = "Motion", "Encoder faults"
+
+
+def _vibration(what: str, text: str) -> Vibration:
+    from tachometry.sim.encoder.motion import Vibration
+
+    return Vibration.parse(text)
+
+
+def _bounce(what: str, text: str) -> Bounce:
+    from tachometry.sim.encoder.imperfections import Bounce
+
+    return Bounce.parse(text)
+
+
+def _seed(what: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise ParameterError(what, f"must be a whole number, not {text!r}") from None
+
+
+def _fault(help: str, metavar: str, parse: Callable[[str, str], float], name: str = "") -> float:
+    found: float = option(None, help, text="0", name=name, metavar=metavar, group=_FAULTS, parse=parse)
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class EncoderOptions:
+    """Says how a shaft vibrates beside its motion, and what is wrong with its encoder.
+
+    Parameters
+    ----------
+    vibration : Vibration or None
+        Of the shaft; it is part of the truth.
+    jitter : float, from 0 to less than 0.5
+        Standard deviation of the Gaussian shift in time of each edge, as a fraction of its gap to the nearer of its
+        neighbours (edges, start and end of the recording). Shifts are clipped at 0.49 gaps: edges keep their order.
+    nonuniformity : float, from 0 to less than 0.5
+        The disc's offsets are uniform between plus and minus this many pitches.
+    phase_error_deg : float, electrical degrees, more than -90 and less than 90
+        The centre of B's pulse comes this much later, forwards, than a quarter period after the centre of A's.
+    duty_error_deg : float, electrical degrees, more than -90 and less than 90
+        The pulses of both lines are this much wider than 180, and the pauses narrower. Phase error, duty error and
+        nonuniformity (a pitch is 90 degrees, and both edges of a state may be off) must add up to less than 90: then
+        no state vanishes. They are of the disc, hence part of the truth.
+    bounce : Bounce or None
+        After an edge the line falls back and returns so many times, at random moments within the bounce time or half
+        the time to the next edge of either line, whichever is less. Edges that come together do not bounce.
+    lost : float, from 0 to 1
+        Probability that a line misses a pulse: it stays low, and two edges are lost. A pulse that begins before the
+        recording or ends after it is not missed.
+    illegal : float, from 0 to 1
+        Probability that an edge is late and comes at the instant of the next one, so that both lines change at once.
+        An edge is not late if the one before it is, or if the next one is of the same line, as after a reversal.
+    seed : int, at least 0
+        Of all random numbers. Each imperfection has a stream of its own.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+
+    vibration: Vibration | None = option(  # noqa: RUF009
+        None,
+        "Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz, kHz, MHz or GHz). It is part of "
+        "the true motion.",
+        metavar="AMPL:FREQ",
+        group=_MOTION,
+        parse=_vibration,
+    )
+    jitter: float = _fault(
+        "Gaussian jitter of each edge in time: its standard deviation over the gap to the nearer neighbour, such as "
+        "0.05 or 5%, below 0.5.",
+        "FRACTION",
+        number_reader(FRACTION),
+    )
+    nonuniformity: float = _fault(
+        "Edges of the disc are displaced by up to this many edge pitches, below 0.5, the same in every turn.",
+        "FRACTION",
+        number_reader(FRACTION),
+    )
+    phase_error_deg: float = _fault(
+        "B's pulse comes this many electrical degrees later than 90 after A's, such as 5 or 5deg; between -90 and 90.",
+        "DEGREES",
+        number_reader(DEGREES, "deg"),
+        name="phase-error",
+    )
+    duty_error_deg: float = _fault(
+        "Pulses of A and B are this many electrical degrees wider than 180, such as 5 or 5deg; between -90 and 90.",
+        "DEGREES",
+        number_reader(DEGREES, "deg"),
+        name="duty-error",
+    )
+    bounce: Bounce | None = option(  # noqa: RUF009
+        None,
+        "Contact bounce, such as 3:500us (s, ms, us or ns): after an edge the line falls back COUNT times within TIME, "
+        "or within half the way to the next edge.",
+        metavar="COUNT:TIME",
+        group=_FAULTS,
+        parse=_bounce,
+    )
+    lost: float = _fault(
+        "Probability that a line misses a pulse: it stays low, and two edges are lost.",
+        "PROBABILITY",
+        number_reader(FRACTION),
+    )
+    illegal: float = _fault(
+        "Probability that an edge comes together with the next one: both lines change at once.",
+        "PROBABILITY",
+        number_reader(FRACTION),
+    )
+    seed: int = option(
+        0, "Seed of all random numbers; equal seeds give equal files.", metavar="N", group=_FAULTS, parse=_seed
+    )
+
+    def __post_init__(self) -> None:
+        for name, value in (("jitter", self.jitter), ("nonuniformity", self.nonuniformity)):
+            if not 0 <= value < 0.5:
+                raise ParameterError(name, f"must be from 0 to less than 0.5, not {value}")
+        for name, value in (("illegal", self.illegal), ("lost", self.lost)):
+            if not 0 <= value <= 1:
+                raise ParameterError(name, f"must be from 0 to 1, not {value}")
+        for name, value in (("phase_error_deg", self.phase_error_deg), ("duty_error_deg", self.duty_error_deg)):
+            if not -90 < value < 90:
+                raise ParameterError(name, f"must be more than -90 and less than 90, not {value}")
+        errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * self.nonuniformity
+        if not errors < 90:
+            raise ValueError(
+                "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical "
+                f"degrees, not {errors:.6g}"
+            )
+        if self.seed < 0:
+            raise ParameterError("seed", f"must be at least 0, not {self.seed}")
