@@ -89,8 +89,11 @@ class TickCounts(wiring.Component):
             m.d.comb += more.eq(1)
         with m.If(fresh):
             m.d.sync += [
-                *(self.number.eq(number), self.times.eq(times), self.places.eq(places)),
-                *(self.counted.eq(number.any()), self.elapsed.eq(more)),
+                self.number.eq(number),
+                self.times.eq(times),
+                self.places.eq(places),
+                self.counted.eq(number.any()),
+                self.elapsed.eq(more),
                 alone.eq(~number.any() | ~self.tracks),
             ]
         m.d.comb += self.quiet.eq(quiet)

@@ -156,7 +156,8 @@ BUSES = {
                 _into("spi_mosi", 1, "Data to the core, asynchronous; sampled when spi_sck rises."),
                 _into("spi_cs_n", 1, "Chip select, asynchronous, active low."),
                 _out(
-                    *("spi_miso", 1),
+                    "spi_miso",
+                    1,
                     "Data from the core; changes after spi_sck fell, 0 when not selected. Where others share the line, "
                     "drive its pin only while the pin of spi_cs_n is low.",
                 ),
@@ -169,7 +170,8 @@ BUSES = {
             "UART, 8 bits, no parity, 1 stop bit, with frames and a CRC, see --baud",
             (
                 _into(
-                    *("uart_rx", 1),
+                    "uart_rx",
+                    1,
                     f"Line to the core, asynchronous; high when idle. A frame begins after {QUIET_BITS} bits of idle.",
                 ),
                 _out("uart_tx", 1, "Line from the core; high when idle."),

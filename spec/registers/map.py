@@ -28,6 +28,7 @@ IDENTIFICATION = int.from_bytes(b"TACH", "big")
 COUNTER_WIDTH = 8  # bits of each counter of COUNTERS
 
 _LIVE = (TICK, UPDATE, INDEX)  # what is captured is new with these strobes
+_DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port", "shift")  # in the manifest
 
 
 @dataclass(frozen=True)
@@ -235,8 +236,7 @@ class RegisterMap:
                     "captures": register.captures,
                     "fields": [
                         {
-                            **{key: getattr(field, key) for key in ("name", "low", "width", "access", "reset")},
-                            **{key: getattr(field, key) for key in ("signed", "unit", "port", "shift")},
+                            **{key: getattr(field, key) for key in _DESCRIBED},
                             "port_width": widths.get(field.port, field.kept + field.shift),
                             **({} if field.most is None else {"least": field.least, "most": field.most}),
                         }
@@ -249,17 +249,22 @@ class RegisterMap:
 
     def _head(self) -> Iterable[Draft]:
         yield (
-            *("IDENTIFICATION", "Says that a tachometer answers: the letters TACH.", (_constant(IDENTIFICATION),)),
+            "IDENTIFICATION",
+            "Says that a tachometer answers: the letters TACH.",
+            (_constant(IDENTIFICATION),),
             {"constant": True},
         )
         yield (
-            *("CONFIGURATION", "Says which core it is: a hash of all that a driver relies on, as the manifest has it."),
-            *((_constant(self.configuration),), {"constant": True}),
+            "CONFIGURATION",
+            "Says which core it is: a hash of all that a driver relies on, as the manifest has it.",
+            (_constant(self.configuration),),
+            {"constant": True},
         )
         clear = "Writing 1 sets all counters to 0."
         hold = "Reading the velocity does not capture; the input capture still does."
         yield (
-            *("CONTROL", "What a driver may change."),
+            "CONTROL",
+            "What a driver may change.",
             (
                 Field("clear", 1, 0, clear, writable=True, single=True),
                 Field("hold", 1, 1, hold, writable=True),
@@ -281,7 +286,13 @@ class RegisterMap:
                 name = port.name.upper() + ("_HIGH" if word else "_LOW" if len(words) > 1 else "")
                 low = "" if len(words) == 1 else "Upper word. " if word else "Lower word. "
                 field = Field(
-                    *("value", WORD), help=port.help, signed=port.signed, unit=port.unit, port=port.name, shift=word
+                    "value",
+                    WORD,
+                    help=port.help,
+                    signed=port.signed,
+                    unit=port.unit,
+                    port=port.name,
+                    shift=word,
                 )
                 first = port is values[0] and not word
                 yield name, f"{low}{port.help}", (field,), {**more, "captures": first}
