@@ -13,6 +13,18 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.spec.methods.axes import DECIDE, READ, AxesSpec
 
 
+class _Turn:
+    """Holds what the axis that has its turn had before, and what it has after it."""
+
+    def __init__(self, datapath: "AxesDatapath") -> None:
+        position, window = datapath.position.shape(), datapath.window.state.shape()
+        kept = data.StructLayout({"position": position, "window": window})
+        self.decides = datapath.turns.step[DECIDE]
+        self.after = Signal(kept)
+        self.count = Signal.like(datapath.count)
+        self.before = Signal(kept)
+
+
 class AxesDatapath(wiring.Component):
     """S-method datapath that the axes have in turn: from the counts of a tick to position and velocity.
 
@@ -84,12 +96,20 @@ class AxesDatapath(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        spec = self._spec
-        m.submodules.turns = turns = self.turns
-        m.submodules.window = window = self.window
-        m.submodules.quotient = quotient = self.quotient
-        m.submodules.handed_over = handed = Memory(shape=self.count.shape(), depth=spec.slots, init=[])
-        kept = data.StructLayout({"position": self.position.shape(), "window": window.state.shape()})
+        m.submodules.turns = self.turns
+        m.submodules.window = self.window
+        m.submodules.quotient = self.quotient
+        turn = _Turn(self)
+        self._read(m, turn)
+        self._add(m, turn)
+        self._decide(m, turn)
+        self._show(m)
+        return m
+
+    def _read(self, m: Module, turn: _Turn) -> None:
+        """Read the count that was handed over, and the state; both are registered, as block RAM is slow."""
+        turns = self.turns
+        m.submodules.handed_over = handed = Memory(shape=self.count.shape(), depth=self._spec.slots, init=[])
         read_count = handed.read_port()
         write_count = handed.write_port()
         m.d.comb += [
@@ -99,50 +119,53 @@ class AxesDatapath(wiring.Component):
             write_count.en.eq(self.complete),
             read_count.addr.eq(turns.axis),
         ]
-        decides = turns.step[DECIDE]
-        after = Signal(kept)
-        # Block RAM is slow.
-        count = Signal.like(self.count)
-        before = Signal(kept)
-        stored = self._stored(m, after, decides)
+        stored = self._stored(m, turn)
         with m.If(turns.step[READ - 1]):
-            m.d.sync += [count.eq(read_count.data), before.eq(stored)]
+            m.d.sync += [turn.count.eq(read_count.data), turn.before.eq(stored)]
 
+    def _add(self, m: Module, turn: _Turn) -> None:
+        """Make m_e and the position."""
+        turns, axis = self.turns, self._spec.axis
         overflow = Signal()
-        m_e = count
-        if spec.axis.max_count < spec.rounds:
-            m_e, overflow = saturate(m, count, spec.axis.max_count)
+        m_e = turn.count
+        if axis.max_count < self._spec.rounds:
+            m_e, overflow = saturate(m, turn.count, axis.max_count)
         with m.If(turns.step[READ]):
             m.d.sync += [
                 self.axis.eq(turns.axis),
                 self.pulse_count.eq(m_e),
                 self.overflow.eq(overflow),
-                self.position.eq(before.position + count),
+                self.position.eq(turn.before.position + turn.count),
             ]
             with m.If(turns.clears):
                 m.d.sync += [self.pulse_count.eq(0), self.overflow.eq(0), self.position.eq(0)]
 
+    def _decide(self, m: Module, turn: _Turn) -> None:
+        """Follow the window, and divide where it has an update."""
+        window, quotient = self.window, self.quotient
         updates = Signal()
         forced = Signal()
-        m.d.sync += updates.eq(decides & window.update)
-        with m.If(decides):
+        m.d.sync += updates.eq(turn.decides & window.update)
+        with m.If(turn.decides):
             m.d.sync += [self.stalled.eq(window.next.rests), forced.eq(window.forced)]
         m.d.comb += [
-            window.clears.eq(turns.clears),
-            window.state.eq(before.window),
+            window.clears.eq(self.turns.clears),
+            window.state.eq(turn.before.window),
             window.m_e.eq(self.pulse_count),
-            after.position.eq(self.position),
-            after.window.eq(window.next),
+            turn.after.position.eq(self.position),
+            turn.after.window.eq(window.next),
             quotient.m.eq(window.state.m_s),
-            quotient.load.eq(decides),
+            quotient.load.eq(turn.decides),
             quotient.start.eq(updates),
             quotient.base.eq(window.state.previous),
             quotient.numerator.eq(window.numerator),
             quotient.tag.forced.eq(forced),
         ]
-        found = quotient.results
-        # As late as the velocity: what the next turn has by then does not show yet.
-        ended = turns.step[-1] & ~turns.clears
+
+    def _show(self, m: Module) -> None:
+        """Show a tick as late as its velocity: what the next turn has by then does not show yet."""
+        found = self.quotient.results
+        ended = self.turns.step[-1] & ~self.turns.clears
         (tick,) = delay(m, ended, clocks=READ + 1)
         m.d.comb += [
             self.tick.eq(tick),
@@ -151,13 +174,13 @@ class AxesDatapath(wiring.Component):
             self.interval.eq(found.p.m),
             self.forced.eq(found.p.forced),
         ]
-        return m
 
-    def _stored(self, m: Module, after: data.View, decides: Value) -> Value | data.View:
-        """Return the state of the axis that has its turn, as it was; it becomes `after` where it decides."""
+    def _stored(self, m: Module, turn: _Turn) -> Value | data.View:
+        """Return the state of the axis that has its turn, as it was; it becomes `after` where the axis decides."""
+        after = turn.after
         if self._spec.axes == 1:
             only = Signal.like(after, reset_less=True)  # Verilog has no addresses of no bits
-            with m.If(decides):
+            with m.If(turn.decides):
                 m.d.sync += only.eq(after)
             return only
         m.submodules.state = state = Memory(shape=after.shape(), depth=self._spec.axes, init=[])
@@ -167,6 +190,6 @@ class AxesDatapath(wiring.Component):
             read.addr.eq(self.turns.axis),
             write.addr.eq(self.turns.axis),
             write.data.eq(after),
-            write.en.eq(decides),
+            write.en.eq(turn.decides),
         ]
         return read.data
