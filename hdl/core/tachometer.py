@@ -93,15 +93,34 @@ class Tachometer(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        m.submodules.conditioner = conditioner = self.conditioner
-        m.submodules.decoder = decoder = self.decoder
-        m.submodules.pulse_counter = pulse_counter = self.pulse_counter
-        m.submodules.position_counter = position_counter = self.position_counter
-        m.submodules.datapath = datapath = self.datapath
-        sampling_clock = self.sampling_clock
+        m.submodules.conditioner = self.conditioner
+        m.submodules.decoder = self.decoder
+        m.submodules.pulse_counter = self.pulse_counter
+        m.submodules.position_counter = self.position_counter
+        m.submodules.datapath = self.datapath
         if not self._spec.own_ticks:
-            m.submodules.sampling_clock = sampling_clock
-        (step,) = delay(m, decoder.step, clocks=int(self._spec.registers_steps))
+            m.submodules.sampling_clock = self.sampling_clock
+        (step,) = delay(m, self.decoder.step, clocks=int(self._spec.registers_steps))
+        self._count(m, step)
+        ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
+        self._measure(m, step, ticks)
+        self._rest(m)
+        updates = self._output(m)
+        self._age(m, ticks, updates)
+        self._index(m)
+        if isinstance(self.sampling_clock, ExternalTick):
+            m.d.comb += [
+                self.sampling_clock.tick_in.eq(self.tick_in),
+                self.tick_error.eq(self.sampling_clock.tick_error),
+            ]
+        if self._spec.filter_clocks:
+            m.d.comb += self.swallowed_edges.eq(self.conditioner.swallowed_edges)
+        return m
+
+    def _count(self, m: Module, step: Signal) -> None:
+        """Count the steps of the pins: the position, and the pulses of a window."""
+        conditioner, decoder = self.conditioner, self.decoder
+        position_counter, pulse_counter = self.position_counter, self.pulse_counter
         m.d.comb += [
             conditioner.a.eq(self.a),
             conditioner.b.eq(self.b),
@@ -112,49 +131,27 @@ class Tachometer(wiring.Component):
             position_counter.step.eq(decoder.step),
             self.position.eq(position_counter.position),
             pulse_counter.step.eq(step),
-            pulse_counter.last.eq(sampling_clock.last),
+            pulse_counter.last.eq(self.sampling_clock.last),
             self.tick.eq(pulse_counter.tick),
             self.pulse_count.eq(pulse_counter.pulse_count),
             self.overflow.eq(pulse_counter.overflow),
         ]
-        ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
+
+    def _measure(self, m: Module, step: Signal, ticks: Signal) -> None:
+        """Give the datapath what its method takes of ticks, counts and steps."""
+        datapath, latency = self.datapath, self._spec.tick_latency
         taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")}
-        taken |= {name: getattr(pulse_counter, name) for name in ("coming", "next_count")}
+        taken |= {name: getattr(self.pulse_counter, name) for name in ("coming", "next_count")}
         taken |= {"step_now": step, "stamp": ticks}
         inputs = datapath.signature.members
         if "step" in inputs:
             # As late as `tick`: with it, all steps of the window have come.
-            (taken["step"],) = delay(m, decoder.step, clocks=self._spec.tick_latency)
+            (taken["step"],) = delay(m, self.decoder.step, clocks=latency)
         if "step_before" in inputs:
-            (taken["step_before"],) = delay(m, decoder.step, clocks=self._spec.tick_latency - 1)
+            (taken["step_before"],) = delay(m, self.decoder.step, clocks=latency - 1)
         m.d.comb += [getattr(datapath, name).eq(value) for name, value in taken.items() if name in inputs]
         if isinstance(datapath, OwnTicks):
-            m.d.comb += pulse_counter.beyond.eq(datapath.beyond)
-        self._rest(m)
-        updates = self._output(m)
-        if self.update_age is not None:
-            m.submodules.age = age = self.update_age
-            m.d.comb += [age.tick.eq(self.tick), age.update.eq(self.velocity_valid), self.age.eq(age.age)]
-            if self._spec.stamp_width:
-                before = Signal.like(ticks)
-                m.d.sync += before.eq(ticks)
-                m.d.comb += [ticks.eq(before + self.tick), age.fresh.eq(before - updates.p.stamp)]
-        if self.index_capture is not None:
-            m.submodules.index_capture = index = self.index_capture
-            m.d.comb += [
-                conditioner.z.eq(self.z),
-                index.level_z.eq(conditioner.level_z),
-                index.ready.eq(conditioner.ready_z),
-                index.position.eq(position_counter.next),
-                position_counter.clear.eq(index.rises & int(self._spec.index_reset)),
-                self.index_position.eq(index.index_position),
-                self.index_valid.eq(index.index_valid),
-            ]
-        if isinstance(sampling_clock, ExternalTick):
-            m.d.comb += [sampling_clock.tick_in.eq(self.tick_in), self.tick_error.eq(sampling_clock.tick_error)]
-        if self._spec.filter_clocks:
-            m.d.comb += self.swallowed_edges.eq(conditioner.swallowed_edges)
-        return m
+            m.d.comb += self.pulse_counter.beyond.eq(datapath.beyond)
 
     def _rest(self, m: Module) -> None:
         """Tell whether the shaft rests."""
@@ -187,3 +184,29 @@ class Tachometer(wiring.Component):
         m.d.comb += self.velocity_valid.eq(updates.valid)
         m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in self._spec.strobes[UPDATE]]
         return updates
+
+    def _age(self, m: Module, ticks: Signal, updates: stream.Interface) -> None:
+        """Show how many ticks ago the velocity was that of the shaft, if `age` is a port."""
+        if self.update_age is None:
+            return
+        m.submodules.age = age = self.update_age
+        m.d.comb += [age.tick.eq(self.tick), age.update.eq(self.velocity_valid), self.age.eq(age.age)]
+        if self._spec.stamp_width:
+            before = Signal.like(ticks)
+            m.d.sync += before.eq(ticks)
+            m.d.comb += [ticks.eq(before + self.tick), age.fresh.eq(before - updates.p.stamp)]
+
+    def _index(self, m: Module) -> None:
+        """Capture the position at the index, if the encoder has one."""
+        if self.index_capture is None:
+            return
+        m.submodules.index_capture = index = self.index_capture
+        m.d.comb += [
+            self.conditioner.z.eq(self.z),
+            index.level_z.eq(self.conditioner.level_z),
+            index.ready.eq(self.conditioner.ready_z),
+            index.position.eq(self.position_counter.next),
+            self.position_counter.clear.eq(index.rises & int(self._spec.index_reset)),
+            self.index_position.eq(index.index_position),
+            self.index_valid.eq(index.index_valid),
+        ]
