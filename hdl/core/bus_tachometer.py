@@ -2,7 +2,6 @@
 
 from amaranth import Module
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In
 
 from tachometry.hdl.bus.apb import ApbBridge
 from tachometry.hdl.bus.axi_lite import AxiLiteBridge
@@ -11,7 +10,7 @@ from tachometry.hdl.bus.spi import SpiBridge
 from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.bus.wishbone import WishboneBridge
 from tachometry.hdl.core.register_core import RegisterCore
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import hand_through, members
 from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.map import RegisterMap
 
@@ -61,8 +60,6 @@ class BusTachometer(wiring.Component):
         m.submodules.core = core = self.core
         m.submodules.bridge = bridge = self.bridge
         wiring.connect(m, bridge.native, core.bus)
-        for name, member in self.signature.members.items():
-            inner = getattr(bridge if name in bridge.signature.members else core, name)
-            own = getattr(self, name)
-            m.d.comb += inner.eq(own) if member.flow == In else own.eq(inner)
+        for name in self.signature.members:
+            hand_through(m, self, bridge if name in bridge.signature.members else core, [name])
         return m

@@ -10,7 +10,7 @@ from tachometry.hdl.control.held_inputs import HeldInputs
 from tachometry.hdl.control.sigma_delta import SigmaDelta
 from tachometry.hdl.control.update_window import UpdateWindow
 from tachometry.hdl.core.tachometer import Tachometer
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import follow, hand_through, members
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import GAIN_PORTS
 
@@ -48,38 +48,47 @@ class LoopCore(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        m.submodules.tachometer = tachometer = self.tachometer
-        m.submodules.control_clock = clock = self.control_clock
-        m.submodules.window = window = self.window
-        m.submodules.controller = controller = self.controller
-        m.submodules.sigma_delta = sigma_delta = self.sigma_delta
-        for port in self._spec.tachometer.ports:
-            if port.name not in ("clk", "rst"):
-                inner, outer = getattr(tachometer, port.name), getattr(self, port.name)
-                m.d.comb += inner.eq(outer) if port.direction == "input" else outer.eq(inner)
-        given: LoopCore | HeldInputs = self
-        if self.held_inputs is not None:
-            m.submodules.held_inputs = given = self.held_inputs
-            m.d.comb += [
-                given.coming.eq(clock.coming),
-                given.freeze.eq(self.freeze),
-                *(getattr(given, f"given_{port.name}").eq(getattr(self, port.name)) for port in self._spec.held_inputs),
-                *(
-                    getattr(controller, name).eq(getattr(given, name))
-                    for name in (*GAIN_PORTS.values(), "current_limit")
-                ),
-            ]
-        if self.generator is None:
-            commands: CommandGenerator | LoopCore | HeldInputs = given
-        else:
-            m.submodules.generator = commands = generator = self.generator
-            m.d.comb += [
-                generator.tick.eq(clock.tick),
-                generator.enable.eq(self.enable),
-                generator.position.eq(tachometer.position),
-                *(getattr(generator, name).eq(getattr(given, f"generator_{name}")) for name in _DEMANDS),
-                *(getattr(self, name).eq(getattr(generator, name)) for name in _COMMANDS),
-            ]
+        m.submodules.tachometer = self.tachometer
+        m.submodules.control_clock = self.control_clock
+        m.submodules.window = self.window
+        m.submodules.controller = self.controller
+        m.submodules.sigma_delta = self.sigma_delta
+        hand_through(m, self, self.tachometer, members(self._spec.tachometer.ports))
+        self._control(m, self._commands(m, self._held(m)))
+        self._show(m)
+        return m
+
+    def _held(self, m: Module) -> wiring.Component:
+        """Return the box that has the inputs: this one, or what holds them between two programs."""
+        held = self.held_inputs
+        if held is None:
+            return self
+        m.submodules.held_inputs = held
+        m.d.comb += [held.coming.eq(self.control_clock.coming), held.freeze.eq(self.freeze)]
+        m.d.comb += [
+            getattr(held, f"given_{port.name}").eq(getattr(self, port.name)) for port in self._spec.held_inputs
+        ]
+        follow(m, self.controller, held, (*GAIN_PORTS.values(), "current_limit"))
+        return held
+
+    def _commands(self, m: Module, given: wiring.Component) -> wiring.Component:
+        """Return the box that has the commands: that with the inputs, or the generator, which then shows them."""
+        generator = self.generator
+        if generator is None:
+            return given
+        m.submodules.generator = generator
+        m.d.comb += [
+            generator.tick.eq(self.control_clock.tick),
+            generator.enable.eq(self.enable),
+            generator.position.eq(self.tachometer.position),
+        ]
+        m.d.comb += [getattr(generator, name).eq(getattr(given, f"generator_{name}")) for name in _DEMANDS]
+        follow(m, self, generator, _COMMANDS)
+        return generator
+
+    def _control(self, m: Module, commands: wiring.Component) -> None:
+        """Give the controller what it takes at a control tick, and the window what happens between two of them."""
+        clock, tachometer, window, controller = self.control_clock, self.tachometer, self.window, self.controller
         m.d.comb += [
             window.tick.eq(clock.tick),
             window.update.eq(tachometer.velocity_valid),
@@ -89,10 +98,16 @@ class LoopCore(wiring.Component):
             window.current.eq(controller.current),
             controller.tick.eq(clock.tick),
             controller.position.eq(tachometer.position),
-            *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
-            controller.enable.eq(self.enable),
-            *(getattr(controller, name).eq(getattr(commands, name)) for name in _COMMANDS),
-            self.control_tick.eq(clock.tick),
+        ]
+        follow(m, controller, window, ("due", "held", "n", "current_sum"))
+        m.d.comb += controller.enable.eq(self.enable)
+        follow(m, controller, commands, _COMMANDS)
+
+    def _show(self, m: Module) -> None:
+        """Show the current, as a number and as a stream of bits, and what it was made of."""
+        controller, sigma_delta = self.controller, self.sigma_delta
+        m.d.comb += [
+            self.control_tick.eq(self.control_clock.tick),
             self.current_valid.eq(controller.valid),
             self.current.eq(controller.current),
             self.current_saturated.eq(controller.saturated),
@@ -101,4 +116,3 @@ class LoopCore(wiring.Component):
             sigma_delta.value.eq(controller.current),
             self.drive.eq(sigma_delta.drive),
         ]
-        return m

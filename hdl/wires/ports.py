@@ -1,9 +1,10 @@
-"""Ports of the exported core as members of a component."""
+"""Ports of the exported core as members of a component, and ports of boxes that have the same names."""
 
 from collections.abc import Iterable
 from typing import Any
 
-from amaranth import signed
+from amaranth import Module, signed
+from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.spec import Port
@@ -18,3 +19,15 @@ def members(ports: Iterable[Port]) -> dict[str, Any]:
         for port in ports
         if port.name not in ("clk", "rst")
     }
+
+
+def follow(m: Module, box: wiring.Component, source: wiring.Component, names: Iterable[str]) -> None:
+    """Set ports of a box to those of the same names of another."""
+    m.d.comb += [getattr(box, name).eq(getattr(source, name)) for name in names]
+
+
+def hand_through(m: Module, outer: wiring.Component, inner: wiring.Component, names: Iterable[str]) -> None:
+    """Make ports of an inner box those of the same names of the box around it."""
+    for name in names:
+        box, source = (inner, outer) if outer.signature.members[name].flow == In else (outer, inner)
+        follow(m, box, source, [name])
