@@ -9,7 +9,7 @@ from tachometry.hdl.axes.axis_index import AxisIndex
 from tachometry.hdl.axes.held_outputs import HeldOutputs
 from tachometry.hdl.axes.rounds import Rounds
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import follow, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 from tachometry.spec.methods.axes import WARM_UP, AxesSpec
@@ -53,8 +53,8 @@ class AxesTachometer(wiring.Component):
         level = {pin.name: Signal(spec.axes, name=f"level_{pin.name}") for pin in spec.pins}
         for name, levels in level.items():
             m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), levels)
+        follow(m, counters, rounds, ("slot", "first", "last", "ready"))
         m.d.comb += [
-            *(getattr(counters, name).eq(getattr(rounds, name)) for name in ("slot", "first", "last", "ready")),
             counters.level_a.eq(level["a"]),
             counters.level_b.eq(level["b"]),
             datapath.complete.eq(counters.complete),
@@ -88,6 +88,6 @@ class AxesTachometer(wiring.Component):
             m.d.comb += [getattr(held, value).eq(signal) for value, signal in values.items()]
             values = {f"{value}_{k}": getattr(held, f"{value}_{k}") for value in shapes for k in range(self._spec.axes)}
             strobe, axis = delay(m, strobe, axis)
-        m.d.comb += [getattr(self, name).eq(strobe), *(getattr(self, key).eq(value) for key, value in values.items())]
+        m.d.comb += [getattr(self, port).eq(value) for port, value in {name: strobe, **values}.items()]
         if name != UPDATE:  # its axis is that of its tick
             m.d.comb += getattr(self, axis_name).eq(axis)

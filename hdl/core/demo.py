@@ -8,7 +8,7 @@ from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.core.bus_tachometer import bridge_on
 from tachometry.hdl.core.emulator import EncoderEmulator
 from tachometry.hdl.core.register_core import RegisterCore
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import follow, hand_through, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.registers.buses import CAPTURE, Bus
 from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports
@@ -52,19 +52,29 @@ class Demo(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        core, bank, bridge = self.core, self.core.bank, self.bridge
-        m.submodules.core = core
-        m.submodules.bridge = bridge
-        m.submodules.emulator = emulator = ResetInserter(bank.restart)(self.emulator)
-        time = Signal(WORD)
-        changed = Signal(WORD)
-        # Nominal sampling periods: those of a core may last for ever.
-        cycles = self._map.spec.timing.tick_cycles
-        left = Signal(range(cycles))
+        m.submodules.core = self.core
+        m.submodules.bridge = self.bridge
+        m.submodules.emulator = ResetInserter(self.core.bank.restart)(self.emulator)
         period = Signal()
-        m.d.sync += [period.eq(left == 0), left.eq(Mux(left == 0, cycles - 1, left - 1))]
+        sends = self._time(m, period)
+        self._choose_pins(m, period)
+        self._enable(m)
+        hand_through(m, self, self.bridge, (port.name for port in self._bus_ports))
+        m.d.comb += self.core.capture.eq(self.capture)
+        self._native(m, sends)
+        self._light(m)
+        return m
+
+    def _time(self, m: Module, period: Signal) -> Signal:
+        """Count clocks and nominal periods, as windows of a core may last for ever; return when telemetry is due."""
+        bank = self.core.bank
+        cycles = self._map.spec.timing.tick_cycles
+        time = Signal(WORD)
+        changed = Signal(WORD)  # the time of the last change of a setting
+        left = Signal(range(cycles))  # clocks of the period
         periods = Signal(PERIOD_WIDTH)  # since the last telemetry
         sends = Signal()
+        m.d.sync += [period.eq(left == 0), left.eq(Mux(left == 0, cycles - 1, left - 1))]
         m.d.sync += time.eq(time + 1)
         with m.If(bank.written):
             m.d.sync += changed.eq(time)
@@ -73,42 +83,25 @@ class Demo(wiring.Component):
             m.d.sync += periods.eq(Mux(sends, 0, periods + 1))
         with m.If(bank.restart):
             m.d.sync += [signal.eq(0) for signal in (time, changed, left, period, periods)]
-        m.d.comb += [
-            bank.time.eq(time),
-            bank.changed.eq(changed),
-            *(getattr(emulator, field.port).eq(getattr(bank, field.port)) for field in self._map.emulated),
-        ]
+        m.d.comb += [bank.time.eq(time), bank.changed.eq(changed)]
+        return sends
 
+    def _choose_pins(self, m: Module, period: Signal) -> None:
+        """Give the core its pins, or the lines of the emulator and a tick in each period."""
+        core, emulator, bank = self.core, self.emulator, self.core.bank
+        follow(m, emulator, bank, (field.port for field in self._map.emulated))
         for pin in self._map.spec.pins:
-            given = getattr(self, pin.name)
+            emulated = getattr(emulator, pin.name) if pin.name in self._lines else period  # the external tick
             if pin.name in self._lines:
-                line = getattr(self.emulator, pin.name)
-                given = Mux(bank.emulated, line, given)
-                m.d.comb += getattr(self, f"emulated_{pin.name}").eq(line)
-            else:
-                given = Mux(bank.emulated, period, given)  # the external tick
-            m.d.comb += getattr(core, pin.name).eq(given)
-        if core.loop is not None:
-            # It comes from a pin, and many flip-flops follow it.
+                m.d.comb += getattr(self, f"emulated_{pin.name}").eq(emulated)
+            m.d.comb += getattr(core, pin.name).eq(Mux(bank.emulated, emulated, getattr(self, pin.name)))
+
+    def _enable(self, m: Module) -> None:
+        """Give the loop its enable, which comes from a pin, and which many flip-flops follow."""
+        if self.core.loop is not None:
             enable = Signal()
             m.submodules.sync_enable = Synchronizer(self.enable, enable)
-            m.d.comb += [core.enable.eq(enable), self.drive.eq(core.drive)]
-
-        for port in self._bus_ports:
-            mine, its = getattr(self, port.name), getattr(bridge, port.name)
-            m.d.comb += its.eq(mine) if port.direction == "input" else mine.eq(its)
-        m.d.comb += core.capture.eq(self.capture)
-        self._native(m, sends)
-
-        wrong = Signal()
-        m.d.sync += wrong.eq((wrong | core.decode_error | (core.tick & core.overflow)) & ~bank.clear)
-        backward = Signal()
-        with m.If(core.velocity_valid):
-            m.d.sync += backward.eq(core.velocity < 0)
-        runs = Signal(range(self._map.spec.timing.clock_hz))
-        m.d.sync += runs.eq(runs + 1)
-        m.d.sync += self.leds.eq(Cat(~core.stalled, backward, wrong, runs[-1]))
-        return m
+            m.d.comb += [self.core.enable.eq(enable), self.drive.eq(self.core.drive)]
 
     def _native(self, m: Module, sends: Signal) -> None:
         """Put the bridge and the telemetry on one native port: one of them begins when the other has ended."""
@@ -131,3 +124,15 @@ class Demo(wiring.Component):
             of_bridge.error.eq(native.error),
             of_telemetry.read_data.eq(native.read_data),
         ]
+
+    def _light(self, m: Module) -> None:
+        """Light the LEDs: the shaft turns, backward, something went wrong, and the clock runs."""
+        core = self.core
+        wrong = Signal()
+        backward = Signal()
+        runs = Signal(range(self._map.spec.timing.clock_hz))
+        m.d.sync += wrong.eq((wrong | core.decode_error | (core.tick & core.overflow)) & ~core.bank.clear)
+        with m.If(core.velocity_valid):
+            m.d.sync += backward.eq(core.velocity < 0)
+        m.d.sync += runs.eq(runs + 1)
+        m.d.sync += self.leds.eq(Cat(~core.stalled, backward, wrong, runs[-1]))

@@ -9,7 +9,7 @@ from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.bus.tick_position import TickPosition
 from tachometry.hdl.core.loop_core import LoopCore
 from tachometry.hdl.core.tachometer import Tachometer
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 
@@ -58,16 +58,16 @@ class RegisterCore(wiring.Component):
         m.submodules.tachometer, m.submodules.tick_position = restarts(whole), restarts(position)
         m.submodules.bank = bank
         names = {port.name for port in self._map.ports} - {*_OTHERWISE}
-        same = [*(port.name for port in spec.outputs if port.name in names), *spec.strobes]
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
         written = {field.port for field in self._map.settings}
         for pin in self._map.core.pins:
             given = getattr(bank if pin.name in written else self, pin.name)
             switched = given & bank.loop_enable if pin.name == "enable" else given
             m.d.comb += getattr(whole, pin.name).eq(switched)
+        follow(m, self, whole, (port.name for port in self._map.core.outputs))
+        follow(m, bank, whole, (port.name for port in spec.outputs if port.name in names))
+        follow(m, bank, whole, spec.strobes)
         m.d.comb += [
-            *(getattr(self, port.name).eq(getattr(whole, port.name)) for port in self._map.core.outputs),
-            *(getattr(bank, name).eq(getattr(whole, name)) for name in same),
             bank.capture.eq(self.capture),
             core.conditioner.clear.eq(bank.clear),
             position.tick.eq(core.tick),
