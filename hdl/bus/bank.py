@@ -67,29 +67,45 @@ class RegisterBank(wiring.Component):
         writable = Cat(here[register.name] for register in self._map if register.writable).any()
         m.d.sync += bus.error.eq((bus.read & (bus.address >= len(self._map.registers))) | (bus.write & ~writable))
         m.d.comb += self.written.eq(bus.write & writable)
-        hold, capture, control = (Signal(name=name) for name in ("hold", "captures", "control"))
+        hold = Signal()
+        capture = self._control(m, here, hold)
+        captured, lost = self._captured(m, capture)
+        shown = {**captured, **self._counts(m, lost=lost), "clear": Const(0), "hold": hold, **self._settings(m, here)}
+        shown |= {field.port: getattr(self, field.port) for field in self._map.live}
+        self._answer(m, shown)
+        return m
+
+    def _control(self, m: Module, here: dict[str, Value], hold: Signal) -> Signal:
+        """Follow CONTROL; return whether all is captured in this clock."""
+        bus = self.bus
+        capture = Signal(name="captures")
+        control = Signal()  # it is being written
         m.d.comb += [control.eq(bus.write & here["CONTROL"]), self.clear.eq(control & bus.write_data[0])]
         with m.If(control):
             m.d.sync += hold.eq(bus.write_data[1])
         (captures,) = (here[register.name] for register in self._map if register.captures)
         m.d.comb += capture.eq(self.capture | (bus.read & captures & ~hold))
+        return capture
 
+    def _captured(self, m: Module, capture: Signal) -> tuple[dict[str, Value], Value]:
+        """Return what was captured, by names, and whether an update is lost: the one before it was not captured."""
         taken: dict[str, Value] = {port.name: getattr(self, port.name) for port in self._map.ports}
         waiting = {flag: Signal(name=f"{flag}_waits") for flag, strobe in _EVENTS.items() if hasattr(self, strobe)}
         for flag, waits in waiting.items():
             taken[flag] = waits | getattr(self, _EVENTS[flag])
             m.d.sync += waits.eq(taken[flag] & ~capture)
-        captured = {
+        captured: dict[str, Value] = {
             name: Signal.like(Value.cast(value), name=f"captured_{name}", reset_less=False)
             for name, value in taken.items()
         }
         with m.If(capture):
             m.d.sync += [captured[name].eq(value) for name, value in taken.items()]
+        return captured, waiting["updated"] & self.velocity_valid
 
-        counts = self._counts(m, lost=waiting["updated"] & self.velocity_valid)
-        shown = {**captured, **counts, "clear": Const(0), "hold": hold, **self._settings(m, here)}
-        shown |= {field.port: getattr(self, field.port) for field in self._map.live}
-        # What is kept for a clock is which register was read, not what it said; an address without a register reads 0.
+    def _answer(self, m: Module, shown: dict[str, Value]) -> None:
+        """Answer a read a clock later; an address without a register reads 0."""
+        bus = self.bus
+        # Which register was read is kept for a clock, not what it said.
         chosen = Signal(bus.address.shape(), init=(1 << len(bus.address)) - 1)
         m.d.sync += chosen.eq(Mux(bus.read, bus.address, -1))
         # A word of all selections, and not each where it is used, which compiled simulations would repeat for each bit.
@@ -100,7 +116,6 @@ class RegisterBank(wiring.Component):
             for register, selects in zip(self._map, selected, strict=True)
         ]
         m.d.comb += bus.read_data.eq(reduce(or_, answers))
-        return m
 
     def _settings(self, m: Module, here: dict[str, Value]) -> dict[str, Value]:
         """Return the settings by their names, as they are read."""

@@ -46,7 +46,9 @@ class NativeBridge(Bridge):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         m.d.comb += [
-            *(getattr(self.native, name).eq(getattr(self, f"reg_{name}")) for name in ("address", "read", "write")),
+            self.native.address.eq(self.reg_address),
+            self.native.read.eq(self.reg_read),
+            self.native.write.eq(self.reg_write),
             self.native.write_data.eq(self.reg_write_data),
             self.reg_read_data.eq(self.native.read_data),
             self.reg_error.eq(self.native.error),

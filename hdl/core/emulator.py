@@ -76,12 +76,26 @@ class EncoderEmulator(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
+        phase = Signal(PHASE_WIDTH, init=START)
+        after = Signal(signed(PHASE_WIDTH + 2))
+        m.d.comb += after.eq(phase + (self._speed(m) >> RATE_SHIFT))
+        m.d.sync += phase.eq(after ^ (self.jump << PHASE_WIDTH - 1))
+        random = Signal(RANDOM_WIDTH, init=1)
+        m.d.sync += random.eq((random << 1) | (random[-1] ^ random[RANDOM_TAP - 1]))
+        fine = Signal(FINE_WIDTH)
+        m.d.comb += fine.eq(phase[-FINE_WIDTH:])
+        self._lines(m, fine, random, self._jitter(m, fine, random))
+        if self._lines_per_rev is not None:
+            self._index(m, fine, after[PHASE_WIDTH:])
+        return m
+
+    def _speed(self, m: Module) -> Signal:
+        """Go to the speed that is asked for in two clocks, as the sum and its comparison are long carry chains."""
         speed = Signal(signed(PHASE_WIDTH + RATE_SHIFT))
         target = Signal.like(speed)
-        # In two clocks: the sum and its comparison are long carry chains.
         second = Signal()
         down = Signal()
-        turned = Signal(signed(len(speed) + 1))
+        turned = Signal(signed(len(speed) + 1))  # the sum
         goes_down = Signal()
         m.d.comb += [target.eq(self.speed << RATE_SHIFT), goes_down.eq(target < speed)]
         passed = Mux(down, turned <= target, turned >= target)
@@ -90,28 +104,22 @@ class EncoderEmulator(wiring.Component):
             m.d.sync += speed.eq(Mux((self.rate == 0) | passed, target, turned))
         with m.Else():
             m.d.sync += [down.eq(goes_down), turned.eq(speed + Mux(goes_down, -self.rate, self.rate))]
+        return speed
 
-        phase = Signal(PHASE_WIDTH, init=START)
-        after = Signal(signed(PHASE_WIDTH + 2))
-        m.d.comb += after.eq(phase + (speed >> RATE_SHIFT))
-        m.d.sync += phase.eq(after ^ (self.jump << PHASE_WIDTH - 1))
-
-        random = Signal(RANDOM_WIDTH, init=1)
-        m.d.sync += random.eq((random << 1) | (random[-1] ^ random[RANDOM_TAP - 1]))
-
-        fine = Signal(FINE_WIDTH)
-        between = Signal(2)  # changes in the middle between two edges
+    def _jitter(self, m: Module, fine: Signal, random: Signal) -> Signal:
+        """Return how far the edges are moved, which changes in the middle between two of them."""
+        between = Signal(2)
         between_before = Signal(2, init=1)
         moved = Signal(signed(JITTER_WIDTH + 1))
-        m.d.comb += [
-            fine.eq(phase[-FINE_WIDTH:]),
-            between.eq((fine + _QUARTER // 2)[FINE_WIDTH - 2 : FINE_WIDTH]),
-        ]
+        m.d.comb += between.eq((fine + _QUARTER // 2)[FINE_WIDTH - 2 : FINE_WIDTH])
         m.d.sync += between_before.eq(between)
         with m.If(between != between_before):
             late, early = random[:JITTER_WIDTH], random[JITTER_WIDTH : 2 * JITTER_WIDTH]
             m.d.sync += moved.eq((late & self.jitter) - (early & self.jitter))
+        return moved
 
+    def _lines(self, m: Module, fine: Signal, random: Signal, moved: Signal) -> None:
+        """Drive A and B, each high for half a period from its start on, less its errors."""
         starts = {"a": _QUARTER, "b": _HALF + self.phase_error}
         ends = {"a": self.duty_a, "b": self.duty_b}
         for k, name in enumerate(starts):
@@ -125,9 +133,6 @@ class EncoderEmulator(wiring.Component):
                 getattr(self, name).eq(line.line),
             ]
             m.d.sync += line.ideal.eq(since < _HALF + ends[name])
-        if self._lines_per_rev is not None:
-            self._index(m, fine, after[PHASE_WIDTH:])
-        return m
 
     def _index(self, m: Module, fine: Signal, turns: object) -> None:
         """Drive the index line, in the first quarter of the first period."""
