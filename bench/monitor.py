@@ -10,7 +10,8 @@ from rich.terminal_theme import MONOKAI
 from tachometry.boards.monitor.columns import columns
 from tachometry.boards.monitor.session import Session
 from tachometry.boards.monitor.settings import emulator_settings
-from tachometry.cli.reports.monitor import State, view
+from tachometry.boards.monitor.watch import State
+from tachometry.cli.reports.monitor import view
 from tachometry.sim.engines.board import BoardSimulation
 from tachometry.sim.signals.files import replacing
 from tachometry.spec import of_texts

@@ -50,7 +50,7 @@ ALLOWED = {
     "boards/monitor": {"boards/host", "sim/golden", "spec"},
     "boards/simulated": set[str](),
     "cli": {"cli", "boards", "sim", "hdl", "spec"},
-    "cli/options": {"boards/fpga", "sim", "spec"},
+    "cli/options": {"boards", "sim", "spec"},
     "cli/sweeping": {"cli/options", "sim", "spec"},
     "cli/reports": {"boards", "cli/options", "cli/sweeping", "sim", "spec"},
     "cli/commands": {"cli", "boards", "sim", "hdl", "spec"},

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+import json
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
 from pathlib import Path
+from types import FrameType
 
 import click
 
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.boards.monitor.columns import columns
-from tachometry.boards.monitor.session import Session
+from tachometry.boards.monitor.recorder import Recorder
+from tachometry.boards.monitor.selftest import selftest as run_selftest
+from tachometry.boards.monitor.selftest import steps
+from tachometry.boards.monitor.session import Session, connected
 from tachometry.boards.monitor.settings import emulator_settings
-from tachometry.cli.commands import monitoring
-from tachometry.cli.commands.monitored import SIMULATED, attached, simulated
+from tachometry.boards.monitor.watch import State, watch
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import CoreTexts, optional_core_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
-from tachometry.cli.reports.monitor import State, display
+from tachometry.cli.options.target import SIMULATED, Target, target_of
+from tachometry.cli.reports.monitor import SelftestReport, display
 from tachometry.spec.language.units import parse_time
 from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
 
 _GROUP = "Monitor"
+# A terminal that is closed, too, where there is this signal.
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_ORDERLY = 3.0  # seconds that an end may take before it can be interrupted
 
 
 @click.command(
@@ -127,18 +139,11 @@ def monitor(
     seconds = None if duration is None else parse_time("duration", duration)
     if seconds is not None and seconds <= 0:
         raise ValueError(f"--duration must be longer than 0, not {duration}")
-    if port.startswith(SIMULATED):
-        _refuse("a simulated board, but options of the core", {"--manifest": manifest})
-        target = simulated(port, core)
-    else:
-        target = attached(port, core, manifest)
-
-    from tachometry.boards.monitor.recorder import Recorder
-
+    target = target_of(port, core, manifest)
     if serve is not None:
-        return monitoring.serve(target, serve, seconds)
+        return _serve(target, serve, seconds)
     if selftest:
-        return monitoring.selftest(target)
+        return _selftest(target)
     settings = emulator_settings(target.registers.spec, words)
     period = _ticks(target.registers, every)
     outputs = Outputs({} if record is None else {"--record": record}, inputs=[] if manifest is None else [manifest])
@@ -146,16 +151,16 @@ def monitor(
     state = State(target.title, target.registers.spec, shown, recorded="" if record is None else str(record))
     screen = display(plain)
     failure: Exception | None = None
-    with monitoring.interrupts() as stop, outputs, ExitStack() as stack:
+    with _interrupts() as stop, outputs, ExitStack() as stack:
         where, recorder = outputs.get("--record"), None
         if where is not None and record is not None:
             recorder = stack.enter_context(Recorder(where, record.suffix.lower(), list(shown.values())))
         try:
-            name = stack.enter_context(target.running())
+            name = stack.enter_context(target.presence())
             label, described = target.label(name), target.manifest
-            session = Session(label, lambda: target.opened(name), described, period, settings, screen.told)
+            session = Session(label, lambda: target.open(name), described, period, settings, screen.notice)
             with screen:
-                monitoring.watch(session, state, screen, recorder, seconds, stop)
+                watch(session, state, screen, recorder, seconds, stop)
         except Exception as error:
             if recorder is None or not recorder.rows:
                 raise
@@ -163,6 +168,59 @@ def monitor(
     if failure is not None:
         raise failure
     return 0
+
+
+def _selftest(target: Target) -> int:
+    """Run the self-test, and print what its steps have shown; 1 if one has failed.
+
+    Raises
+    ------
+    OSError
+        If the port cannot be used, or nothing answers.
+    ValueError
+        If something else than the board answers.
+    """
+    report = SelftestReport([step.name for step in steps(target.registers)])
+    with target.presence() as name, target.open(name) as port:
+        board = connected(target.label(name), port, target.manifest)
+        report.head()
+        results = run_selftest(board, target.registers, told=report.line)
+    return 0 if report.verdict(results) else 1
+
+
+def _serve(target: Target, path: Path, seconds: Fraction | None) -> int:
+    """Run a simulated board until it is stopped, for other programs."""
+    with _interrupts() as stop, target.presence() as name:
+        with Outputs({"--serve": path}) as outputs:
+            outputs["--serve"].write_text(json.dumps(target.manifest, indent=2) + "\n", encoding="utf-8", newline="\n")
+        click.echo(name)
+        stop.wait(None if seconds is None else float(seconds))
+    return 0
+
+
+@contextmanager
+def _interrupts() -> Iterator[threading.Event]:
+    """Yield an event that Ctrl-C, SIGTERM and SIGHUP set; later on they interrupt, but not while all is tidied up."""
+    stop = threading.Event()
+    begun = 0.0
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        nonlocal begun
+        if not stop.is_set():
+            begun = time.monotonic()
+            stop.set()
+        elif time.monotonic() - begun > _ORDERLY:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = {number: signal.signal(number, hear) for number in _SIGNALS}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _refuse(other: str, others: dict[str, object]) -> None:

@@ -2,11 +2,8 @@
 
 import sys
 import time
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Any, Protocol, Self
+from collections.abc import Callable, Sequence
+from typing import Any, Self
 
 import click
 from rich.console import Console, Group, RenderableType
@@ -14,78 +11,18 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from tachometry.boards.host.link import Counts
-from tachometry.boards.monitor.columns import Column, Value
-from tachometry.boards.monitor.session import Frame
+from tachometry.boards.monitor.selftest import Result
+from tachometry.boards.monitor.watch import HISTORY, Display, State
 from tachometry.cli.reports.streams import printable
-from tachometry.spec import TachometerSpec
 from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.language.units import plural
 
-_SHOWN = 10.0  # seconds of the plot
 _LINE = 1.0  # seconds of board from a plain line to the next
 _REFRESH = 0.1  # seconds from a picture to the next
 _SIDE = 46  # columns beside the plot
 _LEAST = 24  # columns of a plot
 _ERRORS = {"decode_errors": "illegal transitions", "overflows": "overflows", "tick_errors": "tick errors"}
 _SATURATED = 255
-
-
-@dataclass
-class State:
-    """Holds the state of a board.
-
-    Parameters
-    ----------
-    title : str
-    spec : TachometerSpec
-    columns : sequence of Column
-    waits_for : str
-        Why there is no telemetry; empty: there is.
-    """
-
-    title: str
-    spec: TachometerSpec
-    columns: Mapping[str, Column]
-    counts: Counts = field(default_factory=Counts)
-    counters: Mapping[str, int] = field(default_factory=dict)
-    waits_for: str = ""
-    recorded: str = ""
-    frame: Frame | None = None
-    history: deque[tuple[float, float, Value, Value]] = field(default_factory=deque)
-
-    def take(self, frames: Iterable[Frame]) -> None:
-        """Frames that have come."""
-        for frame in frames:
-            self.frame = frame
-            lower, upper = (self.value(name) for name in BOUNDS)
-            speed = self.value("velocity")
-            assert speed is not None
-            self.history.append((frame.time, speed, lower, upper))
-        while self.history and self.history[-1][0] - self.history[0][0] > _SHOWN:
-            self.history.popleft()
-
-    def value(self, name: str) -> Value:
-        """Return a value of the latest frame, None if there is none."""
-        return self.columns[name].value(self.frame.snapshot) if self.frame and name in self.columns else None
-
-
-class Display(Protocol):
-    """Where a state is shown; a context manager."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None: ...
-
-    def told(self, text: str) -> None:
-        """Show that something has changed."""
-
-    def show(self, state: State) -> None:
-        """Show the state, if it is time to."""
-
-    def end(self, state: State) -> None:
-        """Show the state for the last time."""
 
 
 class PlainLines:
@@ -97,12 +34,10 @@ class PlainLines:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         pass
 
-    def told(self, text: str) -> None:
+    def notice(self, text: str) -> None:
         """Show that something has changed."""
         click.echo(f"tachometry: {printable(text)}", err=True)
 
@@ -142,14 +77,12 @@ class LiveView:
         self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._live.stop()
         for text in self._texts:
             click.echo(f"tachometry: {printable(text)}", err=True)
 
-    def told(self, text: str) -> None:
+    def notice(self, text: str) -> None:
         """Show that something has changed: below the view, when it has ended."""
         self._texts.append(text)
 
@@ -221,7 +154,7 @@ def plot(state: State, width: int, height: int) -> Text:
     room = max(0.05 * (max(speeds) - min(speeds)), 0.02 * max(map(abs, speeds)), 1e-6)
     figure.ylim(min(speeds) - room, max(speeds) + room)
     last = times[-1] if times else 0.0
-    figure.xlim(max(last - _SHOWN, 0.0), max(last, _SHOWN))
+    figure.xlim(max(last - HISTORY, 0.0), max(last, HISTORY))
     figure.title(f"{state.spec.shown_unit.name} over s")
     return Text.from_ansi(figure.build())
 
@@ -272,3 +205,32 @@ def _wrong(state: State) -> list[tuple[str, str]]:
 def _received(state: State) -> list[tuple[str, str]]:
     counts = state.counts
     return [("frames", str(counts.frames)), ("lost", str(counts.lost)), ("bytes dropped", str(counts.bytes_dropped))]
+
+
+class SelftestReport:
+    """Prints a line for each step of a self-test as it comes, and the verdict.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of all steps.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._width = max(map(len, names))
+
+    def head(self) -> None:
+        """Print the heads of the columns."""
+        click.echo(f"{'step':<{self._width}}  frames   values")
+
+    def line(self, result: Result) -> None:
+        """Print what a step has shown."""
+        verdict = "pass" if result.passed else f"FAIL: {result.difference or 'no telemetry'}"
+        click.echo(f"{result.name:<{self._width}}  {result.frames:>6}  {result.values:>7}  {verdict}")
+
+    def verdict(self, results: Sequence[Result]) -> bool:
+        """Print how many steps have passed; whether all have."""
+        passed = sum(result.passed for result in results)
+        whole = passed == len(results)
+        click.echo(f"{'PASS' if whole else 'FAIL'}: {passed} of {plural(len(results), 'step')} passed")
+        return whole

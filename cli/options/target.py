@@ -49,14 +49,14 @@ class Target:
         return demo_manifest(self.registers, self.bus, self.module)
 
     @property
-    def simulated(self) -> bool:
+    def is_simulated(self) -> bool:
         """Whether there is no hardware."""
         return self.port.startswith(SIMULATED)
 
     @contextmanager
-    def running(self) -> Iterator[str]:
+    def presence(self) -> Iterator[str]:
         """Yield the name of the serial port, while there is a board at it."""
-        if not self.simulated:
+        if not self.is_simulated:
             yield self.port
             return
         from tachometry.boards.simulated.simulated_board import SimulatedBoard
@@ -71,23 +71,31 @@ class Target:
 
     def label(self, name: str) -> str:
         """Return what messages call the port of this name."""
-        return f"{self.port} at {name}" if self.simulated else name
+        return f"{self.port} at {name}" if self.is_simulated else name
 
-    def opened(self, name: str) -> SerialPort:
-        """Return the port, opened."""
+    def open(self, name: str) -> SerialPort:
+        """Open the port."""
         from tachometry.boards.monitor.serial_port import SerialPort
 
         return SerialPort(name, self.bus.baud)
 
 
-def simulated(port: str, core: CoreTexts) -> Target:
-    """Return the board that `sim:NAME` names, with this core.
+def target_of(port: str, core: CoreTexts, manifest: Path | None) -> Target:
+    """Return the board at a port: of `sim:NAME` one with this core, of a serial port that of a manifest.
 
     Raises
     ------
     ValueError
-        If there is none, or the core cannot be.
+        If there is none, its core cannot be, or its manifest is not that of a demo on a UART.
     """
+    if not port.startswith(SIMULATED):
+        return _attached(port, core, manifest)
+    if manifest is not None:
+        raise ValueError("--manifest must not be given together with a simulated board, but options of the core")
+    return _simulated(port, core)
+
+
+def _simulated(port: str, core: CoreTexts) -> Target:
     board = port.removeprefix(SIMULATED)
     if board not in BOARDS:
         names = ", ".join(SIMULATED + name for name in BOARDS)
@@ -98,14 +106,7 @@ def simulated(port: str, core: CoreTexts) -> Target:
     return Target(port, f"{board}, simulated: {spec.heading}", DemoMap(spec), bus)
 
 
-def attached(port: str, core: CoreTexts, path: Path | None) -> Target:
-    """Return the board at a serial port, whose manifest is in a file.
-
-    Raises
-    ------
-    ValueError
-        If it is not that of a demo on a UART.
-    """
+def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:
     if path is None:
         raise ValueError("--manifest must be given with a serial port: the file NAME.json that tachometry build writes")
     if core.given:
