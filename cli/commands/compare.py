@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
-from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.commands.comparing import costs, given, tuned
 from tachometry.cli.files import Outputs
@@ -180,7 +179,7 @@ def compare(
     print_comparison(scores, sizes, named, n_tried, spec.shown_unit)
 
     clock_hz = spec.timing.clock_hz
-    print_warnings(merged_edges(source.recording, clock_hz, int(duration * clock_hz)))
+    print_warnings(merged_edges(source.recording.n_merged(clock_hz, int(duration * clock_hz))))
     return 0
 
 
@@ -230,13 +229,12 @@ def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
     """Return COMB, FF and Fmax of the cores on an ECP5, by name."""
     specs = {name: spec for name, spec in named.specs.items() if spec is not None}
     sizes = {}
-    with progress_bar("measuring sizes", len(specs), MofNCompleteColumn(), TextColumn("cores")) as report:
+    with progress_bar("measuring sizes", len(specs), "cores") as report:
         for done, (name, spec) in enumerate(specs.items(), 1):
             verilog = export(spec, CORE)[f"{CORE}.v"]
             try:
                 sizes[name] = measure_core(spec, TARGETS["ECP5"], verilog, tools, seeds=SEEDS[:3])
             except RuntimeError as error:
                 raise click.ClickException(str(error)) from error
-            if report is not None:
-                report(done)
+            report(done)
     return sizes

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.options.core import Make
 from tachometry.cli.options.methods import Methods
@@ -74,15 +73,14 @@ def _tried(setting: Setting, make: Make, *, of_cores: bool) -> list[Setting]:
 def _counted(settings: dict[str, list[Setting]], verb: str) -> Iterator[tuple[str, Iterator[Setting]]]:
     """Yield methods with their settings one by one; a progress bar counts these."""
     n_done, total = 0, sum(len(tried) for tried in settings.values())
-    with progress_bar(verb, total, MofNCompleteColumn(), TextColumn("settings")) as report:
+    with progress_bar(verb, total, "settings") as report:
 
         def count(tried: list[Setting]) -> Iterator[Setting]:
             nonlocal n_done
             for setting in tried:
                 yield setting
                 n_done += 1
-                if report is not None:
-                    report(n_done)
+                report(n_done)
 
         for name, tried in settings.items():
             yield name, count(tried)

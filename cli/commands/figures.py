@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from rich.text import Text
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
 from tachometry.cli.reports.terminal import print_table, progress_bar, stdout_console
+from tachometry.sim.signals.progress import Progress
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
     from tachometry.sim.figures.lab import Lab
@@ -76,8 +76,7 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
                 write_figure(outputs[f"{entry.name}.{kind}"], result)
             write_data(outputs[f"{entry.name}.csv"], result)
             before += entry.seconds
-            if report is not None:
-                report(before)
+            report(before)
         write_claims(outputs[_SUMMARY], results)
     _print(results, labs, directory)
     return 1 if any(lab.mismatches for lab in labs.values()) else 0
@@ -97,9 +96,9 @@ def _chosen(only: str) -> list[Entry]:
     return [FIGURES[name] for name in names]
 
 
-def _within(report: Callable[[float], None] | None, before: float, entry: Entry) -> Callable[[float], None] | None:
+def _within(report: Progress, before: float, entry: Entry) -> Progress:
     """Return what a figure's lab reports to: the share of the figure that is done."""
-    return None if report is None else lambda share: report(before + share * entry.seconds)
+    return lambda share: report(before + share * entry.seconds)
 
 
 def _print(results: dict[str, Result], labs: dict[str, Lab], directory: Path) -> None:

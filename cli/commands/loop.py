@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.closed_loop import loop_options
@@ -15,7 +14,7 @@ from tachometry.cli.options.motion import FORMS, tables_of
 from tachometry.cli.options.option import option, output
 from tachometry.cli.reports.closed_loop import print_loop, print_loops, write_log, write_loops
 from tachometry.cli.reports.streams import INTERRUPTED
-from tachometry.cli.reports.terminal import PerSecond, progress_bar
+from tachometry.cli.reports.terminal import progress_bar
 from tachometry.cli.sweeping.command import VaryingCommand
 from tachometry.cli.sweeping.loops import Loops, loops_of
 from tachometry.cli.sweeping.settings import Settings
@@ -153,12 +152,11 @@ def _alone(point: LoopPoint, jobs: int | None) -> tuple[Log, list[Outcome]]:
     """Return the log with the first seed, and what came of all."""
     first: Log = {}
     outcomes = []
-    with progress_bar("running", len(point.seeds), MofNCompleteColumn(), TextColumn("seeds")) as report:
+    with progress_bar("running", len(point.seeds), "seeds") as report:
         for found in each_seed(point.setting, point.seeds, jobs):
             first = first or found
             outcomes.append(point.setting.outcome(found))
-            if report is not None:
-                report(len(outcomes))
+            report(len(outcomes))
     return first, outcomes
 
 
@@ -173,16 +171,14 @@ def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, R
 
     cluster.require()
     rows: dict[str, Row] = {}
-    columns = (MofNCompleteColumn(), TextColumn("loops"), PerSecond("loops"))
     try:
         with (
             cluster.cluster(scheduler, jobs) as client,
-            progress_bar("running", len(found.points), *columns) as report,
+            progress_bar("running", len(found.points), "loops", rate=True) as report,
         ):
             for row in cluster.rows(client, found.points, "sweeping.loops"):
                 rows[row["point"]] = row
-                if report is not None:
-                    report(len(rows))
+                report(len(rows))
     except KeyboardInterrupt:
         click.echo(f"tachometry: interrupted after {len(rows)} of {plural(len(found.points), 'loop')}", err=True)
         raise click.exceptions.Exit(INTERRUPTED) from None

@@ -7,14 +7,18 @@ from pathlib import Path
 
 import click
 
-from tachometry.cli.commands.running import Window, refuse_plot, run_and_report, run_axes_and_report
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import axes_options
 from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import engine_options
-from tachometry.cli.options.option import FilePath, GroupedCommand, output_options
+from tachometry.cli.options.option import FilePath, GroupedCommand
+from tachometry.cli.options.outputs import output_options, refuse_plot, write_outputs
+from tachometry.cli.reports.run import print_simulation
+from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.recording import Recording
+from tachometry.sim.studies.simulation import Window
+from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import AxesSpec, CoreSpec
 
 
@@ -57,5 +61,18 @@ def replay(
     if isinstance(spec, AxesSpec):
         refuse_plot(targets)
         recordings = [read(capture, spec, axis) for axis in range(spec.axes)]
-        return run_axes_and_report(spec, str(capture), recordings, None, outputs, engine, window)
-    return run_and_report(spec, str(capture), read(capture, spec), None, outputs, engine, window)
+    else:
+        recordings = [read(capture, spec)]
+    with outputs:
+        found = simulation_of(
+            spec,
+            str(capture),
+            recordings,
+            None,
+            engine,
+            window=window,
+            vcd=outputs.get("--vcd"),
+            bar=progress_bar,
+        )
+        write_outputs(found, outputs.get)
+    return print_simulation(found)

@@ -7,14 +7,18 @@ from pathlib import Path
 
 import click
 
-from tachometry.cli.commands.running import Window, refuse_plot, run_and_report, run_axes_and_report
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import axes_options
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import engine_options
 from tachometry.cli.options.motion import FORMS, motion_options
-from tachometry.cli.options.option import GroupedCommand, output_options
+from tachometry.cli.options.option import GroupedCommand
+from tachometry.cli.options.outputs import output_options, refuse_plot, write_outputs
+from tachometry.cli.reports.run import print_simulation
+from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.studies.simulation import Window
+from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import AxesSpec, CoreSpec
 
 
@@ -60,7 +64,19 @@ def simulate(
     if isinstance(spec, AxesSpec):
         refuse_plot(targets)
         truths = [record(spec.tachometer, axis, spec.axes) for axis in range(spec.axes)]
-        recordings = [truth.recording for truth in truths]
-        return run_axes_and_report(spec, "--motion", recordings, truths, outputs, engine, window)
-    truth = record(spec)
-    return run_and_report(spec, "--motion", truth.recording, truth, outputs, engine, window)
+    else:
+        truths = [record(spec)]
+    recordings = [truth.recording for truth in truths]
+    with outputs:
+        found = simulation_of(
+            spec,
+            "--motion",
+            recordings,
+            truths,
+            engine,
+            window=window,
+            vcd=outputs.get("--vcd"),
+            bar=progress_bar,
+        )
+        write_outputs(found, outputs.get)
+    return print_simulation(found)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.progress import MofNCompleteColumn, TextColumn
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, tables_of
@@ -15,7 +14,7 @@ from tachometry.cli.options.option import FilePath, option, output
 from tachometry.cli.options.sweep import point_options
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.sweep import print_sweep
-from tachometry.cli.reports.terminal import PerSecond, progress_bar
+from tachometry.cli.reports.terminal import progress_bar
 from tachometry.cli.sweeping.command import VaryingCommand
 from tachometry.cli.sweeping.points import Points, points_of
 from tachometry.cli.sweeping.settings import Settings
@@ -196,19 +195,17 @@ def _run(
 
     if not missing:
         return
-    columns = (MofNCompleteColumn(), TextColumn("points"), PerSecond("points"))
     n_done = len(found.points) - len(missing)
     try:
         with (
             cluster.cluster(scheduler, jobs) as client,
-            progress_bar("sweeping", len(missing), *columns) as report,
+            progress_bar("sweeping", len(missing), "points", rate=True) as report,
         ):
             arriving = cluster.rows(client, {point: found.points[point] for point in missing})
             for done, row in enumerate(arriving, 1):
                 kept.add(row)
                 n_done += 1
-                if report is not None:
-                    report(done)
+                report(done)
     except KeyboardInterrupt:
         where = f", kept in {results}" if results is not None and n_done else ""
         click.echo(f"tachometry: interrupted after {n_done} of {plural(len(found.points), 'point')}{where}", err=True)

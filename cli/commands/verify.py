@@ -8,13 +8,12 @@ import shlex
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import Pool, parent_process
 from pathlib import Path
 
 import click
-from rich.progress import MofNCompleteColumn, TextColumn
 from rich.text import Text
 
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
@@ -107,11 +106,13 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
     found: list[_Result] = []
     interrupted = False
     try:
-        with _each(check, cores, jobs or os.cpu_count() or 1) as results, _progress(len(cores)) as report:
+        with (
+            _each(check, cores, jobs or os.cpu_count() or 1) as results,
+            progress_bar("verifying", len(cores), "configurations") as report,
+        ):
             for result in results:
                 found.append(result)
-                if report is not None:
-                    report(len(found))
+                report(len(found))
     except KeyboardInterrupt:
         interrupted = True
     failed = _print(found, chosen, used, whole=not interrupted)
@@ -182,11 +183,6 @@ def _each(
         return
     with Pool(n_jobs, _heed_only_the_pool) as pool:
         yield pool.imap_unordered(check, cores)
-
-
-def _progress(n_cores: int) -> AbstractContextManager[Callable[[float], None] | None]:
-
-    return progress_bar("verifying", n_cores, MofNCompleteColumn(), TextColumn("configurations"))
 
 
 _HEADS = ("method", "engine", "configurations", "motions", "clocks", "ticks", "updates", "mismatches", "seconds")

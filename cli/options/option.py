@@ -1,6 +1,5 @@
 """Options that commands share, and how they are shown and explained."""
 
-import functools
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -241,62 +240,3 @@ def output_folder(default: str, *, help: str) -> Callable[[Any], Any]:
     """Decorate a command with the option that names the folder of all outputs, handed to the command as `directory`."""
     kind = FilePath(file_okay=False)
     return option(_OUTPUTS, "-o", "--output", "directory", type=kind, default=default, metavar="DIR", help=help)
-
-
-_OUTPUT_OPTIONS = [
-    output(
-        "--vcd",
-        suffixes=(".vcd",),
-        help="Waveform of pins, ports and inner values, with a GTKWave save file (.gtkw) beside it, which GTKWave "
-        "opens.",
-    ),
-    output(
-        "--plot",
-        suffixes=(".png", ".pdf"),
-        help="Figure of velocity, error, pulse numbers and measurement times; .png or .pdf.",
-    ),
-    output(
-        "--trace",
-        help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
-        "velocity in rad/s, or in the unit of --unit; then all other outputs that change with an update.",
-    ),
-    output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts), and what else ticks have."),
-    output("--events", help="CSV with a row per index pulse, illegal transition and external tick that was wrong."),
-    output(
-        "--save-capture",
-        suffixes=(".sr",),
-        help="Encoder lines as the core samples them, as a sigrok capture, for PulseView or `tachometry replay`.",
-    ),
-]
-
-
-def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: the outputs of a simulation, handed to the command as `targets`, a dictionary of option to
-    path.
-
-    A `.gtkw` comes with `--vcd`.
-    """
-
-    @functools.wraps(command)
-    def collect(
-        *,
-        vcd: Path | None,
-        plot: Path | None,
-        trace: Path | None,
-        counts: Path | None,
-        events: Path | None,
-        save_capture: Path | None,
-        **others: Any,
-    ) -> Any:
-        given = {
-            "--vcd": vcd,
-            "--vcd (its .gtkw)": None if vcd is None else vcd.with_suffix(".gtkw"),
-            "--plot": plot,
-            "--trace": trace,
-            "--counts": counts,
-            "--events": events,
-            "--save-capture": save_capture,
-        }
-        return command(targets={what: path for what, path in given.items() if path is not None}, **others)
-
-    return all_of(_OUTPUT_OPTIONS, collect)

@@ -4,7 +4,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -31,20 +31,22 @@ _GAP = 2  # columns between two of a table
 
 
 @contextmanager
-def progress_bar(verb: str, total: float, *columns: ProgressColumn) -> Iterator[Callable[[float], None] | None]:
-    """Yield a function to be called with how much of `total` is done.
+def progress_bar(verb: str, total: float, unit: str = "", *, rate: bool = False) -> Iterator[Callable[[float], None]]:
+    """Yield a function to be called with how much of `total` is done, in some unit.
 
-    It shows a bar on stderr as soon as the work is seen to take more than two seconds; None if stderr is no terminal.
+    It shows a bar on stderr as soon as the work is seen to take more than two seconds, if stderr is a terminal.
     """
     if not sys.stderr.isatty():
-        yield None
+        yield lambda done: None
         return
+    columns = [MofNCompleteColumn(), TextColumn(unit)] if unit else []
     begun = time.monotonic()
     with ExitStack() as stack:
         bar = Progress(
             TextColumn(verb),
             BarColumn(),
             *columns,
+            *([_PerSecond(unit)] if rate else []),
             TimeRemainingColumn(),
             console=Console(stderr=True),
             transient=True,
@@ -79,12 +81,7 @@ def activity() -> Iterator[Callable[[str], None]]:
         yield lambda what: shown.update(task, description=what)
 
 
-def clocks_progress(n_clocks: int) -> AbstractContextManager[Callable[[float], None] | None]:
-    """Return a progress bar of the clocks that are simulated."""
-    return progress_bar("simulating", n_clocks, MofNCompleteColumn(), TextColumn("clocks"), PerSecond("clocks"))
-
-
-class PerSecond(ProgressColumn):
+class _PerSecond(ProgressColumn):
     """How fast it goes."""
 
     def __init__(self, what: str) -> None:

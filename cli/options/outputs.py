@@ -1,0 +1,102 @@
+"""Options of the files that a simulation writes, and what writes each."""
+
+import functools
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tachometry.cli.options.option import all_of, output
+from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.signals.tables import write_counts, write_events, write_trace
+from tachometry.sim.studies.simulation import Simulation
+from tachometry.spec import AxesSpec
+
+_OPTIONS = [
+    output(
+        "--vcd",
+        suffixes=(".vcd",),
+        help="Waveform of pins, ports and inner values, with a GTKWave save file (.gtkw) beside it, which GTKWave "
+        "opens.",
+    ),
+    output(
+        "--plot",
+        suffixes=(".png", ".pdf"),
+        help="Figure of velocity, error, pulse numbers and measurement times; .png or .pdf.",
+    ),
+    output(
+        "--trace",
+        help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
+        "velocity in rad/s, or in the unit of --unit; then all other outputs that change with an update.",
+    ),
+    output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts), and what else ticks have."),
+    output("--events", help="CSV with a row per index pulse, illegal transition and external tick that was wrong."),
+    output(
+        "--save-capture",
+        suffixes=(".sr",),
+        help="Encoder lines as the core samples them, as a sigrok capture, for PulseView or `tachometry replay`.",
+    ),
+]
+
+
+def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorate a command: the outputs of a simulation, handed to the command as `targets`, a dictionary of option to
+    path.
+
+    A `.gtkw` comes with `--vcd`.
+    """
+
+    @functools.wraps(command)
+    def collect(
+        *,
+        vcd: Path | None,
+        plot: Path | None,
+        trace: Path | None,
+        counts: Path | None,
+        events: Path | None,
+        save_capture: Path | None,
+        **others: Any,
+    ) -> Any:
+        given = {
+            "--vcd": vcd,
+            "--vcd (its .gtkw)": None if vcd is None else vcd.with_suffix(".gtkw"),
+            "--plot": plot,
+            "--trace": trace,
+            "--counts": counts,
+            "--events": events,
+            "--save-capture": save_capture,
+        }
+        return command(targets={what: path for what, path in given.items() if path is not None}, **others)
+
+    return all_of(_OPTIONS, collect)
+
+
+def refuse_plot(targets: Mapping[str, Path]) -> None:
+    """Check that no figure is wanted of many axes."""
+    if "--plot" in targets:
+        raise ValueError("--plot must not be given together with --axes: a figure is of one axis")
+
+
+def write_outputs(simulation: Simulation, place: Callable[[str], Path | None]) -> None:
+    """Write what is wanted of a simulation, but the waveform, which it has written.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    place : callable
+        Tells where the file of an option goes; None: it is not wanted.
+    """
+    spec, run = simulation.spec, simulation.lockstep.actual
+    if path := place("--trace"):
+        write_trace(path, spec, run)
+    if path := place("--counts"):
+        write_counts(path, run)
+    if path := place("--events"):
+        write_events(path, run)
+    if path := place("--save-capture"):
+        write_sr(path, simulation.lockstep.trace, spec.timing.clock_hz)
+    if path := place("--plot"):
+        from tachometry.sim.plots.run import save_plot  # Matplotlib is slow to import
+
+        assert not isinstance(spec, AxesSpec), "a figure is of one axis"
+        truth = simulation.axes[0].truth
+        save_plot(path, spec, run, None if truth is None else truth.true_speed)

@@ -1,0 +1,166 @@
+"""A core is simulated on encoder signals: what the hardware says, the golden model, and the shaft itself."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.axes import AxesTrace, of_axis
+from tachometry.sim.signals.progress import Bar
+from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.signals.run import Run
+from tachometry.sim.signals.tables import VelocityError, held_from, held_velocity, velocity_error
+from tachometry.sim.studies.lockstep import Lockstep, lockstep
+from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec.language.units import format_time
+
+Window = Callable[[CoreSpec, int], tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Holds what an axis has made of its encoder.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+        Of a core of this axis alone.
+    run : Run
+        Its rows.
+    recording : Recording
+    truth : Encoding or None
+        What the shaft truly did, if it is known; with it `counts_in` and `error`.
+    n_merged : int
+        Edges that came too soon after another to be told apart.
+    counts_in, counts_out : int
+        Of the shaft, up to the last tick, and of the core.
+    error : VelocityError or None
+        Of the held velocity; None also if there was no update.
+    """
+
+    spec: TachometerSpec
+    run: Run
+    recording: Recording
+    truth: Encoding | None
+    n_merged: int
+    counts_in: int | None
+    counts_out: int
+    error: VelocityError | None
+
+    @property
+    def difference(self) -> int:
+        """Counts out less counts in; the position may have wrapped."""
+        half = 1 << (self.spec.position_width - 1)
+        return 0 if self.counts_in is None else (self.counts_out - self.counts_in + half) % (2 * half) - half
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Holds a simulation, compared in every bit.
+
+    Parameters
+    ----------
+    spec : CoreSpec
+    engine : str
+        What has run the hardware.
+    wanted : int
+        Clocks that it was to run; after Ctrl-C it has run fewer.
+    lockstep : Lockstep
+    axes : tuple of Axis
+    """
+
+    spec: CoreSpec
+    engine: str
+    wanted: int
+    lockstep: Lockstep
+    axes: tuple[Axis, ...]
+
+
+def simulate(
+    spec: CoreSpec,
+    source: str,
+    recordings: Sequence[Recording],
+    truths: Sequence[Encoding] | None,
+    engine: str,
+    *,
+    window: Window,
+    vcd: Path | None,
+    bar: Bar,
+) -> Simulation:
+    """Run hardware and golden model on a recording for each axis.
+
+    Parameters
+    ----------
+    source : str
+        What messages call that which the recordings come from.
+    truths : sequence of Encoding or None
+        What the shaft of each axis truly did.
+    window : callable
+        Gives the clocks that the waveform `vcd` shows.
+    bar : Bar
+
+    Raises
+    ------
+    ValueError
+        If the recordings do not last a tick, or have too many.
+    """
+    trace = AxesTrace.placed(recordings, spec) if isinstance(spec, AxesSpec) else PinTrace.of(recordings[0], spec)
+    fewest = spec.longest_tick + spec.tick_latency  # after which there is something to report
+    if trace.n_clocks < fewest:
+        raise ValueError(
+            f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.seconds(fewest))}), "
+            f"a tick and its latency, not {trace.n_clocks}"
+        )
+    shown, chosen = window(spec, trace.n_clocks), pick(engine)
+    with bar("simulating", trace.n_clocks, "clocks", rate=True) as progress:
+        found = lockstep(spec, trace, chosen, vcd=vcd, window=shown, progress=progress, fewest=fewest)
+    missing = " (there is no C++ compiler)" if (engine, chosen.name) == ("auto", "pysim") else ""
+    known = [None] * len(recordings) if truths is None else truths
+    each = enumerate(zip(recordings, known, strict=True))
+    if isinstance(spec, AxesSpec):
+        axes = [_one_of_many(spec, found.actual, axis, *of) for axis, of in each]
+    else:
+        axes = [_alone(spec, found.actual, *of) for _, of in each]
+    return Simulation(spec, chosen.name + missing, trace.n_clocks, found, tuple(axes))
+
+
+def _alone(spec: TachometerSpec, run: Run, recording: Recording, truth: Encoding | None) -> Axis:
+    counts_in = error = None
+    if truth is not None:
+        # Up to the pin sample that the last tick can hold.
+        clock = int(run.ticks.clock[-1]) - spec.tick_latency - spec.pin_to_count
+        sampled = _sampled(max(clock, 0), spec.timing.clock_hz)
+        counts_in = int(truth.true_position(sampled, spec.encoder.decoding))
+        error = velocity_error(held_velocity(spec, run), truth.true_speed)
+    # An index that resets the position does not undo what has been counted.
+    counts_out = int(run.ticks.pulse_count.sum() if spec.index_reset else run.ticks.position[-1])
+    n_merged = recording.n_merged(spec.timing.clock_hz, run.n_clocks)
+    return Axis(spec, run, recording, truth, n_merged, counts_in, counts_out, error)
+
+
+def _sampled(clock: int, clock_hz: int) -> float:
+    """Return the last instant that `Recording.place` puts at or before clock edge `clock`, in seconds."""
+    instant = clock / clock_hz
+    while instant * clock_hz > clock:
+        instant = math.nextafter(instant, 0)
+    while (later := math.nextafter(instant, math.inf)) * clock_hz <= clock:
+        instant = later
+    return instant
+
+
+def _one_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
+    own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
+    if truth is not None and (n_ticks := len(own.ticks)):
+        # From the first look at the axis to the last one of the last tick.
+        latency = spec.axis.pin_to_count
+        clocks = np.array([spec.look(axis, latency), spec.look(axis, n_ticks * spec.rounds - 1)]) - latency
+        first, last = truth.true_position(clocks / spec.timing.clock_hz, spec.axis.encoder.decoding)
+        counts_in = int(last - first)
+        error = velocity_error(held_from(own.ticks.clock, own.updates, alone), truth.true_speed)
+    counts_out = int(own.ticks.position[-1]) if len(own.ticks) else 0
+    n_merged = recording.n_merged(spec.timing.clock_hz // spec.slots, run.n_clocks // spec.slots)
+    return Axis(alone, own, recording, truth, n_merged, counts_in, counts_out, error)
