@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import click
 
-from tachometry.cli.commands.comparing import costs, given, tuned
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import capture_options
 from tachometry.cli.options.core import Make, common_core_options
-from tachometry.cli.options.methods import Methods, named_methods
+from tachometry.cli.options.methods import named_methods
 from tachometry.cli.options.motion import FORMS, optional_motion_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
-from tachometry.cli.reports.compare import print_comparison, shown_time, write_comparison, write_costs
-from tachometry.cli.reports.run import merged_edges, print_warnings
+from tachometry.cli.reports.compare import comparison_table, cost_table, print_comparison, shown_time
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.hdl.export import export
 from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.signals.files import write_csv
 from tachometry.sim.signals.recording import Recording
-from tachometry.sim.studies.comparing.compare import TrueSpeed, common_instants, score
-from tachometry.sim.studies.comparing.rivals import BASELINES, baseline_model
-from tachometry.sim.studies.comparing.tune import Cost
+from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
+from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, Measurement, measure_core, versions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import parse_time
@@ -135,61 +132,33 @@ def compare(
     inputs = tables if capture is None else [capture]
     outputs = Outputs({name: path for name, path in files.items() if path is not None}, inputs=inputs)
     named = named_methods(methods, make, BASELINES)
-    for name in (name for name, spec in named.specs.items() if spec is None):
-        baseline_model(name)  # what is wrong is reported at once
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
     source = _source(record, capture, read, spec)
-    earliest = 0.0 if start is None else float(parse_time("start", start))
-    if earliest < 0:
+    earliest = None if start is None else float(parse_time("start", start))
+    if earliest is not None and earliest < 0:
         raise ValueError(f"--from must be at least 0, not {start}")
     latest = math.inf if until is None else float(parse_time("until", until))
-    if latest <= earliest:
-        raise ValueError(f"--until must be later than --from, {shown_time(earliest)}, not {until}")
-    tick_s = float(spec.timing.tick_seconds)
+    if latest <= (earliest or 0.0):
+        raise ValueError(f"--until must be later than --from, {shown_time(earliest or 0.0)}, not {until}")
     tools = _tools() if size else {}
-    n_tried: dict[str, int] = {}
+    if source.true_speed is None and (tune or tradeoff is not None):
+        raise ValueError(f"{'--tune' if tune else '--tradeoff'} must be given together with --motion")
     with outputs:
-        duration = source.recording.duration
-        end = min(duration, latest)
-        if tune or tradeoff is not None:
-            if source.true_speed is None:
-                raise ValueError(f"{'--tune' if tune else '--tradeoff'} must be given together with --motion")
-            judged = common_instants([], end, tick_s, earliest)
-            if len(judged) < 2:
-                raise ValueError(f"{source.name} must last longer than --from, not {shown_time(duration)}")
-            asked = (named, spec.encoder, make, source.recording, judged, source.true_speed)
-            if path := outputs.get("--tradeoff"):
-                _tradeoff(path, spec, *costs(*asked))
-            if tune:
-                named, n_tried = tuned(*asked)
-        curves = [setting.curve(source.recording) for setting in given(named, spec.encoder)]
-        instants = common_instants(curves, end, tick_s, earliest)
-        if len(instants) < 2:
-            beyond = "" if start is None else ", and beyond --from"
-            what = source.name if end == duration else "--until"
-            raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {shown_time(end)}")
-        scores = [score(curve, duration, instants, source.true_speed) for curve in curves]
-        sizes = _sizes(named, tools) if size else {}
-        if path := outputs.get("--csv"):
-            write_comparison(path, scores, sizes, spec.shown_unit)
-        if path := outputs.get("--plot"):
-            from tachometry.sim.plots.compare import save_comparison
-
-            save_comparison(path, spec, curves, scores, instants, source.true_speed)
-    print_comparison(scores, sizes, named, n_tried, spec.shown_unit)
-
-    clock_hz = spec.timing.clock_hz
-    print_warnings(merged_edges(source.recording.n_merged(clock_hz, int(duration * clock_hz))))
+        found = comparison(
+            spec,
+            named.specs,
+            make,
+            source,
+            earliest=earliest,
+            latest=latest,
+            tune=tune,
+            tradeoff=tradeoff is not None,
+            bar=progress_bar,
+        )
+        sizes = _sizes(found, tools) if size else {}
+        _write(found, sizes, outputs)
+    print_comparison(found, sizes, named.left_out)
     return 0
-
-
-@dataclass(frozen=True)
-class _Source:
-    """Where the edges come from; a capture does not tell the true speed."""
-
-    name: str
-    recording: Recording
-    true_speed: TrueSpeed | None
 
 
 def _source(
@@ -197,24 +166,29 @@ def _source(
     capture: Path | None,
     read: Callable[[Path, TachometerSpec], Recording],
     spec: TachometerSpec,
-) -> _Source:
+) -> Source:
     if (record is None) == (capture is None):
         raise ValueError("--motion must be given, or --replay, and not both")
     if capture is not None:
-        return _Source(str(capture), read(capture, spec), None)
+        return Source(str(capture), read(capture, spec), None)
     assert record is not None
     truth = record(spec)
-    return _Source("--motion", truth.recording, truth.true_speed)
+    return Source("--motion", truth.recording, truth.true_speed)
 
 
-def _tradeoff(path: Path, spec: TachometerSpec, costs: dict[str, list[Cost]], speed: float) -> None:
-    """Write the figure of error over delay, or its numbers."""
-    if path.suffix.lower() == ".csv":
-        write_costs(path, costs, spec.shown_unit)
-        return
-    from tachometry.sim.plots.tradeoff import save_tradeoff
+def _write(found: Comparison, sizes: Mapping[str, Measurement], outputs: Outputs) -> None:
+    if path := outputs.get("--csv"):
+        write_csv(path, *comparison_table(found, sizes))
+    if path := outputs.get("--plot"):
+        from tachometry.sim.plots.compare import save_comparison  # Matplotlib is slow to import
 
-    save_tradeoff(path, spec, costs, speed)
+        save_comparison(path, found.spec, found.curves, found.scores, found.instants, found.true_speed)
+    if (path := outputs.get("--tradeoff")) and path.suffix.lower() == ".csv":
+        write_csv(path, *cost_table(found))
+    elif path:
+        from tachometry.sim.plots.tradeoff import save_tradeoff
+
+        save_tradeoff(path, found.spec, found.costs, found.rms_speed)
 
 
 def _tools() -> dict[str, str]:
@@ -225,9 +199,9 @@ def _tools() -> dict[str, str]:
         raise click.ClickException(f"--size needs the extra `size`: {error}") from error
 
 
-def _sizes(named: Methods, tools: dict[str, str]) -> dict[str, Measurement]:
+def _sizes(found: Comparison, tools: dict[str, str]) -> dict[str, Measurement]:
     """Return COMB, FF and Fmax of the cores on an ECP5, by name."""
-    specs = {name: spec for name, spec in named.specs.items() if spec is not None}
+    specs = {name: spec for name, spec in found.specs.items() if spec is not None}
     sizes = {}
     with progress_bar("measuring sizes", len(specs), "cores") as report:
         for done, (name, spec) in enumerate(specs.items(), 1):

@@ -1,20 +1,16 @@
 """`compare` prints and writes a row per method, with sizes if they were measured, and the cost of settings."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from pathlib import Path
 
 from rich.text import Text
 
-from tachometry.cli.options.methods import Methods
+from tachometry.cli.reports.run import merged_edges, print_warnings
 from tachometry.cli.reports.terminal import print_table, stdout_console
-from tachometry.sim.signals.files import write_csv
 from tachometry.sim.studies.comparing.compare import Score
-from tachometry.sim.studies.comparing.tune import Cost, front
+from tachometry.sim.studies.comparing.comparison import Comparison
 from tachometry.sim.studies.size import Measurement
-from tachometry.spec.language.units import SpeedUnit, format_time
+from tachometry.spec.language.units import format_time
 
 _SPEEDS = ("rms", "max")  # of a score, in rad/s
 _SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
@@ -25,25 +21,18 @@ def shown_time(seconds: float) -> str:
     return format_time(Fraction(f"{seconds:.4g}"))
 
 
-def print_comparison(
-    scores: list[Score],
-    sizes: Mapping[str, Measurement],
-    named: Methods,
-    n_tried: Mapping[str, int],
-    unit: SpeedUnit,
-) -> None:
+def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], left_out: Mapping[str, str]) -> None:
     """Print the table, and below it what each method is.
 
     Parameters
     ----------
-    scores : list of Score
+    comparison : Comparison
     sizes : mapping of str to Measurement
         Of cores, by name; empty if they were not measured.
-    named : Methods
-    n_tried : mapping of str to int
-        Number of settings of which one is the best.
-    unit : SpeedUnit
+    left_out : mapping of str to str
+        Methods that are not compared, and why.
     """
+    scores, unit = comparison.scores, comparison.spec.shown_unit
 
     def time(seconds: float | None) -> str:
         return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
@@ -67,23 +56,27 @@ def print_comparison(
     console = stdout_console()
     console.print()
     for row in scores:
-        tried = f"; best of {n_tried[row.name]} settings" if row.name in n_tried else ""
+        tried = f"; best of {comparison.n_tried[row.name]} settings" if row.name in comparison.n_tried else ""
         console.print(Text(f"{row.name}: {row.what}{tried}"))
     if sizes:
         console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/measured/size.md")
-    for name, spec in named.specs.items():
+    for name, spec in comparison.specs.items():
         for note in spec.notes if spec is not None else ():
             console.print(Text(f"{name}: {note}"))
-    for name, reason in named.left_out.items():
+    for name, reason in left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
+    print_warnings(merged_edges(comparison.n_merged))
 
 
 def _size_cells(size: Measurement | None) -> list[str]:
     return ["-" if size is None else form.format(size.figures[figure]) for figure, form in _SIZE.items()]
 
 
-def write_comparison(path: Path, scores: list[Score], sizes: Mapping[str, Measurement], unit: SpeedUnit) -> None:
-    """Write the table as CSV."""
+def comparison_table(
+    comparison: Comparison, sizes: Mapping[str, Measurement]
+) -> tuple[list[str], Iterator[list[object]]]:
+    """Return heads and rows of the table as CSV."""
+    scores, unit = comparison.scores, comparison.spec.shown_unit
     names = [name for name in vars(scores[0]) if name != "what"]
     figures = list(_SIZE) if sizes else []
 
@@ -97,15 +90,15 @@ def write_comparison(path: Path, scores: list[Score], sizes: Mapping[str, Measur
         return shown + [size and size.figures[figure] for figure in figures]
 
     heads = [f"{name}_{unit.suffix}" if name in _SPEEDS else name for name in names]
-    write_csv(path, [*heads, *figures], map(cells, scores))
+    return [*heads, *figures], map(cells, scores)
 
 
-def write_costs(path: Path, costs: Mapping[str, Sequence[Cost]], unit: SpeedUnit) -> None:
-    """Write what all settings cost as CSV; the last column tells those that are in the figure."""
-    rows = [
+def cost_table(comparison: Comparison) -> tuple[list[str], list[tuple[object, ...]]]:
+    """Return heads and rows of what all settings cost; the last column tells those that are in the figure."""
+    unit, shown = comparison.spec.shown_unit, comparison.front
+    rows: list[tuple[object, ...]] = [
         (cost.method, cost.name, unit.of(cost.rms), cost.delay, int(cost in shown))
-        for tried in costs.values()
-        for shown in [front(tried)]
+        for tried in comparison.costs.values()
         for cost in tried
     ]
-    write_csv(path, ["method", "name", f"rms_{unit.suffix}", "equivalent_delay", "shown"], rows)
+    return ["method", "name", f"rms_{unit.suffix}", "equivalent_delay", "shown"], rows

@@ -1,0 +1,285 @@
+"""Methods are compared as they are given, or each with the best of its settings, and what all settings cost."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+
+from tachometry.sim.encoder.motion import FloatArray, parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.progress import Bar
+from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.studies.comparing.compare import Curve, Score, TrueSpeed, common_instants, core_curve, score
+from tachometry.sim.studies.comparing.rivals import baseline_curve, baseline_model, settings
+from tachometry.sim.studies.comparing.tune import (
+    SETTLED_S,
+    TUNED,
+    Cost,
+    best,
+    core_settings,
+    cost,
+    front,
+    possible,
+    triangle,
+)
+from tachometry.spec import Encoder, TachometerSpec
+from tachometry.spec.language.units import format_time
+
+Specs = Mapping[str, TachometerSpec | None]  # by the name of the method; None: it is a baseline
+Make = Callable[[str, Mapping[str, str]], TachometerSpec]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Holds the edges that all methods see; a capture does not tell the true speed."""
+
+    name: str
+    recording: Recording
+    true_speed: TrueSpeed | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Holds what has come of all methods.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+        Whose clock, tick and unit hold for all.
+    specs : mapping of str to TachometerSpec or None
+        Of the methods that are compared, by their names with their settings.
+    curves : list of Curve
+    scores : list of Score
+    instants : float64 array, shape (n,), seconds
+        At which they are compared.
+    true_speed : TrueSpeed or None
+    n_merged : int
+        Edges that no core can tell apart.
+    n_tried : dict of str to int
+        Number of settings of which one is the best, by the name of this one.
+    costs : dict of str to list of Cost
+        Of all settings, by the method; empty if they were not asked for.
+    rms_speed : float, rad/s
+        Of the motion, with which delays were measured.
+    """
+
+    spec: TachometerSpec
+    specs: Specs
+    curves: list[Curve]
+    scores: list[Score]
+    instants: FloatArray
+    true_speed: TrueSpeed | None
+    n_merged: int
+    n_tried: dict[str, int] = field(default_factory=dict)
+    costs: dict[str, list[Cost]] = field(default_factory=dict)
+    rms_speed: float = 0.0
+
+    @property
+    def front(self) -> list[Cost]:
+        """The costs than which no other setting of the same method has both less error and less delay."""
+        return [cost for tried in self.costs.values() for cost in front(tried)]
+
+
+def comparison(
+    spec: TachometerSpec,
+    specs: Specs,
+    make: Make,
+    source: Source,
+    *,
+    earliest: float | None,
+    latest: float,
+    tune: bool,
+    tradeoff: bool,
+    bar: Bar,
+) -> Comparison:
+    """Run methods on the same edges, and compare them with the truth.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+        Whose encoder, clock and tick hold for all.
+    specs : mapping of str to TachometerSpec or None
+    make : callable
+        Makes a core of a method and its own options.
+    source : Source
+        With the true speed, where there is to be `tune` or `tradeoff`.
+    earliest, latest : float, seconds
+        Errors before and after are left out; None: only those before all methods have a value.
+    tune : bool
+        Each baseline, and M/T, takes part with the best of its settings.
+    tradeoff : bool
+        Measure what all settings cost.
+    bar : Bar
+
+    Raises
+    ------
+    ValueError
+        If a method cannot be on these edges, or they end too early.
+    """
+    for name in (name for name, one in specs.items() if one is None):
+        baseline_model(name)  # what is wrong is reported at once
+    recording, tick_s = source.recording, float(spec.timing.tick_seconds)
+    duration, begin = recording.duration, earliest or 0.0
+    end = min(duration, latest)
+    costs, speed, n_tried = dict[str, list[Cost]](), 0.0, dict[str, int]()
+    if (tune or tradeoff) and source.true_speed is not None:
+        judged = common_instants([], end, tick_s, begin)
+        if len(judged) < 2:
+            raise ValueError(f"{source.name} must last longer than --from, not {_time(duration)}")
+        trial = _Trial(spec.encoder, make, recording, judged, source.true_speed, bar)
+        if tradeoff:
+            costs, speed = trial.costs(specs)
+        if tune:
+            specs, n_tried = trial.tuned(specs)
+    curves = [Setting(name, one, spec.encoder).curve(recording) for name, one in specs.items()]
+    instants = common_instants(curves, end, tick_s, begin)
+    if len(instants) < 2:
+        beyond = "" if earliest is None else ", and beyond --from"
+        what = source.name if end == duration else "--until"
+        raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {_time(end)}")
+    clock_hz = spec.timing.clock_hz
+    return Comparison(
+        spec=spec,
+        specs=specs,
+        curves=curves,
+        scores=[score(curve, duration, instants, source.true_speed) for curve in curves],
+        instants=instants,
+        true_speed=source.true_speed,
+        n_merged=recording.n_merged(clock_hz, int(duration * clock_hz)),
+        n_tried=n_tried,
+        costs=costs,
+        rms_speed=speed,
+    )
+
+
+def _time(seconds: float) -> str:
+    return format_time(Fraction(f"{seconds:.4g}"))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A method with its options.
+
+    Parameters
+    ----------
+    name : str
+    spec : TachometerSpec or None
+        None: it is a baseline.
+    encoder : Encoder
+    """
+
+    name: str
+    spec: TachometerSpec | None
+    encoder: Encoder
+
+    def curve(self, recording: Recording) -> Curve:
+        """Return what it shows.
+
+        Raises
+        ------
+        ValueError
+            If its options are wrong, or do not fit the recording.
+        """
+        if self.spec is None:
+            return baseline_curve(self.name, recording, self.encoder.counts_per_rev, self.encoder.decoding)
+        return core_curve(self.name, self.spec, PinTrace.of(recording, self.spec))
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """Tries all settings of methods on a motion."""
+
+    encoder: Encoder
+    make: Make
+    recording: Recording
+    instants: FloatArray
+    true_speed: TrueSpeed
+    bar: Bar
+
+    def tuned(self, specs: Specs) -> tuple[dict[str, TachometerSpec | None], dict[str, int]]:
+        """Return the methods, in place of each baseline and of M/T without options its best setting.
+
+        Returns them, and the number of settings that were tried, by the name of the best.
+
+        Raises
+        ------
+        ValueError
+            If a method has no setting that can be.
+        """
+        found: dict[str, TachometerSpec | None] = {}
+        n_tried = {}
+        settings = self._settings(specs, of_cores=False)
+        for name, tried in self._counted(settings, "tuning"):
+            if len(settings[name]) == 1:
+                found[name] = specs[name]
+                next(tried)
+                continue
+            curves = possible(partial(setting.curve, self.recording) for setting in tried)
+            chosen = best(curves, self.instants, self.true_speed).name
+            found[chosen] = next(setting.spec for setting in settings[name] if setting.name == chosen)
+            n_tried[chosen] = len(settings[name])
+        return found, n_tried
+
+    def costs(self, specs: Specs) -> tuple[dict[str, list[Cost]], float]:
+        """Return what all settings of each method cost, and the RMS speed (rad/s) of the motion, with which delays were
+        measured.
+
+        Raises
+        ------
+        ValueError
+            If the shaft does not move.
+        """
+        speed = float(np.sqrt(np.mean(self.true_speed(self.instants) ** 2)))
+        if not speed:
+            raise ValueError("--motion must move the shaft where there is a --tradeoff")
+        found: dict[str, list[Cost]] = {}
+        index = any(spec is not None and spec.index for spec in specs.values())
+        moving = VirtualEncoder(self.encoder.pulses_per_rev, index=index).record(parse_motion(triangle(speed)))
+        tick_s = float(self.instants[1] - self.instants[0])
+        after = common_instants([], moving.recording.duration, tick_s, SETTLED_S)
+        for name, tried in self._counted(self._settings(specs, of_cores=True), "measuring"):
+            found[name] = []
+            for setting in tried:
+                try:
+                    curves = setting.curve(self.recording), setting.curve(moving.recording)
+                except ValueError:
+                    continue  # not with this clock, encoder or motion
+                measured = cost(name, *curves, (self.instants, self.true_speed), (after, moving.true_speed))
+                if measured is not None:
+                    found[name].append(measured)
+        return found, speed
+
+    def _settings(self, specs: Specs, *, of_cores: bool) -> dict[str, list[Setting]]:
+        return {name: self._tried(Setting(name, spec, self.encoder), of_cores=of_cores) for name, spec in specs.items()}
+
+    def _tried(self, setting: Setting, *, of_cores: bool) -> list[Setting]:
+        """Return all settings of a method; one if it is given with options, and of a core that is not to be tuned."""
+        if ":" in setting.name:
+            return [setting]
+        if setting.spec is None:
+            return [replace(setting, name=name) for name in settings(setting.name)]
+        found = [setting]
+        if of_cores or setting.name in TUNED:
+            for name, options in core_settings(setting.name):
+                try:
+                    found.append(replace(setting, name=name, spec=self.make(setting.name, options)))
+                except ValueError:
+                    continue  # not with this clock or tick
+        return found
+
+    def _counted(self, settings: dict[str, list[Setting]], verb: str) -> Iterator[tuple[str, Iterator[Setting]]]:
+        """Yield methods with their settings one by one; a progress bar counts these."""
+        n_done = 0
+        with self.bar(verb, sum(map(len, settings.values())), "settings") as report:
+
+            def count(tried: list[Setting]) -> Iterator[Setting]:
+                nonlocal n_done
+                for setting in tried:
+                    yield setting
+                    n_done += 1
+                    report(n_done)
+
+            for name, tried in settings.items():
+                yield name, count(tried)
