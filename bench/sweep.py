@@ -10,10 +10,10 @@ from pathlib import Path
 from pages import markdown, write_block
 
 from tachometry.cli.commands.sweep import sweep
+from tachometry.cli.options.points import points_of
+from tachometry.cli.options.settings import of_file
 from tachometry.cli.options.sweep import by_name, point_options
 from tachometry.cli.reports.terminal import print_table
-from tachometry.cli.sweeping.points import points_of
-from tachometry.cli.sweeping.settings import of_file
 from tachometry.sim.studies.sweeping import cluster
 from tachometry.sim.studies.sweeping.sweep import Point, run_point
 

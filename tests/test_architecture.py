@@ -51,8 +51,7 @@ ALLOWED = {
     "boards/simulated": set[str](),
     "cli": {"cli", "boards", "sim", "hdl", "spec"},
     "cli/options": {"boards", "sim", "spec"},
-    "cli/sweeping": {"cli/options", "sim", "spec"},
-    "cli/reports": {"boards", "cli/options", "cli/sweeping", "sim", "spec"},
+    "cli/reports": {"boards", "sim", "spec"},
     "cli/commands": {"cli", "boards", "sim", "hdl", "spec"},
 }
 

@@ -12,15 +12,16 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.closed_loop import loop_options
 from tachometry.cli.options.motion import FORMS, tables_of
 from tachometry.cli.options.option import option, output
+from tachometry.cli.options.points import loops_of
+from tachometry.cli.options.settings import Settings
+from tachometry.cli.options.sweep import VaryingCommand
 from tachometry.cli.reports.closed_loop import print_loop, print_loops, write_log, write_loops
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.terminal import progress_bar
-from tachometry.cli.sweeping.command import VaryingCommand
-from tachometry.cli.sweeping.loops import Loops, loops_of
-from tachometry.cli.sweeping.settings import Settings
 from tachometry.sim.engines import build
 from tachometry.sim.engines.loop import Log
 from tachometry.sim.studies.loops.control import Outcome, each_seed, mean
+from tachometry.sim.studies.sweeping.grid import Loops
 from tachometry.sim.studies.sweeping.loops import LoopPoint, row_of
 from tachometry.sim.studies.sweeping.sweep import Row
 from tachometry.spec.language.units import plural

@@ -11,14 +11,14 @@ import click
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, tables_of
 from tachometry.cli.options.option import FilePath, option, output
-from tachometry.cli.options.sweep import point_options
+from tachometry.cli.options.points import points_of
+from tachometry.cli.options.settings import Settings
+from tachometry.cli.options.sweep import VaryingCommand, point_options
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.sweep import print_sweep
 from tachometry.cli.reports.terminal import progress_bar
-from tachometry.cli.sweeping.command import VaryingCommand
-from tachometry.cli.sweeping.points import Points, points_of
-from tachometry.cli.sweeping.settings import Settings
 from tachometry.sim.engines.pick import pick
+from tachometry.sim.studies.sweeping.grid import Points
 from tachometry.spec.language.units import parse_time, plural
 
 if TYPE_CHECKING:  # numpy, pyarrow and Dask are slow to import, and --help needs none of them

@@ -8,10 +8,10 @@ from pathlib import Path
 from rich.text import Text
 
 from tachometry.cli.reports.terminal import print_table, stdout_console
-from tachometry.cli.sweeping.loops import Loops
 from tachometry.sim.engines.loop import Log
 from tachometry.sim.signals.files import write_csv
 from tachometry.sim.studies.loops.control import Outcome, mean
+from tachometry.sim.studies.sweeping.grid import Loops
 from tachometry.sim.studies.sweeping.loops import FIGURES, LoopPoint, row_of
 from tachometry.sim.studies.sweeping.sweep import Row
 from tachometry.spec.language.units import plural

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tachometry.cli.reports.terminal import print_table, stdout_console
-from tachometry.cli.sweeping.points import Points
+from tachometry.sim.studies.sweeping.grid import Points
 from tachometry.spec.language.units import format_time, plural
 
 if TYPE_CHECKING:

@@ -3,112 +3,30 @@
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from itertools import product
-from typing import Generic, Protocol, TypeVar
 
 import click
 
+from tachometry.cli.options.closed_loop import LOOP, loop_click_options, loop_options
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.methods import listed_methods
 from tachometry.cli.options.option import told
+from tachometry.cli.options.settings import Settings, Text, arguments
 from tachometry.cli.options.sweep import ENCODER, by_name, point_options
-from tachometry.cli.sweeping.settings import Settings, Text, arguments
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.studies.sweeping.grid import Grid, Item, Loops, Points
+from tachometry.sim.studies.sweeping.loops import LoopPoint, seeds_from
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Point
 from tachometry.spec import METHODS, TachometerSpec, common_options, methods_with, of_texts
-from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, SpeedUnit, read_nearest
+from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, read_nearest
 
 Words = tuple[str, ...]
 
-_MOST = 1_000_000  # points
+_MOST, _MOST_LOOPS = 1_000_000, 100_000
 _PLACE = re.compile(r"\{([^{}]*)\}")
 _UNITS = SPEED | TIME | FREQUENCY
-
-
-class _Digested(Protocol):
-    @property
-    def digest(self) -> str: ...
-
-
-Item = TypeVar("Item", bound=_Digested)
-
-
-@dataclass(frozen=True)
-class Found(Generic[Item]):
-    """Holds the points that are to be run.
-
-    Parameters
-    ----------
-    points : dict of str to Item
-        By their digests, in order.
-    at : dict of str to dict
-        Where each is: values of the axes that its method has.
-    axes : dict of str to list of str
-        All values of each axis.
-    left_out : dict of str to str
-        Methods of `all` that are impossible somewhere, and why.
-    """
-
-    points: dict[str, Item]
-    at: dict[str, dict[str, str]]
-    axes: dict[str, list[str]]
-    left_out: dict[str, str] = field(default_factory=dict)
-
-    def fill(
-        self,
-        settings: Settings,
-        listed: Sequence[tuple[str, str | None, Mapping[str, str]]],
-        make: Callable[[str, str, Mapping[str, str], Mapping[str, Text]], Item],
-        *,
-        everything: bool,
-        alone: bool = False,
-    ) -> None:
-        """Add the points of all methods at all values; with `everything`, a method that cannot be is left out.
-
-        `alone`: where there is one method and no axis, an error names neither.
-
-        Raises
-        ------
-        ValueError
-            If a point cannot be.
-        """
-        for name, method, given in listed:
-            assert method is not None
-            names = [key for key in settings.vary if has_option(settings, method, key)]
-            fixed = {key: text for key, text in settings.fixed.items() if has_option(settings, method, key)}
-            for values in product(*(settings.vary[key] for key in names)):
-                at = dict(zip(names, values, strict=True))
-                try:
-                    point = make(name, method, given, fixed | at)
-                except (ValueError, click.UsageError) as error:
-                    message = error.format_message() if isinstance(error, click.UsageError) else told(error)
-                    where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
-                    if everything or where or not alone:
-                        message += f" (method {name}{', ' * bool(where)}{where})"
-                    if everything and name != listed[0][0]:
-                        self.left_out.setdefault(name, message)
-                        continue
-                    raise ValueError(message) from None
-                self.points.setdefault(point.digest, point)
-                self.at.setdefault(point.digest, {key: text or "none" for key, text in at.items()})
-
-
-class Points(Found[Point]):
-    """The points of a sweep."""
-
-    @property
-    def unit(self) -> SpeedUnit:
-        """The unit in which speeds are shown: that of all points, else rad/s."""
-        units = {point.spec.shown_unit for point in self.points.values()}
-        return units.pop() if len(units) == 1 else SpeedUnit("rad/s")
-
-    @property
-    def values(self) -> list[str]:
-        """Values that are varied within the motion."""
-        return list(dict.fromkeys(name for point in self.points.values() for name in point.values))
 
 
 def points_of(settings: Settings, methods: str, earliest: float, engine: str | None) -> Points:
@@ -133,17 +51,17 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     everything = methods.strip() == "all"
     listed = [(name, name, {}) for name in METHODS] if everything else listed_methods(methods)
     _check_axes(settings, {method for _, method, _ in listed if method is not None})
-    own = [[name for name in settings.vary if has_option(settings, str(method), name)] for _, method, _ in listed]
+    own = [[name for name in settings.vary if _has_option(settings, str(method), name)] for _, method, _ in listed]
     count = sum(math.prod(len(settings.vary[name]) for name in names) for names in own)
     if count > _MOST:
         raise ValueError(f"--vary must give at most {_MOST} points, not {count}")
     maker = _Maker(earliest, engine)
-    found = Points({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
-    found.fill(settings, listed, maker.point, everything=everything)
-    return found
+    grid = Points({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
+    _fill(grid, settings, listed, maker.point, everything=everything)
+    return grid
 
 
-def has_option(settings: Settings, method: str, name: str) -> bool:
+def _has_option(settings: Settings, method: str, name: str) -> bool:
     """Tell whether an option is for a method."""
     own_ticks = METHODS[method].own_ticks
     if name == "dt":
@@ -158,11 +76,11 @@ def has_option(settings: Settings, method: str, name: str) -> bool:
     return not has or common.needs in settings.fixed or common.needs in settings.vary
 
 
-def check_options(settings: Settings, methods: set[str]) -> None:
+def _check_options(settings: Settings, methods: set[str]) -> None:
     """Refuse options that are for none of the methods, with a ValueError."""
     needs = {about.name: f", or with --{about.needs}" for about in common_options() if about.needs}
     for name in (*settings.fixed, *settings.vary):
-        if not any(has_option(settings, method, name) for method in methods) and (has := methods_with(name)):
+        if not any(_has_option(settings, method, name) for method in methods) and (has := methods_with(name)):
             has_it = ", ".join(has) + needs.get(name, "")
             raise ValueError(f"--{name} must be given with a method that has it: {has_it}")
 
@@ -182,7 +100,7 @@ def _check_axes(settings: Settings, methods: set[str]) -> None:
             raise ValueError(f"--motion must have names in braces that are no option or column, not {name!r}")
         if name not in settings.vary:
             raise ValueError(f"--vary must have values for {{{name}}} of --motion, such as --vary {name}=1,2,5")
-    check_options(settings, methods)
+    _check_options(settings, methods)
 
 
 class _Maker:
@@ -219,3 +137,82 @@ def _parsed_encoder(words: Words) -> tuple[Callable[[TachometerSpec], VirtualEnc
     with ENCODER.make_context("sweep", list(words)) as context:
         found: tuple[Callable[[TachometerSpec], VirtualEncoder], str] = ENCODER.invoke(context)
         return found
+
+
+def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
+    """Return all loops.
+
+    Parameters
+    ----------
+    settings : Settings
+        Options of core and loop, and axes.
+    methods : str
+        See `listed_methods`, or `all`: then those that cannot be are left out.
+    n_seeds : int
+
+    Raises
+    ------
+    ValueError
+        If an axis is not known, or a loop cannot be.
+    """
+    everything = methods.strip() == "all"
+    listed = [(name, name, {}) for name in METHODS] if everything else listed_methods(methods)
+    options = loop_options()
+    for name in settings.vary:
+        if name not in options:
+            raise ValueError(f"--vary must be of {', '.join(options)}, not {name!r}")
+    _check_options(settings, {method for _, method, _ in listed if method is not None})
+    count = len(listed) * math.prod(map(len, settings.vary.values()))
+    if count > _MOST_LOOPS:
+        raise ValueError(f"--vary must give at most {_MOST_LOOPS} loops, not {count}")
+    grid = Loops({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
+    _fill(grid, settings, listed, partial(_loop, n_seeds), everything=everything, alone=True)
+    return grid
+
+
+def _loop(n_seeds: int, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> LoopPoint:
+    core = {key: texts[key] for key in core_click_options() if key in texts} | dict(given)
+    of_loop = {key: text for key, text in texts.items() if key in loop_click_options()}
+    with LOOP.make_context("loop", arguments(of_loop, loop_click_options())) as context:
+        make, motion, seed = LOOP.invoke(context)
+    setting = make(of_texts(method, core))
+    return LoopPoint(name, setting, motion, seeds_from(seed, n_seeds))
+
+
+def _fill(
+    grid: Grid[Item],
+    settings: Settings,
+    listed: Sequence[tuple[str, str | None, Mapping[str, str]]],
+    make: Callable[[str, str, Mapping[str, str], Mapping[str, Text]], Item],
+    *,
+    everything: bool,
+    alone: bool = False,
+) -> None:
+    """Add the points of all methods at all values; with `everything`, a method that cannot be is left out.
+
+    `alone`: where there is one method and no axis, an error names neither.
+
+    Raises
+    ------
+    ValueError
+        If a point cannot be.
+    """
+    for name, method, given in listed:
+        assert method is not None
+        names = [key for key in settings.vary if _has_option(settings, method, key)]
+        fixed = {key: text for key, text in settings.fixed.items() if _has_option(settings, method, key)}
+        for values in product(*(settings.vary[key] for key in names)):
+            at = dict(zip(names, values, strict=True))
+            try:
+                point = make(name, method, given, fixed | at)
+            except (ValueError, click.UsageError) as error:
+                message = error.format_message() if isinstance(error, click.UsageError) else told(error)
+                where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
+                if everything or where or not alone:
+                    message += f" (method {name}{', ' * bool(where)}{where})"
+                if everything and name != listed[0][0]:
+                    grid.left_out.setdefault(name, message)
+                    continue
+                raise ValueError(message) from None
+            grid.points.setdefault(point.digest, point)
+            grid.at.setdefault(point.digest, {key: text or "none" for key, text in at.items()})

@@ -1,1 +1,0 @@
-"""A sweep has settings, from which its points follow."""
