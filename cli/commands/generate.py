@@ -21,6 +21,7 @@ from tachometry.hdl.export.files import CORE_FILES
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.studies.plan import plan_at
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import AxesSpec, TachometerSpec
 from tachometry.spec.control import AnySpec, LoopSpec
@@ -165,4 +166,4 @@ def _print(spec: AnySpec, bus: str) -> None:
     elif isinstance(spec, LoopSpec):
         print_loop_core(spec, bus)
     else:
-        print_core(spec, bus)
+        print_core(spec, plan_at(spec), bus)

@@ -5,20 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-import numpy as np
-from numpy.typing import NDArray
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import Make, core_and_make_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.cli.reports.plan import print_plan, print_plans
-from tachometry.sim.studies.plan import Plan, dense_speeds, plan_at, write_plan, write_plans
+from tachometry.sim.studies.plan import Plans, default_range
 from tachometry.spec import Speed, TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.units import SpeedUnit
 
-_ROWS = 12
 _SLOWEST = 1e-9  # counts per tick; keeps every number printable
 
 
@@ -68,39 +65,27 @@ def plan(
     targets = {what: path for what, path in (("--plot", plot), ("--csv", csv)) if path is not None}
     outputs = Outputs(targets)
     low, high, unit = _range(spec, speeds)
-    named = None if methods is None else named_methods(methods, make)
-
-    rows = np.geomspace(low, high, _ROWS)
+    named = Methods({}) if methods is None else named_methods(methods, make)
+    plans = Plans(spec, {name: one for name, one in named.specs.items() if one is not None}, low, high)
     with outputs:
-        if targets:
-            speed = dense_speeds(spec, low, high)
-            dense, all_dense = plan_at(spec, speed), _plans(named, speed)
         if path := outputs.get("--csv"):
-            write_plans(path, all_dense, spec.shown_unit) if all_dense else write_plan(path, dense, spec.shown_unit)
+            plans.write(path)
         if path := outputs.get("--plot"):
-            from tachometry.sim.plots.plan import save_plan_plot, save_plans_plot
+            from tachometry.sim.plots.plan import save_plan_plot, save_plans_plot  # Matplotlib is slow to import
 
-            if all_dense:
-                save_plans_plot(path, spec, all_dense, unit)
+            if methods is None:
+                save_plan_plot(path, spec, plans.line, unit)
             else:
-                save_plan_plot(path, spec, dense, unit)
-    print_plan(spec, plan_at(spec, rows), unit)
-    if named is not None:
-        print_plans(_plans(named, rows), named.left_out, unit)
+                save_plans_plot(path, spec, plans.lines, unit)
+    print_plan(spec, plans.table, unit)
+    if methods is not None:
+        print_plans(plans.tables, named.left_out, unit)
     return 0
-
-
-def _plans(named: Methods | None, speed: NDArray[np.float64]) -> dict[str, Plan]:
-    """Return plans of all methods at these speeds, rad/s; none without a list."""
-    specs = {} if named is None else named.specs
-    return {name: plan_at(spec, speed) for name, spec in specs.items() if spec is not None}
 
 
 def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
     """Return least and greatest speed in rad/s, and the unit to show speeds in."""
     if text is None:
-        from tachometry.sim.studies.plan import default_range
-
         unit = "rad/s" if spec.max_speed is None else spec.max_speed.unit
         return *default_range(spec), unit if spec.unit == NATIVE else spec.unit
     low, _, high = (part.strip() for part in text.partition(":"))

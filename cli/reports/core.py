@@ -4,7 +4,7 @@ import math
 from fractions import Fraction
 
 from tachometry.cli.reports.terminal import print_rows
-from tachometry.sim.studies.plan import default_range, plan_at
+from tachometry.sim.studies.plan import Plan
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
@@ -14,9 +14,9 @@ from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import WORD
 
 
-def print_core(spec: TachometerSpec, bus: str = "none") -> None:
-    """Print the configuration of a core, what it measures at low and at high speed, and its registers on a bus."""
-    print_rows([*configuration(spec), *_resolution(spec), *([] if bus == "none" else [registers_row(spec, bus)])])
+def print_core(spec: TachometerSpec, ends: Plan, bus: str = "none") -> None:
+    """Print the configuration of a core, what it measures at the ends of its range, and its registers on a bus."""
+    print_rows([*configuration(spec), *_resolution(spec, ends), *([] if bus == "none" else [registers_row(spec, bus)])])
 
 
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
@@ -66,10 +66,10 @@ def _full_scale(spec: TachometerSpec) -> str:
     return f"{held}, counted is up to {counted:.6g} {spec.shown_unit.name}"
 
 
-def _resolution(spec: TachometerSpec) -> list[tuple[str, str]]:
+def _resolution(spec: TachometerSpec, ends: Plan) -> list[tuple[str, str]]:
     """Return what the equations of the method promise at the ends of its range."""
-    found, unit, rows = plan_at(spec, default_range(spec)), spec.shown_unit, []
-    columns = zip(("low", "high"), found.speed, found.resolution, found.measurement_time, strict=True)
+    unit, rows = spec.shown_unit, []
+    columns = zip(("low", "high"), ends.speed, ends.resolution, ends.measurement_time, strict=True)
     for name, speed, resolution, time in columns:
         if math.isnan(resolution):
             shown = "unknown: there are no equations for the method, or it is too fast for it"

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import SpeedUnit
 
+_ROWS = 12  # of a table
 _UNITS = 10  # of the default range
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
 
@@ -56,13 +58,13 @@ class Plan:
         return self.resolution * self.measurement_time
 
 
-def plan_at(spec: TachometerSpec, speed: ArrayLike) -> Plan:
-    """Return what to expect of a core at speeds in rad/s, from the equations of its method, see
-    `sim.theory.performance`.
+def plan_at(spec: TachometerSpec, speed: ArrayLike | None = None) -> Plan:
+    """Return what to expect of a core at speeds in rad/s, by default at both ends of its range, from the equations of
+    its method, see `sim.theory.performance`.
 
     A method that has none there has NaN for times and resolution.
     """
-    speed = np.atleast_1d(np.asarray(speed, dtype=np.float64))
+    speed = np.atleast_1d(np.asarray(default_range(spec) if speed is None else speed, dtype=np.float64))
     tick_seconds = float(spec.timing.tick_seconds)
     found = PERFORMANCES.get(spec.method, unknown)(spec, speed)
     return Plan(
@@ -104,17 +106,52 @@ def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.fl
     return np.unique(np.concatenate([steady, near[(near > low) & (near < high)]]))
 
 
-def write_plan(path: Path, plan: Plan, unit: SpeedUnit) -> None:
-    """Write a CSV with a row per speed."""
-    columns = _columns(plan, unit)
-    write_csv(path, tuple(columns), rows_of(list(columns.values())))
+@dataclass(frozen=True)
+class Plans:
+    """Holds plans of a core, and of methods beside each other, over a range of speeds.
 
+    Parameters
+    ----------
+    spec : TachometerSpec
+    methods : mapping of str to TachometerSpec
+    low, high : float, rad/s
+    """
 
-def write_plans(path: Path, plans: Mapping[str, Plan], unit: SpeedUnit) -> None:
-    """Write a CSV with a row per method and speed."""
-    columns = [_columns(plan, unit) | {"product_rad": plan.product} for plan in plans.values()]
-    rows = ((name, *row) for name, one in zip(plans, columns, strict=True) for row in rows_of(list(one.values())))
-    write_csv(path, ("method", *columns[0]), rows)
+    spec: TachometerSpec
+    methods: Mapping[str, TachometerSpec]
+    low: float
+    high: float
+
+    @cached_property
+    def table(self) -> Plan:
+        """The plan of the core at a few speeds."""
+        return plan_at(self.spec, np.geomspace(self.low, self.high, _ROWS))
+
+    @property
+    def tables(self) -> dict[str, Plan]:
+        """Those of the methods at the same speeds."""
+        return {name: plan_at(spec, self.table.speed) for name, spec in self.methods.items()}
+
+    @cached_property
+    def line(self) -> Plan:
+        """The plan of the core at all speeds that a line can show."""
+        return plan_at(self.spec, dense_speeds(self.spec, self.low, self.high))
+
+    @cached_property
+    def lines(self) -> dict[str, Plan]:
+        """Those of the methods at the same speeds."""
+        return {name: plan_at(spec, self.line.speed) for name, spec in self.methods.items()}
+
+    def write(self, path: Path) -> None:
+        """Write a CSV with a row per speed that a line can show; with methods, for each of them."""
+        unit = self.spec.shown_unit
+        if not self.methods:
+            columns = _columns(self.line, unit)
+            write_csv(path, tuple(columns), rows_of(list(columns.values())))
+            return
+        each = {name: _columns(plan, unit) | {"product_rad": plan.product} for name, plan in self.lines.items()}
+        rows = ((name, *row) for name, columns in each.items() for row in rows_of(list(columns.values())))
+        write_csv(path, ("method", *next(iter(each.values()))), rows)
 
 
 def _columns(plan: Plan, unit: SpeedUnit) -> dict[str, NDArray[Any]]:

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from support.command import run
 
-from tachometry.cli.commands import plan
 from tachometry.cli.files import writable_caches
 from tachometry.cli.reports.streams import printable
 from tachometry.cli.reports.terminal import print_rows, print_table
@@ -28,7 +27,7 @@ def test_a_fault_of_the_program_has_a_status_and_a_line_of_its_own(
     def faulty(*_: object) -> None:
         raise KeyError("an\nentry")
 
-    monkeypatch.setattr(plan, "plan_at", faulty)
+    monkeypatch.setattr(study, "plan_at", faulty)
     assert run(*PLAN) == 70
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
@@ -73,7 +72,7 @@ def test_an_import_that_turns_ctrl_c_into_another_error(
         except KeyboardInterrupt:
             raise AttributeError("half imported") from None
 
-    monkeypatch.setattr(plan, "plan_at", interrupted)
+    monkeypatch.setattr(study, "plan_at", interrupted)
     assert run(*PLAN) == 130
     assert capsys.readouterr().err == "tachometry: interrupted\n"
 
@@ -139,7 +138,7 @@ def test_a_home_that_cannot_be_written(
         return real(*words)
 
     real = study.plan_at
-    monkeypatch.setattr(plan, "plan_at", within)
+    monkeypatch.setattr(study, "plan_at", within)
     assert run(*PLAN) == 0
     assert capsys.readouterr().err == ""
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.methods.s import Model
 from tachometry.sim.signals.run import Table
-from tachometry.sim.studies.plan import Plan, default_range, dense_speeds, plan_at, write_plan
+from tachometry.sim.studies.plan import Plan, Plans, default_range, dense_speeds, plan_at
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 50), frac_bits=24)
@@ -151,8 +151,9 @@ def test_dense_speeds_are_not_too_many(high: float) -> None:
 
 
 def test_csv(tmp_path: Path) -> None:
-    expected = plan_at(SPEC, dense_speeds(SPEC, 1.0, 1000.0))
-    write_plan(tmp_path / "p.csv", expected, SPEC.shown_unit)
+    plans = Plans(SPEC, {}, 1.0, 1000.0)
+    expected = plans.line
+    plans.write(tmp_path / "p.csv")
     table = np.genfromtxt(tmp_path / "p.csv", delimiter=",", names=True)
     assert table["speed_rad_s"].tolist() == expected.speed.tolist()
     assert table["interval_ticks"].tolist() == expected.interval.tolist()
