@@ -20,8 +20,8 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     try:
         code = _run(sys.argv[1:] if args is None else args, interrupts)
         sys.stdout.flush()
-    except KeyboardInterrupt:
-        code = _interrupted()
+    except KeyboardInterrupt as interrupt:
+        code = _interrupted(str(interrupt))
     except BrokenPipeError:
         silence(sys.stdout)
         code = UNREAD
@@ -66,12 +66,12 @@ def _run(args: Sequence[str], interrupts: _Interrupts) -> int:
         return _fail(f"error: {error}")
 
 
-def _interrupted() -> int:
+def _interrupted(how_far: str = "") -> int:
     import warnings
 
     # The simulator's, if they had not begun yet.
     warnings.filterwarnings("ignore", message="coroutine .* was never awaited")
-    return _fail("interrupted", INTERRUPTED)
+    return _fail(f"interrupted {how_far}".rstrip(), INTERRUPTED)
 
 
 def _report(error: Exception) -> str:

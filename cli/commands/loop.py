@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -10,21 +9,17 @@ import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.closed_loop import loop_options
-from tachometry.cli.options.motion import FORMS, tables_of
+from tachometry.cli.options.motion import FORMS
 from tachometry.cli.options.option import option, output
 from tachometry.cli.options.points import loops_of
 from tachometry.cli.options.settings import Settings
 from tachometry.cli.options.sweep import VaryingCommand
-from tachometry.cli.reports.closed_loop import print_loop, print_loops, write_log, write_loops
-from tachometry.cli.reports.streams import INTERRUPTED
+from tachometry.cli.reports.closed_loop import log_table, loop_table, print_loops
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.engines import build
-from tachometry.sim.engines.loop import Log
-from tachometry.sim.studies.loops.control import Outcome, each_seed, mean
+from tachometry.sim.signals.files import write_csv
 from tachometry.sim.studies.sweeping.grid import Loops
-from tachometry.sim.studies.sweeping.loops import LoopPoint, row_of
-from tachometry.sim.studies.sweeping.sweep import Row
-from tachometry.spec.language.units import plural
+from tachometry.sim.studies.sweeping.run import LoopResult, run_loops
 
 
 @click.command(
@@ -112,83 +107,38 @@ def loop(
         raise ValueError("--jobs must not be given together with --scheduler")
     if jobs is not None and jobs < 1:
         raise ValueError(f"--jobs must be at least 1, not {jobs}")
-    found = loops_of(settings, methods, seeds)
-    alone = len(found.points) == 1 and scheduler is None
+    grid = loops_of(settings, methods, seeds)
+    alone = len(grid.points) == 1 and scheduler is None
     if log is not None and not alone:
         raise ValueError("--log must be of one loop on this machine, without --vary, several --methods or --scheduler")
-    across = None if alone or plot is None else _across(found)
+    across = "" if alone or plot is None else _across(grid)
     files = {"--plot": plot, "--log": log, "--csv": csv}
-    motions = settings.vary.get("motion") or [settings.fixed.get("motion")]
-    inputs = [table for motion in motions if motion is not None for table in tables_of(motion)]
     build.compiler()  # without one nothing is begun
-    with Outputs({name: path for name, path in files.items() if path is not None}, inputs=inputs) as outputs:
-        begun = time.monotonic()
-        if alone:
-            ((digest, point),) = found.points.items()
-            shown, outcomes = _alone(point, jobs)
-            if (path := outputs.get("--log")) is not None:
-                write_log(path, shown)
-            rows = {digest: _mean(outcomes)}
-        else:
-            shown, outcomes = {}, []
-            rows = _sweep(found, scheduler, jobs)
+    with Outputs({name: path for name, path in files.items() if path is not None}, inputs=settings.tables) as outputs:
+        result = run_loops(grid, scheduler, jobs, progress_bar)
+        if (path := outputs.get("--log")) is not None:
+            write_csv(path, *log_table(result.log))
         if (path := outputs.get("--csv")) is not None:
-            write_loops(path, found, rows)
+            write_csv(path, *loop_table(result))
         if (path := outputs.get("--plot")) is not None:
-            from tachometry.sim.plots.loop import save_log, save_loops
-
-            if across is None:
-                save_log(path, next(iter(found.points.values())).setting, shown)
-            else:
-                names = {digest: point.method for digest, point in found.points.items()}
-                save_loops(path, [(names[digest], found.at[digest], row) for digest, row in rows.items()], across)
-        if alone:
-            print_loop(point, outcomes)
-        else:
-            print_loops(found, rows, time.monotonic() - begun)
+            _plot(path, result, across)
+    print_loops(result)
     return 0
 
 
-def _alone(point: LoopPoint, jobs: int | None) -> tuple[Log, list[Outcome]]:
-    """Return the log with the first seed, and what came of all."""
-    first: Log = {}
-    outcomes = []
-    with progress_bar("running", len(point.seeds), "seeds") as report:
-        for found in each_seed(point.setting, point.seeds, jobs):
-            first = first or found
-            outcomes.append(point.setting.outcome(found))
-            report(len(outcomes))
-    return first, outcomes
+def _plot(path: Path, result: LoopResult, across: str) -> None:
+    from tachometry.sim.plots.loop import save_log, save_loops  # Matplotlib is slow to import
+
+    points, at = result.grid.points, result.grid.at
+    if across:
+        save_loops(path, [(points[digest].method, at[digest], row) for digest, row in result.rows.items()], across)
+    else:
+        save_log(path, next(iter(points.values())).setting, result.log)
 
 
-def _mean(outcomes: list[Outcome]) -> Row:
-
-    return row_of(mean(outcomes))
-
-
-def _sweep(found: Loops, scheduler: str | None, jobs: int | None) -> dict[str, Row]:
-    """Return rows of all points, in their order."""
-    from tachometry.sim.studies.sweeping import cluster
-
-    cluster.require()
-    rows: dict[str, Row] = {}
-    try:
-        with (
-            cluster.cluster(scheduler, jobs) as client,
-            progress_bar("running", len(found.points), "loops", rate=True) as report,
-        ):
-            for row in cluster.rows(client, found.points, "sweeping.loops"):
-                rows[row["point"]] = row
-                report(len(rows))
-    except KeyboardInterrupt:
-        click.echo(f"tachometry: interrupted after {len(rows)} of {plural(len(found.points), 'loop')}", err=True)
-        raise click.exceptions.Exit(INTERRUPTED) from None
-    return {digest: rows[digest] for digest in found.points}
-
-
-def _across(found: Loops) -> str:
+def _across(grid: Loops) -> str:
     """Return the axis over which loops are drawn."""
-    varied = [name for name, values in found.axes.items() if len(values) > 1]
-    if not varied:
+    axes = [name for name, values in grid.axes.items() if len(values) > 1]
+    if not axes:
         raise ValueError("--vary must be given together with --plot of several loops, with two values or more")
-    return varied[0]
+    return axes[0]

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.motion import FORMS, tables_of
+from tachometry.cli.options.motion import FORMS
 from tachometry.cli.options.option import FilePath, option, output
 from tachometry.cli.options.points import points_of
 from tachometry.cli.options.settings import Settings
 from tachometry.cli.options.sweep import VaryingCommand, point_options
-from tachometry.cli.reports.streams import INTERRUPTED
-from tachometry.cli.reports.sweep import print_sweep
+from tachometry.cli.reports.sweep import COLUMNS, print_sweep
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.studies.sweeping.grid import Points
-from tachometry.spec.language.units import parse_time, plural
-
-if TYPE_CHECKING:  # numpy, pyarrow and Dask are slow to import, and --help needs none of them
-    from tachometry.sim.studies.sweeping.results import Results
+from tachometry.sim.studies.sweeping.run import SweepResult, run_sweep
+from tachometry.spec.language.units import parse_time
 
 # What a heat map can show: the column, what it is, and whether colours go by its logarithm. Columns of speeds are in
 # rad/s, and are shown in the unit of the cores.
@@ -140,9 +136,6 @@ def sweep(
     Ctrl-C ends the sweep; what is done is in --results, and the same command goes on from there. Exit status 1 if
     hardware and golden model differ. Needs the extra `sweep`.
     """
-    from tachometry.sim.studies.sweeping import cluster
-
-    cluster.require()
     earliest = 0.0 if start is None else float(parse_time("start", start))
     if earliest < 0:
         raise ValueError(f"--from must be at least 0, not {start}")
@@ -152,74 +145,34 @@ def sweep(
         raise ValueError("--axes must be given together with --plot")
     if jobs is not None and jobs < 1:
         raise ValueError(f"--jobs must be at least 1, not {jobs}")
-
-    from tachometry.sim.studies.sweeping.results import Results
-
-    if engine == "auto":
-        engine = pick(engine).name
-    found = points_of(settings, methods, earliest, engine)
-    shown = {} if plot is None else _axes(axes, found)
-    inputs = [*([] if file is None else [file]), *_tables(settings)]
+    grid = points_of(settings, methods, earliest, pick(engine).name if engine == "auto" else engine)
+    across = {} if plot is None else _axes(axes, grid)
     every = {"--results": results, "--plot": plot}
+    inputs = [*([] if file is None else [file]), *settings.tables]
     Outputs({what: path for what, path in every.items() if path is not None}, inputs=inputs)
-    outputs = Outputs({} if plot is None else {"--plot": plot})
-    with outputs, Results(results, list(found.points), found.values) as kept:
-        begun = time.monotonic()
-        missing = kept.missing
-        _run(kept, found, missing, scheduler, jobs, results)
+    columns = (*COLUMNS, "point", METRICS[metric][0])
+    with Outputs({} if plot is None else {"--plot": plot}) as outputs:
+        result = run_sweep(grid, columns, results, scheduler, jobs, progress_bar)
         if (path := outputs.get("--plot")) is not None:
-            from tachometry.sim.plots.sweep import save_heat_maps
-
-            column, what, log = METRICS[metric]
-            columns = kept.columns("point", "method", column)
-            at = [found.at[point] for point in columns["point"]]
-            values = columns[column]
-            if "{unit}" in what:
-                what = what.format(unit=found.unit.name)
-                values = [None if value is None else found.unit.of(value) for value in values]
-            save_heat_maps(path, columns["method"], at, values, shown, what, log)
-        n_wrong = print_sweep(kept, found, len(missing), time.monotonic() - begun, results)
-    return 1 if n_wrong else 0
+            _plot(path, result, across, metric)
+    return 1 if print_sweep(result, results) else 0
 
 
-def _run(
-    kept: Results,
-    found: Points,
-    missing: list[str],
-    scheduler: str | None,
-    jobs: int | None,
-    results: Path | None,
-) -> None:
-    """Run the points that are missing; Ctrl-C ends it early."""
-    from tachometry.sim.studies.sweeping import cluster
+def _plot(path: Path, result: SweepResult, across: dict[str, list[str]], metric: str) -> None:
+    from tachometry.sim.plots.sweep import save_heat_maps  # Matplotlib is slow to import
 
-    if not missing:
-        return
-    n_done = len(found.points) - len(missing)
-    try:
-        with (
-            cluster.cluster(scheduler, jobs) as client,
-            progress_bar("sweeping", len(missing), "points", rate=True) as report,
-        ):
-            arriving = cluster.rows(client, {point: found.points[point] for point in missing})
-            for done, row in enumerate(arriving, 1):
-                kept.add(row)
-                n_done += 1
-                report(done)
-    except KeyboardInterrupt:
-        where = f", kept in {results}" if results is not None and n_done else ""
-        click.echo(f"tachometry: interrupted after {n_done} of {plural(len(found.points), 'point')}{where}", err=True)
-        raise click.exceptions.Exit(INTERRUPTED) from None
+    column, what, log = METRICS[metric]
+    values, unit = result.columns[column], result.grid.unit
+    if "{unit}" in what:
+        what = what.format(unit=unit.name)
+        values = [None if value is None else unit.of(value) for value in values]
+    at = [result.grid.at[point] for point in result.columns["point"]]
+    save_heat_maps(path, result.columns["method"], at, values, across, what, log)
 
 
-def _tables(settings: Settings) -> list[Path]:
-    motions = settings.vary.get("motion") or [settings.fixed.get("motion")]
-    return [table for motion in motions if motion is not None for table in tables_of(motion)]
-
-
-def _axes(text: str | None, found: Points) -> dict[str, list[str]]:
+def _axes(text: str | None, grid: Points) -> dict[str, list[str]]:
     """Return axes of the heat map with their values: across, and upwards if there are two."""
-    varied = {name: values for name, values in found.axes.items() if len(values) > 1}
+    varied = {name: values for name, values in grid.axes.items() if len(values) > 1}
     if not varied:
         raise ValueError("--vary must be given together with --plot, with two values or more")
     if text is None:

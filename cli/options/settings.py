@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from tachometry.cli.options.motion import tables_of
 from tachometry.spec.language.option import ParameterError, parse_flag
 from tachometry.spec.language.units import QUANTITY, ratio
 
@@ -45,6 +46,12 @@ class Settings:
     def first(self) -> dict[str, Text]:
         """Return all options, with the first value of every axis."""
         return self.fixed | {name: values[0] for name, values in self.vary.items()}
+
+    @property
+    def tables(self) -> list[Path]:
+        """The files that the motions read."""
+        motions = self.vary.get("motion") or [self.fixed.get("motion")]
+        return [table for motion in motions if motion is not None for table in tables_of(motion)]
 
 
 def of_command_line(raw: Mapping[str, Any], options: Mapping[str, click.Option]) -> Settings:

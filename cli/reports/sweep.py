@@ -1,30 +1,41 @@
 """`tachometry sweep` prints this at its end."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING
 
 from rich.text import Text
 
 from tachometry.cli.reports.terminal import print_table, stdout_console
-from tachometry.sim.studies.sweeping.grid import Points
+from tachometry.sim.studies.sweeping.run import SweepResult
 from tachometry.spec.language.units import format_time, plural
 
-if TYPE_CHECKING:
-    from tachometry.sim.studies.sweeping.results import Results
+COLUMNS = (
+    "method",
+    "relative_error",
+    "rms_error_rad_s",
+    "delay_s",
+    "mean_time_s",
+    "worst_time_s",
+    "updates_per_s",
+    "mismatches",
+    "clocks",
+)
 
 
-def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, results: Path | None) -> int:
-    """Print a row per method, of all its points, and what was run; values in which the hardware was wrong."""
-    columns = kept.columns(
-        *("method", "relative_error", "rms_error_rad_s", "delay_s", "mean_time_s", "worst_time_s", "updates_per_s"),
-        *("mismatches", "clocks"),
-    )
+def print_sweep(result: SweepResult, results: Path | None) -> int:
+    """Print a row per method, of all its points, and what was run; values in which the hardware was wrong.
+
+    Parameters
+    ----------
+    result : SweepResult
+        With these `COLUMNS`.
+    results : Path or None
+        The file that has all rows.
+    """
+    grid, columns, n_run, seconds = result.grid, result.columns, result.n_run, result.seconds
     checked = [wrong for wrong in columns["mismatches"] if wrong is not None]
-    unit = found.unit
+    unit = grid.unit
     errors = ("error/V", "worst", f"RMS ({unit.name})", "worst")
     heads = ("method", "points", *errors, "delay", "T_m", "worst", "updates/s", *(["differ"] if checked else []))
     table = []
@@ -46,9 +57,9 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
     print_table(heads, table)
     console = stdout_console()
     console.print("\nMedians of all points, and the worst. error/V: RMS error over RMS of the true speed.")
-    for name, reason in found.left_out.items():
+    for name, reason in grid.left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
-    n_points = plural(len(found.points), "point")
+    n_points = plural(len(grid.points), "point")
     rate = f", {n_run} of them run in {_time(seconds)}, {n_run / seconds:.3g} a second" if n_run else ", none run anew"
     where = "" if results is None else f"; rows in {results}"
     console.print(Text(f"{n_points}{rate}{where}"), soft_wrap=True)
@@ -60,8 +71,8 @@ def print_sweep(kept: Results, found: Points, n_run: int, seconds: float, result
 def _verdict(n_wrong: int, n_points: int, n_clocks: int) -> Text:
     if n_wrong:
         return Text(f"FAIL: hardware and golden model differ in {plural(n_wrong, 'value')}", style="bold red")
-    told = f"PASS: hardware and golden model agree in every bit of {plural(n_points, 'point')}, {n_clocks} clocks"
-    return Text(told, style="bold green")
+    verdict = f"PASS: hardware and golden model agree in every bit of {plural(n_points, 'point')}, {n_clocks} clocks"
+    return Text(verdict, style="bold green")
 
 
 def _median(values: list[float], default: None = None) -> float | None:
