@@ -1,6 +1,8 @@
 """Disturbance observer and controller: one multiplier, and a product after the other."""
 
 from collections.abc import Mapping
+from functools import reduce
+from operator import or_
 
 from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
@@ -9,7 +11,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
-from tachometry.spec.control.form import GAINS, GUARD_BITS, TABLED, ControlForm, Term
+from tachometry.spec.control.form import GAINS, GUARD_BITS, ControlForm, Term
 from tachometry.spec.control.ports import GAIN_PORTS
 from tachometry.spec.language.units import signed_width
 
@@ -160,30 +162,25 @@ class Controller(wiring.Component):
 
     def _sequence(self, m: Module, steps: "_Steps") -> None:
         """Go from step to step, and from term to term."""
-        last = steps.term == Term.DISTURBANCE
+        last = max(Term)
         m.d.sync += [
             steps.subtract.eq(steps.load),
-            steps.again.eq(steps.stored & (steps.term != Term.DISTURBANCE)),
-            steps.finish.eq(steps.stored & last),
+            steps.again.eq(steps.stored & (steps.term != last)),
+            steps.finish.eq(steps.stored & (steps.term == last)),
             steps.limit.eq(steps.finish),
             self.valid.eq(steps.limit),
         ]
 
     def _load(self, m: Module, taken: "_Taken", steps: "_Steps") -> None:
         """Load the word of a term, and a clock later take from it what is to be taken."""
-        less_filter = Signal()
-        less_velocity = Signal()
-        less = Mux(less_filter, self.y << self._shift(Term.FILTER), 0)
-        less |= Mux(less_velocity, self.y << self._shift(Term.VELOCITY), 0)
-        m.d.sync += [
-            less_filter.eq(steps.term == Term.FILTER),
-            less_velocity.eq(steps.term == Term.VELOCITY),
-        ]
+        less = {term: Signal(name=f"less_{term.name.lower()}") for term in Term if term.less_y}
+        m.d.sync += [chosen.eq(steps.term == term) for term, chosen in less.items()]
+        y = reduce(or_, (Mux(chosen, self.y << self._shift(term), 0) for term, chosen in less.items()))
         loaded = self._word(m, steps.term, taken)
         with m.If(steps.load):
             m.d.sync += steps.word.eq(loaded)
         with m.Elif(steps.subtract):
-            m.d.sync += steps.word.eq(steps.word - less)
+            m.d.sync += steps.word.eq(steps.word - y)
 
     def _take(self, m: Module, taken: "_Taken") -> None:
         """Take the inputs with a tick; the position error wraps as positions do."""
@@ -206,10 +203,7 @@ class Controller(wiring.Component):
         short = Signal.like(held, reset_less=True)
         beyond = Signal(reset_less=True)
         m.d.sync += [short.eq(held), beyond.eq(outside)]
-        if form.gain_bits:
-            limited, changed = self._limited(m, short)
-        else:
-            limited, changed = saturate(m, short, form.current_limit)
+        limited, changed = self._limited(m, short) if form.gain_bits else saturate(m, short, form.current_limit)
         m.d.comb += self.clear.eq(steps.stored & (steps.term == Term.CURRENT) & taken.due)
         with m.If(steps.limit):
             m.d.sync += [
@@ -236,7 +230,7 @@ class Controller(wiring.Component):
             values |= {one: getattr(self, GAIN_PORTS[one]) << form.gain_shift for one in GAINS}
         if form.longest > 1:
             tabled = self._tabled(m, term, load)
-            values |= dict.fromkeys(set(TABLED) & values.keys(), tabled)
+            values |= dict.fromkeys((one for one in form.terms if one.tabled), tabled)
         factor = Signal(form.factor_bits)
         _choose(m, term, values, factor)
         return factor
@@ -244,10 +238,8 @@ class Controller(wiring.Component):
     def _tabled(self, m: Module, term: Signal, load: Value) -> Value:
         """Return a coefficient that depends on n: equal tables are one."""
         form = self._form
-        places: dict[tuple[int, ...], int] = {}
-        of_term = {one: form.terms[one].values for one in TABLED if one in form.terms}
-        for values in of_term.values():
-            places.setdefault(values, len(places))
+        of_term = {one: form.terms[one].values for one in Term if one.tabled and one in form.terms}
+        places = {values: place for place, values in enumerate(dict.fromkeys(of_term.values()))}
         # An entry for n = 0, which there is not, makes the address n itself.
         init = [entry for values in places for entry in (0, *values)]
         m.submodules.table = table = Memory(shape=form.factor_bits, depth=len(init), init=init)
@@ -264,36 +256,35 @@ class Controller(wiring.Component):
         error = Signal.like(held, reset_less=True)
         m.d.sync += error.eq(held)
         fine = form.extra_bits
-        words: dict[Term, Value] = {
-            Term.FILTER: self.held << fine,
-            Term.OBSERVER: self.w,
-            Term.CURRENT: self.current_sum,
-            Term.POSITION: error,
-            Term.VELOCITY: taken.velocity << (fine - form.command_bits),
-            Term.ACCELERATION: taken.acceleration,
-            Term.DISTURBANCE: self.w,
+        words = {
+            "held": self.held << fine,
+            "w": self.w,
+            "current_sum": self.current_sum,
+            "error": error,
+            "velocity": taken.velocity << (fine - form.command_bits),
+            "acceleration": taken.acceleration,
         }
         word = Signal(signed(form.word_width), name="loaded")
-        _choose(m, term, {one: value << self._shift(one) for one, value in words.items()}, word)
+        _choose(m, term, {one: words[one.word] << self._shift(one) for one in Term}, word)
         return word
 
     def _shift(self, term: Term) -> int:
-        found = self._form.terms.get(term)
-        return 0 if found is None else found.shift
+        return self._form.terms[term].shift if term in self._form.terms else 0
 
     def _store(self, m: Module, steps: "_Steps", step: Value, taken: "_Taken") -> None:
         """Add a product to what it belongs to."""
         term, stored, due, total = steps.term, steps.stored, taken.due, taken.total
+        (into_y,), into_w, (plus_w,) = Term.into("y"), Term.into("w", "-w"), Term.into("w")
         # Where it goes is in registers: the term has been the same for some clocks.
         to_y = Signal()
         to_w = Signal()
         minus = Signal()
         first = Signal()
         m.d.sync += [
-            to_y.eq(term == Term.FILTER),
-            to_w.eq(term <= Term.CURRENT),
-            minus.eq(term != Term.CURRENT),
-            first.eq(term == Term.POSITION),
+            to_y.eq(term == into_y),
+            to_w.eq(term <= max(into_w)),
+            minus.eq(term != plus_w),
+            first.eq(term == min(Term.into("total"))),
         ]
         with m.If(stored & due & to_y):
             m.d.sync += self.y.eq(self.y + step)

@@ -36,21 +36,16 @@ def ratios_of(spec: LoopSpec) -> dict[Term, list[Fraction]]:
     found = {
         Term.OBSERVER: observed,
         Term.CURRENT: [one * per_current / n for n, one in enumerate(observed, 1)],
-        **{term: [gain * _of_one(spec, term)] for term, gain in _gains(spec).items()},
+        **{term: [_gain(spec, term) * _of_one(spec, term)] for term in GAINS},
     }
     if spec.filter is not None:
         found[Term.FILTER] = form.ratios(spec.filter, spec.seconds, spec.longest)
     return found
 
 
-def _gains(spec: LoopSpec) -> dict[Term, Fraction]:
-    """Return k_p and k_v, and how much of the acceleration and of the disturbance becomes current: all."""
-    return {
-        Term.POSITION: spec.position_gain,
-        Term.VELOCITY: spec.velocity_gain,
-        Term.ACCELERATION: Fraction(1),
-        Term.DISTURBANCE: Fraction(1),
-    }
+def _gain(spec: LoopSpec, term: Term) -> Fraction:
+    """Return k_p, k_v, or how much of the acceleration and of the disturbance becomes current: all."""
+    return {Term.POSITION: spec.position_gain, Term.VELOCITY: spec.velocity_gain}.get(term, Fraction(1))
 
 
 def _of_one(spec: LoopSpec, term: Term) -> Fraction:
@@ -91,11 +86,8 @@ def control_form(spec: LoopSpec) -> ControlForm:
 
 
 def _usual(spec: LoopSpec, term: Term) -> Fraction:
-    """Return the ratio for which the range of a gain is made: that of its option, or of k_p = (k_v/2)² where that is
-    0.
-    """
-    gain = _gains(spec)[term] or spec.velocity_gain**2 / 4
-    return gain * _of_one(spec, term)
+    """Return the ratio for which the range of a gain is made: that of its option, or of k_p = (k_v/2)² for k_p = 0."""
+    return (_gain(spec, term) or spec.velocity_gain**2 / 4) * _of_one(spec, term)
 
 
 def gain_per_lsb(spec: LoopSpec, term: Term) -> Fraction:

@@ -40,6 +40,7 @@ from decimal import Decimal, localcontext
 from enum import IntEnum
 from fractions import Fraction
 from functools import cached_property
+from typing import Self
 
 from tachometry.spec.language.units import ceil_log2, signed_width
 
@@ -52,20 +53,36 @@ GAIN_HEADROOM = 4  # such a gain can be 2^this times that of the option, or more
 
 
 class Term(IntEnum):
-    """The products, in the order in which they are formed."""
+    """Lists the products in the order in which they are formed, as the program of the controller.
 
-    FILTER = 0  # c_v·(u − y)
-    OBSERVER = 1  # c_d·w
-    CURRENT = 2  # c_d·K_a/n·ΣI
-    POSITION = 3
-    VELOCITY = 4
-    ACCELERATION = 5
-    DISTURBANCE = 6
+    A row has the word that is multiplied, as it is or less y; whether its coefficient is of a table, by n, or a gain,
+    which can be an input; and the sums that the product is added to or taken from.
+    """
+
+    FILTER = "held - y", "table", "y -w"  # c_v·(u − y)
+    OBSERVER = "w", "table", "-w"  # c_d·w
+    CURRENT = "current_sum", "table", "w"  # c_d·K_a/n·ΣI
+    POSITION = "error", "gain", "total"
+    VELOCITY = "velocity - y", "gain", "total"
+    ACCELERATION = "acceleration", "gain", "total"
+    DISTURBANCE = "w", "gain", "total"
+
+    def __new__(cls, *row: str) -> Self:
+        term = int.__new__(cls, len(cls.__members__))
+        term._value_ = int(term)
+        return term
+
+    def __init__(self, word: str, coefficient: str, sums: str) -> None:
+        self.word, self.less_y = word.removesuffix(" - y"), word.endswith(" - y")
+        self.tabled, self.sums = coefficient == "table", sums.split()
+
+    @classmethod
+    def into(cls, *sums: str) -> list[Self]:
+        """Return the products that go into one of these sums, with this sign."""
+        return [term for term in cls if {*sums} & {*term.sums}]
 
 
-# Products whose coefficient depends on n, and those whose coefficient can be an input.
-TABLED = (Term.FILTER, Term.OBSERVER, Term.CURRENT)
-GAINS = (Term.POSITION, Term.VELOCITY, Term.ACCELERATION, Term.DISTURBANCE)
+GAINS = tuple(term for term in Term if not term.tabled)
 
 
 def decay(exponent: Fraction) -> Fraction:
@@ -190,6 +207,18 @@ class ControlForm:
         """Greatest magnitude of the commanded velocity, in units of y."""
         return 1 << (self.velocity_width - 1 + self.extra_bits)
 
+    @cached_property
+    def _most_words(self) -> dict[Term, int]:
+        """Greatest magnitude of what is multiplied, but of the position error, which is held for all others."""
+        words = {
+            "held": self.most_y,
+            "w": self.most_w,
+            "current_sum": self.most_sum,
+            "velocity": self.most_command,
+            "acceleration": 1 << (self.acceleration_width - 1),
+        }
+        return {term: words[term.word] + term.less_y * self.most_y for term in Term if term.word in words}
+
     def _most(self, term: Term, word: int) -> int:
         """Return the product of a word with the greatest coefficient that a term can have."""
         if not self.gain_bits:
@@ -215,20 +244,14 @@ class ControlForm:
     def _most_error_of_gains(self) -> int:
         """2^GAIN_HEADROOM times that of the options; where there is no gain of the position, of the usual one."""
         usual = 1 << max(self.factor_bits - GAIN_HEADROOM - 1, 0)
-        fixed = {term: self.terms[term] for term in self.terms}
-        gain = min(fixed[Term.POSITION].values[0] or usual, usual)
-        fixed[Term.POSITION] = replace(fixed[Term.POSITION], values=(gain,))
+        position = self.terms[Term.POSITION]
+        fixed = self.terms | {Term.POSITION: replace(position, values=(min(position.values[0] or usual, usual),))}
         return (replace(self, terms=fixed, gain_bits=0).most_error + 1 << GAIN_HEADROOM) - 1
 
     @cached_property
     def _most_others(self) -> int:
         """Greatest magnitude of the sum without the position."""
-        words = {
-            Term.VELOCITY: self.most_command + self.most_y,
-            Term.ACCELERATION: 1 << (self.acceleration_width - 1),
-            Term.DISTURBANCE: self.most_w,
-        }
-        return sum(self._most(term, word) + 1 for term, word in words.items())
+        return sum(self._most(term, self._most_words[term]) + 1 for term in GAINS if term != Term.POSITION)
 
     @cached_property
     def most_total(self) -> int:
@@ -238,15 +261,7 @@ class ControlForm:
     @cached_property
     def word_width(self) -> int:
         """Bits of a word that is multiplied, shifted."""
-        most = {
-            Term.FILTER: 2 * self.most_y,
-            Term.OBSERVER: self.most_w,
-            Term.CURRENT: self.most_sum,
-            Term.POSITION: self.most_error + 1,
-            Term.VELOCITY: self.most_command + self.most_y,
-            Term.ACCELERATION: 1 << (self.acceleration_width - 1),
-            Term.DISTURBANCE: self.most_w,
-        }
+        most = self._most_words | {Term.POSITION: self.most_error + 1}
         return max(signed_width(most[term] << one.shift) for term, one in self.terms.items())
 
     @property
