@@ -142,11 +142,11 @@ def variants(
     found.append(
         Configuration(f"{name}-max-speed", f"{what}, 1000 rad/s", fast, bars, is_option=False, without_max_speed=name)
     )
-    if not spec.own_ticks:
+    if not spec.facts.own_ticks:
         inside = (found[0].name, what, spec), (found[1].name, found[1].what, fast)
         for inner, about, each in inside:
             without = f"{name}-external-tick" if each.max_speed else ""
-            made = replace(each, max_tick_cycles=MAX_TICK)
+            made = replace(each, external_tick=True, max_tick_cycles=MAX_TICK)
             found.append(
                 Configuration(
                     f"{inner}-external-tick",
@@ -192,14 +192,14 @@ CONFIGURATIONS = (
     Configuration(
         "external-tick",
         "external tick, up to 40 us",
-        replace(REFERENCE, max_tick_cycles=MAX_TICK),
+        replace(REFERENCE, external_tick=True, max_tick_cycles=MAX_TICK),
         FAST,
         without_max_speed="default-external-tick",
     ),
     Configuration(
         "default-external-tick",
         "external tick, no max_speed",
-        replace(REFERENCE, max_speed=None, max_tick_cycles=MAX_TICK),
+        replace(REFERENCE, max_speed=None, external_tick=True, max_tick_cycles=MAX_TICK),
         FAST,
     ),
     Configuration("rad-per-s", "velocity in 2^-10 rad/s", replace(REFERENCE, unit="rad/s", frac_bits=10)),
@@ -276,14 +276,14 @@ CONFIGURATIONS = (
     Configuration(
         "track-external-tick",
         "tracking, external tick",
-        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16, max_tick_cycles=MAX_TICK),
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16, external_tick=True, max_tick_cycles=MAX_TICK),
         is_option=False,
         without_max_speed="track-wide-external-tick",
     ),
     Configuration(
         "track-wide-external-tick",
         "tracking, no max_speed, external tick",
-        TrackTachometer(**COMMON, max_tick_cycles=MAX_TICK),
+        TrackTachometer(**COMMON, external_tick=True, max_tick_cycles=MAX_TICK),
         is_option=False,
     ),
     Configuration("track-wide", "tracking, no max_speed", TrackTachometer(**COMMON), is_option=False),

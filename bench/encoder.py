@@ -77,7 +77,7 @@ EXAMPLES = (
 
 def turn(counts_per_tick: float, encoder: VirtualEncoder, spec: STachometer) -> tuple[Encoding, Run]:
     """Return an encoder at constant speed on a core's golden model."""
-    speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.seconds(spec.timing.tick_cycles)))
+    speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.times.seconds(spec.timing.tick_cycles)))
     encoding = encoder.record(parse_motion(f"constant:{speed!r}rev/s:{DURATION_S}s"))
     return encoding, golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
 
@@ -99,7 +99,7 @@ def measure(example: Example) -> list[str]:
     encoder = VirtualEncoder(ppr, start_angle_rad=math.pi / (4 * ppr), seed=SEED, **example.measured)
     fast, slow = (turn(counts, encoder, spec) for counts in (FAST, SLOW))
     encoding, run = fast
-    sampled = (run.ticks.clock[-1] - spec.tick_latency - spec.pin_to_count) / spec.timing.clock_hz
+    sampled = (run.ticks.clock[-1] - spec.latency.tick - spec.latency.pin_to_count) / spec.timing.clock_hz
     true = int(encoding.true_position(sampled, example.decoding))
     return [
         f"`{example.option}`" if example.measured else example.option,

@@ -308,9 +308,9 @@ def registers() -> str:
 
 def _cores(method: str) -> list[TachometerSpec]:
     """Return cores that have among them every port of a method."""
-    everything = EVERYTHING if METHODS[method].has_bounds else EVERYTHING | {"bounds": None}
+    everything = EVERYTHING if METHODS[method].facts.bounds else EVERYTHING | {"bounds": None}
     cores = [of_texts(method, everything)]
-    if not METHODS[method].own_ticks:
+    if not METHODS[method].facts.own_ticks:
         cores.append(of_texts(method, everything | EXTERNAL))
     if method == "rairan":
         timing = Timing(1_000_000, 100, 50)

@@ -1,14 +1,14 @@
 """Frozen objects say what is to be built: hardware, golden models, manifest and documents all read them."""
 
+import json
 from collections.abc import Mapping
-from itertools import chain, combinations
-from typing import Any
+from pathlib import Path
 
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.core.encoder import Encoder
-from tachometry.spec.core.parameters import TWO_TICKS
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.timing import Timing
-from tachometry.spec.language.option import Option, ParameterError, is_derived, options_of, read_options
+from tachometry.spec.language.option import Option, ParameterError, options_of, parse_flag, parse_whole, read_options
 from tachometry.spec.language.port import Port
 from tachometry.spec.language.units import Speed
 from tachometry.spec.methods.axes import AxesSpec, CoreSpec
@@ -74,53 +74,60 @@ def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
             others = " and ".join(methods_with(name))
             why = f"it is for {others}" if others else "there is no such option"
             raise ParameterError(parameter, f"must not be given with method {method}: {why}")
-        if (fits := known[name].fits) is not None and not fits(spec):
+        if not known[name].fits_in(spec):
             other = next(about.name for about in known.values() if about.field == known[name].field)
             instead = "" if other == name else f", but {other}"
             raise ParameterError(parameter, f"must not be given with method {method}{instead}")
     encoder, timing = Encoder(**read_options(Encoder, given)), Timing(**read_options(Timing, given))
-    return spec(encoder=encoder, timing=timing, **read_options(spec, given))
+    return spec(encoder=encoder, timing=timing, **read_options(spec, given, vars(timing)))
 
 
-def of_parameters(parameters: Mapping[str, Any]) -> TachometerSpec:
-    """Return the core whose `parameters` a manifest has.
+def of_options(options: Mapping[str, str]) -> AnySpec:
+    """Return the core that `options` describe, of one axis, of many or with a loop: those of a core or of a manifest.
 
     Raises
     ------
     ParameterError
-        If they are not those of a core, or not of this version.
+        If they are not those of a core.
     """
-    spec = spec_class(parameters.get("method", ""))
-    expected = {about.field for part in (Encoder, Timing, spec) for about in options_of(part)}
-    for name in sorted(expected ^ (parameters.keys() - {"method"})):
-        what = "is missing" if name in expected else "is none of them"
-        raise ParameterError("parameters", f"must be those that this version of tachometry writes: {name} {what}")
+    texts = dict(options)
+    axes, parallel, loop = (texts.pop(name, "") for name in ("axes", "parallel", "loop"))
+    of_loop = {about.name: texts.pop(about.name) for about in options_of(LoopSpec) if about.name in texts}
+    spec = of_texts(texts.pop("method", ""), texts)
+    if axes:
+        if not isinstance(spec, STachometer):
+            raise ParameterError("method", f"must be s together with axes, not {spec.method}")
+        number = parse_whole("axes", axes)
+        return AxesSpec(tachometer=spec, axes=number, parallel=parse_flag("parallel", parallel or "no"))
+    if loop:
+        return LoopSpec(tachometer=spec, **read_options(LoopSpec, of_loop, vars(spec.timing)))
+    return spec
 
-    def values(part: type[Any]) -> dict[str, Any]:
-        return {about.field: about.of_canonical(parameters[about.field]) for about in options_of(part)}
 
-    encoder, timing, own = Encoder(**values(Encoder)), Timing(**values(Timing)), values(spec)
-    # What follows from the rest may be what must not be given, such as a width of 5 bits.
-    optional = [about.field for about in options_of(spec) if about.default is None or is_derived(about.default)]
-    refused: ParameterError | None = None
-    for omitted in chain.from_iterable(combinations(optional, number) for number in range(len(optional) + 1)):
-        given = {name: value for name, value in own.items() if name not in omitted}
-        try:
-            found = spec(encoder=encoder, timing=timing, **given)
-        except ParameterError as error:
-            refused = refused or error
-            continue
-        if found.parameters == parameters:
-            return found
-    raise refused or ParameterError("parameters", "must be those of a core that this version of tachometry makes")
+def of_manifest(path: Path) -> AnySpec:
+    """Return the core of a manifest, the file NAME.json that lies beside its Verilog.
+
+    Raises
+    ------
+    ValueError
+        If the file is no manifest.
+    ParameterError
+        If this version of tachometry makes no such core.
+    """
+    try:
+        options = json.loads(path.read_bytes())["options"]
+        texts = {str(name): str(text) for name, text in options.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ValueError(f"{path} must be a manifest that tachometry writes, with options") from error
+    return of_options(texts)
 
 
 __all__ = [
     "METHODS",
-    "TWO_TICKS",
     "AxesSpec",
     "CoreSpec",
     "Encoder",
+    "LoopSpec",
     "MTTachometer",
     "MTachometer",
     "Option",
@@ -135,7 +142,8 @@ __all__ = [
     "TrackTachometer",
     "common_options",
     "methods_with",
-    "of_parameters",
+    "of_manifest",
+    "of_options",
     "of_texts",
     "own_options",
     "spec_class",

@@ -14,7 +14,7 @@ ALLOWED = {
     "spec/formats": {"spec/language"},
     "spec/core": {"spec/formats", "spec/language"},
     "spec/methods": {"spec/core", "spec/formats", "spec/language"},
-    "spec": {"spec/core", "spec/language", "spec/methods"},
+    "spec": {"spec/control", "spec/core", "spec/language", "spec/methods"},
     "spec/control": {"spec/core", "spec/language", "spec/methods"},
     "spec/registers": {"spec/control", "spec/core", "spec/language", "spec/methods"},
     "hdl": {"hdl/core"},

@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -35,7 +35,7 @@ class XTachometer(MTachometer):
     doubled: bool = option(False, "Everything is measured twice, which changes nothing.")
 
     method = "x"
-    summary = "does what m does"
+    facts = replace(MTachometer.facts, title="X", summary="does what m does")
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

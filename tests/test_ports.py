@@ -49,7 +49,7 @@ def test_every_port(words: tuple[str, ...], tmp_path: Path) -> None:
     widths = {name: (len(value), value.shape().signed) for name, value in shown(Tachometer(spec)).items()}
     vectors = strobe_rows(run)
     described = {port["name"] for port in manifest(spec)["ports"]}
-    for port in spec.outputs:
+    for port in spec.ports.outputs:
         assert port.name in listed, f"{port.name} is in no CSV"
         assert widths[port.name] == (port.width, port.signed), f"{port.name} is not in the waveform"
         assert port.name in described

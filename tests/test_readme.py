@@ -109,7 +109,7 @@ def test_numbers_of_the_table_of_methods_are_those_of_the_pages(method: str) -> 
     assert comb == cells("measured/size.md", "ECP5 (LFE5U-25F, CABGA256)", row)[2]
     texts = {"ppr": "500", "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
     spec = of_texts(method, texts)
-    rest = float(1000 * spec.standstill_ticks * spec.timing.tick_seconds)
+    rest = float(1000 * spec.times.standstill_ticks * spec.timing.tick_seconds)
     assert standstill.split(",")[0] == f"{rest:g} ms"
     if "--min-time 1ms" in when:
         assert f"{float(cells('measured/compare.md', 'Ramp, real encoder', 'mt:min-time=1ms')[3]):.2g} rad/s" in when

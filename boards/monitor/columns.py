@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tachometry.boards.host.snapshot import Snapshot
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.language.port import Port
 from tachometry.spec.registers.demo import DemoMap
 
@@ -43,25 +43,27 @@ def columns(registers: DemoMap) -> list[Column]:
     shown.
     """
     spec = registers.spec
-    lsb = spec.rad_per_s_per_lsb
+    lsb = spec.scale.rad_per_s_per_lsb
     (speeds,) = (port.unit for port in registers.ports if port.name == "velocity")
 
     def of(port: Port) -> Column:
         name = port.name
         if name in BOUNDS:
-            return Column(name, spec.shown_unit.name, float, bound(name))
+            return Column(name, spec.scale.shown_unit.name, float, bound(name))
         if port.unit == speeds:
-            return Column(name, spec.shown_unit.name, float, lambda now: float(spec.shown_unit.of(now[name] * lsb)))
+            return Column(
+                name, spec.scale.shown_unit.name, float, lambda now: float(spec.scale.shown_unit.of(now[name] * lsb))
+            )
         if port.width == 1 and not port.unit:
             return Column(name, "", bool, lambda now: bool(now[name]))
         return Column(name, port.unit, int, lambda now: now[name])
 
     def bound(name: str) -> Callable[[Snapshot], Value]:
-        absent = BOUNDS[name] * spec.shown_absent_bound
+        absent = BOUNDS[name] * spec.bound.shown_absent
 
         def value(now: Snapshot) -> Value:
             there = now["bounds_valid"] and now[name] != absent
-            return float(spec.shown_unit.of(now[name] * lsb)) if there else None
+            return float(spec.scale.shown_unit.of(now[name] * lsb)) if there else None
 
         return value
 

@@ -71,7 +71,7 @@ def steps(registers: DemoMap) -> list[Step]:
     """Return speeds, reversals, standstill, illegal edges, and an encoder with all its faults."""
     spec = registers.spec
     highest = min(spec.max_speed.rad_per_s if spec.max_speed else math.inf, fastest(spec))
-    silence = 2.5 * spec.stalled_after_ticks * spec.timing.tick_cycles / spec.timing.clock_hz
+    silence = 2.5 * spec.times.stalled_after_ticks * spec.timing.tick_cycles / spec.timing.clock_hz
 
     def at(part: float) -> int:
         return speed_of(spec, part * highest)
@@ -193,7 +193,7 @@ def _compared(
     at = [register.name for _, register in captured].index("TIME")
     n_clocks = max(words[at] for words in seen) + 1
     trace = GoldenEmulator(spec.encoder.pulses_per_rev if spec.index else None).trace(changes, n_clocks)
-    if spec.max_tick_cycles:
+    if spec.external_tick:
         trace = trace.with_tick_in(np.arange(1, n_clocks, spec.timing.tick_cycles))
     bank = GoldenBank(registers, trace)
     before = sum(words[at] < cleared for words in seen)

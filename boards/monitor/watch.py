@@ -13,7 +13,7 @@ from tachometry.boards.monitor.columns import Column, Value
 from tachometry.boards.monitor.recorder import Recorder
 from tachometry.boards.monitor.session import Frame, Session
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 
 HISTORY = 10.0  # seconds that are kept
 _COUNTERS = 0.5  # seconds from a look at the counters to the next

@@ -88,12 +88,12 @@ def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
             from tachometry.sim.captures.other_sensors import converted
             from tachometry.sim.captures.read import read_capture, with_last_tick
 
-            alone, axes = (spec.tachometer, spec.axes) if isinstance(spec, AxesSpec) else (spec, None)
+            alone, axes = spec.tachometer, spec.axes if isinstance(spec, AxesSpec) else None
             if sensor == "pulses" and b is not None:
                 raise OptionError("b", "must not be given together with --sensor pulses")
             line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
             index = _of_axis("z", z, axis, axes) if z is not None or alone.index else None
-            tick = "tick_in" if tick_in is None and spec.max_tick_cycles else tick_in
+            tick = "tick_in" if tick_in is None and alone.external_tick else tick_in
             rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
             second = SAME if sensor == "pulses" else line_b
             recording = read_capture(capture, line_a, second, rate, index, tick, time)

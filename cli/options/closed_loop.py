@@ -182,9 +182,9 @@ def _motor_and_gains(
 ) -> tuple[Any, Any]:
     from tachometry.sim.engines.loop import Gains, Motor, Observer
 
-    if measured_acceleration and not hasattr(spec, "acceleration_per_lsb"):
+    if measured_acceleration and "acceleration" not in spec.method_entries:
         raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
-    law = Law(tachometer=spec, **take_values(Law, of_law))
+    law = Law(tachometer=spec, **take_values(Law, of_law, vars(spec.timing)))
     inertia, torque_constant = float(law.inertia), float(law.torque_constant)
     motor = Motor(
         inertia=inertia,
@@ -196,7 +196,7 @@ def _motor_and_gains(
     late = 0 if delay is None else whole_clocks("delay", delay, spec.timing.clock_hz)
     if not 0 <= late <= law.period:
         raise ParameterError(
-            "delay", f"must be at most a control tick, {format_time(spec.seconds(law.period))}, not {delay}"
+            "delay", f"must be at most a control tick, {format_time(spec.times.seconds(law.period))}, not {delay}"
         )
     way = Observer.SYNCHRONISED if law.synchronised else Observer.CONVENTIONAL
     if measured_acceleration:
@@ -206,9 +206,9 @@ def _motor_and_gains(
         velocity=float(law.velocity_gain),
         observer=float(law.observer),
         filter=math.inf if law.filter is None else float(law.filter),
-        seconds=float(spec.seconds(law.period)),
+        seconds=float(spec.times.seconds(law.period)),
         way=way,
-        delay=float(spec.seconds(late)),
+        delay=float(spec.times.seconds(late)),
         on_filtered=not unfiltered,
         feed_forward=feed_forward,
         inertia=inertia,

@@ -31,7 +31,7 @@ Make = Callable[[str, Mapping[str, str]], TachometerSpec]
 
 
 def _methods_help() -> str:
-    return f"How velocity is measured: {'; '.join(f'{name} {spec.summary}' for name, spec in METHODS.items())}."
+    return f"How velocity is measured: {'; '.join(f'{name} {spec.facts.summary}' for name, spec in METHODS.items())}."
 
 
 _METHOD = option("Core", "--method", default="s", metavar=lambda: f"[{'|'.join(METHODS)}]", help=_methods_help)

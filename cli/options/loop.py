@@ -53,4 +53,4 @@ def of_loop(spec: CoreSpec, texts: dict[str, str]) -> AnySpec:
     """
     if isinstance(spec, AxesSpec):
         raise ParameterError("axes", "must not be given together with --loop: it is of one axis")
-    return LoopSpec(tachometer=spec, **read_options(LoopSpec, texts))
+    return LoopSpec(tachometer=spec, **read_options(LoopSpec, texts, vars(spec.timing)))

@@ -1,9 +1,10 @@
 """Options that commands share, and how they are shown and explained."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import click
@@ -165,9 +166,11 @@ def default_of(about: declaration.Option) -> str:
     return "" if shown is None else f" [default: {shown}]"
 
 
-def take_values(spec: type[Any], given: dict[str, Any]) -> dict[str, Any]:
+def take_values(
+    spec: type[Any], given: dict[str, Any], timing: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Any]:
     """Take the declared options of a class out of what click gives a command, and return the values of its fields."""
-    return read_options(spec, take_texts(spec, given))
+    return read_options(spec, take_texts(spec, given), timing)
 
 
 def take_texts(spec: type[Any], given: dict[str, Any]) -> dict[str, str]:

@@ -63,7 +63,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
 
 def _has_option(settings: Settings, method: str, name: str) -> bool:
     """Tell whether an option is for a method."""
-    own_ticks = METHODS[method].own_ticks
+    own_ticks = METHODS[method].facts.own_ticks
     if name == "dt":
         return own_ticks
     if name == "tick" and own_ticks:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.cli.options.core import CoreTexts
-from tachometry.spec import of_parameters
+from tachometry.spec import of_options
 from tachometry.spec.registers.buses import Bus, bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
@@ -103,7 +103,7 @@ def _simulated(port: str, core: CoreTexts) -> Target:
     bus, spec = bus_of(_BUS), core.at(BOARDS[board].clock_hz)
     assert bus is not None
     bus.bit_cycles(spec.timing.clock_hz)
-    return Target(port, f"{board}, simulated: {spec.heading}", DemoMap(spec), bus)
+    return Target(port, f"{board}, simulated: {spec.words.heading}", DemoMap(spec), bus)
 
 
 def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:
@@ -115,7 +115,7 @@ def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:
         content = file.read(_LARGEST)
     try:
         described = json.loads(content)
-        parameters, registers = dict(described["parameters"]), described["registers"]
+        options, registers = dict(described["options"]), described["registers"]
         bus, baud, module = described["bus"], described.get("baud"), described["module"]
         configuration = registers["configuration"]
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
@@ -124,10 +124,10 @@ def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:
         ) from error
     if bus != _BUS:
         raise ValueError(f"--manifest must be that of a board with --bus {_BUS}, not {bus}")
-    if "loop" in parameters:
+    if "loop" in options:
         raise ValueError("--manifest must be that of a board without --loop, whose registers other programs read")
     try:
-        found = DemoMap(of_parameters(parameters))
+        found = DemoMap(of_options(options).tachometer)
         line = bus_of(_BUS, baud)
         assert line is not None
         demo_manifest(found, line, module)
@@ -138,4 +138,4 @@ def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:
             f"--manifest {path} must be that of a demo which this version of tachometry makes: its configuration would "
             f"be 0x{found.configuration:08x}, not {configuration!r}"
         )
-    return Target(port, f"{port}: {found.spec.heading}", found, line, module)
+    return Target(port, f"{port}: {found.spec.words.heading}", found, line, module)

@@ -10,13 +10,13 @@ from tachometry.spec.registers.manifest import manifest
 def print_axes_core(spec: AxesSpec) -> None:
     """Print the configuration of a core of many axes."""
     alone, axis = spec.tachometer, spec.axis
-    greatest = axis.max_velocity * alone.unit_velocity
+    greatest = axis.widths.max_velocity * alone.scale.unit_velocity
     latencies = manifest(spec)["latency_cycles"]
     own = {
-        "greatest speed": f"{speed_text(greatest)} ({axis.max_velocity} counts per tick)",
-        "full scale": full_scale_text(alone, axis.full_scale),
-        "widths": ", ".join(f"{port.name} {port.width}" for port in axis.outputs if port.width > 1),
-        "reciprocal": f"{memory_text(*spec.memory)}; there is no time to divide between two axes",
+        "greatest speed": f"{speed_text(greatest)} ({axis.widths.max_velocity} counts per tick)",
+        "full scale": full_scale_text(alone, axis.scale.full_scale),
+        "widths": ", ".join(f"{port.name} {port.width}" for port in axis.ports.outputs if port.width > 1),
+        "reciprocal": f"{memory_text(*spec.words.memory)}; there is no time to divide between two axes",
         **{name: plural(clocks, "clock") for name, clocks in latencies.items()},
         "tick_to_velocity": "0 clocks: velocity_valid comes together with tick",
     }
@@ -25,4 +25,4 @@ def print_axes_core(spec: AxesSpec) -> None:
         f"{plural(spec.turn_cycles, 'clock')} of a tick"
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
-    print_rows([rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.notes)])
+    print_rows([rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)])

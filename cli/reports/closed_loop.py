@@ -35,7 +35,7 @@ def print_loops(result: LoopResult) -> None:
         rows = [(str(seed), *_cells(row)) for seed, row in zip(first.seeds, result.seeds, strict=True)]
         means = [("mean", *_cells(row)) for row in result.rows.values()] if len(rows) > 1 else []
         print_table(("seed", *_HEADS), [*rows, *means])
-        stdout_console().print(Text(f"\n{first.setting.spec.heading}; {first.text}"), soft_wrap=True)
+        stdout_console().print(Text(f"\n{first.setting.spec.words.heading}; {first.text}"), soft_wrap=True)
         return
     table = [
         (grid.points[digest].method, *(grid.at[digest].get(name, "-") for name in axes), *_cells(row))

@@ -32,7 +32,7 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
     left_out : mapping of str to str
         Methods that are not compared, and why.
     """
-    scores, unit = comparison.scores, comparison.spec.shown_unit
+    scores, unit = comparison.scores, comparison.spec.scale.shown_unit
 
     def time(seconds: float | None) -> str:
         return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
@@ -61,7 +61,7 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
     if sizes:
         console.print("COMB, FF, Fmax: of the core on an ECP5, see docs/measured/size.md")
     for name, spec in comparison.specs.items():
-        for note in spec.notes if spec is not None else ():
+        for note in spec.words.notes if spec is not None else ():
             console.print(Text(f"{name}: {note}"))
     for name, reason in left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
@@ -76,7 +76,7 @@ def comparison_table(
     comparison: Comparison, sizes: Mapping[str, Measurement]
 ) -> tuple[list[str], Iterator[list[object]]]:
     """Return heads and rows of the table as CSV."""
-    scores, unit = comparison.scores, comparison.spec.shown_unit
+    scores, unit = comparison.scores, comparison.spec.scale.shown_unit
     names = [name for name in vars(scores[0]) if name != "what"]
     figures = list(_SIZE) if sizes else []
 
@@ -95,7 +95,7 @@ def comparison_table(
 
 def cost_table(comparison: Comparison) -> tuple[list[str], list[tuple[object, ...]]]:
     """Return heads and rows of what all settings cost; the last column tells those that are in the figure."""
-    unit, shown = comparison.spec.shown_unit, comparison.front
+    unit, shown = comparison.spec.scale.shown_unit, comparison.front
     rows: list[tuple[object, ...]] = [
         (cost.method, cost.name, unit.of(cost.rms), cost.delay, int(cost in shown))
         for tried in comparison.costs.values()

@@ -23,58 +23,59 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     """Return rows of the table: a name and its value."""
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
-    greatest = f"{speed_text(spec.greatest_speed)} ({spec.greatest_speed / spec.unit_velocity:.6g} counts per tick)"
+    fastest = spec.scale.greatest_speed
+    greatest = f"{speed_text(fastest)} ({fastest / spec.scale.unit_velocity:.6g} counts per tick)"
     latencies = manifest(spec)["latency_cycles"]
-    memory = spec.memory
+    memory = spec.words.memory
     return [
-        ("method", f"{spec.method.upper()}, {spec.description}"),
+        ("method", f"{spec.method.upper()}, {spec.words.description}"),
         ("encoder", counts),
         ("clock", f"{timing.clock_hz:,} Hz"),
         ("tick", f"{short_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
         ("maximum time", f"{short_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
-        ("unit velocity", f"{speed_text(spec.unit_velocity)} (1 count per tick)"),
+        ("unit velocity", f"{speed_text(spec.scale.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
         ("full scale", _full_scale(spec)),
         (
             "one LSB of velocity",
-            f"2^{-spec.frac_bits} {spec.unit} = {spec.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to "
-            f"{spec.rounding_lsb} of it",
+            f"2^{-spec.widths.frac_bits} {spec.unit} = {spec.scale.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to "
+            f"{spec.scale.rounding_lsb} of it",
         ),
-        ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.outputs if port.width > 1)),
+        ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports.outputs if port.width > 1)),
         *([] if memory is None else [("reciprocal", memory_text(*memory))]),
-        *([("reciprocal", spec.division)] if spec.division else []),
-        *((name, f"{plural(n, 'clock')} ({short_time(spec.seconds(n))})") for name, n in latencies.items()),
+        *([("reciprocal", spec.words.division)] if spec.words.division else []),
+        *((name, f"{plural(n, 'clock')} ({short_time(spec.times.seconds(n))})") for name, n in latencies.items()),
         ("standstill", _standstill(spec)),
-        *(("note", note) for note in spec.notes),
+        *(("note", note) for note in spec.words.notes),
     ]
 
 
 def full_scale_text(spec: TachometerSpec, full_scale: int) -> str:
     """Return a greatest velocity in LSB, in the unit of a core and in rad/s."""
-    value = f"{full_scale * 2.0**-spec.frac_bits:.9g} {spec.unit}"
+    value = f"{full_scale * 2.0**-spec.widths.frac_bits:.9g} {spec.unit}"
     if spec.unit == NATIVE:
-        value += f" = {full_scale * spec.rad_per_s_per_lsb:.6g} rad/s"
+        value += f" = {full_scale * spec.scale.rad_per_s_per_lsb:.6g} rad/s"
     return f"{value}, either way"
 
 
 def _full_scale(spec: TachometerSpec) -> str:
-    value = full_scale_text(spec, spec.full_scale)
-    if not spec.narrow:
+    value = full_scale_text(spec, spec.scale.full_scale)
+    if not spec.scale.narrow:
         return value
-    counted = spec.shown_unit.of(spec.max_velocity * spec.unit_velocity)
-    held = f"{value}; that is what {spec.velocity_width} bits hold"
-    return f"{held}, counted is up to {counted:.6g} {spec.shown_unit.name}"
+    counted = spec.scale.shown_unit.of(spec.widths.max_velocity * spec.scale.unit_velocity)
+    held = f"{value}; that is what {spec.widths.velocity} bits hold"
+    return f"{held}, counted is up to {counted:.6g} {spec.scale.shown_unit.name}"
 
 
 def _resolution(spec: TachometerSpec, ends: Plan) -> list[tuple[str, str]]:
     """Return what the equations of the method promise at the ends of its range."""
-    unit, rows = spec.shown_unit, []
+    unit, rows = spec.scale.shown_unit, []
     columns = zip(("low", "high"), ends.speed, ends.resolution, ends.measurement_time, strict=True)
     for name, speed, resolution, time in columns:
         if math.isnan(resolution):
             shown = "unknown: there are no equations for the method, or it is too fast for it"
         else:
-            rounding = spec.rounding_lsb * spec.rad_per_s_per_lsb
+            rounding = spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
             shown = (
                 f"{unit.of(resolution):.4g} {unit.name} and {unit.of(rounding):.2g} by rounding, at "
                 f"{unit.of(speed):.6g} {unit.name}, measured in {short_time(float(time))}"
@@ -96,7 +97,7 @@ def memory_text(kind: str, entries: int, width: int) -> str:
 
 
 def _standstill(spec: TachometerSpec) -> str:
-    rest = spec.standstill_ticks
+    rest = spec.times.standstill_ticks
     time = short_time(rest * spec.timing.tick_seconds)
     return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
 

@@ -8,7 +8,7 @@ from tachometry.spec.language.units import plural
 
 def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:
     """Print the configuration of tachometer and loop, and the registers on a bus."""
-    form, period = spec.form, spec.seconds
+    form, period, late = spec.form, spec.units.seconds, spec.tick_to_current
     filtered = "none" if spec.filter is None else f"{float(spec.filter):.6g} rad/s"
     when = "at updates of the velocity" if spec.synchronised else "at every control tick"
     widths = ", ".join(
@@ -18,11 +18,14 @@ def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:
         ("gains", f"kp {float(spec.position_gain):.6g} 1/s², kv {float(spec.velocity_gain):.6g} 1/s"),
         ("observer", f"{float(spec.observer):.6g} rad/s, velocity filter {filtered}, {when}"),
         ("motor", f"{float(spec.inertia):.6g} kg m², {float(spec.torque_constant):.6g} Nm/A"),
-        ("current", f"at most {float(form.current_limit * spec.amperes):.6g} A, in 2^{-spec.current_frac_bits} A"),
+        (
+            "current",
+            f"at most {float(form.current_limit * spec.units.amperes):.6g} A, in 2^{-spec.units.current_frac_bits} A",
+        ),
         ("control period", f"{short_time(period)} ({plural(spec.period, 'clock')})"),
         (
             "command to current",
-            f"{plural(spec.latency, 'clock')} ({short_time(spec.tachometer.seconds(spec.latency))})",
+            f"{plural(late, 'clock')} ({short_time(spec.tachometer.times.seconds(late))})",
         ),
         (
             "multiplier",

@@ -14,7 +14,7 @@ from rich.text import Text
 from tachometry.boards.monitor.selftest import Result
 from tachometry.boards.monitor.watch import HISTORY, Display, State
 from tachometry.cli.reports.streams import printable
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.language.units import plural
 
 _LINE = 1.0  # seconds of board from a plain line to the next
@@ -155,7 +155,7 @@ def plot(state: State, width: int, height: int) -> Text:
     figure.ylim(min(speeds) - room, max(speeds) + room)
     last = times[-1] if times else 0.0
     figure.xlim(max(last - HISTORY, 0.0), max(last, HISTORY))
-    figure.title(f"{state.spec.shown_unit.name} over s")
+    figure.title(f"{state.spec.scale.shown_unit.name} over s")
     return Text.from_ansi(figure.build())
 
 
@@ -179,7 +179,7 @@ def _measured(state: State) -> list[tuple[str, str]]:
         value = state.value(name)
         return absent if value is None else style(value)
 
-    unit = state.spec.shown_unit.name
+    unit = state.spec.scale.shown_unit.name
     rows = [("speed", f"{shown('velocity', '{:.6g}'.format)} {unit}")]
     if state.spec.bounds:
         lower, upper = (shown(name, "{:.6g}".format, "none") for name in BOUNDS)

@@ -26,17 +26,17 @@ def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:
             _number(m_s, ".4g"),
             _duration(t_m),
             _number(q_v / per_unit, ".4g"),
-            _number(100 * (q_v + spec.rounding_lsb * spec.rad_per_s_per_lsb) / speed, ".3g"),
-            "maximum time (forced)" if forced else spec.update_by,
+            _number(100 * (q_v + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb) / speed, ".3g"),
+            "maximum time (forced)" if forced else spec.facts.update_by,
         )
         rows.append(cells)
     console = stdout_console()
     console.print()
     print_table(heads, rows, left=(len(heads) - 1,))
-    remark = f"{spec.remark} " if spec.remark else ""
+    remark = f"{spec.words.remark} " if spec.words.remark else ""
     console.print(
         f"\n{remark}error/V is Q_V and the rounding together."
-        + ("\nTimes are those of the nominal tick; an external one may be longer." if spec.max_tick_cycles else ""),
+        + ("\nTimes are those of the nominal tick; an external one may be longer." if spec.external_tick else ""),
         soft_wrap=True,
     )
 

@@ -17,7 +17,7 @@ def print_simulation(simulation: Simulation) -> int:
     """Print what was simulated, what the core cannot have seen rightly, and the verdict; the exit status."""
     found, spec, axes = simulation.lockstep, simulation.spec, simulation.axes
     run = found.actual
-    time, n_ticks = format_time(spec.seconds(run.n_clocks)), len(run.ticks) // len(axes)
+    time, n_ticks = format_time(spec.times.seconds(run.n_clocks)), len(run.ticks) // len(axes)
     simulated = ("simulated", f"{run.n_clocks} clocks ({time}), {n_ticks} ticks")
     mismatches = ("mismatches", str(found.n_mismatches))
     if isinstance(spec, AxesSpec):
@@ -97,13 +97,13 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     if spec.index:
         last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
         rows.append(("index", f"{len(run.index.clock)} times{last}"))
-    if spec.max_tick_cycles:
+    if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
     if n_overflows := int(np.count_nonzero(run.ticks.overflow)):
         rows.append(("overflow", f"{n_overflows} ticks: faster than --max-speed, velocity saturated"))
     if n_saturated := int(np.count_nonzero(run.updates.get("velocity_overflow"))):
         rows.append(("velocity overflow", f"{n_saturated} updates: beyond --velocity-width, saturated"))
-    return rows + _errors(axis) + [("note", note) for note in spec.notes]
+    return rows + _errors(axis) + [("note", note) for note in spec.words.notes]
 
 
 def _flagged(axis: Axis) -> str:
@@ -115,7 +115,7 @@ def _flagged(axis: Axis) -> str:
 
 
 def _errors(axis: Axis) -> list[tuple[str, str]]:
-    name, error, unit = "velocity error", axis.error, axis.spec.shown_unit
+    name, error, unit = "velocity error", axis.error, axis.spec.scale.shown_unit
     if axis.truth is None:
         return [(name, "unknown: a capture does not tell the true speed")]
     if error is None:
@@ -130,7 +130,7 @@ def _errors(axis: Axis) -> list[tuple[str, str]]:
 
 def _line(axis: Axis) -> str:
     """Return the line of one of many axes."""
-    run, unit = axis.run, axis.spec.shown_unit
+    run, unit = axis.run, axis.spec.scale.shown_unit
     parts = [f"{plural(len(run.updates), 'update')} ({np.count_nonzero(run.updates.forced)} forced)"]
     if axis.counts_in is not None:
         parts.append(f"counts in {axis.counts_in}")

@@ -59,15 +59,15 @@ class AxesDatapath(wiring.Component):
         self.turns = Turns(spec.axes, spec.turn_cycles)
         self.window = AxisWindow(
             max_ticks=axis.timing.max_ticks,
-            kept_ticks=axis.kept_ticks,
-            count_width=axis.count_width,
-            numerator_width=axis.numerator_width,
+            kept_ticks=axis.form.kept_ticks,
+            count_width=axis.widths.count,
+            numerator_width=axis.form.numerator_width,
             cancel=axis.cancel,
         )
         self.quotient = Quotient(
             spec.reciprocal,
-            quotients={"velocity": (axis.native_width, 0)},
-            numerator_width=axis.numerator_width,
+            quotients={"velocity": (axis.widths.native, 0)},
+            numerator_width=axis.form.numerator_width,
             tag=data.StructLayout({"forced": 1}),
             serial=True,
         )
@@ -78,13 +78,13 @@ class AxesDatapath(wiring.Component):
                 "count": In(signed(spec.rounds.bit_length() + 1)),
                 "tick": Out(1),
                 "axis": Out(len(self.turns.axis)),
-                "pulse_count": Out(signed(axis.count_width)),
+                "pulse_count": Out(signed(axis.widths.count)),
                 "position": Out(signed(axis.position_width)),
                 "overflow": Out(1),
                 "stalled": Out(1),
                 "velocity_valid": Out(1),
-                "velocity": Out(signed(axis.native_width)),
-                "interval": Out(axis.interval_width),
+                "velocity": Out(signed(axis.widths.native)),
+                "interval": Out(axis.widths.interval),
                 "forced": Out(1),
             }
         )
@@ -128,8 +128,8 @@ class AxesDatapath(wiring.Component):
         turns, axis = self.turns, self._spec.axis
         overflow = Signal()
         m_e = turn.count
-        if axis.max_count < self._spec.rounds:
-            m_e, overflow = saturate(m, turn.count, axis.max_count)
+        if axis.widths.max_count < self._spec.rounds:
+            m_e, overflow = saturate(m, turn.count, axis.widths.max_count)
         with m.If(turns.step[READ]):
             m.d.sync += [
                 self.axis.eq(turns.axis),

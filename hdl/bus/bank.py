@@ -53,7 +53,7 @@ class RegisterBank(wiring.Component):
                 "capture": In(1),
                 "clear": Out(1),
                 **{port.name: In(signed(port.width) if port.signed else port.width) for port in registers.ports},
-                **{name: In(1) for name in registers.spec.strobes},
+                **{name: In(1) for name in registers.spec.ports.strobes},
                 "written": Out(1),
                 **{name: Out(shape, init=init) for name, (shape, init) in _shapes(registers.settings).items()},
                 **{field.port: In(_shape(field)) for field in registers.live},

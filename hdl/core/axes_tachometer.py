@@ -50,7 +50,7 @@ class AxesTachometer(wiring.Component):
         m.submodules.rounds = rounds = self.rounds
         m.submodules.axis_counters = counters = self.axis_counters
         m.submodules.datapath = datapath = self.datapath
-        level = {pin.name: Signal(spec.axes, name=f"level_{pin.name}") for pin in spec.pins}
+        level = {pin.name: Signal(spec.axes, name=f"level_{pin.name}") for pin in spec.ports.pins}
         for name, levels in level.items():
             m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), levels)
         follow(m, counters, rounds, ("slot", "first", "last", "ready"))
@@ -78,7 +78,7 @@ class AxesTachometer(wiring.Component):
 
     def _show(self, m: Module, name: str, strobe: Value, axis_name: str, axis: Value, box: wiring.Component) -> None:
         """Show what is new with a strobe: as it comes, or held for each axis."""
-        values = {port.name: getattr(box, port.name) for port in self._spec.axis.outputs if port.held_by == name}
+        values = {port.name: getattr(box, port.name) for port in self._spec.axis.ports.outputs if port.held_by == name}
         del values[name]
         if self._spec.parallel:
             shapes = {value: signal.shape() for value, signal in values.items()}

@@ -41,7 +41,7 @@ class Demo(wiring.Component):
         spec = registers.spec
         self._map = registers
         self.core = RegisterCore(registers)
-        self._lines = [pin.name for pin in spec.pins if pin.name in ENCODER_LINES]
+        self._lines = [pin.name for pin in spec.ports.pins if pin.name in ENCODER_LINES]
         self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None)
         self.bridge = bridge_on(registers, bus)
         self.telemetry: TelemetrySender | None = None
@@ -90,7 +90,7 @@ class Demo(wiring.Component):
         """Give the core its pins, or the lines of the emulator and a tick in each period."""
         core, emulator, bank = self.core, self.emulator, self.core.bank
         follow(m, emulator, bank, (field.port for field in self._map.emulated))
-        for pin in self._map.spec.pins:
+        for pin in self._map.spec.ports.pins:
             emulated = getattr(emulator, pin.name) if pin.name in self._lines else period  # the external tick
             if pin.name in self._lines:
                 m.d.comb += getattr(self, f"emulated_{pin.name}").eq(emulated)

@@ -51,7 +51,7 @@ class RegisterCore(wiring.Component):
         core, bank = self.tachometer, self.bank
         whole = core if self.loop is None else self.loop
         # Long windows saturate what has been counted since the tick, and an index that resets is not in it.
-        counted = not (spec.own_ticks or spec.index_reset)
+        counted = not (spec.facts.own_ticks or spec.index_reset)
         open_sum = core.pulse_counter.open_sum if counted else None
         position = TickPosition(spec.position_width, 0 if open_sum is None else len(open_sum))
         restarts = ResetInserter(bank.restart) if hasattr(bank, "restart") else lambda box: box
@@ -60,13 +60,13 @@ class RegisterCore(wiring.Component):
         names = {port.name for port in self._map.ports} - {*_OTHERWISE}
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
         written = {field.port for field in self._map.settings}
-        for pin in self._map.core.pins:
+        for pin in self._map.core.ports.pins:
             given = getattr(bank if pin.name in written else self, pin.name)
             switched = given & bank.loop_enable if pin.name == "enable" else given
             m.d.comb += getattr(whole, pin.name).eq(switched)
-        follow(m, self, whole, (port.name for port in self._map.core.outputs))
-        follow(m, bank, whole, (port.name for port in spec.outputs if port.name in names))
-        follow(m, bank, whole, spec.strobes)
+        follow(m, self, whole, (port.name for port in self._map.core.ports.outputs))
+        follow(m, bank, whole, (port.name for port in spec.ports.outputs if port.name in names))
+        follow(m, bank, whole, spec.ports.strobes)
         m.d.comb += [
             bank.capture.eq(self.capture),
             core.conditioner.clear.eq(bank.clear),
@@ -84,9 +84,9 @@ class RegisterCore(wiring.Component):
 
     def _keep(self, m: Module, loop: LoopCore) -> None:
         """Keep what a program changes as it was with its strobe, whenever it is captured."""
-        for strobe, names in self._map.core.strobes.items():
+        for strobe, names in self._map.core.ports.strobes.items():
             for name in names:
-                if name in self._map.spec.strobes.get(strobe, ()):
+                if name in self._map.spec.ports.strobes.get(strobe, ()):
                     continue
                 value = getattr(loop, name)
                 kept = Signal.like(value, name=f"kept_{name}")

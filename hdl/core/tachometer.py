@@ -47,31 +47,33 @@ class Tachometer(wiring.Component):
         self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
         self.decoder = QuadratureDecoder(spec.encoder.decoding)
         self.pulse_counter = PulseCounter(
-            max(spec.longest_tick, spec.max_pulse_count),
-            spec.max_pulse_count,
-            stretched=spec.own_ticks,
-            staged=spec.tick_latency - spec.registers_steps > 2,
+            max(spec.times.longest_tick, spec.widths.max_pulse_count),
+            spec.widths.max_pulse_count,
+            stretched=spec.facts.own_ticks,
+            staged=spec.latency.tick - spec.latency.registers_steps > 2,
         )
-        self.position_counter = PositionCounter(spec.position_width, spec.tick_latency)
-        self.index_capture = IndexCapture(spec.position_width, spec.tick_latency) if spec.index else None
+        self.position_counter = PositionCounter(spec.position_width, spec.latency.tick)
+        self.index_capture = IndexCapture(spec.position_width, spec.latency.tick) if spec.index else None
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
         if isinstance(self.datapath, OwnTicks):
             self.sampling_clock = self.datapath
-        elif spec.max_tick_cycles:
-            self.sampling_clock = ExternalTick(spec.min_tick_cycles, spec.max_tick_cycles, spec.tick_latency)
+        elif spec.external_tick:
+            self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.times.longest_tick, spec.latency.tick)
         else:
             self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
         layout = update_layout(spec)
-        self.low_pass = None if spec.lowpass is None else LowPass(spec.low_pass, layout, clears=spec.last_at_rest)
+        self.low_pass = (
+            None if spec.lowpass is None else LowPass(spec.scale.low_pass, layout, clears=spec.facts.last_at_rest)
+        )
         self.standstill: Standstill | None = None
         if not isinstance(self.datapath, OwnStandstill):
-            self.standstill = Standstill(spec.timing.max_ticks, spec.count_width, max_shift=spec.max_tick_shift)
-        self.update_age = UpdateAge(spec.timing.max_ticks, spec.stamp_width) if spec.age else None
+            self.standstill = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
+        self.update_age = UpdateAge(spec.timing.max_ticks, spec.widths.stamp) if spec.age else None
         self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
-        if spec.output is not None:
-            box = SerialVelocityOutput if spec.output_serial else PipelinedVelocityOutput
-            self.velocity_output = box(spec.output, layout)
+        if spec.scale.output is not None:
+            box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
+            self.velocity_output = box(spec.scale.output, layout)
 
     @property
     def spec(self) -> TachometerSpec:
@@ -82,7 +84,7 @@ class Tachometer(wiring.Component):
     def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
         """Counters and divisions that a simulation may skip: `IdleCounter` and `IdleDivision`."""
         boxes: dict[str, object] = {"datapath": self.datapath}
-        if not self._spec.own_ticks:
+        if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
         return tuple(
             counter.within(name)
@@ -98,11 +100,11 @@ class Tachometer(wiring.Component):
         m.submodules.pulse_counter = self.pulse_counter
         m.submodules.position_counter = self.position_counter
         m.submodules.datapath = self.datapath
-        if not self._spec.own_ticks:
+        if not self._spec.facts.own_ticks:
             m.submodules.sampling_clock = self.sampling_clock
-        (step,) = delay(m, self.decoder.step, clocks=int(self._spec.registers_steps))
+        (step,) = delay(m, self.decoder.step, clocks=int(self._spec.latency.registers_steps))
         self._count(m, step)
-        ticks = Signal(max(self._spec.stamp_width, 1))  # with the one in this clock
+        ticks = Signal(max(self._spec.widths.stamp, 1))  # with the one in this clock
         self._measure(m, step, ticks)
         self._rest(m)
         updates = self._output(m)
@@ -139,7 +141,7 @@ class Tachometer(wiring.Component):
 
     def _measure(self, m: Module, step: Signal, ticks: Signal) -> None:
         """Give the datapath what its method takes of ticks, counts and steps."""
-        datapath, latency = self.datapath, self._spec.tick_latency
+        datapath, latency = self.datapath, self._spec.latency.tick
         taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")}
         taken |= {name: getattr(self.pulse_counter, name) for name in ("coming", "next_count")}
         taken |= {"step_now": step, "stamp": ticks}
@@ -182,7 +184,7 @@ class Tachometer(wiring.Component):
             wiring.connect(m, updates, output.updates)
             updates = output.shown
         m.d.comb += self.velocity_valid.eq(updates.valid)
-        m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in self._spec.strobes[UPDATE]]
+        m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in self._spec.ports.strobes[UPDATE]]
         return updates
 
     def _age(self, m: Module, ticks: Signal, updates: stream.Interface) -> None:
@@ -191,7 +193,7 @@ class Tachometer(wiring.Component):
             return
         m.submodules.age = age = self.update_age
         m.d.comb += [age.tick.eq(self.tick), age.update.eq(self.velocity_valid), self.age.eq(age.age)]
-        if self._spec.stamp_width:
+        if self._spec.widths.stamp:
             before = Signal.like(ticks)
             m.d.sync += before.eq(ticks)
             m.d.comb += [ticks.eq(before + self.tick), age.fresh.eq(before - updates.p.stamp)]

@@ -56,7 +56,7 @@ def _synchronizers(tacho: TachometerSpec | AxesSpec, bus: Bus | None) -> dict[st
     """Return where the synchroniser of each pin is in the core: the boxes from the outermost to itself."""
     box = {"tick_in": ["sampling_clock"]}
     default: list[str] = [] if isinstance(tacho, AxesSpec) else ["conditioner"]
-    boxes = {pin.name: box.get(pin.name, default) for pin in tacho.pins}
+    boxes = {pin.name: box.get(pin.name, default) for pin in tacho.ports.pins}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}
 

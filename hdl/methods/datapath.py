@@ -59,14 +59,14 @@ def datapath_members(spec: TachometerSpec) -> dict[str, Member]:
     return {
         **{name: In(width) for name, width in stamped(spec).items()},
         "tick": In(1),
-        "pulse_count": In(signed(spec.count_width)),
+        "pulse_count": In(signed(spec.widths.count)),
         "updates": Out(update_stream(update_layout(spec))),
     }
 
 
 def stamped(spec: TachometerSpec) -> dict[str, int]:
     """Return what travels with an update for its age, as fields of a structure."""
-    return {"stamp": spec.stamp_width} if spec.stamp_width else {}
+    return {"stamp": spec.widths.stamp} if spec.widths.stamp else {}
 
 
 def quotients(spec: TachometerSpec) -> dict[str, tuple[int, int]]:

@@ -44,17 +44,17 @@ class DtShift(wiring.Component):
                 "nominal": In(1),
                 "n": In(width),
                 "high": In(1),
-                "shift": Out(range(spec.max_shift + 1)),
+                "shift": Out(range(spec.times.max_tick_shift + 1)),
                 "last": Out(1),
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        spec, rule = self._spec, self._spec.adaptive_dt
+        spec, rule = self._spec, self._spec.form.adaptive_dt
         # 2^k − 1 has no register of its own: after an upset that could belong to another k.
-        mask = self._soon(m, Cat(self.shift > k for k in range(spec.max_shift)))
-        passed = Signal(spec.max_shift)
+        mask = self._soon(m, Cat(self.shift > k for k in range(spec.times.max_tick_shift)))
+        passed = Signal(spec.times.max_tick_shift)
         m.d.comb += self.last.eq(self.nominal & (passed == mask))
         with m.If(self.nominal):
             m.d.sync += passed.eq(passed + 1)
@@ -74,9 +74,9 @@ class DtShift(wiring.Component):
             m.d.sync += falling.eq(falls & (mask >> 1).any() & ~self.anew)
             with m.If(self.anew):
                 m.d.sync += self.shift.eq(0)
-            if spec.max_shift & (spec.max_shift + 1):  # an upset can lead beyond it
-                with m.Elif(self.shift > spec.max_shift):
-                    m.d.sync += self.shift.eq(spec.max_shift)
+            if spec.times.max_tick_shift & (spec.times.max_tick_shift + 1):  # an upset can lead beyond it
+                with m.Elif(self.shift > spec.times.max_tick_shift):
+                    m.d.sync += self.shift.eq(spec.times.max_tick_shift)
             with m.Elif(down), m.If(mask[0]):
                 m.d.sync += self.shift.eq(self.shift - 1)
             with m.Elif(up & ~mask[-1]):
@@ -85,7 +85,9 @@ class DtShift(wiring.Component):
 
     def of(self, constant: Callable[[int], int]) -> Value:
         """Return a constant that depends on k."""
-        return Array([constant(min(k, self._spec.max_shift)) for k in range(1 << len(self.shift))])[self.shift]
+        return Array([constant(min(k, self._spec.times.max_tick_shift)) for k in range(1 << len(self.shift))])[
+            self.shift
+        ]
 
     def _soon(self, m: Module, value: Value, init: int = 0) -> Value:
         """Return a constant that depends on k, from a register: a window lasts a dt at least, except at a reversal."""

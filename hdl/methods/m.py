@@ -93,7 +93,7 @@ class MMethod(wiring.Component):
     A mean over a power of two is a shift; otherwise the sum is multiplied by a constant, as in the S method, and
     correctly rounded like there.
 
-    Latency: an update comes `spec.datapath_latency` clocks after `tick`.
+    Latency: an update comes `spec.latency.datapath` clocks after `tick`.
 
     Parameters
     ----------
@@ -116,16 +116,16 @@ class MMethod(wiring.Component):
         # Verilog has no signals of no bits.
         tag = {**stamped(spec), **({"bounds_valid": 1} if spec.bounds else {})}
         self._tag = data.StructLayout(tag or {"forced": 1})
-        self.moving_sum = MovingSum(spec.average, count_width=spec.count_width, sum_width=spec.sum_width)
+        self.moving_sum = MovingSum(spec.average, count_width=spec.widths.count, sum_width=spec.form.sum_width)
         self.quotient: Quotient | None = None
-        if spec.shift is None:
+        if spec.form.shift is None:
             self.quotient = Quotient(
-                spec.reciprocal,
+                spec.form.reciprocal,
                 quotients=quotients(spec),
-                numerator_width=spec.numerator_width,
+                numerator_width=spec.form.numerator_width,
                 tag=self._tag,
-                serial=spec.serial,
-                margin=spec.margin,
+                serial=spec.latency.serial,
+                margin=spec.form.margin,
                 constant=spec.average,
             )
 
@@ -144,7 +144,7 @@ class MMethod(wiring.Component):
             moving_sum.m_e.eq(self.pulse_count),
             self.updates.p.interval.eq(spec.average),
         ]
-        if spec.stamp_width:
+        if spec.widths.stamp:
             m.d.comb += known.stamp.eq(self.stamp)
         if spec.bounds:
             # The first tick was not seen completely.
@@ -159,7 +159,7 @@ class MMethod(wiring.Component):
 
     def _divided(self, m: Module, known: data.View) -> tuple[Signal, data.View]:
         """Return the mean and its bounds, with what is known of the sum."""
-        total, shift = self.moving_sum.total, self._spec.shift
+        total, shift = self.moving_sum.total, self._spec.form.shift
         if self.quotient is not None:
             m.submodules.quotient = quotient = self.quotient
             # The sum takes one clock.
@@ -171,12 +171,12 @@ class MMethod(wiring.Component):
             m.d.comb += [
                 quotient.load.eq(load),
                 quotient.start.eq(start),
-                quotient.numerator.eq(total << self._spec.error_bits),
+                quotient.numerator.eq(total << self._spec.bound.error_bits),
                 quotient.tag.eq(tag),
             ]
             return quotient.results.valid, quotient.results.p
         assert shift is not None
-        velocities, finer = quotients(self._spec), self._spec.error_bits
+        velocities, finer = quotients(self._spec), self._spec.bound.error_bits
         left = shift - finer
         valid = Signal()
         layout = {name: signed(width) for name, (width, _) in velocities.items()} | self._tag.members
@@ -184,7 +184,7 @@ class MMethod(wiring.Component):
         m.d.sync += valid.eq(self.tick)
         with m.If(self.tick):
             m.d.sync += [
-                new[name].eq(((total << finer) + count * self._spec.margin) << left)
+                new[name].eq(((total << finer) + count * self._spec.form.margin) << left)
                 for name, (_, count) in velocities.items()
             ]
             m.d.sync += [new[name].eq(known[name]) for name in self._tag.members]

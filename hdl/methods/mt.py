@@ -14,15 +14,15 @@ class MTMethod(TimedDatapath):
     the one before adds one, and a count of the other sign, which meets the same edge again, adds none. On the lattice a
     tick with m_e counts adds m_e, or one count less if their sign is not that before.
 
-    With `spec.cycle_counts` more than 1, a window that has completed a cycle without a reversal waits for the end of
-    the next one, until `spec.patient_periods` are over.
+    With `spec.form.cycle_counts` more than 1, a window that has completed a cycle without a reversal waits for the end
+    of the next one, until `spec.form.patient_periods` are over.
     """
 
     def __init__(self, spec: MTTachometer) -> None:
         super().__init__(spec)
-        self._min_periods = spec.min_periods
-        self._patient_periods = spec.patient_periods
-        self._cycle_counts = spec.cycle_counts
+        self._min_periods = spec.form.min_periods
+        self._patient_periods = spec.form.patient_periods
+        self._cycle_counts = spec.form.cycle_counts
 
     @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
@@ -33,13 +33,13 @@ class MTMethod(TimedDatapath):
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:
         spec, timer = self._spec, self.gap_timer
-        length = Signal(spec.interval_width, init=1)
+        length = Signal(spec.widths.interval, init=1)
         late = Signal()
         travelled = Signal.like(self.quotient_velocity.dividend)
         total = Signal.like(travelled)
         ends = Signal()
         opens = Signal()
-        may_end: ValueLike = self.quotient_velocity.free if spec.may_be_late else 1
+        may_end: ValueLike = self.quotient_velocity.free if spec.form.may_be_late else 1
         if self._cycle_counts > 1:
             may_end = ~self._waits(m, length, opens)
         m.d.comb += [
@@ -78,7 +78,7 @@ class MTMethod(TimedDatapath):
     @property
     def _distance(self) -> Value:
         """From the edge of the last count to that of this one; on the lattice, to the last edge of the tick."""
-        if not self._spec.on_lattice:
+        if not self._spec.form.on_lattice:
             return self._way
         # All counts of the tick, less the one that meets the same edge again.
         return self._size + Mux(self._same, 0, Mux(self.gap_timer.negative, 1, -1))

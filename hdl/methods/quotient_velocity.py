@@ -8,7 +8,7 @@ from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.methods.datapath import stamped
 from tachometry.hdl.output.update import update_layout, update_stream
 from tachometry.hdl.wires.registers import registers
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
 
 
@@ -19,7 +19,7 @@ class QuotientVelocity(wiring.Component):
     the time since the last count: an edge may lie half a count off. If that, rounded, is nearer to 0 than the velocity,
     it becomes the velocity. A measurement that begins meanwhile takes the divider, and the velocity does not decay.
 
-    Latency: an update comes `spec.datapath_latency` clocks after `measure` or `decay`.
+    Latency: an update comes `spec.latency.datapath` clocks after `measure` or `decay`.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class QuotientVelocity(wiring.Component):
         `divisor` is the time since the last count.
     dividend : In(signed)
         Distance in counts, times the timer periods in a tick.
-    divisor : In(spec.interval_width)
+    divisor : In(spec.widths.interval)
         Time in timer periods.
     forced_in, beyond_in : In(1)
         Valid with `measure` and `decay`, as `divisor`.
@@ -49,20 +49,20 @@ class QuotientVelocity(wiring.Component):
 
     def __init__(self, spec: TimedTachometer) -> None:
         self._spec = spec
-        f, error_bits = spec.native_frac_bits, spec.error_bits
+        f, error_bits = spec.widths.native_frac_bits, spec.bound.error_bits
         # Distances are divided in half counts.
         self.divider = Divider(
-            divisor_width=spec.interval_width,
-            integer_bits=spec.quotient_bits - (f - 1),
+            divisor_width=spec.widths.interval,
+            integer_bits=spec.form.quotient_bits - (f - 1),
             scale_bits=f - 1,
             nearest=True,
             # Of 1½ counts, in half counts.
-            zeros=(spec.timer_periods & -spec.timer_periods).bit_length() - 1,
+            zeros=(spec.form.timer_periods & -spec.form.timer_periods).bit_length() - 1,
         )
         self.bound_dividers = {
             name: Divider(
-                divisor_width=(spec.max_interval + 1).bit_length(),
-                integer_bits=spec.quotient_bits - (f - error_bits),
+                divisor_width=(spec.form.max_interval + 1).bit_length(),
+                integer_bits=spec.form.quotient_bits - (f - error_bits),
                 scale_bits=f - error_bits,
             )
             for name in (BOUNDS if spec.bounds else ())
@@ -71,8 +71,8 @@ class QuotientVelocity(wiring.Component):
             {
                 "measure": In(1),
                 "decay": In(1),
-                "dividend": In(signed(spec.distance_width)),
-                "divisor": In(spec.interval_width),
+                "dividend": In(signed(spec.form.distance_width)),
+                "divisor": In(spec.widths.interval),
                 "forced_in": In(1),
                 "beyond_in": In(1),
                 "free": Out(1),
@@ -91,16 +91,16 @@ class QuotientVelocity(wiring.Component):
         measuring = Signal()
         # Not before the result of the last division is in `velocity`.
         decays = Signal()
-        if spec.decays:
+        if spec.form.decays:
             m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.running & ~divider.done)
         halves = self.dividend << 1
-        greatest = Mux(new.velocity[-1], -3 * spec.timer_periods, 3 * spec.timer_periods)
+        greatest = Mux(new.velocity[-1], -3 * spec.form.timer_periods, 3 * spec.form.timer_periods)
         m.d.comb += [
             self.free.eq(~(measuring & divider.running)),
             divider.start.eq(self.measure | decays),
             divider.divisor.eq(self.divisor),
         ]
-        divided, too_far = self._taken(m, halves, Mux(self.measure, halves, greatest) if spec.decays else halves)
+        divided, too_far = self._taken(m, halves, Mux(self.measure, halves, greatest) if spec.form.decays else halves)
         m.d.comb += divider.dividend.eq(divided)
         forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
         with m.If(divider.start):
@@ -112,7 +112,7 @@ class QuotientVelocity(wiring.Component):
 
         nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity, measuring & too_far)
         update = Signal()
-        m.d.comb += update.eq(divider.done & (measuring | nearer if spec.decays else 1))
+        m.d.comb += update.eq(divider.done & (measuring | nearer if spec.form.decays else 1))
         m.d.sync += self.updates.valid.eq(update)
         with m.If(update):
             m.d.sync += [
@@ -120,10 +120,10 @@ class QuotientVelocity(wiring.Component):
                 new.interval.eq(divider.by),
                 new.forced.eq(forced),
             ]
-            if spec.flags_range:
+            if spec.form.flags_range:
                 m.d.sync += new.out_of_range.eq(beyond | beyond_most)
-        if spec.stamp_width:
-            stamp = Signal(spec.stamp_width, reset_less=True)
+        if spec.widths.stamp:
+            stamp = Signal(spec.widths.stamp, reset_less=True)
             with m.If(divider.start):
                 m.d.sync += stamp.eq(self.stamp)
             with m.If(update):
@@ -158,7 +158,7 @@ class QuotientVelocity(wiring.Component):
         A copy of the velocity goes around in step with the digits of a decay, and takes up those of the result.
         """
         spec, divider = self._spec, self.divider
-        if not (spec.decays or spec.saturates):
+        if not (spec.form.decays or spec.form.saturates):
             return Const(0), Const(0), divider.quotient
         copy = Signal(len(divider.quotient), init=1 << (len(divider.quotient) - 1))
         nearer = Signal(reset_less=True)
@@ -168,14 +168,14 @@ class QuotientVelocity(wiring.Component):
         bound: Value = copy[-1]
         negative: Value = velocity[-1]
         bounded: Value = ~measuring
-        if spec.saturates:
+        if spec.form.saturates:
             negative = Signal(name="negative", reset_less=True)
             most = Signal(reset_less=True)
-            limit = spec.max_count << spec.native_frac_bits
+            limit = spec.widths.max_count << spec.widths.native_frac_bits
             m.d.sync += most.eq(Mux(negative, divider.next_digit_of(-limit), divider.next_digit_of(limit)))
             with m.If(divider.start):
                 m.d.sync += [negative.eq(divider.dividend[-1]), most.eq(~divider.dividend[-1])]
-            bound = Mux(measuring, most, bound) if spec.decays else most
+            bound = Mux(measuring, most, bound) if spec.form.decays else most
             bounded = Const(1)
         m.d.comb += [
             comes_nearer.eq(nearer | (~farther & (bound != negative) & (divider.digit == negative))),
@@ -188,15 +188,15 @@ class QuotientVelocity(wiring.Component):
             ]
         with m.If(divider.start):
             m.d.sync += Cat(nearer, farther).eq(0)
-        return nearer, farther if spec.saturates else Const(0), Cat(copy[:-1], ~copy[-1]).as_signed()
+        return nearer, farther if spec.form.saturates else Const(0), Cat(copy[:-1], ~copy[-1]).as_signed()
 
     def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
         """Add two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
         counted = Signal()
         # Distances in 2^−finer counts, and by how much edges may be off.
-        finer = self._spec.error_bits
-        count = self._spec.timer_periods << finer
-        off = int(self._spec.edge_error * count)
+        finer = self._spec.bound.error_bits
+        count = self._spec.form.timer_periods << finer
+        off = int(self._spec.bound.edge_error * count)
         greatest = count + off
         m.d.comb += counted.eq(self.measure & ~self.forced_in)
         known = Signal(reset_less=True)
@@ -221,7 +221,7 @@ class QuotientVelocity(wiring.Component):
             ]
             with m.If(self.divider.start):
                 m.d.sync += none.eq(counted & end[-1] & (self.divisor == 1))
-            limit = -self._spec.absent_bound
+            limit = -self._spec.bound.absent
             lower = Mux(none, limit, box.quotient)
             with m.If(update):
                 m.d.sync += new[name].eq(-lower if upper else lower)

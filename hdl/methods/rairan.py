@@ -17,7 +17,7 @@ class RairanMethod(wiring.Component):
     """Datapath of Rairán 2013: from steps to velocity with a table, without a divider and without a multiplier.
 
     Latency: an update comes four clocks after the count or the end of dt that causes it, and that is
-    `spec.datapath_latency` clocks after `tick` if it comes with one. There may be an update in every clock. The
+    `spec.latency.datapath` clocks after `tick` if it comes with one. There may be an update in every clock. The
     velocity is correctly rounded: within half an LSB of the exact quotient, ties towards +∞.
 
     Parameters
@@ -48,7 +48,7 @@ class RairanMethod(wiring.Component):
                 "last": Out(1),
                 "beyond": Out(1),
                 **datapath_members(spec),
-                **({"tick_shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
+                **({"tick_shift": Out(range(spec.times.max_tick_shift + 1))} if spec.adaptive else {}),
             }
         )
         self._spec = spec
@@ -68,7 +68,7 @@ class RairanMethod(wiring.Component):
         m = Module()
         spec = self._spec
         m.submodules.counters = counters = self.counters
-        m.submodules.table = memory = Memory(shape=spec.table_width, depth=spec.depth, init=spec.table)
+        m.submodules.table = memory = Memory(shape=spec.form.table_width, depth=spec.form.depth, init=spec.form.table)
         read = memory.read_port()
         tag = [counters.n, counters.high, counters.backward, counters.forced, counters.at_rest]
         if spec.paper_exact:
@@ -76,7 +76,7 @@ class RairanMethod(wiring.Component):
         if spec.adaptive:
             tag += [counters.shift]
         update, n, high, backward, forced, at_rest, *more = delay(m, counters.update, *tag, clocks=2)
-        entry = Signal(spec.table_width)
+        entry = Signal(spec.form.table_width)
         m.d.sync += entry.eq(read.data)
         m.d.comb += [
             counters.step.eq(self.step_now),
@@ -91,7 +91,7 @@ class RairanMethod(wiring.Component):
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())
         new = registers(self.updates.p.shape(), "new", init={"n_dt1": 1})
         m.d.comb += self.updates.p.eq(new)
-        stamp = delay(m, self.stamp) if spec.stamp_width else ()
+        stamp = delay(m, self.stamp) if spec.widths.stamp else ()
         # At rest no update corrects what an upset has done to the outputs.
         shown = update | at_rest
         with m.If(shown):
@@ -100,12 +100,12 @@ class RairanMethod(wiring.Component):
                 new.interval.eq(low << shift if spec.adaptive else low),
                 new.forced.eq(forced),
                 Cat(new.n_ep1, new.n_dt1).eq(
-                    Cat(*more) if spec.paper_exact else Cat(counts[: len(new.n_ep1)], low[: spec.interval_width])
+                    Cat(*more) if spec.paper_exact else Cat(counts[: len(new.n_ep1)], low[: spec.widths.interval])
                 ),
             ]
             if spec.adaptive:
                 m.d.sync += new.dt_shift.eq(shift)
-            if spec.stamp_width:
+            if spec.widths.stamp:
                 m.d.sync += new.stamp.eq(*stamp)
             if "rests" in new.shape().members:
                 m.d.sync += new.rests.eq(at_rest)
@@ -116,16 +116,18 @@ class RairanMethod(wiring.Component):
     def _bounds(self, m: Module, new: data.View, *, shown: Value, backward: Signal) -> None:
         """Look up both bounds; backwards, they are negated and exchanged."""
         spec, counters = self._spec, self.counters
-        width = spec.bound_width - 1
+        width = spec.bound.width - 1
         low = ~counters.high & counters.unsynced
         n, above = counters.n, (counters.n - low)[: len(counters.n)]
         if spec.adaptive:
-            mark = Mux(counters.high, spec.high_depth << counters.shift, Const(spec.low_depth) >> counters.shift)
+            mark = Mux(
+                counters.high, spec.form.high_depth << counters.shift, Const(spec.form.low_depth) >> counters.shift
+            )
             n, above = n | mark, above | mark
         lowest = Cat(counters.high, n)
-        if spec.edge_error:
+        if spec.bound.edge_error:
             # What implies no least speed has the other half of the table.
-            half = (len(spec.lower_table) - 1).bit_length() - 1
+            half = (len(spec.form.lower_table) - 1).bit_length() - 1
             lowest = Cat(lowest, Const(0, half))[:half]
             lowest = Cat(lowest, counters.loose)
         else:
@@ -133,7 +135,7 @@ class RairanMethod(wiring.Component):
         places = {"lower": lowest, "upper": Cat(counters.high, above)}
         entries: dict[str, Signal] = {}
         for name, place in places.items():
-            table = getattr(spec, f"{name}_table")
+            table = getattr(spec.form, f"{name}_table")
             m.submodules[name] = memory = Memory(shape=width, depth=len(table), init=table)
             read = memory.read_port()
             entries[name] = entry = Signal(width, name=name)
@@ -141,7 +143,7 @@ class RairanMethod(wiring.Component):
             m.d.sync += entry.eq(read.data)
         valid = Signal()
         m.d.comb += valid.eq(counters.high | counters.n.any())
-        valid, *negative = delay(m, valid, *([counters.loose] if spec.edge_error else []), clocks=2)
+        valid, *negative = delay(m, valid, *([counters.loose] if spec.bound.edge_error else []), clocks=2)
         lower = Mux(negative[0], -entries["lower"], entries["lower"]) if negative else entries["lower"]
         with m.If(shown):
             m.d.sync += [
@@ -153,7 +155,7 @@ class RairanMethod(wiring.Component):
     def _velocity(self, n: Signal, high: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
         """Return the estimate with its sign: the complement and a carry are −v, so one adder rounds and negates."""
         spec = self._spec
-        f = spec.native_frac_bits
+        f = spec.widths.native_frac_bits
         whole = (n + 1 if spec.estimate == "n1" else n) & high.replicate(len(n) + 1)
         carry: Value = Const(0)
         if spec.estimate != "n3":
@@ -170,12 +172,14 @@ class RairanMethod(wiring.Component):
             magnitude = Cat(part, whole)
         else:
             magnitude = Mux(high, whole << f, entry)
-        padded = Cat(magnitude, Const(0, spec.native_width))[: spec.native_width]
-        return (padded ^ backward.replicate(spec.native_width)) + (carry ^ backward)
+        padded = Cat(magnitude, Const(0, spec.widths.native))[: spec.widths.native]
+        return (padded ^ backward.replicate(spec.widths.native)) + (carry ^ backward)
 
     def _without_tie(self, n: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
         """Return half an LSB backwards is rounded to 0."""
-        ties = {k: tie for k in range(self._spec.max_shift + 1) if (tie := self._spec.tie(k)) is not None}
+        ties = {
+            k: tie for k in range(self._spec.times.max_tick_shift + 1) if (tie := self._spec.form.tie(k)) is not None
+        }
         if not ties:
             return entry
         hits = [(n == tie) & (shift == k) if self._spec.adaptive else n == tie for k, tie in ties.items()]

@@ -51,19 +51,19 @@ class RairanCounters(wiring.Component):
                 "last": Out(1),
                 "beyond": Out(1),
                 "update": Out(1),
-                "n": Out(range(max(spec.max_pulse_count, spec.timing.max_ticks) + 1)),
+                "n": Out(range(max(spec.widths.max_pulse_count, spec.timing.max_ticks) + 1)),
                 "high": Out(1),
                 "backward": Out(1),
                 "forced": Out(1),
                 "at_rest": Out(1),
                 # Nep1 and Ndt1 as they are before anything has come.
                 **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
-                **({"shift": Out(range(spec.max_shift + 1))} if spec.adaptive else {}),
+                **({"shift": Out(range(spec.times.max_tick_shift + 1))} if spec.adaptive else {}),
                 **({name: Out(1) for name in ("loose", "unsynced")} if spec.bounds else {}),
             }
         )
         # Cep − 1, and whether there is any.
-        self.c_more = Signal(range(max(spec.max_pulse_count, 2)))
+        self.c_more = Signal(range(max(spec.widths.max_pulse_count, 2)))
         self.any = Signal()
         self.c_dt = Signal(range(spec.timing.max_ticks + 1))
         self.rest = Signal()  # it has come to its end
@@ -129,7 +129,7 @@ class RairanCounters(wiring.Component):
         # Counts down to −1, as the sampling clock does.
         start = cycles - 2
         # The first step comes a clock after the reset.
-        left = Signal(signed((start + 1).bit_length() + 1), init=start + self._spec.registers_steps)
+        left = Signal(signed((start + 1).bit_length() + 1), init=start + self._spec.latency.registers_steps)
         m.d.sync += left.eq(left - Const(1, left.shape()))
         with m.If(left[-1] | opens):
             m.d.sync += left.eq(start)
@@ -137,10 +137,10 @@ class RairanCounters(wiring.Component):
 
     def _count(self, m: Module, pulse: Signal, opens: Signal) -> None:
         """Count Cep, which includes the count that opens a window, and Cdt since the last count."""
-        c_more, c_dt, most = self.c_more, self.c_dt, self._spec.max_count
+        c_more, c_dt, most = self.c_more, self.c_dt, self._spec.widths.max_count
         # Whether Cdt reaches the maximum time with this end of dt, or has reached it before.
-        full_dt = self._at_end(m, self._is(self._spec.max_dt))
-        m.d.comb += self.longest.eq(self._at_end(m, self._is(lambda k: self._spec.max_dt(k) - 1)) | full_dt)
+        full_dt = self._at_end(m, self._is(self._spec.form.max_dt))
+        m.d.comb += self.longest.eq(self._at_end(m, self._is(lambda k: self._spec.form.max_dt(k) - 1)) | full_dt)
         full: Value = Const(0)
         if most < self._spec.timing.tick_cycles:
             full = self.any & (c_more == self._of_dt(lambda k: (most << k) - 1))

@@ -16,7 +16,7 @@ from tachometry.spec.formats.reciprocal import DividedReciprocal
 class SMethod(wiring.Component):
     """S-method datapath, eqs. (17) and (21) of Tsuji 2009: from pulse numbers to velocity without a divider.
 
-    Latency: an update comes `spec.datapath_latency` clocks after `tick`. The velocity is correctly rounded: within half
+    Latency: an update comes `spec.latency.datapath` clocks after `tick`. The velocity is correctly rounded: within half
     an LSB of the exact quotient, ties towards +∞.
 
     Parameters
@@ -45,27 +45,27 @@ class SMethod(wiring.Component):
             {
                 **datapath_members(spec),
                 "coming": In(1),
-                "next_count": In(signed(spec.count_width)),
+                "next_count": In(signed(spec.widths.count)),
                 "stalled": Out(1),
             }
         )
         self._spec = spec
-        self.alteration = AlterationDetector(spec.count_width, seldom=spec.serial)
+        self.alteration = AlterationDetector(spec.widths.count, seldom=spec.latency.serial)
         self.interval_accumulator = IntervalAccumulator(
             max_ticks=spec.timing.max_ticks,
-            kept_ticks=spec.kept_ticks,
-            count_width=spec.count_width,
-            numerator_width=spec.numerator_width,
+            kept_ticks=spec.form.kept_ticks,
+            count_width=spec.widths.count,
+            numerator_width=spec.form.numerator_width,
             cancel=spec.cancel,
-            seldom=spec.serial,
+            seldom=spec.latency.serial,
         )
         self.quotient = Quotient(
-            spec.reciprocal,
+            spec.form.reciprocal,
             quotients=quotients(spec),
-            numerator_width=spec.numerator_width,
+            numerator_width=spec.form.numerator_width,
             tag=data.StructLayout({"forced": 1, **stamped(spec), **({"bounds_valid": 1} if spec.bounds else {})}),
-            serial=spec.serial,
-            margin=spec.margin,
+            serial=spec.latency.serial,
+            margin=spec.form.margin,
         )
 
     @property
@@ -80,7 +80,7 @@ class SMethod(wiring.Component):
     @property
     def idle_counters(self) -> tuple[IdleDivision, ...]:
         """Divisions that a simulation may skip: q is read from the next tick on."""
-        found = self._spec.reciprocal
+        found = self._spec.form.reciprocal
         if not isinstance(found, DividedReciprocal) or found.steps > 62:
             return ()
         box = "quotient.reciprocal"
@@ -93,7 +93,7 @@ class SMethod(wiring.Component):
         m.submodules.quotient = quotient = self.quotient
         found, new = quotient.results, self.updates.p
         # m_s stays until the result has come, so that no register needs to keep it.
-        moves = (self.tick & ~interval.closes) | found.valid if self._spec.serial else self.tick
+        moves = (self.tick & ~interval.closes) | found.valid if self._spec.latency.serial else self.tick
         for box in (alteration, interval):
             m.d.comb += [
                 box.tick.eq(self.tick),
@@ -109,14 +109,14 @@ class SMethod(wiring.Component):
             quotient.load.eq(self.coming),
             quotient.start.eq(interval.update),
             quotient.base.eq(self.pulse_count),
-            quotient.numerator.eq(interval.numerator << self._spec.finer),
+            quotient.numerator.eq(interval.numerator << self._spec.form.finer),
             quotient.tag.forced.eq(interval.forced),
             self.stalled.eq(interval.stalled),
             self.updates.valid.eq(found.valid),
             new.interval.eq(found.p.m),
             *(new[name].eq(found.p[name]) for name in found.p.shape().members if name != "m"),
         ]
-        if self._spec.stamp_width:
+        if self._spec.widths.stamp:
             m.d.comb += quotient.tag.stamp.eq(self.stamp)
         if self._spec.bounds:
             # The first window has begun before there was anything to be seen.

@@ -10,10 +10,10 @@ class TMethod(TimedDatapath):
 
     def _window(self, m: Module) -> tuple[Value, Value, Value]:
         timer, quotient, size = self.gap_timer, self.quotient_velocity, self._size
-        many = size.any() & (size != 1) & (size != -1) if self._spec.on_lattice else Value.cast(0)
+        many = size.any() & (size != 1) & (size != -1) if self._spec.form.on_lattice else Value.cast(0)
         m.d.comb += quotient.beyond_in.eq(many)
         return (
             timer.count & (timer.opened | many) & quotient.free,
-            Mux(self._same | many, self._one, 0) if self._spec.on_lattice else self._way,
+            Mux(self._same | many, self._one, 0) if self._spec.form.on_lattice else self._way,
             Mux(many, 1, timer.age),
         )

@@ -15,7 +15,7 @@ from tachometry.spec.methods.timed import TimedTachometer
 class TimedDatapath(wiring.Component):
     """From counts to velocities; `_window` of a method says when a measurement ends (docs/concepts/timed.md).
 
-    Latency: an update comes `spec.datapath_latency` clocks after the `step`, or the `tick`, that causes it.
+    Latency: an update comes `spec.latency.datapath` clocks after the `step`, or the `tick`, that causes it.
 
     Parameters
     ----------
@@ -35,14 +35,14 @@ class TimedDatapath(wiring.Component):
 
     def __init__(self, spec: TimedTachometer) -> None:
         self._spec = spec
-        self.gap_timer = GapTimer(spec.max_periods, on_lattice=spec.on_lattice)
+        self.gap_timer = GapTimer(spec.form.max_periods, on_lattice=spec.form.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
-        if not spec.on_lattice:
+        if not spec.form.on_lattice:
             self.count_way = CountWay(reversals=not spec.paper_exact)
         super().__init__(
             {
                 **datapath_members(spec),
-                **({} if spec.on_lattice else {"step_before": In(signed(2))}),
+                **({} if spec.form.on_lattice else {"step_before": In(signed(2))}),
             }
         )
 
@@ -54,25 +54,25 @@ class TimedDatapath(wiring.Component):
     @property
     def idle_counters(self) -> tuple[IdleCounter, ...]:
         """Counters that a simulation may skip: `IdleCounter`."""
-        if self._spec.on_lattice:  # which counts with the tick
+        if self._spec.form.on_lattice:  # which counts with the tick
             return ()
-        return (IdleCounter("gap_timer.age", 1, (self._spec.max_periods - 1,)),)
+        return (IdleCounter("gap_timer.age", 1, (self._spec.form.max_periods - 1,)),)
 
     @property
     def _size(self) -> Signal:
         """The count of a timer period."""
-        size: Signal = self.pulse_count if self._spec.on_lattice else self.count_way.step
+        size: Signal = self.pulse_count if self._spec.form.on_lattice else self.count_way.step
         return size
 
     @property
     def _one(self) -> ValueLike:
         """A count of this sign, times the timer periods in a tick."""
-        return Mux(self.gap_timer.negative, -self._spec.timer_periods, self._spec.timer_periods)
+        return Mux(self.gap_timer.negative, -self._spec.form.timer_periods, self._spec.form.timer_periods)
 
     @property
     def _same(self) -> Value:
         """Whether this count is from another edge than the last count."""
-        if not self._spec.on_lattice:
+        if not self._spec.form.on_lattice:
             return self.count_way.moves
         if self._spec.paper_exact:
             return Value.cast(1)
@@ -81,7 +81,7 @@ class TimedDatapath(wiring.Component):
     @property
     def _way(self) -> Value:
         """From the edge of the last count to that of this one, times the timer periods in a tick; 0 without a count."""
-        periods = self._spec.timer_periods
+        periods = self._spec.form.timer_periods
         # No bit is a gate: each is one of the registers.
         way = self.count_way
         bits = {(0, 0): Const(0), (1, 0): way.forward, (0, 1): way.backward, (1, 1): way.moves}
@@ -101,16 +101,16 @@ class TimedDatapath(wiring.Component):
         m.submodules.gap_timer = timer = self.gap_timer
         m.submodules.quotient_velocity = quotient = self.quotient_velocity
         size = self._size
-        if not spec.on_lattice:
+        if not spec.form.on_lattice:
             m.submodules.count_way = way = self.count_way
             m.d.comb += [way.step_before.eq(self.step_before), way.was_negative.eq(timer.was_negative)]
         ends, distance, time = self._window(m)
         wiring.connect(m, quotient.updates, wiring.flipped(self.updates))
         m.d.comb += [
             timer.tick.eq(self.tick),
-            timer.period.eq(self.tick if spec.on_lattice else 1),
+            timer.period.eq(self.tick if spec.form.on_lattice else 1),
             # Bit 0 of a step tells that it is one.
-            timer.count.eq(self.tick & size.any() if spec.on_lattice else size[0]),
+            timer.count.eq(self.tick & size.any() if spec.form.on_lattice else size[0]),
             timer.negative.eq(size[-1]),
             quotient.measure.eq(timer.overdue | ends),
             quotient.decay.eq(timer.silent),
@@ -118,7 +118,7 @@ class TimedDatapath(wiring.Component):
             quotient.divisor.eq(time),
             quotient.forced_in.eq(~timer.count),
         ]
-        if spec.stamp_width:
+        if spec.widths.stamp:
             m.d.comb += quotient.stamp.eq(self.stamp)
         if spec.bounds:
             # The first period after reset was not seen completely.

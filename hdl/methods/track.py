@@ -13,7 +13,7 @@ from tachometry.spec import TrackTachometer
 class TrackMethod(wiring.Component):
     """Tracking datapath: a filter for fluctuating measurement time (Tsuji 2009, eq. (22)) of third order.
 
-    Latency: an update comes `spec.datapath_latency` clocks after every `tick`.
+    Latency: an update comes `spec.latency.datapath` clocks after every `tick`.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class TrackMethod(wiring.Component):
     def __init__(self, spec: TrackTachometer) -> None:
         self._spec = spec
         self.tick_counts = TickCounts(spec.form, spec.timing.max_ticks)
-        self.machine = TrackMachine(spec.program, moved_width=spec.count_width)
+        self.machine = TrackMachine(spec.program, moved_width=spec.widths.count)
         super().__init__(
             {
                 **datapath_members(spec),
@@ -77,7 +77,7 @@ class TrackMethod(wiring.Component):
                 new.interval.eq(counts.elapsed),
                 new.forced.eq(~counts.counted),
             ]
-        if spec.stamp_width:
+        if spec.widths.stamp:
             stamp = Signal.like(self.stamp)
             with m.If(self.tick):
                 m.d.sync += stamp.eq(self.stamp)

@@ -4,7 +4,7 @@ from amaranth import signed
 from amaranth.lib import data, stream
 
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
 # The velocities of an update, and which way each is rounded: to the nearest (0), down (−1) or up (1).
@@ -17,13 +17,13 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
     `stamp` is for the age: how many ticks there were when the update was caused, modulo a power of two. `rests` is for
     the low-pass filter: no update will follow before the next count.
     """
-    fields = {"velocity": signed(spec.native_width), "interval": spec.interval_width, "forced": 1}
-    if spec.stamp_width:
-        fields["stamp"] = spec.stamp_width
-    if spec.last_at_rest and spec.lowpass is not None:
+    fields = {"velocity": signed(spec.widths.native), "interval": spec.widths.interval, "forced": 1}
+    if spec.widths.stamp:
+        fields["stamp"] = spec.widths.stamp
+    if spec.facts.last_at_rest and spec.lowpass is not None:
         fields["rests"] = 1
     if spec.bounds:
-        fields |= {name: signed(spec.bound_width) for name in BOUNDS} | {"bounds_valid": 1}
+        fields |= {name: signed(spec.bound.width) for name in BOUNDS} | {"bounds_valid": 1}
     fields |= {port.name: signed(port.width) if port.signed else port.width for port in spec.method_ports}
     return data.StructLayout(fields)
 

@@ -37,9 +37,9 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     level = quadrature(np.append(0, np.cumsum(np.concatenate(turns))))
     clock = np.append(0, clock)
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
-    n_clocks = int(clock[-1]) + spec.rest_tenths * longest // 10 + 40 * cycles + 300
+    n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
     trace = PinTrace(clock, level & np.uint8(1), level >> np.uint8(1), n_clocks, z)
-    if spec.max_tick_cycles is None:
+    if not spec.external_tick:
         return trace
     apart = np.full(trace.n_clocks // cycles + 1, cycles)
     apart[500:1000] += rng.integers(-cycles // 2, cycles, len(apart[500:1000]))

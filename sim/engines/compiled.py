@@ -93,12 +93,12 @@ class Design:
     @property
     def outputs(self) -> list[Port]:
         """Outputs of the core, in order."""
-        return list(self.spec.outputs)
+        return list(self.spec.ports.outputs)
 
     @property
     def strobes(self) -> list[str]:
         """Names of those that make a row."""
-        return list(self.spec.strobes)
+        return list(self.spec.ports.strobes)
 
     def source(self, model: str) -> str:
         """Return the driver behind a text with the struct `Model`."""

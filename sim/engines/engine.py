@@ -66,7 +66,7 @@ def driven_pins(spec: CoreSpec, trace: Trace) -> list[Port]:
     ValueError
         If the trace lacks one.
     """
-    missing = [port.name for port in spec.pins if port.name not in trace.lines]
+    missing = [port.name for port in spec.ports.pins if port.name not in trace.lines]
     if missing:
         raise ValueError(f"the trace must have the lines of the core, and lacks {', '.join(missing)}")
-    return list(spec.pins)
+    return list(spec.ports.pins)

@@ -70,7 +70,7 @@ class GateLoop:
 
     def __init__(self, spec: LoopSpec) -> None:
         self._spec = spec
-        self._design = _GateDesign(spec, list(spec.pins))
+        self._design = _GateDesign(spec, list(spec.ports.pins))
         self._simulation = LoopSimulation(spec.tachometer, self._design)
 
     def stop(self, ending: bool = True) -> None:
@@ -96,10 +96,10 @@ class GateLoop:
         commands, currents = np.zeros((n_ticks, 3), np.int64), np.zeros((n_ticks, 4), np.int64)
         lines = np.zeros((MOST_EDGES, 2), np.int64)
         per_count = 2 * math.pi / spec.tachometer.encoder.counts_per_rev
-        rad_per_s, y = float(spec.rad_per_s), float(spec.rad_per_s / (1 << form.extra_bits))
+        rad_per_s, y = float(spec.units.rad_per_s), float(spec.units.rad_per_s / (1 << form.extra_bits))
         gates = _GATES(
-            *(float(spec.amperes), y, float(spec.inertia * spec.observer) * y),
-            *(per_count / 256, rad_per_s / (1 << form.command_bits), 2.0**-spec.acceleration_frac_bits),
+            *(float(spec.units.amperes), y, float(spec.inertia * spec.observer) * y),
+            *(per_count / 256, rad_per_s / (1 << form.command_bits), 2.0**-spec.units.acceleration_frac_bits),
             feed_forward,
             *((1 << (widths[name] - 1)) - 1 for name in ("command_velocity", "command_acceleration")),
             (1 << widths["command_position"]) - 1,
@@ -108,7 +108,7 @@ class GateLoop:
             most_edges=MOST_EDGES,
         )
         # A current is at the motor in the clock after the one in which it is new.
-        clocks = {"clocks": int(spec.period), "first": spec.first_tick, "delay": spec.latency + 1}
+        clocks = {"clocks": int(spec.period), "first": spec.first_tick, "delay": spec.tick_to_current + 1}
         controller = CONTROLLER(**clocks)
         found = self._simulation.call(
             motor, edges, controller, course, log, 1e-5, ctypes.cast(ctypes.byref(gates), ctypes.c_void_p).value

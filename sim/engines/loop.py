@@ -230,7 +230,7 @@ class LoopSimulation:
 
     def __init__(self, spec: TachometerSpec, design: LoopDesign | None = None) -> None:
         self._spec = spec
-        self._design = design or LoopDesign(spec, list(spec.pins))
+        self._design = design or LoopDesign(spec, list(spec.ports.pins))
         self._library = ctypes.CDLL(str(Cxxrtl().library(self._design)))
         self._stop = _I(0)
 
@@ -291,7 +291,7 @@ class LoopSimulation:
     def _controller(self, gains: Gains) -> Any:
         clocks, spec = self.clocks(gains.seconds), self._spec
         # It comes when the velocity of a tick is there.
-        first = (spec.pin_to_count + spec.tick_latency + spec.tick_to_velocity + 1) % clocks
+        first = (spec.latency.pin_to_count + spec.latency.tick + spec.latency.tick_to_velocity + 1) % clocks
         delay = min(round(gains.delay * spec.timing.clock_hz), clocks)
         return CONTROLLER(
             *(gains.position, gains.velocity, gains.observer, gains.filter),
@@ -301,8 +301,8 @@ class LoopSimulation:
 
     def _core(self) -> Any:
         spec, names = self._spec, [port.name for port in self._design.outputs]
-        acceleration = float(getattr(spec, "acceleration_per_lsb", 0.0))
+        acceleration = float(spec.method_entries.get("acceleration", {}).get("rad_per_s2_per_lsb", 0.0))
         columns = [names.index(name) for name in ("velocity", "velocity_valid", "position")]
         columns.append(names.index("acceleration") if acceleration else -1)
         per_count = 2 * np.pi / spec.encoder.counts_per_rev
-        return _CORE(spec.rad_per_s_per_lsb, acceleration, per_count, *columns, 1 / spec.timing.clock_hz)
+        return _CORE(spec.scale.rad_per_s_per_lsb, acceleration, per_count, *columns, 1 / spec.timing.clock_hz)

@@ -21,8 +21,8 @@ def shown(core: AnyTachometer) -> dict[str, Value]:
     update that comes of it.
     """
     spec = core.spec
-    found: dict[str, Value] = {pin.name: getattr(core, pin.name) for pin in spec.pins}
-    for strobe, held in sorted(spec.strobes.items(), key=lambda item: _ORDER.get(item[0], 0)):
+    found: dict[str, Value] = {pin.name: getattr(core, pin.name) for pin in spec.ports.pins}
+    for strobe, held in sorted(spec.ports.strobes.items(), key=lambda item: _ORDER.get(item[0], 0)):
         if strobe == UPDATE:
             inner = core.datapath.probes
             assert not inner.keys() & {port.name for port in spec.ports}, "a probe must not have the name of a port"

@@ -65,7 +65,7 @@ class PySim:
         core = core_of(spec)
         top = Module()
         top.submodules.core = core
-        outputs = spec.outputs
+        outputs = spec.ports.outputs
         strobe = Cat(getattr(core, port.name) for port in outputs if port.is_strobe).any()
         values = _packed(top, [strobe, *(getattr(core, port.name) for port in outputs)])
         seen = shown(core) if vcd is not None else {}

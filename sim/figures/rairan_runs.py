@@ -51,7 +51,7 @@ def _estimates(spec: RairanTachometer, run: Run) -> _Estimates:
     is.
     """
     updates = run.updates
-    unit = 2.0**spec.frac_bits
+    unit = 2.0**spec.widths.frac_bits
     # n3 tells the regime: 2/3 and less is low, 4/3 and more is high.
     n3 = updates.velocity / unit
     shown = n3 > 0
@@ -72,7 +72,7 @@ def _window_means(spec: RairanTachometer, encoding: Encoding, at: _Estimates) ->
     clock_hz, dt = spec.timing.clock_hz, spec.timing.tick_cycles
     trace = encoding.recording.place(clock_hz)
     counted = trace.clock[1:]  # all edges count, in one direction
-    end = at.clock - spec.tick_latency - spec.tick_to_velocity - spec.pin_to_count
+    end = at.clock - spec.latency.tick - spec.latency.tick_to_velocity - spec.latency.pin_to_count
     last = counted[np.maximum(np.searchsorted(counted, end, side="left") - 1, 0)]
     begin = np.where(at.n1 > 1, end - dt, last)
     moved = encoding.motion.angle(end / clock_hz) - encoding.motion.angle(begin / clock_hz)

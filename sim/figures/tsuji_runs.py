@@ -31,7 +31,7 @@ def fig05(lab: Lab) -> Result:
     held = held_velocity(spec, lab.golden(spec, ramp))
 
     # The same distance from a multiple, and at the end of every window the same phase: the offset alone differs.
-    late = (spec.pin_to_count + 1) / spec.timing.clock_hz
+    late = (spec.latency.pin_to_count + 1) / spec.timing.clock_hz
     bands, distances, alike, n_ticks = 4, (0.03, 0.25, 0.4, 0.61, 0.9), 0, 0
     shown = []
     for distance in distances:
@@ -87,12 +87,14 @@ def fig05(lab: Lab) -> Result:
 
 
 def _held(run: Run, spec: TachometerSpec, instants: FloatArray) -> FloatArray:
-    velocity = run.updates.velocity.astype(np.float64) * spec.rad_per_s_per_lsb
+    velocity = run.updates.velocity.astype(np.float64) * spec.scale.rad_per_s_per_lsb
     return velocity[np.searchsorted(run.updates.clock / spec.timing.clock_hz, instants, side="right") - 1]
 
 
 def _steps(label: str, run: Run, spec: TachometerSpec) -> Curve:
-    return Curve(label, run.updates.clock / spec.timing.clock_hz, run.updates.velocity * spec.rad_per_s_per_lsb, "held")
+    return Curve(
+        label, run.updates.clock / spec.timing.clock_hz, run.updates.velocity * spec.scale.rad_per_s_per_lsb, "held"
+    )
 
 
 def _rms(error: FloatArray) -> float:
@@ -241,11 +243,13 @@ def _deviation(run: Run, spec: TachometerSpec, encoding: Encoding) -> tuple[floa
     """
     updates, clock_hz = run.updates, spec.timing.clock_hz
     chosen = np.flatnonzero(~updates.forced & (updates.interval > 1))[1:]
-    end = (updates.clock[chosen] - spec.tick_to_velocity - spec.tick_latency - spec.pin_to_count).astype(np.float64)
+    end = (
+        updates.clock[chosen] - spec.latency.tick_to_velocity - spec.latency.tick - spec.latency.pin_to_count
+    ).astype(np.float64)
     begin = end - updates.interval[chosen] * spec.timing.tick_cycles
     motion = encoding.motion
     mean = (motion.angle(end / clock_hz) - motion.angle(begin / clock_hz)) / (end - begin) * clock_hz
-    error = np.abs(updates.velocity[chosen] * spec.rad_per_s_per_lsb - mean)
+    error = np.abs(updates.velocity[chosen] * spec.scale.rad_per_s_per_lsb - mean)
     within = error <= tsuji_eq18_resolution(updates.interval[chosen], COUNTS, TICK)
     distance = np.abs(mean / UNIT - np.floor(mean / UNIT + 0.5))
     near, middle = distance < 1 / 8, distance > 3 / 8

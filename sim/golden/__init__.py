@@ -35,8 +35,8 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
     """Return the same by strobes, and with each update the clock of its cause, as the column `cause`."""
     steps = decoded(spec, trace)
     golden = model(spec)
-    if spec.own_ticks:
-        last, beyond, nominal = golden.windows(steps, trace.n_clocks - spec.tick_latency)
+    if spec.facts.own_ticks:
+        last, beyond, nominal = golden.windows(steps, trace.n_clocks - spec.latency.tick)
         tick_errors = np.empty(0, dtype=np.int64)
     else:
         last, tick_errors = windows(spec, trace)
@@ -44,7 +44,7 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
     ticks, index = count(spec, steps, last, beyond)
     ticks = with_stalled(spec, ticks, nominal)
     measured = golden.updates(ticks, steps, trace.n_clocks)
-    measured = measured.having(cause=measured.clock - spec.datapath_latency)
+    measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
     found = {
         "tick": with_age(spec, ticks, updates),

@@ -16,7 +16,7 @@ def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec,
     """Return what the core of `spec` must show at its ports for these pins; `tables` is the golden model of a single
     core.
     """
-    found: dict[str, list[Table]] = {name: [] for name in spec.axis.strobes}
+    found: dict[str, list[Table]] = {name: [] for name in spec.axis.ports.strobes}
     for axis, pins in enumerate(trace.each):
         rows = tables(spec.axis, seen(spec, pins, axis))
         ticks, updates = rows[TICK], rows[UPDATE]
@@ -25,14 +25,14 @@ def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec,
             TICK: spec.tick_clock(axis, np.arange(len(ticks))),
             UPDATE: spec.tick_clock(axis, number),
             "decode_error": spec.look(axis, rows["decode_error"].clock) + COUNT_LATENCY,
-            INDEX: spec.look(axis, rows[INDEX].clock - spec.axis.tick_latency) + spec.index_latency,
+            INDEX: spec.look(axis, rows[INDEX].clock - spec.axis.latency.tick) + spec.latency.index,
         }
         for name, tables_of_name in found.items():
             own = {"clock": clocks[name], "axis": np.full(len(rows[name]), axis)}
             tables_of_name.append(rows[name].having(**own))
     every = {name: _merged(each, trace.n_clocks) for name, each in found.items()}
     if spec.parallel:
-        every = {name: _held(table, spec.axis.strobes[name], spec.axes) for name, table in every.items()}
+        every = {name: _held(table, spec.axis.ports.strobes[name], spec.axes) for name, table in every.items()}
     named = {
         name: table.having(**{f"{name.removesuffix('_valid')}_axis": table["axis"]}) for name, table in every.items()
     }
@@ -45,12 +45,12 @@ def seen(spec: AxesSpec, pins: PinTrace, axis: int) -> PinTrace:
     The first level that counts is looked at in the third round; a core of its own has its first in the third clock.
     """
     core = spec.axis
-    first = spec.look(axis, core.pin_to_count) - core.pin_to_count
+    first = spec.look(axis, core.latency.pin_to_count) - core.latency.pin_to_count
     look = np.maximum(-(-(pins.clock - first) // spec.slots), 0)
     last = np.append(look[1:] != look[:-1], True)  # of the levels between two looks
     lines = {name: line[last] for name, line in pins.lines.items()}
     # So long that all that is shown within the trace has come.
-    n_clocks = pins.n_clocks // spec.slots + core.datapath_latency + 2 * spec.rounds
+    n_clocks = pins.n_clocks // spec.slots + core.latency.datapath + 2 * spec.rounds
     return PinTrace(look[last], n_clocks=n_clocks, **lines)
 
 

@@ -153,7 +153,7 @@ def control(
         rows.append((loop.current, loop.saturated, loop.y, loop.w))
     columns = np.array(rows, dtype=np.int64).reshape(-1, 4).T
     names = ("current", "current_saturated", "filtered_velocity", "disturbance")
-    return Table(clock + spec.latency, dict(zip(names, columns, strict=True)))
+    return Table(clock + spec.tick_to_current, dict(zip(names, columns, strict=True)))
 
 
 def run_loop(
@@ -171,7 +171,7 @@ def run_loop(
     alone = spec.tachometer
     clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
     # The position is as late as a tick shows it.
-    places, _ = count(alone, decoded(alone, trace), clock - alone.tick_latency)
+    places, _ = count(alone, decoded(alone, trace), clock - alone.latency.tick)
     found = tables(alone, trace)
     given = [one for one in commands if isinstance(one, Command)]
     columns: dict[str, IntArray] = {}

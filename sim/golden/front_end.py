@@ -126,11 +126,11 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         changed = np.append(True, (trace.a[1:] != trace.a[:-1]) | (trace.b[1:] != trace.b[:-1]))
         clock, a, b = trace.clock[changed], trace.a[changed], trace.b[changed]
     step, illegal = decode(a, b, spec.encoder.decoding)
-    at = clock[1:] + spec.pin_to_count
+    at = clock[1:] + spec.latency.pin_to_count
     rises = at[:0]
     if spec.index:
         at_z, z = conditioned("z")
-        rises = at_z[1:][z[1:] == 1] + spec.pin_to_count
+        rises = at_z[1:][z[1:] == 1] + spec.latency.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
     return Steps(at, step, at[illegal], rises, np.sort(np.concatenate(returned)) + 3)
 
@@ -169,10 +169,10 @@ def count(
     forward, backward = (np.bincount(window[steps.step == sign], minlength=len(last) + 1)[:-1] for sign in (1, -1))
     sums = forward - backward
     reached = np.cumsum(sums)
-    overflow = np.abs(sums) > spec.max_pulse_count
+    overflow = np.abs(sums) > spec.widths.max_pulse_count
     if beyond is not None:
-        left = first_beyond(steps, last, spec.max_pulse_count)
-        sums = np.where(left != 0, left * spec.max_pulse_count, sums)
+        left = first_beyond(steps, last, spec.widths.max_pulse_count)
+        sums = np.where(left != 0, left * spec.widths.max_pulse_count, sums)
         overflow = (left != 0) | beyond
     rises = steps.index
     captured = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, rises, side="right")]
@@ -184,12 +184,12 @@ def count(
         half = 1 << (spec.position_width - 1)
         return ((position + half) & (2 * half - 1)) - half
 
-    strobe = last + spec.tick_latency
+    strobe = last + spec.latency.tick
     glitches = places(steps.swallowed, strobe, "right")
     columns = {
-        "pulse_count": np.clip(sums, -spec.max_pulse_count, spec.max_pulse_count),
+        "pulse_count": np.clip(sums, -spec.widths.max_pulse_count, spec.widths.max_pulse_count),
         "position": wrapped(shown),
         "overflow": overflow,
         "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),
     }
-    return Table(strobe, columns), Table(rises + spec.tick_latency, {"index_position": wrapped(captured - origin[:-1])})
+    return Table(strobe, columns), Table(rises + spec.latency.tick, {"index_position": wrapped(captured - origin[:-1])})

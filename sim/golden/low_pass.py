@@ -14,14 +14,14 @@ def filtered(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
     """
     if spec.lowpass is None:
         return updates
-    form = spec.low_pass
+    form = spec.scale.low_pass
     latency = form.latency
     tables, low_bits, extra, bits = form.tables, form.low_bits, form.extra_bits, form.factor_bits
     half = 1 << (bits - 1)
     came = updates.clock
     # Ticks from the clock of the update before, or from reset, on.
     intervals = np.diff(np.searchsorted(ticks.clock, came, side="left"), prepend=0)
-    clears = (updates.get("rests") & spec.last_at_rest).tolist()
+    clears = (updates.get("rests") & spec.facts.last_at_rest).tolist()
 
     taken: list[tuple[int, int, int]] = []  # clock, row, intervals
     free = 0

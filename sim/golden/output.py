@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 
 
 def in_unit(spec: TachometerSpec, updates: Table) -> Table:
@@ -13,7 +13,7 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
 
     Where 64 bits do not hold the products, Python's integers do.
     """
-    output = spec.output
+    output = spec.scale.output
     if output is None:
         return updates
 
@@ -26,7 +26,7 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
 
     velocity, overflow = scaled(updates.velocity)
     bounds = {name: scaled(updates[name], towards)[0] for name, towards in BOUNDS.items() if spec.bounds}
-    clock = updates.clock + spec.output_latency
+    clock = updates.clock + spec.latency.output
     return updates.having(clock=clock, velocity=velocity, velocity_overflow=overflow, **bounds)
 
 

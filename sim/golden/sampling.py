@@ -5,22 +5,22 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.tachometer import TICK_IN_TO_WINDOW_END
+from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 
 
 def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return last clocks of all windows, and clocks of all `tick_error`s; each `tick` and `tick_error` is within the
     trace.
     """
-    n_clocks = trace.n_clocks - spec.tick_latency
-    if spec.max_tick_cycles is None:
+    n_clocks = trace.n_clocks - spec.latency.tick
+    if not spec.external_tick:
         cycles = spec.timing.tick_cycles
         return np.arange(cycles - 1, n_clocks, cycles, dtype=np.int64), np.empty(0, dtype=np.int64)
     assert trace.tick_in is not None, "an external tick needs its line"
     # A line that is high at first has not risen.
     rises = trace.clock[np.flatnonzero(np.diff(trace.tick_in, prepend=1) == 1)] + TICK_IN_TO_WINDOW_END
-    last, error = external_windows(rises, n_clocks, spec.min_tick_cycles, spec.max_tick_cycles)
-    return last, error + spec.tick_latency
+    last, error = external_windows(rises, n_clocks, spec.times.min_tick_cycles, spec.times.longest_tick)
+    return last, error + spec.latency.tick
 
 
 def external_windows(

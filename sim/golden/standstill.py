@@ -15,4 +15,4 @@ def with_stalled(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64])
     """
     through = np.cumsum(nominal)
     counted = np.maximum.accumulate(np.where(ticks.pulse_count != 0, through, -1))
-    return ticks.having(stalled=through - counted >= spec.stalled_after_ticks)
+    return ticks.having(stalled=through - counted >= spec.times.stalled_after_ticks)

@@ -32,7 +32,7 @@ def _draw(
 ) -> Figure:
     heights = {"velocity": 3.2} | ({curve.name: 0.8 for curve in curves} if true_speed else {})
     figure, panels = place_panels(spec, heights, "Comparison")
-    unit = spec.shown_unit
+    unit = spec.scale.shown_unit
     truth = unit.of(true_speed(instants)) if true_speed else None
     values = [unit.of(curve.estimate.at(instants)) for curve in curves]
     # What goes up and down most is drawn behind, as it would bury the others.

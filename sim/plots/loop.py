@@ -52,7 +52,7 @@ def save_loops(path: Path, loops: Sequence[tuple[str, Mapping[str, str], Mapping
 
 def _draw_log(setting: Setting, log: Log) -> Figure:
     spec = setting.spec
-    unit = spec.shown_unit
+    unit = spec.scale.shown_unit
     figure, panels = place_panels(spec, _HEIGHTS, f"Loop, {in_words(spec.method)}")
     time = log["time"]
 

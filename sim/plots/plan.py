@@ -42,7 +42,7 @@ def _draw_all(spec: TachometerSpec, plans: Mapping[str, Plan], unit: str) -> Fig
             axes.loglog(plan.speed / per_unit, value, color=colour, label=in_words(name))
     labels = (f"resolution ({unit})", "resolution/speed (%)", "measurement time (s)", "resolution × time (rad)")
     for axes, label in zip(panels.values(), labels, strict=True):
-        axes.axvline(spec.unit_velocity / per_unit, color="0.4", linestyle=":")
+        axes.axvline(spec.scale.unit_velocity / per_unit, color="0.4", linestyle=":")
         axes.set_ylabel(label)
     panels["resolution"].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=6)
     panels["product"].set_xlabel(f"speed ({unit})")
@@ -56,11 +56,11 @@ def _draw(spec: TachometerSpec, plan: Plan, unit: str) -> Figure:
     per_unit = SpeedUnit(unit).rad_per_s
     speed, forced = plan.speed / per_unit, plan.forced
     left, right = speed[0] / 1.05, speed[-1] * 1.05
-    marks = [("one count per tick", spec.unit_velocity / per_unit, ":")]
+    marks = [("one count per tick", spec.scale.unit_velocity / per_unit, ":")]
     if spec.max_speed is not None:
         marks.append(("greatest speed", spec.max_speed.rad_per_s / per_unit, "--"))
     for axes, values in ((resolution, 100 * plan.resolution / plan.speed), (time, plan.measurement_time)):
-        axes.loglog(speed, values, color=ESTIMATE, label=f"update by {spec.update_by}")
+        axes.loglog(speed, values, color=ESTIMATE, label=f"update by {spec.facts.update_by}")
         if forced.any():
             axes.loglog(
                 speed[forced], values[forced], ".", color=FORCED, markersize=2.5, label="update by the maximum time"
@@ -68,8 +68,8 @@ def _draw(spec: TachometerSpec, plan: Plan, unit: str) -> Figure:
         for label, mark, style in marks:
             if left <= mark <= right:
                 axes.axvline(mark, color="0.4", linestyle=style, label=label)
-    rounding = 100 * spec.rounding_lsb * spec.rad_per_s_per_lsb / plan.speed
-    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"rounding, {spec.rounding_lsb} LSB")
+    rounding = 100 * spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb / plan.speed
+    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"rounding, {spec.scale.rounding_lsb} LSB")
     resolution.set_ylabel("resolution/speed (%)")
     resolution.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=5)
     time.set_ylabel("measurement time (s)")

@@ -66,8 +66,8 @@ def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figur
 
 
 def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None, scale: float) -> None:
-    clock_hz, updates, unit = spec.timing.clock_hz, run.updates, spec.shown_unit
-    velocity = unit.of(updates.velocity * spec.rad_per_s_per_lsb)
+    clock_hz, updates, unit = spec.timing.clock_hz, run.updates, spec.scale.shown_unit
+    velocity = unit.of(updates.velocity * spec.scale.rad_per_s_per_lsb)
     clock, velocity = _held_to_end(updates.clock, velocity, run.n_clocks)
     kept = columns(clock, velocity)
     time = clock[kept] / clock_hz * scale
@@ -89,7 +89,7 @@ def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
         )
     axes.set_ylabel(f"velocity ({unit.name})")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, ncols=2)
-    _multiples(axes, unit.of(spec.unit_velocity))
+    _multiples(axes, unit.of(spec.scale.unit_velocity))
 
 
 def _held_to_end(clock: NDArray[np.int64], values: NDArray[np.generic], n_clocks: int) -> tuple[FloatArray, FloatArray]:
@@ -119,7 +119,7 @@ def _multiples(axes: Axes, unit_velocity: float) -> None:
 
 
 def _error(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed, scale: float) -> None:
-    held, unit = held_velocity(spec, run), spec.shown_unit
+    held, unit = held_velocity(spec, run), spec.scale.shown_unit
     error = unit.of(held.velocity_rad_s - true_speed(held.time))
     kept = columns(held.time, error)
     axes.axhline(0, color="0.6", linewidth=0.7)
@@ -147,14 +147,14 @@ def _count(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
 
 def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     updates = run.updates
-    for forced, colour, label in ((False, ESTIMATE, spec.update_by), (True, FORCED, "forced")):
+    for forced, colour, label in ((False, ESTIMATE, spec.facts.update_by), (True, FORCED, "forced")):
         chosen = updates.forced == forced
         time = updates.clock[chosen] / spec.timing.clock_hz
-        m_s = updates.interval[chosen] * (spec.interval_unit_cycles / spec.timing.tick_cycles)
+        m_s = updates.interval[chosen] * (spec.times.interval_unit / spec.timing.tick_cycles)
         kept = columns(time, m_s)
         axes.plot(time[kept] * scale, m_s[kept], ".", color=colour, markersize=2.5, label=label)
     axes.set_yscale("log")
-    axes.set_ylim(0.8 * spec.interval_unit_cycles / spec.timing.tick_cycles, spec.timing.max_ticks * 1.25)
+    axes.set_ylim(0.8 * spec.times.interval_unit / spec.timing.tick_cycles, spec.timing.max_ticks * 1.25)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylabel("measurement (ticks)")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=2)

@@ -99,12 +99,12 @@ def place_panels(
 
 
 def _title(spec: TachometerSpec, what: str | None) -> str:
-    timing, unit = spec.timing, spec.shown_unit
+    timing, unit = spec.timing, spec.scale.shown_unit
     return (
-        f"{what or spec.heading}: "
+        f"{what or spec.words.heading}: "
         f"{spec.encoder.pulses_per_rev} lines ×{spec.encoder.decoding}, "
         f"tick {format_time(timing.tick_seconds)}, at most {format_time(timing.max_ticks * timing.tick_seconds)}, "
-        f"clock {_frequency(timing.clock_hz)}, one count per tick = {unit.of(spec.unit_velocity):.5g} {unit.name}"
+        f"clock {_frequency(timing.clock_hz)}, one count per tick = {unit.of(spec.scale.unit_velocity):.5g} {unit.name}"
     )
 
 
@@ -115,7 +115,7 @@ def in_words(name: str) -> str:
     method, _, options = name.partition(":")
     if method not in METHODS:
         return name
-    return f"{METHODS[method].title or method.upper()} method" + (f" ({options})" if options else "")
+    return f"{METHODS[method].facts.title or method.upper()} method" + (f" ({options})" if options else "")
 
 
 def _frequency(hertz: int) -> str:

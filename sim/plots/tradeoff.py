@@ -30,7 +30,7 @@ def save_tradeoff(path: Path, spec: TachometerSpec, costs: Mapping[str, Sequence
 
 def _draw(spec: TachometerSpec, costs: Mapping[str, Sequence[Cost]], speed: float) -> Figure:
     figure, panels = place_panels(spec, {"costs": 5.4}, "Error over delay")
-    axes, unit = panels["costs"], spec.shown_unit
+    axes, unit = panels["costs"], spec.scale.shown_unit
     axes.set_xscale("log")
     axes.set_yscale("log")
     for place, (method, tried) in enumerate(costs.items()):

@@ -98,7 +98,7 @@ def of_axis(spec: AxesSpec, run: Run, axis: int) -> Run:
     found = {}
     ticks = run.tables[TICK]
     own = ticks.clock[ticks["axis"] == axis]
-    for strobe, names in spec.axis.strobes.items():
+    for strobe, names in spec.axis.ports.strobes.items():
         table = run.tables[strobe]
         if strobe == UPDATE:
             chosen = np.isin(table.clock, own)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.tachometer import TICK_IN_TO_WINDOW_END
+from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.language.units import format_time
 
 LINES = ("a", "b", "z", "tick_in")
@@ -219,7 +219,7 @@ class PinTrace(_Lines):
 
     def with_nominal_ticks(self, spec: TachometerSpec) -> "PinTrace":
         """Return the same trace, with nominal external ticks if the core takes them and there are none."""
-        if not spec.max_tick_cycles or self.tick_in is not None:
+        if not spec.external_tick or self.tick_in is not None:
             return self
         return self.with_tick_in(nominal_ticks(spec, self.n_clocks))
 

@@ -78,7 +78,7 @@ class Run:
         """Return the run with just what the ports of `spec` say, in their order; KeyError if a column is missing."""
         found = {
             strobe: Table(tables[strobe].clock, {name: tables[strobe][name] for name in names})
-            for strobe, names in spec.strobes.items()
+            for strobe, names in spec.ports.strobes.items()
         }
         return cls(n_clocks, found)
 
@@ -123,10 +123,10 @@ def observed(spec: AnySpec, n_clocks: int, rows: Ints) -> Run:
     """
     columns = {
         port.name: rows[:, k].astype(np.bool_ if port.width == 1 and not port.signed else np.int64)
-        for k, port in enumerate(spec.outputs, 1)
+        for k, port in enumerate(spec.ports.outputs, 1)
     }
     every = Table(rows[:, 0], columns)
-    return Run.of_ports(spec, n_clocks, {strobe: every.rows(columns[strobe]) for strobe in spec.strobes})
+    return Run.of_ports(spec, n_clocks, {strobe: every.rows(columns[strobe]) for strobe in spec.ports.strobes})
 
 
 @dataclass(frozen=True)

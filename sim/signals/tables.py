@@ -48,7 +48,7 @@ class VelocityError:
 
 def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
     """Return velocity at the end of every tick; empty if there was no update."""
-    clock = run.ticks.clock + spec.tick_to_velocity
+    clock = run.ticks.clock + spec.latency.tick_to_velocity
     return held_from(clock[clock < run.n_clocks], run.updates, spec)
 
 
@@ -56,7 +56,7 @@ def held_from(clock: NDArray[np.int64], updates: Table, spec: TachometerSpec) ->
     """Return the velocity that is held in these clocks, from the first update on."""
     latest = np.searchsorted(updates.clock, clock, side="right") - 1
     clock, latest = clock[latest >= 0], latest[latest >= 0]
-    velocity = updates.velocity[latest].astype(np.float64) * spec.rad_per_s_per_lsb
+    velocity = updates.velocity[latest].astype(np.float64) * spec.scale.rad_per_s_per_lsb
     return HeldVelocity(clock.astype(np.float64) / spec.timing.clock_hz, velocity)
 
 
@@ -79,7 +79,7 @@ def write_trace(path: Path, spec: CoreSpec, run: Run) -> None:
     else is raw, by the names of the ports. With many axes, the axis comes first.
     """
     if not isinstance(spec, AxesSpec):
-        columns = _of_updates(spec, run, spec.tick_to_velocity)
+        columns = _of_updates(spec, run, spec.latency.tick_to_velocity)
     else:
         each = [_of_updates(spec.tachometer, of_axis(spec, run, axis), 0) for axis in range(spec.axes)]
         axis = np.repeat(np.arange(spec.axes), [len(found["clock"]) for found in each])
@@ -90,7 +90,7 @@ def write_trace(path: Path, spec: CoreSpec, run: Run) -> None:
 
 
 def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[str, NDArray[Any]]:
-    updates, unit = run.updates, spec.shown_unit
+    updates, unit = run.updates, spec.scale.shown_unit
     tick = np.searchsorted(run.ticks.clock, updates.clock - tick_to_velocity, side="right") - 1
     columns = {
         "clock": updates.clock,
@@ -98,7 +98,7 @@ def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[s
         "interval": updates.interval,
         "forced": updates.forced.astype(np.int64),
         "velocity_raw": updates.velocity,
-        f"velocity_{unit.suffix}": unit.of(updates.velocity * spec.rad_per_s_per_lsb),
+        f"velocity_{unit.suffix}": unit.of(updates.velocity * spec.scale.rad_per_s_per_lsb),
     }
     return columns | {
         name: updates[name].astype(np.int64) for name in updates.columns if name not in (*columns, "velocity")

@@ -26,7 +26,7 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
     the `longest` minimum time. The maximum time is in ticks. An option that needs a flag is a value of that: `yes
     index-reset`, `yes edge-error 0.3`.
     """
-    every = spec_class(method).pairs_all
+    every = spec_class(method).facts.pairs_all
     common = {about.name: about.tested if every else about.tested[: about.few] for about in common_options()}
     own = {about.name: about.tested for about in own_options(method)}
     found = own | {name: values for name, values in common.items() if name not in own}
@@ -142,13 +142,13 @@ def _texts(method: str, row: Texts) -> Texts:
     frac_bits, width = texts.pop("frac-bits", ""), texts.pop("velocity-width", "")
     if frac_bits:
         spec = of_texts(method, texts)
-        fewest, most = spec.frac_bits_range(spec.unit)
+        fewest, most = spec.widths.frac_bits_range(spec.unit)
         bits = max(fewest, most - _less(frac_bits)) if "-" in frac_bits else min(int(frac_bits), most)
         texts["frac-bits"] = str(bits)
     if width:
         # The greatest speed must fit.
         less = 0 if "max-speed" in texts else _less(width)
-        texts["velocity-width"] = str(max(8, of_texts(method, texts).velocity_width - less))
+        texts["velocity-width"] = str(max(8, of_texts(method, texts).widths.velocity - less))
     return texts
 
 

@@ -83,9 +83,9 @@ def default_range(spec: TachometerSpec) -> tuple[float, float]:
     From one count in the maximum time to `max_speed`; without it, as everything recurs in each multiple of ω_u, to ten
     of them. Never beyond one count per clock, and over a decade at least.
     """
-    unit = spec.unit_velocity
+    unit = spec.scale.unit_velocity
     high = _UNITS * unit if spec.max_speed is None else spec.max_speed.rad_per_s
-    high = min(high, spec.greatest_speed)
+    high = min(high, spec.scale.greatest_speed)
     return min(unit / spec.timing.max_ticks, high / 10), high
 
 
@@ -96,7 +96,7 @@ def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.fl
     Evenly spaced logarithms, and around every multiple of ω_u, or as many as a figure can tell apart, evenly spaced
     logarithms of the distance to it, down to where updates are forced.
     """
-    unit = spec.unit_velocity
+    unit = spec.scale.unit_velocity
     steady = np.geomspace(low, high, _STEADY)
     multiples = np.unique(np.floor(np.geomspace(low, high, _MULTIPLES) / unit + 0.5))
     edge = 1 / spec.timing.max_ticks
@@ -144,7 +144,7 @@ class Plans:
 
     def write(self, path: Path) -> None:
         """Write a CSV with a row per speed that a line can show; with methods, for each of them."""
-        unit = self.spec.shown_unit
+        unit = self.spec.scale.shown_unit
         if not self.methods:
             columns = _columns(self.line, unit)
             write_csv(path, tuple(columns), rows_of(list(columns.values())))

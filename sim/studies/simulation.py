@@ -109,10 +109,10 @@ def simulate(
         If the recordings do not last a tick, or have too many.
     """
     trace = AxesTrace.placed(recordings, spec) if isinstance(spec, AxesSpec) else PinTrace.of(recordings[0], spec)
-    fewest = spec.longest_tick + spec.tick_latency  # after which there is something to report
+    fewest = spec.times.longest_tick + spec.latency.tick  # after which there is something to report
     if trace.n_clocks < fewest:
         raise ValueError(
-            f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.seconds(fewest))}), "
+            f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.times.seconds(fewest))}), "
             f"a tick and its latency, not {trace.n_clocks}"
         )
     shown, chosen = window(spec, trace.n_clocks), pick(engine)
@@ -132,7 +132,7 @@ def _alone(spec: TachometerSpec, run: Run, recording: Recording, truth: Encoding
     counts_in = error = None
     if truth is not None:
         # Up to the pin sample that the last tick can hold.
-        clock = int(run.ticks.clock[-1]) - spec.tick_latency - spec.pin_to_count
+        clock = int(run.ticks.clock[-1]) - spec.latency.tick - spec.latency.pin_to_count
         sampled = _sampled(max(clock, 0), spec.timing.clock_hz)
         counts_in = int(truth.true_position(sampled, spec.encoder.decoding))
         error = velocity_error(held_velocity(spec, run), truth.true_speed)
@@ -156,7 +156,7 @@ def _one_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording, trut
     own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
     if truth is not None and (n_ticks := len(own.ticks)):
         # From the first look at the axis to the last one of the last tick.
-        latency = spec.axis.pin_to_count
+        latency = spec.axis.latency.pin_to_count
         clocks = np.array([spec.look(axis, latency), spec.look(axis, n_ticks * spec.rounds - 1)]) - latency
         first, last = truth.true_position(clocks / spec.timing.clock_hz, spec.axis.encoder.decoding)
         counts_in = int(last - first)

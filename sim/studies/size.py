@@ -216,7 +216,7 @@ def measure_core(
     """
     between = wrapper(tuple(ports) or spec.ports)
     found = measure_verilog(verilog, CORE, between, target, tools, seeds)
-    latency = spec.latency if isinstance(spec, LoopSpec) else spec.tick_to_velocity
+    latency = spec.tick_to_current if isinstance(spec, LoopSpec) else spec.latency.tick_to_velocity
     return replace(found, figures={**found.figures, "latency": latency})
 
 

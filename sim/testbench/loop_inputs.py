@@ -26,7 +26,7 @@ def loop_inputs(spec: LoopSpec, trace: PinTrace) -> tuple[dict[str, IntArray], R
     """Return the levels of all inputs of the loop by control tick, without a sign, and what the core must show."""
     clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
     inputs = _inputs(spec, trace, clock)
-    widths = {port.name: port.width for port in spec.pins}
+    widths = {port.name: port.width for port in spec.ports.pins}
     bits = {name: values & ((1 << widths[name]) - 1) for name, values in inputs.items()}
     columns = {name: values.tolist() for name, values in (inputs | _held(inputs)).items()}
 
@@ -47,10 +47,10 @@ def _inputs(spec: LoopSpec, trace: PinTrace, clock: IntArray) -> dict[str, IntAr
     rng = np.random.default_rng(1)
     alone = spec.tachometer
     own = {port.name for port in alone.ports}
-    inputs = {port.name: _levels(port, rng, len(clock)) for port in spec.pins if port.name not in own}
+    inputs = {port.name: _levels(port, rng, len(clock)) for port in spec.ports.pins if port.name not in own}
     if "command_position" in inputs:
         # About the shaft, so that the current is not always at its limit.
-        places, _ = count(alone, decoded(alone, trace), clock - alone.tick_latency)
+        places, _ = count(alone, decoded(alone, trace), clock - alone.latency.tick)
         here = (places.position << POSITION_FRAC_BITS) + (inputs["command_position"] >> alone.position_width)
         inputs["command_position"] = np.where(rng.random(len(clock)) < 0.9, here, inputs["command_position"])
     if spec.form.gain_bits:

@@ -49,7 +49,7 @@ def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recordin
     recording = usual_motion(spec) if recording is None else recording
     check_ticks(recording.duration, spec, _MOST_BENCH_TICKS)
     trace = recording.place(spec.timing.clock_hz)
-    if spec.max_tick_cycles:
+    if spec.external_tick:
         trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
     vectors = _vectors(core, trace)
     text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
@@ -105,9 +105,9 @@ def _usual_form(spec: TachometerSpec) -> str:
     part = moving / 8 / clock_hz
 
     def speed(counts_per_tick: float) -> str:
-        return f"{spec.unit_velocity * counts_per_tick}rad/s"
+        return f"{spec.scale.unit_velocity * counts_per_tick}rad/s"
 
-    brisk, fast = min(3.3, most), min(1.5 * spec.max_count, most)
+    brisk, fast = min(3.3, most), min(1.5 * spec.widths.max_count, most)
     return (
         f"ramp:0:{speed(brisk)}:{part}s+constant:{speed(min(1.25, most))}:{part}s+constant:{speed(fast)}:{part / 20}s"
         f"+constant:{speed(-fast)}:{part / 20}s+constant:{speed(-min(1.25, most))}:{part}s"
@@ -123,7 +123,7 @@ def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
     k = np.arange(n_clocks // 2 // cycles + 2)
     gap = cycles + (k % 5 - 2) * (cycles // 16)
     gap[7::30] = 2
-    gap[17::30] = 3 * spec.longest_tick
+    gap[17::30] = 3 * spec.times.longest_tick
     return np.cumsum(np.maximum(gap, 2)).astype(np.int64)
 
 

@@ -157,7 +157,7 @@ def _of_s(spec: STachometer, speed: Floats) -> Performance:
     found = s_performance(speed, counts, tick_seconds, spec.timing.max_ticks)
     if spec.cancel:
         return found
-    worst = tsuji.unit_velocity(counts, tick_seconds) / (spec.kept_ticks + 1)
+    worst = tsuji.unit_velocity(counts, tick_seconds) / (spec.form.kept_ticks + 1)
     return replace(found, resolution=np.where(found.forced, worst, found.resolution))
 
 
@@ -166,14 +166,19 @@ def _of_m(spec: MTachometer, speed: Floats) -> Performance:
 
 
 def _of_t(spec: TTachometer, speed: Floats) -> Performance:
-    timer_seconds = float(spec.timing.tick_seconds) / spec.timer_periods
-    return t_performance(speed, spec.encoder.counts_per_rev, timer_seconds, spec.max_periods)
+    timer_seconds = float(spec.timing.tick_seconds) / spec.form.timer_periods
+    return t_performance(speed, spec.encoder.counts_per_rev, timer_seconds, spec.form.max_periods)
 
 
 def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
-    timer_seconds = float(spec.timing.tick_seconds) / spec.timer_periods
+    timer_seconds = float(spec.timing.tick_seconds) / spec.form.timer_periods
     return mt_performance(
-        speed, spec.min_periods, spec.encoder.counts_per_rev, timer_seconds, spec.max_periods, spec.cycle_counts
+        speed,
+        spec.form.min_periods,
+        spec.encoder.counts_per_rev,
+        timer_seconds,
+        spec.form.max_periods,
+        spec.form.cycle_counts,
     )
 
 
@@ -182,10 +187,10 @@ def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:
     counts, tick_seconds, longest = spec.encoder.counts_per_rev, float(spec.timing.tick_seconds), spec.timing.max_ticks
     if spec.adaptive is None:
         return rairan_performance(speed, spec.estimate, counts, tick_seconds, longest)
-    shift = _steady_shift(spec, speed / spec.unit_velocity)
+    shift = _steady_shift(spec, speed / spec.scale.unit_velocity)
     each = [
         rairan_performance(speed, spec.estimate, counts, tick_seconds * 2**k, longest >> k)
-        for k in range(spec.max_shift + 1)
+        for k in range(spec.times.max_tick_shift + 1)
     ]
     columns = (np.choose(shift, [getattr(found, name) for found in each]) for name in ("resolution", "time", "forced"))
     return Performance(*columns)
@@ -193,7 +198,7 @@ def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:
 
 def _steady_shift(spec: RairanTachometer, ratio: Floats) -> NDArray[np.int64]:
     """Return k of an adaptive dt that comes from shorter ones, at speeds in counts per tick."""
-    rule = spec.adaptive_dt
+    rule = spec.form.adaptive_dt
     doubled = np.ceil(np.log2((rule.fewest - 1) / ratio) + 1e-12)
     return np.where(ratio * rule.slow <= 1, 0, np.clip(doubled, 0, rule.max_shift)).astype(np.int64)
 
@@ -206,7 +211,7 @@ def _of_track(spec: TrackTachometer, speed: Floats) -> Performance:
     """
     timing, form = spec.timing, spec.form
     level = len(form.rates) - 1 if spec.growing_memory else 0
-    ratio = speed / spec.unit_velocity
+    ratio = speed / spec.scale.unit_velocity
     ticks, forced = _limited(np.maximum(1 / ratio, 1), timing.max_ticks)
     x = np.minimum(form.rate(level) * timing.tick_cycles * ticks, form.most(level))
     worst = np.array([tracking_filter.worst_gain(each) for each in x.tolist()])
@@ -214,7 +219,7 @@ def _of_track(spec: TrackTachometer, speed: Floats) -> Performance:
     tick_seconds = float(timing.tick_seconds)
     return Performance(
         _or_forced(
-            worst * place / ticks * spec.unit_velocity,
+            worst * place / ticks * spec.scale.unit_velocity,
             forced,
             timing.max_ticks,
             spec.encoder.counts_per_rev,

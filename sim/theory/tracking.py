@@ -71,8 +71,8 @@ class Tuning:
         """Return those of a core."""
         clock_hz, bandwidth = spec.timing.clock_hz, float(spec.bandwidth)
         # A power of two clocks: a quarter of 1/λ_0, or half the longest tick, whichever is more.
-        bits = max(math.floor(math.log2(clock_hz / (4 * bandwidth))), math.floor(math.log2(spec.longest_tick)))
-        delay = spec.pin_to_count + spec.tick_latency + spec.tick_to_velocity
+        bits = max(math.floor(math.log2(clock_hz / (4 * bandwidth))), math.floor(math.log2(spec.times.longest_tick)))
+        delay = spec.latency.pin_to_count + spec.latency.tick + spec.latency.tick_to_velocity
         return cls(
             bandwidth=bandwidth,
             least_memory=float(spec.least_memory),
@@ -82,7 +82,7 @@ class Tuning:
             clock_seconds=1 / clock_hz,
             tick_seconds=float(spec.timing.tick_seconds),
             max_ticks=spec.timing.max_ticks,
-            max_count=spec.max_count,
+            max_count=spec.widths.max_count,
             unit_seconds=2.0**bits / clock_hz,
             lead_seconds=min(delay, 2 * 2**bits - 1) / clock_hz,
         )

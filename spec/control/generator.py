@@ -24,13 +24,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 from tachometry.spec.control.form import ACCELERATION_WIDTH, POSITION_FRAC_BITS
+from tachometry.spec.control.units import Units
 from tachometry.spec.language.units import PI
-
-if TYPE_CHECKING:
-    from tachometry.spec.control.loop import LoopSpec
 
 CONSTANT, RAMP, SINE = 0, 1, 2  # modes; 3 is a sine, too
 MODE_WIDTH = 2
@@ -136,26 +133,27 @@ class GeneratorForm:
         return max(self._away_word, speed - self.velocity.shift, change - self.acceleration.shift)
 
 
-def generator_form(spec: LoopSpec) -> GeneratorForm:
-    """Yield that of a loop."""
-    count = 2 * PI / spec.tachometer.encoder.counts_per_rev  # rad
-    speed = count / spec.seconds  # a count per control tick in rad/s
-    change = speed / spec.seconds
-    acceleration = Fraction(2) ** -spec.acceleration_frac_bits
+def generator_form(units: Units, command_width: int) -> GeneratorForm:
+    """Return the numbers of the generator of a loop, whose commanded velocity has so many bits."""
+    core = units.law.tachometer
+    count = 2 * PI / core.encoder.counts_per_rev  # rad
+    speed = count / units.seconds  # a count per control tick in rad/s
+    change = speed / units.seconds
+    acceleration = Fraction(2) ** -units.acceleration_frac_bits
     greatest = acceleration * (1 << (ACCELERATION_WIDTH - 1)) / change
     fraction = math.floor(math.log2((1 << (WORD - 1)) / greatest))
     fraction = max(POSITION_FRAC_BITS, min(fraction, MOST_FRACTION))
-    fastest = spec.rad_per_s * spec.tachometer.full_scale / speed * (1 << fraction)
+    fastest = units.rad_per_s * core.scale.full_scale / speed * (1 << fraction)
     bits = max(WORD - 1, math.ceil(fastest).bit_length())
-    velocity = spec.rad_per_s / (1 << spec.command_bits)
+    velocity = units.rad_per_s / (1 << units.command_bits)
     return GeneratorForm(
         fraction=fraction,
-        position_width=spec.tachometer.position_width,
+        position_width=core.position_width,
         velocity_bits=bits,
         velocity_shift=bits - (WORD - 1),
         velocity=Scale.of(speed / (1 << fraction) / velocity),
         acceleration=Scale.of(change / (1 << fraction) / acceleration),
-        command_width=spec.form.command_width,
+        command_width=command_width,
         acceleration_width=ACCELERATION_WIDTH,
     )
 

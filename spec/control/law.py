@@ -5,9 +5,9 @@ from fractions import Fraction
 
 from tachometry.spec.control.motor import Motor
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.core.timing import Timing, whole_clocks
-from tachometry.spec.language.option import Derived, ParameterError, option, options_of, settle
-from tachometry.spec.language.units import CURRENT, PLAIN, parse_bandwidth, reader
+from tachometry.spec.core.timing import Timing, parse_clocks
+from tachometry.spec.language.option import ParameterError, option, options_of
+from tachometry.spec.language.units import CURRENT, PLAIN, Quantity, parse_bandwidth
 
 MAX_PERIOD = 1 << 24
 _GROUP = "Loop"
@@ -22,12 +22,18 @@ _SIZES = {
 }
 
 
-def _clocks(what: str, text: str) -> Derived:
-    return Derived(lambda law: whole_clocks(what, text, law.timing.clock_hz))
+class _Filter:
+    """Reads and writes the bandwidth of the velocity filter, 0 for none."""
 
+    def __call__(self, what: str, text: str) -> Fraction:
+        if text.strip().lower() == "none":
+            return Fraction(0)
+        if (value := parse_bandwidth(what, text)) <= 0:
+            raise ParameterError(what, f"must be greater than 0, not {float(value):.9g}")
+        return value
 
-def _filter(what: str, text: str) -> Fraction | None:
-    return None if text.strip().lower() == "none" else parse_bandwidth(what, text)
+    def written(self, value: Fraction) -> str:
+        return parse_bandwidth.written(value) if value else "none"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,12 +48,12 @@ class Law(Motor):
         k_p in 1/s² and k_v in 1/s.
     observer : Fraction
         G_dis in rad/s.
-    filter : Fraction or None
-        G_v in rad/s. None: y is the velocity.
+    velocity_filter : Fraction or None
+        G_v in rad/s. 0: y is the velocity. None: G_dis, but 0 with method track.
     current_limit : Fraction
         In A.
-    period : int
-        Clocks between two control ticks.
+    control_period : int or None
+        Clocks between two control ticks. None: a tick.
     synchronised : bool
         Filter and observer work at the updates of the velocity, as in Fig. 11, not at every control tick, as in Fig. 2.
 
@@ -65,7 +71,7 @@ class Law(Motor):
         name="kp",
         metavar="KP",
         group=_GROUP,
-        parse=reader(PLAIN),
+        parse=Quantity(PLAIN),
     )
     velocity_gain: Fraction = option(  # noqa: RUF009
         None,
@@ -74,7 +80,7 @@ class Law(Motor):
         name="kv",
         metavar="KV",
         group=_GROUP,
-        parse=reader(PLAIN),
+        parse=Quantity(PLAIN),
     )
     observer: Fraction = option(  # noqa: RUF009
         None,
@@ -85,15 +91,14 @@ class Law(Motor):
         group=_GROUP,
         parse=parse_bandwidth,
     )
-    filter: Fraction | None = option(  # noqa: RUF009
-        Derived(lambda spec: None if spec.tachometer.method == "track" else spec.observer),
+    velocity_filter: Fraction | None = option(  # noqa: RUF009
+        None,
         "Bandwidth G_v of the low-pass filter of the velocity, or none.",
         shown="that of --observer; none with method track",
-        name="velocity-filter",
         metavar="[BANDWIDTH|none]",
         unit="rad/s",
         group=_GROUP,
-        parse=_filter,
+        parse=_Filter(),
     )
     current_limit: Fraction = option(  # noqa: RUF009
         None,
@@ -101,17 +106,16 @@ class Law(Motor):
         text="20A",
         metavar="CURRENT",
         group=_GROUP,
-        parse=reader(CURRENT),
+        parse=Quantity(CURRENT),
     )
-    period: int = option(
-        Derived(lambda spec: int(spec.timing.tick_cycles)),
+    control_period: int | None = option(
+        None,
         "Time between two control ticks, a whole number of clocks; a plain number is clocks.",
         shown="one tick",
-        name="control-period",
         metavar="TIME",
         unit="clocks",
         group=_GROUP,
-        parse=_clocks,
+        parse_at=parse_clocks,
     )
     synchronised: bool = option(
         True,
@@ -121,12 +125,11 @@ class Law(Motor):
     )
 
     def __post_init__(self) -> None:
-        settle(self)
         for about in options_of(Law):
             if about.parameter in _SIZES:
                 self._check_size(about.parameter, getattr(self, about.field))
-        if self.filter is not None and self.filter <= 0:
-            raise ParameterError("velocity_filter", f"must be greater than 0, not {float(self.filter):.9g}")
+        if self.velocity_filter is not None and self.velocity_filter < 0:
+            raise ParameterError("velocity_filter", f"must be at least 0, not {float(self.velocity_filter):.9g}")
         if not 1 <= self.period <= MAX_PERIOD:
             raise ParameterError("control_period", f"must be from 1 to {MAX_PERIOD} clocks, not {self.period}")
 
@@ -140,6 +143,19 @@ class Law(Motor):
         least, most = _SIZES[parameter]
         if not Fraction(least) <= value <= Fraction(most):
             raise ParameterError(parameter, f"must be of a size from {least} to {most}, not {float(value):g}")
+
+    @property
+    def filter(self) -> Fraction | None:
+        """G_v in rad/s; None: there is no filter."""
+        asked = self.velocity_filter
+        if asked is None:
+            asked = Fraction(0) if self.tachometer.method == "track" else self.observer
+        return asked or None
+
+    @property
+    def period(self) -> int:
+        """Clocks between two control ticks."""
+        return self.timing.tick_cycles if self.control_period is None else self.control_period
 
     @property
     def timing(self) -> Timing:

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from tachometry.spec.control.coefficients import control_form, extra_bits_of, ratios_of
-from tachometry.spec.control.form import ACCELERATION_WIDTH, ControlForm, Term, factor_bits
+from tachometry.spec.control.coefficients import control_form, ratios_of
+from tachometry.spec.control.form import ControlForm, Term, factor_bits
 from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
 from tachometry.spec.control.law import Law
-from tachometry.spec.control.ports import loop_ports
+from tachometry.spec.control.ports import loop_entries, loop_ports
+from tachometry.spec.control.units import Units
+from tachometry.spec.core.tachometer import written
 from tachometry.spec.language.option import ParameterError, option, options_of
-from tachometry.spec.language.port import HasPorts, Port
-from tachometry.spec.language.units import (
-    PI,
-    plural,
-    rounded,
-)
+from tachometry.spec.language.port import Port, Ports
+from tachometry.spec.language.units import PI, plural, rounded
 from tachometry.spec.methods.axes import CoreSpec
 
-MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
 MAX_EXTRA_BITS = 24
 MAX_FACTOR_BITS = 40
 MAX_WORD_WIDTH = 80
@@ -39,7 +35,7 @@ _LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopSpec(Law, HasPorts):
+class LoopSpec(Law):
     """A tachometer with a disturbance observer and a controller of position and velocity; see `ControlForm`.
 
     Parameters
@@ -92,7 +88,6 @@ class LoopSpec(Law, HasPorts):
             raise ParameterError("gains", f"must be fixed or inputs, not {self.gains!r}")
         self._check_formats()
         if self.period < self.least_period:
-            # Words are of other widths in a longer period, so this is not what this one would take.
             periods = [self.period]
             while (needed := self._least_in(periods[-1])) not in periods:
                 periods.append(needed)
@@ -104,16 +99,13 @@ class LoopSpec(Law, HasPorts):
             )
 
     def _least_in(self, period: int) -> int:
-        """Return `least_period` with another period."""
-        other = object.__new__(LoopSpec)
-        for field in fields(self):
-            object.__setattr__(other, field.name, getattr(self, field.name))
-        object.__setattr__(other, "period", period)
-        return other.least_period
+        """Return `least_period` with another period: words are of other widths in it."""
+        ratios = ratios_of(replace(self.units, period=period))
+        return self._least_period(factor_bits(list(ratios.values())))
 
     def _check_formats(self) -> None:
         for rate, name in ((self.observer, "observer"), (self.filter, "velocity_filter")):
-            least = 4 / ((1 << MAX_EXTRA_BITS) * self.seconds)
+            least = 4 / ((1 << MAX_EXTRA_BITS) * self.units.seconds)
             most = 2 * PI * self.timing.clock_hz
             if rate is not None and not least <= rate <= most:
                 raise ParameterError(
@@ -140,10 +132,10 @@ class LoopSpec(Law, HasPorts):
         """Name of the tachometer's method."""
         return self.tachometer.method
 
-    @property
-    def seconds(self) -> Fraction:
-        """T_c, the time between two control ticks."""
-        return self.tachometer.seconds(self.period)
+    @cached_property
+    def units(self) -> Units:
+        """Units of its numbers."""
+        return Units(self, self.current_width, self.period)
 
     @property
     def first_tick(self) -> int:
@@ -152,80 +144,53 @@ class LoopSpec(Law, HasPorts):
         So a period of whole ticks meets each update when it is new.
         """
         spec = self.tachometer
-        return spec.timing.tick_cycles - 1 + spec.tick_latency + spec.tick_to_velocity + 1
-
-    @property
-    def longest(self) -> int:
-        """Most control ticks that an update can stand for; then the velocity that is held is taken as one."""
-        if not self.synchronised:
-            return 1
-        spec = self.tachometer
-        ticks = -(-(spec.timing.max_ticks * spec.longest_tick) // self.period) + 2
-        return min((1 << ticks.bit_length()) - 1, MAX_INTERVAL)
-
-    @property
-    def rad_per_s(self) -> Fraction:
-        """One LSB of the velocity in rad/s."""
-        spec = self.tachometer
-        counts = spec.encoder.counts_per_rev * spec.timing.tick_seconds * spec.per_count
-        return 2 * PI / (counts * Fraction(2) ** spec.frac_bits)
-
-    @property
-    def current_frac_bits(self) -> int:
-        """One LSB of `current` is 2^−this A."""
-        return math.floor(math.log2(((1 << (self.current_width - 1)) - 1) / self.current_limit))
-
-    @property
-    def amperes(self) -> Fraction:
-        """One LSB of `current` in A."""
-        return Fraction(2) ** -self.current_frac_bits
-
-    @property
-    def acceleration_frac_bits(self) -> int:
-        """One LSB of the commanded acceleration is 2^−this rad/s²: twice what the greatest current makes fits."""
-        most = 2 * self.torque_constant * self.current_limit / self.inertia
-        return math.floor(math.log2(((1 << (ACCELERATION_WIDTH - 1)) - 1) / most))
-
-    @property
-    def command_bits(self) -> int:
-        """Fraction bits of the commanded velocity, below an LSB of the velocity."""
-        return min(extra_bits_of(self), 8)
+        return spec.timing.tick_cycles - 1 + spec.latency.tick + spec.latency.tick_to_velocity + 1
 
     @cached_property
     def ratios(self) -> dict[Term, list[Fraction]]:
         """The factor of each term, in units of its result for one of its word."""
-        return ratios_of(self)
+        return ratios_of(self.units)
 
     @cached_property
     def form(self) -> ControlForm:
         """Formats and coefficients."""
-        return control_form(self)
+        return control_form(self.units, self.ratios, inputs=self.gains == "inputs")
 
     @property
     def product_clocks(self) -> int:
         """Clocks from one product to the next."""
-        return _STEPS + (self.form.factor_bits if self.multiplier == "serial" else _PARALLEL)
+        return self._product_clocks(self.form.factor_bits)
+
+    def _product_clocks(self, factor_bits: int) -> int:
+        return _STEPS + (factor_bits if self.multiplier == "serial" else _PARALLEL)
 
     @property
-    def latency(self) -> int:
+    def tick_to_current(self) -> int:
         """Clocks from `control_tick` to `current_valid`."""
+        return self._tick_to_current(self.form.factor_bits)
+
+    def _tick_to_current(self, factor_bits: int) -> int:
         unfiltered = _UNFILTERED if self.filter is None else 0
-        return (len(Term) - (self.filter is None)) * self.product_clocks + unfiltered + _LIMIT
+        return (len(Term) - (self.filter is None)) * self._product_clocks(factor_bits) + unfiltered + _LIMIT
 
     @property
     def least_period(self) -> int:
         """Fewest clocks between two control ticks: the current is added to those before it."""
-        return max(self.latency + 1, generator_clocks(self.multiplier) if self.command == "generator" else 0)
+        return self._least_period(self.form.factor_bits)
+
+    def _least_period(self, factor_bits: int) -> int:
+        generated = generator_clocks(self.multiplier) if self.command == "generator" else 0
+        return max(self._tick_to_current(factor_bits) + 1, generated)
 
     @cached_property
     def generator(self) -> GeneratorForm:
         """Formats of the command generator."""
-        return generator_form(self)
+        return generator_form(self.units, self.form.command_width)
 
     @property
-    def ports(self) -> tuple[Port, ...]:
+    def ports(self) -> Ports:
         """Ports of the exported core, in order: those of the tachometer first."""
-        return (*self.tachometer.ports, *loop_ports(self))
+        return Ports((*self.tachometer.ports, *loop_ports(self)))
 
     @property
     def held_inputs(self) -> tuple[Port, ...]:
@@ -237,9 +202,24 @@ class LoopSpec(Law, HasPorts):
         )
 
     @property
+    def entries(self) -> dict[str, Any]:
+        """Entries of the manifest: those of the tachometer, and of the loop, which forgets gradually."""
+        of_tachometer = {name: entry for name, entry in self.tachometer.entries.items() if name != "recovery_cycles"}
+        return of_tachometer | {"loop": loop_entries(self)}
+
+    @property
+    def options(self) -> dict[str, str]:
+        """Texts of all options that are asked for, by their names."""
+        return {**self.tachometer.options, "loop": "yes", **written(self, self.tachometer)}
+
+    @property
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults included."""
-        own = {about.parameter: about.canonical(getattr(self, about.field)) for about in options_of(LoopSpec)}
+        follows = {"velocity_filter": self.filter, "control_period": self.period}
+        own = {
+            about.parameter: about.canonical(follows.get(about.field, getattr(self, about.field)))
+            for about in options_of(LoopSpec)
+        }
         return {**self.tachometer.parameters, "loop": own}
 
 

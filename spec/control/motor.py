@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tachometry.spec.language.option import option
-from tachometry.spec.language.units import PLAIN, TORQUE_CONSTANT, reader
+from tachometry.spec.language.units import PLAIN, TORQUE_CONSTANT, Quantity
 
 _GROUP = "Loop"
 
@@ -22,7 +22,7 @@ class Motor:
     """
 
     inertia: Fraction = option(  # noqa: RUF009
-        None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", group=_GROUP, parse=reader(PLAIN)
+        None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", group=_GROUP, parse=Quantity(PLAIN)
     )
     torque_constant: Fraction = option(  # noqa: RUF009
         None,
@@ -30,5 +30,5 @@ class Motor:
         text="60.3mNm/A",
         metavar="KT",
         group=_GROUP,
-        parse=reader(TORQUE_CONSTANT),
+        parse=Quantity(TORQUE_CONSTANT),
     )

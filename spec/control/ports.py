@@ -28,7 +28,7 @@ _GAIN_UNIT = {Term.POSITION: " 1/s²", Term.VELOCITY: " 1/s"}
 def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
     """Return ports beside those of the tachometer."""
     form, tachometer = spec.form, spec.tachometer
-    fine = f"2^{-tachometer.frac_bits - form.extra_bits} {tachometer.unit}"
+    fine = f"2^{-tachometer.widths.frac_bits - form.extra_bits} {tachometer.unit}"
     return (
         Port("enable", "input", help="The current is 0 unless this is high in the clock of control_tick."),
         *(_generated(spec) if spec.command == "generator" else _commands(spec)),
@@ -38,7 +38,7 @@ def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
         held(
             *(CURRENT, "current", spec.current_width),
             signed=True,
-            unit=f"2^{-spec.current_frac_bits} A",
+            unit=f"2^{-spec.units.current_frac_bits} A",
             help="Commanded current, within the limit.",
         ),
         held(CURRENT, "current_saturated", help="This current was held within the limit."),
@@ -67,8 +67,8 @@ def _units(spec: LoopSpec) -> dict[str, tuple[int, str]]:
     form, tachometer = spec.form, spec.tachometer
     return {
         "position": (tachometer.position_width + POSITION_FRAC_BITS, f"2^{-POSITION_FRAC_BITS} counts"),
-        "velocity": (form.command_width, f"2^{-tachometer.frac_bits - form.command_bits} {tachometer.unit}"),
-        "acceleration": (form.acceleration_width, f"2^{-spec.acceleration_frac_bits} rad/s²"),
+        "velocity": (form.command_width, f"2^{-tachometer.widths.frac_bits - form.command_bits} {tachometer.unit}"),
+        "acceleration": (form.acceleration_width, f"2^{-spec.units.acceleration_frac_bits} rad/s²"),
     }
 
 
@@ -93,14 +93,14 @@ def _gains(spec: LoopSpec) -> tuple[Port, ...]:
         *(
             Port(
                 *(GAIN_PORTS[term], "input", form.gain_bits),
-                unit=f"{float(gain_per_lsb(spec, term)):.9g}{_GAIN_UNIT.get(term, '')}",
+                unit=f"{float(gain_per_lsb(spec.units, form, term)):.9g}{_GAIN_UNIT.get(term, '')}",
                 help=f"{_GAIN_HELP[term]} {taken}",
             )
             for term in GAINS
         ),
         Port(
             *("current_limit", "input", form.current_limit.bit_length()),
-            unit=f"2^{-spec.current_frac_bits} A",
+            unit=f"2^{-spec.units.current_frac_bits} A",
             help=f"Greatest current; a limit beyond that of the option is held at it. {taken}",
         ),
         Port("freeze", "input", help="Commands, gains and limit stay as they were, but enable does not."),
@@ -161,22 +161,20 @@ def loop_entries(spec: LoopSpec) -> dict[str, Any]:
             "rate": {"per_lsb": 2.0**-RATE_FRAC_BITS},
         }
     return {
-        "period_cycles": int(spec.period),
+        "period_cycles": spec.period,
         "first_tick": spec.first_tick,
-        "tick_to_current": spec.latency,
+        "tick_to_current": spec.tick_to_current,
         "longest_interval": form.longest,
         "current": {
             "width": spec.current_width,
-            "amperes_per_lsb": float(spec.amperes),
+            "amperes_per_lsb": float(spec.units.amperes),
             "limit": form.current_limit,
         },
         "command_position": {"counts_per_lsb": 2.0**-POSITION_FRAC_BITS},
-        "command_velocity": {"rad_per_s_per_lsb": float(spec.rad_per_s / (1 << form.command_bits))},
-        "command_acceleration": {"rad_per_s2_per_lsb": 2.0**-spec.acceleration_frac_bits},
-        "filtered_velocity": {"rad_per_s_per_lsb": float(spec.rad_per_s / (1 << form.extra_bits))},
-        "disturbance": {
-            "torque_per_lsb": float(spec.inertia * spec.observer * spec.rad_per_s / (1 << form.extra_bits))
-        },
+        "command_velocity": {"rad_per_s_per_lsb": float(spec.units.rad_per_s / (1 << form.command_bits))},
+        "command_acceleration": {"rad_per_s2_per_lsb": 2.0**-spec.units.acceleration_frac_bits},
+        "filtered_velocity": {"rad_per_s_per_lsb": float(spec.units.fine)},
+        "disturbance": {"torque_per_lsb": float(spec.inertia * spec.observer * spec.units.fine)},
         **generator,
         **_gain_entries(spec),
     }
@@ -189,12 +187,17 @@ def _gain_entries(spec: LoopSpec) -> dict[str, Any]:
         return {}
     found: dict[str, Any] = {
         GAIN_PORTS[term]: {
-            "per_lsb": float(gain_per_lsb(spec, term)),
+            "per_lsb": float(gain_per_lsb(spec.units, form, term)),
             "unit": _GAIN_UNIT.get(term, " 1").strip(),
             "most": form.most_gain,
             "option": form.reset_gains[term],
         }
         for term in GAINS
     }
-    amperes = {"per_lsb": float(spec.amperes), "unit": "A", "most": form.current_limit, "option": form.current_limit}
+    amperes = {
+        "per_lsb": float(spec.units.amperes),
+        "unit": "A",
+        "most": form.current_limit,
+        "option": form.current_limit,
+    }
     return {"gains": found | {"current_limit": amperes}}

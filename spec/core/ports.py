@@ -1,12 +1,20 @@
 """Ports of the exported core of one axis."""
 
-from collections.abc import Iterable
+from __future__ import annotations
 
-from tachometry.spec.core.numbers import Numbers
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, held, pin, strobe
 
+if TYPE_CHECKING:
+    from tachometry.spec.core.tachometer import TachometerSpec
 
-def ports_of(spec: Numbers, own: Iterable[Port]) -> tuple[Port, ...]:
+# The ends of what encloses the true speed, and which way each is rounded: outward.
+BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
+
+
+def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
     """Return all ports of a core, in the order of the exported module; those of options and methods come last."""
     return (
         pin("clk", "Clock; all outputs change at its rising edge."),
@@ -15,19 +23,19 @@ def ports_of(spec: Numbers, own: Iterable[Port]) -> tuple[Port, ...]:
         pin("b", "Encoder line B, asynchronous."),
         *_if(spec.index, pin("z", "Index line, asynchronous; its rising edge captures the position.")),
         *_if(
-            spec.max_tick_cycles,
+            spec.external_tick,
             pin("tick_in", "External tick, asynchronous; its rising edge ends a sampling period."),
         ),
         held(
-            *(UPDATE, "velocity", spec.velocity_width),
+            *(UPDATE, "velocity", spec.widths.velocity),
             signed=True,
-            unit=f"2^{-spec.frac_bits} {spec.unit}",
+            unit=f"2^{-spec.widths.frac_bits} {spec.unit}",
             help="Measured velocity; multiplied by rad_per_s_per_lsb of the manifest it is in rad/s.",
         ),
         strobe(UPDATE, "One clock for every update of the velocity."),
         held(
-            *(UPDATE, "interval", spec.interval_width),
-            unit=f"{spec.interval_unit_cycles} clocks",
+            *(UPDATE, "interval", spec.widths.interval),
+            unit=f"{spec.times.interval_unit} clocks",
             help="Length of the measurement: m_s in ticks (s), the number of averaged ticks (m), timer periods (t, "
             "mt), Ndt1 in sampling periods dt (rairan), or ticks since the last one with counts (track).",
         ),
@@ -38,7 +46,9 @@ def ports_of(spec: Numbers, own: Iterable[Port]) -> tuple[Port, ...]:
             "tick held no count (track).",
         ),
         strobe(TICK, "One clock for every sampling period."),
-        held(TICK, "pulse_count", spec.count_width, signed=True, unit="counts", help="m_e, the counts of this period."),
+        held(
+            TICK, "pulse_count", spec.widths.count, signed=True, unit="counts", help="m_e, the counts of this period."
+        ),
         held(
             *(TICK, "position", spec.position_width),
             signed=True,
@@ -57,7 +67,8 @@ def ports_of(spec: Numbers, own: Iterable[Port]) -> tuple[Port, ...]:
             "time, see stalled_after_ticks of the manifest. It falls with the next count.",
         ),
         *_if(
-            spec.output, held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
+            spec.scale.output,
+            held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port."),
         ),
         *_if(
             spec.age,
@@ -80,7 +91,7 @@ def ports_of(spec: Numbers, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
         *_if(
-            spec.max_tick_cycles,
+            spec.external_tick,
             strobe(
                 "tick_error",
                 "One clock. Together with tick: the external tick was missing, and the core made one. Alone: an "
@@ -100,3 +111,24 @@ def ports_of(spec: Numbers, own: Iterable[Port]) -> tuple[Port, ...]:
 
 def _if(present: object, port: Port) -> Iterable[Port]:
     return (port,) if present else ()
+
+
+def bound_ports(spec: TachometerSpec) -> tuple[Port, ...]:
+    """Return ports that enclose the true speed."""
+    if not spec.bounds:
+        return ()
+    width = spec.bound.width if spec.scale.output is None else spec.widths.velocity
+    return (
+        *(
+            held(
+                *(UPDATE, name, width),
+                signed=True,
+                unit=f"2^{-spec.widths.frac_bits} {spec.unit}",
+                help=f"{side} end of what the true mean speed over the measured window was, for edges within "
+                "--edge-error (0: an ideal disc and ideal lines) while no count is lost or added; "
+                f"{sign} bounds.none of the manifest means that there is none.",
+            )
+            for name, side, sign in zip(BOUNDS, ("Lower", "Upper"), ("minus", "plus"), strict=True)
+        ),
+        held(UPDATE, "bounds_valid", help="There are bounds; not yet for the first measurement."),
+    )

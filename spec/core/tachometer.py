@@ -1,29 +1,72 @@
-"""All methods share checks and ports, and say here how they differ."""
+"""A tachometer says what is asked for: from encoder pins to velocity, whatever the method."""
 
-import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, ClassVar
 
-from tachometry.spec.core.numbers import Numbers
-from tachometry.spec.core.ports import ports_of
-from tachometry.spec.core.timing import MAX_TICK_CYCLES
-from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
-from tachometry.spec.formats.velocity_output import NATIVE, UNITS
-from tachometry.spec.language.option import ParameterError, is_derived, options_of, settle
-from tachometry.spec.language.port import UPDATE, HasPorts, Port, held
-from tachometry.spec.language.units import PI, SpeedUnit, plural, rounded, signed_width
-
-TICK_IN_TO_WINDOW_END = 2  # clocks: the synchroniser
-# The ends of what encloses the true speed, and which way each is rounded: outward.
-BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
+from tachometry.spec.core.bound import Bound
+from tachometry.spec.core.checks import check
+from tachometry.spec.core.encoder import Encoder
+from tachometry.spec.core.facts import Facts
+from tachometry.spec.core.latency import Latency
+from tachometry.spec.core.ports import bound_ports, ports_of
+from tachometry.spec.core.recovery import Recovery
+from tachometry.spec.core.scale import Scale
+from tachometry.spec.core.times import Times
+from tachometry.spec.core.timing import Timing, parse_clocks
+from tachometry.spec.core.widths import Widths
+from tachometry.spec.core.words import Words
+from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
+from tachometry.spec.language.docstrings import with_inherited
+from tachometry.spec.language.option import Option, option, options_of, parse_whole
+from tachometry.spec.language.port import Port, Ports
+from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, written_time
 
 
 @dataclass(frozen=True, kw_only=True)
-class TachometerSpec(Numbers, HasPorts):
-    """From encoder pins to velocity, whatever the method; its parameters are those of `Parameters`.
+class TachometerSpec:
+    """A core of one axis; a method is a subclass, which says what it has of its own.
 
-    A method is a subclass: it declares the members below, and all code that depends on the method reads them.
+    Its fields are what is asked for, None where nothing is. What follows from them is in small objects: `times`,
+    `widths`, `scale`, `bound`, `latency`, `recovery` and `words`, and `form` has the numbers of the method alone.
+
+    Parameters
+    ----------
+    encoder : Encoder
+    timing : Timing
+    unit : str
+        Of `velocity`: `count/tick`, `rad/s`, `rev/s` or `rpm`.
+    frac_bits : int or None
+        One LSB of `velocity` is 2^−frac_bits of its unit. None: 16 in counts per tick, else 10; fewer if
+        there cannot be as many, or if with `max_speed` the velocity would not fit `velocity_width`.
+    velocity_width : int or None
+        Bits of `velocity`. With fewer than it can need, it saturates and raises `velocity_overflow`; `max_speed` must
+        fit. None: as many as it can need.
+    max_speed : Speed or None
+        Greatest speed to be measured. It narrows every number that depends on it; pulses beyond it saturate m_e and
+        raise `overflow`. None: as wide as the tick has clocks.
+    position_width : int
+        Bits of `position`, which wraps.
+    filter_clocks : int
+        A level is accepted after so many stable clocks, and reported so many clocks late; 0 for no filter.
+    index : bool
+        A rising index line Z captures the position.
+    index_reset : bool
+        The rising index line also sets the position to 0.
+    external_tick : bool
+        Ticks come from outside; the tick of `timing` is their nominal period.
+    max_tick_cycles : int or None
+        External ticks are this many clocks apart at most. None: two nominal ticks.
+    age : bool
+        Output `age`: ticks since the update.
+    bounds : bool
+        Outputs `velocity_lower` and `velocity_upper`, which enclose the true mean speed over the measured window, and
+        `bounds_valid`; for a disc and lines whose edges are within `edge_error`, while no count is lost or added.
+    edge_error : Fraction
+        The distance of any two edges is off by at most so many counts, 0 to 1; it is rounded up to eighths.
+    lowpass : Fraction or None
+        G of the low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, in rad/s; None: no filter.
 
     Raises
     ------
@@ -31,219 +74,128 @@ class TachometerSpec(Numbers, HasPorts):
         If a parameter is out of range.
     """
 
-    # Name of the method.
+    encoder: Encoder
+    timing: Timing = Timing.parse()  # noqa: RUF009
+    unit: str = option(
+        NATIVE,
+        "Unit of the velocity; other than count/tick it costs a constant multiplication, and is off by less than one "
+        "LSB.",
+        choices=UNITS,
+        tests=("", "rpm", "rad/s", "rev/s"),
+    )
+    frac_bits: int | None = option(
+        None,
+        "Fraction bits of the velocity: its LSB is 2^-N of the unit. In count/tick 4 to 24.",
+        shown="16 in count/tick, else 10; fewer if --max-speed would not fit --velocity-width",
+        metavar="N",
+        parse=parse_whole,
+        tests=("most - 20", "most - 0", "16"),
+        also=(
+            Option(
+                "LSB of the velocity as a power of two of its unit: 2^-4 or 0.0625 (instead of --frac-bits).",
+                name="lsb",
+                metavar="2^-N",
+                parse=parse_lsb,
+                tests=(),
+            ),
+        ),
+    )
+    velocity_width: int | None = option(
+        None,
+        "Bits of the velocity, 8 to 64; a velocity that does not fit saturates and raises velocity_overflow. "
+        "--max-speed must fit.",
+        shown="as many as it can need",
+        metavar="N",
+        parse=parse_whole,
+        tests=("", "needed - 2", "needed - 0"),
+    )
+    max_speed: Speed | None = option(  # noqa: RUF009
+        None,
+        "Greatest speed to be measured, in rad/s, rev/s or rpm; a lower one makes the core smaller. Beyond it (with an "
+        "external tick: in the longest) the velocity saturates and raises overflow; the position stays exact.",
+        shown="one count per clock",
+        metavar="SPEED",
+        parse=lambda what, text: Speed.parse(text),
+        tests=("", "some counts per tick"),
+    )
+    position_width: int = option(
+        32, "Bits of the position, 8 to 48; it wraps in two's complement.", metavar="N", tests=("8", "", "48")
+    )
+    filter_clocks: int = option(
+        0,
+        "Glitch filter: a level is accepted after N stable clocks, 0 to 255, and reported N clocks late. Swallowed "
+        "edges are counted.",
+        name="filter",
+        metavar="N",
+        tests=("", "1", "5"),
+    )
+    index: bool = option(False, "Index line z: its rising edge captures the position in index_position.")
+    index_reset: bool = option(False, "The rising edge of z also sets the position to 0 (with --index).", needs="index")
+    external_tick: bool = option(
+        False,
+        "A rise of tick_in ends a sampling period, as of a PWM carrier; --tick is its nominal length.",
+        group="Timing",
+    )
+    max_tick_cycles: int | None = option(
+        None,
+        "Longest external tick: after it the core makes a tick itself and raises tick_error.",
+        name="max-tick-period",
+        metavar="TIME",
+        unit="clocks",
+        group="Timing",
+        shown="2 --tick",
+        parse_at=parse_clocks,
+        needs="external-tick",
+    )
+    age: bool = option(False, "Output age: ticks since the update.")
+    bounds: bool = option(
+        False,
+        "Outputs velocity_lower and velocity_upper, which enclose the true mean speed over the measured window, and "
+        "bounds_valid. They hold for an ideal disc and ideal lines, or within --edge-error, while no count is lost.",
+        fits=lambda spec: spec.facts.bounds,
+    )
+    edge_error: Fraction = option(  # noqa: RUF009
+        Fraction(0),
+        "The distance of any two edges is off by at most E counts, 0 to 1, because of the disc and the lines, so "
+        "--bounds are wider. It is rounded up to eighths.",
+        shown="0",
+        metavar="E",
+        parse=Quantity(FRACTION),
+        needs="bounds",
+        tests=("0.3",),
+    )
+    lowpass: Fraction | None = option(  # noqa: RUF009
+        None,
+        "Low-pass filter of the velocity for measurements of different length, eq. (22), in rad/s, Hz or kHz. The "
+        "length is the time since the last update.",
+        metavar="BANDWIDTH",
+        unit="rad/s",
+        parse=parse_bandwidth,
+        tests=("", "20kHz"),
+    )
+
+    # Name of the method, and what sets it apart.
     method: ClassVar[str]
-    # What texts call it; empty: its name in capitals.
-    title: ClassVar[str] = ""
-    # What it does, for --help: it stands behind the name.
-    summary: ClassVar[str] = ""
-    # What makes its updates.
-    update_by: ClassVar[str] = "tick"
-    # Whether the method ends the ticks itself, by what it counts.
-    own_ticks: ClassVar[bool] = False
-    # Whether the 0 that the maximum time forces is the last update before the next count.
-    last_at_rest: ClassVar[bool] = False
-    # Whether its windows can have bounds.
-    has_bounds: ClassVar[bool] = True
-    # Whether pairwise tests give all options all of their values.
-    pairs_all: ClassVar[bool] = False
-    # Tenths of the maximum time after which it shows that the shaft stands, counted from the last count but one.
-    rest_tenths: ClassVar[int] = 17
+    facts: ClassVar[Facts]
+    # What follows.
+    times = cached_property(Times["TachometerSpec"])
+    widths = cached_property(Widths["TachometerSpec"])
+    scale = cached_property(Scale["TachometerSpec"])
+    bound = cached_property(Bound["TachometerSpec"])
+    latency = cached_property(Latency["TachometerSpec"])
+    recovery = cached_property(Recovery["TachometerSpec"])
+    words = cached_property(Words["TachometerSpec"])
+
+    def __init_subclass__(cls) -> None:
+        cls.__doc__ = with_inherited(cls.__doc__, cls.__base__.__doc__ if cls.__base__ else None)
 
     def __post_init__(self) -> None:
-        if self.unit not in UNITS:
-            raise ParameterError("unit", f"must be one of {', '.join(UNITS)}, not {self.unit!r}")
-        self._check_ticks()
-        if not is_derived(self.velocity_width) and not 8 <= self.velocity_width <= 64:
-            raise ParameterError("velocity_width", f"must be from 8 to 64, not {self.velocity_width}")
-        settle(self)
-        self._check_velocity()
-        if not 8 <= self.position_width <= 48:
-            raise ParameterError("position_width", f"must be from 8 to 48, not {self.position_width}")
-        if not 0 <= self.filter_clocks <= 255:
-            raise ParameterError("filter_clocks", f"must be from 0 to 255, not {self.filter_clocks}")
-        if self.index_reset and not self.index:
-            raise ParameterError("index_reset", "must be given together with an index")
-        self._check_edge_error()
-        if self.lowpass is not None:
-            self._check_lowpass(self.lowpass)
-
-    def _check_edge_error(self) -> None:
-        if not 0 <= self.edge_error <= 1:
-            raise ParameterError("edge_error", f"must be from 0 to 1, not {float(self.edge_error):.9g}")
-        if self.edge_error and not self.bounds:
-            raise ParameterError("edge_error", "must be given together with bounds")
-        object.__setattr__(self, "edge_error", Fraction(math.ceil(8 * self.edge_error), 8))
-
-    def _check_lowpass(self, bandwidth: Fraction) -> None:
-        least = 4 / (self.timing.tick_seconds * (1 << MAX_EXTRA_BITS))
-        greatest = 2 * PI * self.timing.clock_hz  # nothing is faster than the clock
-        if bandwidth <= 0 or self.low_pass.extra_bits > MAX_EXTRA_BITS or bandwidth > greatest:
-            raise ParameterError(
-                "lowpass",
-                f"must be from {rounded(least, up=True)} to {rounded(greatest, up=False)} rad/s here, "
-                f"not {float(bandwidth):.9g} rad/s",
-            )
-
-    def _check_ticks(self) -> None:
-        settle(self, "max_tick_cycles")
-        if self.max_tick_cycles is None:
-            return
-        if self.own_ticks:
-            raise ParameterError(
-                "method", f"must be another than {self.method} for an external tick: it makes its own ticks"
-            )
-        shortest = self.timing.tick_cycles
-        if shortest < 2:
-            raise ParameterError("tick_cycles", "must be at least 2 with an external tick, not 1")
-        if not shortest <= self.max_tick_cycles <= MAX_TICK_CYCLES:
-            raise ParameterError(
-                "max_tick_cycles",
-                f"must be from {shortest}, one tick, to {MAX_TICK_CYCLES}, not {self.max_tick_cycles}",
-            )
-
-    def _check_velocity(self) -> None:
-        coarsest, finest = self.frac_bits_range(self.unit)
-        if coarsest <= self.frac_bits <= finest:
-            self._check_full_scale(coarsest)
-            return
-        if self.unit == NATIVE:
-            raise ParameterError("frac_bits", f"must be from {coarsest} to {finest}, not {self.frac_bits}")
-        raise ParameterError(
-            "lsb",
-            f"must be from 2^{-finest} to 2^{-coarsest} {self.unit} with this encoder and tick, "
-            f"not 2^{-self.frac_bits}",
-        )
-
-    def _check_full_scale(self, coarsest: int) -> None:
-        """Check that a velocity of so many bits shows the greatest speed."""
-        if self.max_speed is None or is_derived(self.velocity_width):
-            return
-        counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
-        counts = min(counts, Fraction(self.max_velocity))
-        fitting = self.fitting_frac_bits(counts)
-        if self.frac_bits <= fitting:
-            return
-        needs = f"to show {self.max_speed} in {self.velocity_width} bits"
-        if fitting < coarsest:
-            width = signed_width(math.ceil(counts * self.per_count * Fraction(2) ** coarsest))
-            raise ParameterError("velocity_width", f"must be at least {width} to show {self.max_speed} in {self.unit}")
-        if self.unit == NATIVE:
-            raise ParameterError("frac_bits", f"must be at most {fitting} {needs}, not {self.frac_bits}")
-        raise ParameterError("lsb", f"must be at least 2^{-fitting} {self.unit} {needs}, not 2^{-self.frac_bits}")
+        check(self)
 
     @property
-    def description(self) -> str:
-        """How it measures, in the words of its paper."""
-        return self.summary
-
-    @property
-    def heading(self) -> str:
-        """The name that figures give it."""
-        return f"{self.title or self.method.upper()} method"
-
-    @property
-    def remark(self) -> str:
-        """A remark below the plan of the method; empty: none."""
-        return ""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences on what of the core is not as its options say."""
-        if self.max_speed is None:
-            return ()
-        counts = self.max_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
-        if counts <= self.max_velocity:
-            return ()
-        unit, most = SpeedUnit(self.max_speed.unit), plural(self.max_velocity, "count")
-        greatest = unit.of(self.max_velocity * self.unit_velocity)
-        return (f"greatest speed cut from {self.max_speed} to {greatest:.6g}{unit.name}: {most} per tick is the most",)
-
-    @property
-    def min_time_cycles(self) -> int | None:
-        """Clocks that every measurement lasts longer than; None: there is no such time."""
-        return None
-
-    @property
-    def max_time_cycles(self) -> int:
-        """Clocks after which an update is forced, with ticks as long as nominal."""
-        return self.timing.max_ticks * self.timing.tick_cycles
-
-    @property
-    def memory(self) -> tuple[str, int, int] | None:
-        """The memory of the reciprocal: its kind, entries, bits of an entry. None: there is no such memory."""
-        return None
-
-    @property
-    def division(self) -> str:
-        """How the reciprocal is found where it is divided; empty: it is not."""
-        return ""
-
-    @property
-    def standstill_ticks(self) -> int:
-        """Ticks from that of the last count to the update that reads 0, at most."""
-        return self.timing.max_ticks
-
-    @property
-    def max_tick_shift(self) -> int:
-        """Greatest k where a tick may last 2^k nominal ones."""
-        return 0
-
-    @property
-    def tick_latency(self) -> int:
-        """Clocks from the last one of a window to `tick`: one completes the sum, one registers it."""
-        return 2
-
-    @property
-    def registers_steps(self) -> bool:
-        """Whether a step is in a register before it counts for the tick: a clock of `tick_latency`."""
-        return False
-
-    @property
-    def stamp_width(self) -> int:
-        """Bits of the number of ticks that may fall between the cause of an update and the update; 0 without an age."""
-        # An update may have to wait for the filter as long as this works.
-        clocks = self.tick_to_velocity + self.low_pass_latency
-        shortest = self.timing.tick_cycles if self.max_tick_cycles is None else self.min_tick_cycles
-        by_tick = self.update_by != "count"
-        ticks = -(-clocks // shortest) - by_tick
-        return ticks.bit_length() if self.age else 0
-
-    @property
-    def stalled_after_ticks(self) -> int:
-        """Nominal ticks that ticks in a row without a count must last for `stalled` to rise."""
-        return self.timing.max_ticks + 1
-
-    @property
-    def recovery_clocks(self) -> int | None:
-        """Clocks after which, from any state of the flip-flops, all outputs are right again; position aside.
-
-        docs/concepts/verification.md defines when outputs are right. Counters that an upset has set beyond their ends
-        continue until they wrap. None: the core has a low-pass filter, which forgets only gradually.
-        """
-        if self.lowpass is not None:
-            return None
-        # What counts the ticks of a silence may have to begin anew.
-        silence = ((1 << self.timing.max_ticks.bit_length()) + 1) * self.longest_tick
-        method = self.remembered_clocks + self.tick_to_velocity
-        return self.front_recovery_clocks + max(method, silence) + self.tick_latency
-
-    @property
-    def front_recovery_clocks(self) -> int:
-        """Clocks after which, from any state, a window begins all counts of which are right."""
-        # A line that must be known anew has to hold still once more.
-        held = 1 << max(self.filter_clocks - 1, 1).bit_length()
-        conditioned = 2 + (held + self.filter_clocks if self.filter_clocks else 0)
-        # One clock to decode. The first complete window then begins with the end of another.
-        window = 1 + (
-            1 << (self.longest_tick if self.longest_tick >= 16 else max(self.longest_tick - 2, 0)).bit_length()
-        )
-        return conditioned + 1 + window
-
-    @property
-    def remembered_clocks(self) -> int:
-        """Clocks of right counts after which the method remembers nothing from before."""
-        raise NotImplementedError
+    def tachometer(self) -> "TachometerSpec":
+        """The core of one axis that it is."""
+        return self
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
@@ -251,41 +203,81 @@ class TachometerSpec(Numbers, HasPorts):
         return ()
 
     @property
+    def ports(self) -> Ports:
+        """Ports of the exported core, in order."""
+        return Ports(ports_of(self, (*bound_ports(self), *self.method_ports)))
+
+    @property
     def method_entries(self) -> dict[str, dict[str, Any]]:
         """Entries of the manifest that say how numbers of these outputs are read, by the names of the ports."""
         return {}
 
     @property
-    def bound_ports(self) -> tuple[Port, ...]:
-        """Ports that enclose the true speed."""
-        if not self.bounds:
-            return ()
-        width = self.bound_width if self.output is None else self.velocity_width
-        return (
-            *(
-                held(
-                    *(UPDATE, name, width),
-                    signed=True,
-                    unit=f"2^{-self.frac_bits} {self.unit}",
-                    help=f"{side} end of what the true mean speed over the measured window was, for edges within "
-                    "--edge-error (0: an ideal disc and ideal lines) while no count is lost or added; "
-                    f"{sign} bounds.none of the manifest means that there is none.",
-                )
-                for name, side, sign in zip(BOUNDS, ("Lower", "Upper"), ("minus", "plus"), strict=True)
+    def entries(self) -> dict[str, Any]:
+        """Entries of the manifest, beside ports and options."""
+        times, scale, frac_bits = self.times, self.scale, self.widths.frac_bits
+        found = {
+            "method": self.method,
+            "clock_hz": self.timing.clock_hz,
+            "tick_cycles": self.timing.tick_cycles,
+            "max_ticks": self.timing.max_ticks,
+            "stalled_after_ticks": times.stalled_after_ticks,
+            "counts_per_rev": self.encoder.counts_per_rev,
+            "decoding": self.encoder.decoding,
+            "velocity": {
+                "width": self.widths.velocity,
+                "frac_bits": frac_bits,
+                "unit": self.unit,
+                "rad_per_s_per_lsb": scale.rad_per_s_per_lsb,
+                "full_scale": scale.full_scale * 2.0**-frac_bits,
+                "full_scale_rad_per_s": scale.full_scale * scale.rad_per_s_per_lsb,
+            },
+            **self.method_entries,
+            "max_time_cycles": times.longest,
+            "min_time_cycles": times.shortest,
+            "bounds": {"none": self.bound.shown_absent} if self.bounds else None,
+            "interval_unit_cycles": times.interval_unit,
+            "latency_cycles": self.latency.entries,
+            "recovery_cycles": self.recovery.clocks,
+            "external_tick_cycles": (
+                {"min": times.min_tick_cycles, "max": times.longest_tick} if self.external_tick else None
             ),
-            held(UPDATE, "bounds_valid", help="There are bounds; not yet for the first measurement."),
-        )
+        }
+        return {name: entry for name, entry in found.items() if entry is not None}
 
     @property
-    def ports(self) -> tuple[Port, ...]:
-        """Ports of the exported core, in order."""
-        return ports_of(self, (*self.bound_ports, *self.method_ports))
+    def options(self) -> dict[str, str]:
+        """Texts of all options that are asked for, by their names; `of_options` makes the core of them again."""
+        found = {"method": self.method}
+        for part in (self.encoder, self.timing, self):
+            found |= written(part, self)
+        return found
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Every option in canonical form, defaults included."""
+        """Every option in canonical form, defaults and what follows included."""
         found: dict[str, Any] = {"method": self.method}
         for part in (self.encoder, self.timing, self):
             for about in options_of(type(part)):
                 found[about.field] = about.canonical(getattr(part, about.field))
-        return found
+        del found["external_tick"]
+        return found | {
+            "frac_bits": self.widths.frac_bits,
+            "velocity_width": self.widths.velocity,
+            "max_tick_cycles": self.times.longest_tick if self.external_tick else None,
+            "edge_error": float(self.bound.edge_error) if self.facts.bounds else found["edge_error"],
+        }
+
+
+def written(part: Any, spec: TachometerSpec) -> dict[str, str]:
+    """Return what is asked for in the fields of a part of a core, or of the core itself, as texts by option names."""
+    fitting = {about.field: about for about in reversed(options_of(type(part))) if about.fits_in(spec)}
+    found = {}
+    for about in reversed(fitting.values()):
+        value = getattr(part, about.field)
+        if value is None or (about.needs and value == about.default):
+            continue
+        clocks = spec.timing.tick_cycles if about.unit == "ticks" else 1
+        timed = about.parse_at is not None
+        found[about.name] = written_time(value * clocks, spec.timing.clock_hz) if timed else about.written(value)
+    return found

@@ -1,10 +1,12 @@
 """The clock, the sampling period and the longest measurement."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
-from tachometry.spec.language.option import Derived, Option, ParameterError, option, read_options, settle
+from tachometry.spec.language.option import REQUIRED, Option, ParameterError, option, read_options
 from tachometry.spec.language.units import TIME, format_time, parse_frequency, plural, read_exactly
 
 MAX_CLOCK_HZ = 10**11
@@ -14,14 +16,30 @@ MIN_TICKS, MAX_TICKS = 2, 1 << 20
 _GROUP = "Timing"
 
 
-def _clocks(what: str, text: str) -> Derived:
-    return Derived(lambda timing: whole_clocks(what, text, timing.clock_hz))
+def parse_clocks(what: str, text: str, timing: Mapping[str, Any]) -> int:
+    """Return a time as a whole number of clocks, as `whole_clocks` does, for an option."""
+    return whole_clocks(what, text, timing["clock_hz"])
 
 
-def _ticks(what: str, text: str) -> Derived:
-    return Derived(
-        lambda timing: _whole(what, text, timing.tick_seconds, "tick", Fraction(1, timing.clock_hz), MIN_TICKS)
-    )
+def _tick(what: str, text: str, timing: Mapping[str, Any]) -> int:
+    _check_clock(timing["clock_hz"])
+    return _check_tick(parse_clocks(what, text, timing))
+
+
+def _check_clock(hertz: int) -> None:
+    if not 1 <= hertz <= MAX_CLOCK_HZ:
+        raise ParameterError("clock", f"must be from 1 Hz to 100 GHz, not {float(hertz):.6g} Hz")
+
+
+def _check_tick(cycles: int) -> int:
+    if not 1 <= cycles <= MAX_TICK_CYCLES:
+        raise ParameterError("tick_cycles", f"must be from 1 to {MAX_TICK_CYCLES}, not {cycles}")
+    return cycles
+
+
+def _ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
+    clock = Fraction(1, timing["clock_hz"])
+    return _whole(what, text, timing["tick_cycles"] * clock, "tick", clock, MIN_TICKS)
 
 
 @dataclass(frozen=True)
@@ -33,9 +51,9 @@ class Timing:
     clock_hz : int
         Frequency of `clk` in Hz.
     tick_cycles : int
-        T, clocks in a sampling period T_s; 20 µs, if it is not given.
+        T, clocks in a sampling period T_s; `parse` takes 20 µs, if it is not given.
     max_ticks : int
-        Ticks after which an update is forced (Tsuji 2009, Sec. V-B: 10 ms, which it is if it is not given).
+        Ticks after which an update is forced (Tsuji 2009, Sec. V-B: 10 ms, which `parse` takes, if it is not given).
 
     Raises
     ------
@@ -44,7 +62,7 @@ class Timing:
     """
 
     clock_hz: int = option(
-        None,
+        REQUIRED,
         "Clock of the core, in Hz, kHz, MHz or GHz; a plain number is Hz.",
         text="48MHz",
         name="clock",
@@ -53,14 +71,14 @@ class Timing:
         parse=parse_frequency,
     )
     tick_cycles: int = option(
-        None,
+        REQUIRED,
         "Sampling period Ts, in s, ms, us or ns, a whole number of clocks; a plain number is clocks.",
         text="20us",
         name="tick",
         metavar="TIME",
         unit="clocks",
         group=_GROUP,
-        parse=_clocks,
+        parse_at=_tick,
         tests=("1", "3", "960", "2"),
         few=3,
         also=(
@@ -69,13 +87,13 @@ class Timing:
                 name="dt",
                 metavar="TIME",
                 group=_GROUP,
-                parse=_clocks,
-                fits=lambda spec: spec.own_ticks,
+                parse_at=_tick,
+                fits=lambda spec: spec.facts.own_ticks,
             ),
         ),
     )
     max_ticks: int = option(
-        None,
+        REQUIRED,
         "Longest measurement: after it an update is forced, so that standstill is seen. In s, ms, us or ns, 2 to 2^20 "
         "whole ticks; a plain number is clocks.",
         text="10ms",
@@ -83,18 +101,14 @@ class Timing:
         metavar="TIME",
         unit="ticks",
         group=_GROUP,
-        parse=_ticks,
+        parse_at=_ticks,
         tests=("2", "500", "3", "4096"),
         few=3,
     )
 
     def __post_init__(self) -> None:
-        if not 1 <= self.clock_hz <= MAX_CLOCK_HZ:
-            raise ParameterError("clock", f"must be from 1 Hz to 100 GHz, not {float(self.clock_hz):.6g} Hz")
-        settle(self, "tick_cycles")
-        if not 1 <= self.tick_cycles <= MAX_TICK_CYCLES:
-            raise ParameterError("tick_cycles", f"must be from 1 to {MAX_TICK_CYCLES}, not {self.tick_cycles}")
-        settle(self)
+        _check_clock(self.clock_hz)
+        _check_tick(self.tick_cycles)
         if not MIN_TICKS <= self.max_ticks <= MAX_TICKS:
             raise ParameterError("max_ticks", f"must be from {MIN_TICKS} to {MAX_TICKS}, not {self.max_ticks}")
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from fractions import Fraction
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 _YES = frozenset(("yes", "y", "true", "t", "on", "1"))
@@ -40,40 +41,6 @@ class ParameterError(ValueError):
         if isinstance(error, ParameterError):
             return ParameterError(error.parameter, error.rest + more)
         return ValueError(f"{error}{more}")
-
-
-@dataclass(frozen=True)
-class Derived:
-    """A value that follows from other fields: `settle` puts `of(object)` in its place."""
-
-    of: Callable[[Any], Any]
-
-
-class Settled(int):
-    """A whole number that `settle` has derived. In `dataclasses.replace` it is derived anew."""
-
-    derived: Derived
-
-    def __reduce__(self) -> tuple[type[int], tuple[int]]:
-        return int, (int(self),)
-
-
-def settle(item: Any, *names: str) -> None:
-    """Replace derived values of a frozen dataclass by what they are: those of some fields, or of all in order."""
-    for name in names or (other.name for other in fields(item)):
-        value = getattr(item, name)
-        derived = value.derived if isinstance(value, Settled) else value
-        if isinstance(derived, Derived):
-            value = derived.of(item)
-            if type(value) is int:
-                value = Settled(value)
-                value.derived = derived
-            object.__setattr__(item, name, value)
-
-
-def is_derived(value: object) -> bool:
-    """Tell whether the value of a field was not given, but follows from other fields."""
-    return isinstance(value, Derived | Settled)
 
 
 def parse_flag(what: str, text: str) -> bool:
@@ -118,8 +85,12 @@ class Option:
     shown : str or None
         The default, as `--help` shows it.
     parse : callable
-        Makes the value from the name of the option in messages, and from the text. A value that depends on other fields
-        is a `Derived`.
+        Makes the value from the name of the option in messages, and from the text.
+    parse_at : callable or None
+        Makes it instead, of a text that says nothing without the timing of the core: its third argument is what is
+        known of the fields of `Timing`.
+    text : str or None
+        The default, if it is read as it would be if it were given.
     flag : bool
         Whether it stands alone, for yes.
     needs : str
@@ -145,6 +116,8 @@ class Option:
     choices: tuple[str, ...] = ()
     shown: str | None = None
     parse: Callable[[str, str], Any] = parse_text
+    parse_at: Callable[[str, str, Mapping[str, Any]], Any] | None = None
+    text: str | None = None
     flag: bool = False
     needs: str = ""
     fits: Callable[[type[Any]], bool] | None = None
@@ -161,7 +134,7 @@ class Option:
     @property
     def required(self) -> bool:
         """Whether it must be given."""
-        return self.default is MISSING
+        return self.default is MISSING and self.text is None
 
     @property
     def fractional(self) -> bool:
@@ -177,19 +150,21 @@ class Option:
             return ("", "no" if self.default is True else "yes")
         return tuple("" if choice == self.default else choice for choice in self.choices)
 
+    def fits_in(self, spec: Any) -> bool:
+        """Tell whether a spec, or its class, has the option."""
+        return self.fits is None or self.fits(spec)
+
     def canonical(self, value: Any) -> Any:
         """Return a value of the field for a manifest."""
         if isinstance(value, Fraction):
             return f"{float(value)!r}{self.unit}" if self.unit else float(value)
-        if isinstance(value, Settled):
-            return int(value)
         return value if isinstance(value, bool | int | str | None) else str(value)
 
-    def of_canonical(self, value: Any) -> Any:
-        """Return the value of the field that a manifest has."""
-        if isinstance(value, float):
-            return Fraction(repr(value))
-        return self.parse(self.parameter, value) if isinstance(value, str) else value
+    def written(self, value: Any) -> str:
+        """Return a text that is read as this value."""
+        if isinstance(value, bool):
+            return ("no", "yes")[value]
+        return str(getattr(self.parse, "written", str)(value))
 
 
 def option(default: Any, help: str, *, text: str | None = None, also: tuple[Option, ...] = (), **about: Any) -> Any:
@@ -198,7 +173,7 @@ def option(default: Any, help: str, *, text: str | None = None, also: tuple[Opti
     Parameters
     ----------
     default : object
-        Default of the field; not used if there is a text.
+        Default of the field; with a text, None for that of the text, or `REQUIRED` where only `read_options` has one.
     help : str
     text : str or None
         The default as a text, read as it would be if it were given.
@@ -211,8 +186,8 @@ def option(default: Any, help: str, *, text: str | None = None, also: tuple[Opti
         about = {"flag": True, "parse": parse_flag} | about
     elif type(default) is int:
         about = {"parse": parse_whole} | about
-    main = Option(help, shown=about.pop("shown", text), **about)
-    if text is not None:
+    main = Option(help, shown=about.pop("shown", text), text=text, **about)
+    if text is not None and default is not REQUIRED:
         default = main.parse(main.parameter, text)
     elif main.shown is None and type(default) in (int, str):
         main = replace(main, shown=str(default))
@@ -230,30 +205,51 @@ def _declared(spec: Any) -> tuple[Option, ...]:
 
 
 def _of_field(about: Option, item: Field[Any]) -> Option:
-    return replace(about, name=about.name or item.name.replace("_", "-"), field=item.name, default=item.default)
+    text = item.metadata["options"][0].text  # of the main option, whichever is given
+    name = about.name or item.name.replace("_", "-")
+    return replace(about, name=name, text=text, field=item.name, default=item.default)
 
 
-def read_options(spec: type[Any], texts: Mapping[str, str]) -> dict[str, Any]:
+def read_options(
+    spec: type[Any], texts: Mapping[str, str], timing: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Any]:
     """Return values of the fields of a class, from the texts that are given for its options.
+
+    Parameters
+    ----------
+    spec : type
+    texts : mapping of str to str
+        By the names of the options.
+    timing : mapping of str to object
+        What is known of the fields of `Timing`, for texts that say nothing without.
 
     Raises
     ------
     ParameterError
         If a text cannot be read, two options for one field are given, or one is missing.
     """
-    values: dict[str, Any] = {}
-    by: dict[str, Option] = {}
+    given: dict[str, Option] = {}
     for about in options_of(spec):
         if about.name not in texts:
             continue
-        if about.needs:
-            if not parse_flag(about.needs, texts.get(about.needs, "no")):
-                raise ParameterError(about.parameter, f"must be given together with --{about.needs}")
-        elif other := by.get(about.field):
+        if about.needs and not parse_flag(about.needs, texts.get(about.needs, "no")):
+            raise ParameterError(about.parameter, f"must be given together with --{about.needs}")
+        if other := given.get(about.field):
             raise ParameterError(about.parameter, f"must not be given together with --{other.name}")
-        values[about.field] = about.parse(about.parameter, texts[about.name])
-        by[about.field] = about
+        given[about.field] = about
+    values: dict[str, Any] = {}
     for about in options_of(spec):
-        if about.required and about.field not in values:
+        if about.field in values:
+            continue
+        if about.required and about.field not in given:
             raise ParameterError(about.parameter, "must be given")
+        if about.field in given:
+            about = given[about.field]
+        elif about.text is None:
+            continue
+        text = texts.get(about.name, about.text or "")
+        if about.parse_at is None:
+            values[about.field] = about.parse(about.parameter, text)
+        else:
+            values[about.field] = about.parse_at(about.parameter, text, {**timing, **values})
     return values

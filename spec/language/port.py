@@ -60,23 +60,20 @@ def held(by: str, name: str, width: int = 1, *, signed: bool = False, unit: str 
     return Port(name, "output", width, signed, by, unit, help)
 
 
-class HasPorts:
-    """Derives pins, outputs and strobes from the ports of an exported core."""
+class Ports(tuple[Port, ...]):
+    """All ports of an exported core, in order."""
 
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Ports of the exported core, in order."""
-        raise NotImplementedError
+    __slots__ = ()
 
     @property
     def pins(self) -> tuple[Port, ...]:
         """Inputs beside clock and reset."""
-        return tuple(port for port in self.ports if port.direction == "input" and port.name not in ("clk", "rst"))
+        return tuple(port for port in self if port.direction == "input" and port.name not in ("clk", "rst"))
 
     @property
     def outputs(self) -> tuple[Port, ...]:
         """Outputs of the exported core, in order."""
-        return tuple(port for port in self.ports if port.direction == "output")
+        return tuple(port for port in self if port.direction == "output")
 
     @property
     def strobes(self) -> dict[str, tuple[str, ...]]:

@@ -15,8 +15,9 @@ PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
 
 # A decimal number and its unit. Exponents beyond three digits would make numbers that fill the memory.
 # µ is the sign of either code point, U+00B5 or U+03BC.
-QUANTITY = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([A-Za-zµμ/%]*)"
-_QUANTITY = re.compile(QUANTITY, re.ASCII)
+_NUMBER, _UNIT = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", r"\s*([A-Za-zµμ/%]*)"
+QUANTITY = _NUMBER + _UNIT
+_QUANTITY = re.compile(rf"{_NUMBER}(?:/([1-9]\d{{0,99}}))?{_UNIT}", re.ASCII)  # or a quotient
 _LONGEST = 400  # characters of a number
 # Sizes of a number: products of several still are floats.
 _LEAST, _GREATEST = Fraction(1, 10**30), Fraction(10**30)
@@ -89,14 +90,14 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
     """
     number = text.strip()
     match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
-    unit = plain_unit(match[2]) or default if match else ""
+    unit = plain_unit(match[3]) or default if match else ""
     if match is None or unit not in units:
         names = ", ".join(filter(None, units))
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
         if "" in units:
             allowed = names and f"or one in {names}"
         raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed, also)))}, not {text!r}")
-    value = Fraction(match[1])
+    value = Fraction(match[1]) / int(match[2] or 1)
     if value and not _LEAST <= abs(value) <= _GREATEST:
         raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")
     return value, unit
@@ -126,9 +127,43 @@ def read_nearest(what: str, text: str, units: Units, default: str = "") -> float
     return units[unit].nearest(value)
 
 
-def reader(units: Units) -> Callable[[str, str], Fraction]:
-    """Return a function that reads such a quantity exactly, for an option."""
-    return lambda what, text: read_exactly(what, text, units)
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """Reads and writes quantities of some units, exactly, for an option.
+
+    Parameters
+    ----------
+    units : mapping of str to Unit
+    """
+
+    units: Units
+
+    def __call__(self, what: str, text: str) -> Fraction:
+        return read_exactly(what, text, self.units)
+
+    def written(self, value: Fraction) -> str:
+        """Return the shortest text that is read as this value."""
+        texts = ((decimal(value / unit.exact), name) for name, unit in self.units.items())
+        exact = [f"{number}{name}" for number, name in texts if number]
+        return min(exact, key=len) if exact else f"{value}{next(iter(self.units))}"
+
+
+def decimal(value: Fraction) -> str:
+    """Return a number with all of its digits behind the point; the empty text if they have no end."""
+    digits = 0
+    while (10**digits) % value.denominator:
+        if digits > value.denominator.bit_length():
+            return ""
+        digits += 1
+    whole = f"{int(abs(value) * 10**digits):0{digits + 1}}"
+    text = f"{whole[:-digits]}.{whole[-digits:]}" if digits else whole
+    return f"-{text}" if value < 0 else text
+
+
+def written_time(clocks: int, clock_hz: int) -> str:
+    """Return a number of clocks as a time, or as it is if that has no end."""
+    seconds = Fraction(clocks, clock_hz)
+    return Quantity(TIME).written(seconds) if decimal(seconds) else str(clocks)
 
 
 def number_reader(units: Units, default: str = "") -> Callable[[str, str], float]:
@@ -156,23 +191,31 @@ def parse_time(what: str, text: str) -> Fraction:
     return read_exactly(what, text, TIME)
 
 
-def parse_frequency(what: str, text: str | int) -> int:
-    """Return hertz in a text such as `48MHz`, a whole number; a plain number is hertz.
+class _Frequency:
+    """Reads hertz in a text such as `48MHz`, a whole number; a plain number is hertz.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If the text is no frequency, or not a positive whole number of hertz.
     """
-    hertz = read_exactly(what, str(text), FREQUENCY, "Hz")
-    if hertz.denominator != 1 or hertz <= 0:
-        raise ParameterError(what, f"must be a positive whole number of Hz, not {text!r}")
-    return int(hertz)
+
+    def __call__(self, what: str, text: str | int) -> int:
+        hertz = read_exactly(what, str(text), FREQUENCY, "Hz")
+        if hertz.denominator != 1 or hertz <= 0:
+            raise ParameterError(what, f"must be a positive whole number of Hz, not {text!r}")
+        return int(hertz)
+
+    def written(self, value: int) -> str:
+        """Return the shortest text that is read as this value."""
+        return Quantity(FREQUENCY).written(Fraction(value))
 
 
-def parse_bandwidth(what: str, text: str) -> Fraction:
-    """Return rad/s in a text such as `200rad/s` or `30Hz`."""
-    return read_exactly(what, text, BANDWIDTH)
+parse_frequency = _Frequency()
+
+
+# Reads rad/s in a text such as `200rad/s` or `30Hz`.
+parse_bandwidth = Quantity(BANDWIDTH)
 
 
 def format_time(seconds: Fraction) -> str:
@@ -266,5 +309,4 @@ class Speed:
         return math.ceil(self.counts(counts_per_rev, tick_seconds))
 
     def __str__(self) -> str:
-        number = self.value.numerator if self.value.denominator == 1 else float(self.value)
-        return f"{number}{self.unit}"
+        return f"{decimal(self.value) or self.value}{self.unit}"

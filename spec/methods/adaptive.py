@@ -1,6 +1,5 @@
 """dt of Rairán 2013 that follows the speed: dt·2^k, the shortest for which eq. (13) stays within a target."""
 
-import re
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
@@ -12,8 +11,6 @@ from tachometry.spec.language.units import FRACTION, read_exactly
 def parse_target(what: str, text: str) -> Fraction:
     """Return a fraction such as `0.1%`, `0.001` or `1/8`."""
     try:
-        if quotient := re.fullmatch(r"\s*(\d{1,9})/0*([1-9]\d{0,8})\s*", text, re.ASCII):
-            return Fraction(int(quotient[1]), int(quotient[2]))
         return read_exactly(what, text, FRACTION)
     except ParameterError:
         raise ParameterError(what, f"must be a fraction such as 0.1% or 0.001, not {text!r}") from None

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.port import INDEX, TICK, UPDATE, HasPorts, Port, held, pin, strobe
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, Ports, held, pin, strobe
 from tachometry.spec.language.units import Speed
 from tachometry.spec.methods.s import MAX_TABLE, STachometer
 
@@ -34,7 +34,7 @@ _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("unit", NATIVE, f"the conversion of the velocity {_FOR_ONE}"),
     ("filter_clocks", 0, "the levels of an axis are not looked at in every clock"),
     ("index_reset", False, "the position of an axis is in the memory of the datapath"),
-    ("max_tick_cycles", None, "the core makes the ticks in step with its rounds"),
+    ("external_tick", False, "the core makes the ticks in step with its rounds"),
     ("age", False, f"what counts the ticks {_FOR_ONE}"),
     ("bounds", False, f"what finds them {_FOR_ONE}"),
     ("lowpass", None, f"the filter {_FOR_ONE}"),
@@ -58,14 +58,14 @@ def _axis(spec: STachometer, slots: int) -> STachometer:
     timing, speed = spec.timing, spec.max_speed
     return replace(
         spec,
-        timing=Timing(timing.clock_hz, timing.tick_cycles // slots, int(timing.max_ticks)),
+        timing=Timing(timing.clock_hz, timing.tick_cycles // slots, timing.max_ticks),
         max_speed=None if speed is None else Speed(speed.value * slots, speed.unit),
     )
 
 
 def _turn_cycles(axis: STachometer) -> int:
     # The next axis begins while the velocity of this one is shown. One clock starts the scaler, one takes its sum.
-    return DECIDE + 1 + axis.looked_up.digits + 1 - READ
+    return DECIDE + 1 + axis.form.looked_up.digits + 1 - READ
 
 
 def _fits(spec: STachometer, axes: int, cycles: int) -> bool:
@@ -93,8 +93,100 @@ def _nearest(spec: STachometer, axes: int) -> list[int]:
     return [one for one in found if one is not None]
 
 
+class AxesLatency:
+    """Counts the clocks from a pin of an axis to what is shown of it.
+
+    Parameters
+    ----------
+    spec : AxesSpec
+    """
+
+    def __init__(self, spec: AxesSpec) -> None:
+        self.spec = spec
+
+    @property
+    def pin_to_count(self) -> int:
+        """Most clocks from the sampling of a level to its look: the synchroniser, and a round."""
+        return self.spec.axis.latency.pin_to_count + self.spec.slots - 1
+
+    @property
+    def tick(self) -> int:
+        """Clocks from the last one of a tick to the one in which it is shown of the last axis."""
+        return int(self.spec.tick_clock(self.spec.axes - 1, 0)) - (self.spec.times.longest_tick - 1)
+
+    @property
+    def tick_to_velocity(self) -> int:
+        """Clocks from `tick` to `velocity_valid`: they come together."""
+        return 0
+
+    @property
+    def entries(self) -> dict[str, int]:
+        """Entries of the manifest."""
+        return {
+            "pin_to_count": self.pin_to_count,
+            "tick_latency": self.tick,
+            "tick_to_velocity": self.tick_to_velocity,
+        }
+
+    @property
+    def index(self) -> int:
+        """Clocks from the look that sees the rise of an index line to `index_valid`."""
+        return COUNT_LATENCY + 1 + self.spec.parallel
+
+
+class AxesRecovery:
+    """Says how long a core of many axes takes until all is right again after an upset; see `Recovery`.
+
+    Parameters
+    ----------
+    spec : AxesSpec
+    """
+
+    def __init__(self, spec: AxesSpec) -> None:
+        self.spec = spec
+
+    @property
+    def clocks(self) -> int:
+        """Clocks after which all is right.
+
+        Each axis is a core of its own whose clock is a round. Before that the slots go on to the end of their register,
+        and turns that have begun end; after it each axis has its turn.
+        """
+        own = self.spec.axis.recovery.clocks
+        assert own is not None  # there is no low-pass filter
+        slots = self.spec.slots
+        return own * slots + (1 << (slots - 1).bit_length()) + 2 * self.spec.times.longest_tick
+
+
+class AxesWords:
+    """Says of a core of many axes what commands show.
+
+    Parameters
+    ----------
+    spec : AxesSpec
+    """
+
+    def __init__(self, spec: AxesSpec) -> None:
+        self.spec = spec
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what is other than might be expected."""
+        spec = self.spec
+        if spec.tachometer.max_speed is None or spec.axis.widths.max_count == spec.tachometer.widths.max_count:
+            return ()
+        return (
+            f"greatest speed: an axis is looked at {spec.rounds} times in a tick, so it has at most as many counts",
+        )
+
+    @property
+    def memory(self) -> tuple[str, int, int]:
+        """The memory of the reciprocal: its kind, entries, bits of an entry."""
+        return "table", self.spec.reciprocal.depth, self.spec.reciprocal.width
+
+
 @dataclass(frozen=True, kw_only=True)
-class AxesSpec(HasPorts):
+class AxesSpec:
     """Several encoders, one S-method datapath.
 
     In a round each axis is looked at once, in its slot of one clock. So an axis is, to the bit, a core of its own whose
@@ -119,16 +211,18 @@ class AxesSpec(HasPorts):
     axes: int
     parallel: bool = False
 
+    latency = cached_property(AxesLatency)
+    recovery = cached_property(AxesRecovery)
+    words = cached_property(AxesWords)
+
     def __post_init__(self) -> None:
         if not 1 <= self.axes <= MAX_AXES:
             raise ParameterError("axes", f"must be from 1 to {MAX_AXES}, not {self.axes}")
         spec = self.tachometer
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
-                # What is wrong is the option, not the length that it may have.
-                name = {"max_tick_cycles": "external-tick"}.get(name, name)
                 raise ParameterError(name, f"must not be given together with axes: {why}")
-        if spec.velocity_width != spec.native_width:
+        if spec.velocity_width not in (None, spec.widths.native):
             raise ParameterError(
                 "velocity_width", "must not be given together with axes: it is what the greatest speed needs"
             )
@@ -155,6 +249,11 @@ class AxesSpec(HasPorts):
     def method(self) -> str:
         """Name of the method."""
         return self.tachometer.method
+
+    @property
+    def times(self) -> Times[TachometerSpec]:
+        """How far ticks are apart: as those of the core that each axis would be."""
+        return self.tachometer.times
 
     @property
     def timing(self) -> Timing:
@@ -186,21 +285,7 @@ class AxesSpec(HasPorts):
     @property
     def reciprocal(self) -> Reciprocal:
         """The reciprocal of m_s, which is always looked up: there is no time between two axes to divide."""
-        return self.axis.looked_up
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences on what is other than might be expected."""
-        if self.tachometer.max_speed is None or self.axis.max_count == self.tachometer.max_count:
-            return ()
-        return (
-            f"greatest speed: an axis is looked at {self.rounds} times in a tick, so it has at most as many counts",
-        )
-
-    @property
-    def memory(self) -> tuple[str, int, int]:
-        """The memory of the reciprocal: its kind, entries, bits of an entry."""
-        return "table", self.reciprocal.depth, self.reciprocal.width
+        return self.axis.form.looked_up
 
     def look(self, axis: int, number: Any) -> Any:
         """Return the clock in which the level of an axis is looked at for the `number`-th time, of a number or an
@@ -213,59 +298,14 @@ class AxesSpec(HasPorts):
         begun = self.look(0, (tick + 1) * self.rounds - 1) + HAND_OVER_LATENCY
         return begun + axis * self.turn_cycles + self.turn_cycles + READ + self.parallel
 
-    def seconds(self, clocks: int) -> Fraction:
-        """Return a number of clocks in seconds, exactly."""
-        return self.tachometer.seconds(clocks)
-
     @property
-    def pin_to_count(self) -> int:
-        """Most clocks from the sampling of a level to its look: the synchroniser, and a round."""
-        return self.axis.pin_to_count + self.slots - 1
-
-    @property
-    def longest_tick(self) -> int:
-        """Clocks in a tick."""
-        return self.timing.tick_cycles
-
-    @property
-    def max_tick_cycles(self) -> None:
-        """There is no external tick."""
-        return
-
-    @property
-    def tick_latency(self) -> int:
-        """Clocks from the last one of a tick to the one in which it is shown of the last axis."""
-        return int(self.tick_clock(self.axes - 1, 0)) - (self.longest_tick - 1)
-
-    @property
-    def tick_to_velocity(self) -> int:
-        """Clocks from `tick` to `velocity_valid`: they come together."""
-        return 0
-
-    @property
-    def index_latency(self) -> int:
-        """Clocks from the look that sees the rise of an index line to `index_valid`."""
-        return COUNT_LATENCY + 1 + self.parallel
-
-    @property
-    def recovery_clocks(self) -> int:
-        """Clocks after which, from any state, all outputs are right again; position aside. See `TachometerSpec`.
-
-        Each axis is a core of its own whose clock is a round. Before that the slots go on to the end of their register,
-        and turns that have begun end; after it each axis has its turn.
-        """
-        own = self.axis.recovery_clocks
-        assert own is not None  # there is no low-pass filter
-        return own * self.slots + (1 << (self.slots - 1).bit_length()) + 2 * self.longest_tick
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
+    def ports(self) -> Ports:
         """Ports of the exported core, in order."""
-        return (*self._inputs(), *self._strobed(), *(self._held() if self.parallel else ()))
+        return Ports((*self._inputs(), *self._strobed(), *(self._held() if self.parallel else ())))
 
     def _inputs(self) -> Iterable[Port]:
         spec = self.axis
-        for port in (*spec.ports[:2], *spec.pins):
+        for port in (*spec.ports[:2], *spec.ports.pins):
             if port.name in ("clk", "rst"):
                 yield port
             else:
@@ -295,8 +335,36 @@ class AxesSpec(HasPorts):
         """Return those of the core that each axis is; but its clocks are rounds, and times here are in clocks of this
         core.
         """
-        units = {port.name: port.unit for port in self.tachometer.outputs}
-        return tuple(replace(port, unit=units[port.name]) for port in self.axis.outputs)
+        units = {port.name: port.unit for port in self.tachometer.ports.outputs}
+        return tuple(replace(port, unit=units[port.name]) for port in self.axis.ports.outputs)
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """Entries of the manifest: those of the core of one axis, and of the axes together."""
+        alone, axis = self.tachometer, self.axis
+        of_one = alone.entries
+        of_velocity = {
+            "width": axis.widths.velocity,
+            "full_scale": axis.scale.full_scale * 2.0**-axis.widths.frac_bits,
+            "full_scale_rad_per_s": axis.scale.full_scale * alone.scale.rad_per_s_per_lsb,
+        }
+        return of_one | {
+            "velocity": of_one["velocity"] | of_velocity,
+            "recovery_cycles": self.recovery.clocks,
+            "axes": {
+                "axes": self.axes,
+                "parallel": self.parallel,
+                "round_cycles": self.slots,
+                "turn_cycles": self.turn_cycles,
+                "first_tick": self.tick_clock(0, 0),
+            },
+            "latency_cycles": self.latency.entries,
+        }
+
+    @property
+    def options(self) -> dict[str, str]:
+        """Texts of all options that are asked for, by their names."""
+        return {**self.tachometer.options, "axes": str(self.axes), "parallel": ("no", "yes")[self.parallel]}
 
     @property
     def parameters(self) -> dict[str, Any]:

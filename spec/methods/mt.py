@@ -1,15 +1,64 @@
 """The M/T method: counts over the time that they take, which is longer than a given one (Tsuji 2009, Sec. IV-C)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
-from tachometry.spec.core.timing import whole_clocks
-from tachometry.spec.language.option import Derived, ParameterError, option
-from tachometry.spec.methods.timed import TimedTachometer
+from tachometry.spec.core.facts import Facts
+from tachometry.spec.core.timing import parse_clocks
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.methods.timed import TimedForm, TimedTachometer, TimedTimes, TimedWords
 
 
-def _clocks(what: str, text: str) -> Derived:
-    return Derived(lambda spec: whole_clocks(what, text, spec.timing.clock_hz))
+class MTForm(TimedForm["MTTachometer"]):
+    """Finds the numbers of timer and divider of the M/T method."""
+
+    @property
+    def min_clocks(self) -> int:
+        """T_c in clocks, as it is asked for; else a tick."""
+        return self.spec.timing.tick_cycles if self.spec.min_time is None else self.spec.min_time
+
+    @property
+    def min_periods(self) -> int:
+        """Timer periods that a measurement has to exceed: T_c, or one less than a division if that is longer."""
+        return max(self.min_clocks // self.timer_cycles, self.division_periods - 1)
+
+    @property
+    def cycle_counts(self) -> int:
+        """Counts of which a window that has travelled as many holds a multiple; 1: any number."""
+        return self.spec.encoder.decoding if self.spec.whole_cycles else 1
+
+    @property
+    def patient_periods(self) -> int:
+        """Timer periods after which any count closes a window."""
+        return self.min_periods * (2 if self.cycle_counts > 1 else 1)
+
+    @property
+    def max_interval(self) -> int:
+        # A window stays open while the one before is divided.
+        late = -(-self.division_clocks // self.spec.times.min_tick_cycles) if self.may_be_late else 0
+        return max(self.patient_periods, late) + self.max_periods
+
+    @property
+    def remembered_periods(self) -> int:
+        # The open window, whose length may wrap, ends with a count; then comes the next window.
+        return (1 << self.spec.widths.interval) + self.max_periods + self.max_interval + 2
+
+
+class MTTimes(TimedTimes["MTTachometer"]):
+    """Says how far ticks and updates of an M/T-method core are apart."""
+
+    @property
+    def shortest(self) -> int:
+        return self.spec.form.min_periods * self.spec.form.timer_cycles
+
+
+class MTWords(TimedWords["MTTachometer"]):
+    """Says of an M/T-method core what commands show."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (*self._raised("minimum time", self.spec.form.min_clocks, self.spec.times.shortest), *super().notes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +88,7 @@ class MTTachometer(TimedTachometer):
         shown="a tick",
         metavar="TIME",
         unit="clocks",
-        parse=_clocks,
+        parse_at=parse_clocks,
         tests=("", "longest"),
     )
     whole_cycles: bool = option(
@@ -49,23 +98,34 @@ class MTTachometer(TimedTachometer):
     )
 
     method = "mt"
-    title = "M/T"
-    summary = "takes the time of many counts"
+    facts = Facts(
+        title="M/T",
+        summary="takes the time of many counts",
+        update_by="count",
+        own_ticks=False,
+        bounds=True,
+        last_at_rest=False,
+        rest_tenths=22,
+        pairs_all=False,
+    )
     equation = 13
+    form = cached_property(MTForm)
+    times = cached_property(MTTimes)
+    words = cached_property(MTWords)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         longest = self.timing.max_ticks * self.timing.tick_cycles
-        if not 1 <= self._min_time <= longest:
+        if not 1 <= self.form.min_clocks <= longest:
             raise ParameterError(
                 "min_time", f"must be from 1 to {longest} clocks, the maximum time, not {self.min_time}"
             )
-        if self._min_time % self.timer_cycles:
+        if self.form.min_clocks % self.form.timer_cycles:
             raise ParameterError(
                 "min_time",
-                f"must be a multiple of {self.timer_cycles} clocks with times in ticks, not {self.min_time}",
+                f"must be a multiple of {self.form.timer_cycles} clocks with times in ticks, not {self.min_time}",
             )
-        if self.whole_cycles and self.on_lattice:
+        if self.whole_cycles and self.form.on_lattice:
             raise ParameterError(
                 "whole_cycles", "must not be given with times in ticks, which are coarser than the errors that cancel"
             )
@@ -73,43 +133,5 @@ class MTTachometer(TimedTachometer):
             raise ParameterError("whole_cycles", "must not be given with paper_exact, which has no such windows")
 
     @property
-    def _min_time(self) -> int:
-        return self.timing.tick_cycles if self.min_time is None else self.min_time
-
-    @property
-    def min_periods(self) -> int:
-        """Timer periods that a measurement has to exceed: T_c, or one less than a division if that is longer."""
-        return max(self._min_time // self.timer_cycles, self.division_periods - 1)
-
-    @property
-    def min_time_cycles(self) -> int:
-        return self.min_periods * self.timer_cycles
-
-    @property
-    def cycle_counts(self) -> int:
-        """Counts of which a window that has travelled as many holds a multiple; 1: any number."""
-        return self.encoder.decoding if self.whole_cycles else 1
-
-    @property
-    def patient_periods(self) -> int:
-        """Timer periods after which any count closes a window."""
-        return self.min_periods * (2 if self.cycle_counts > 1 else 1)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return (*self._raised("minimum time", self._min_time, self.min_time_cycles), *super().notes)
-
-    @property
-    def max_interval(self) -> int:
-        # A window stays open while the one before is divided.
-        late = -(-self.division_clocks // self.min_tick_cycles) if self.may_be_late else 0
-        return max(self.patient_periods, late) + self.max_periods
-
-    @property
-    def remembered_periods(self) -> int:
-        # The open window, whose length may wrap, ends with a count; then comes the next window.
-        return (1 << self.interval_width) + self.max_periods + self.max_interval + 2
-
-    @property
     def parameters(self) -> dict[str, Any]:
-        return super().parameters | {"min_time": self.min_time_cycles}
+        return super().parameters | {"min_time": self.times.shortest}

@@ -4,8 +4,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
+from tachometry.spec.core.facts import Facts
+from tachometry.spec.core.follows import Follows
+from tachometry.spec.core.latency import Latency
+from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.times import Times
+from tachometry.spec.core.widths import Widths
+from tachometry.spec.core.words import Words
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
 from tachometry.spec.language.units import rounded
@@ -14,6 +22,207 @@ from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target
 # The estimates are looked up by Ndt1, or by Nep1 − 1, in a table with as many entries at most.
 MAX_TABLE = 2048
 ESTIMATES = ("n1", "n2", "n3")
+
+
+class RairanTimes(Times["RairanTachometer"]):
+    """Says how far ticks and updates of Rairán's core are apart."""
+
+    @property
+    def max_tick_shift(self) -> int:
+        """K: the greatest k for which a tick, of two dt at most, ends within the maximum time and fits the tables."""
+        if self.spec.adaptive is None:
+            return 0
+        longest = (self.spec.timing.max_ticks // 2).bit_length() - 1
+        if self.spec.estimate == "n3" or self.spec.bounds:
+            longest = min(longest, (MAX_TABLE // self.spec.widths.max_count).bit_length() - 1)
+        # Nep1 or Nep1 − 1 of 2^k dt is not rounded.
+        return longest if self.spec.estimate == "n3" else min(longest, self.spec.widths.native_frac_bits)
+
+    @property
+    def update_spacing(self) -> int:
+        # A count may come at any time.
+        return 1
+
+    def has_room(self, clocks: int) -> bool:
+        return clocks <= self.update_spacing
+
+
+class RairanWidths(Widths["RairanTachometer"]):
+    """Counts the bits of the numbers of Rairán's core."""
+
+    @property
+    def max_pulse_count(self) -> int:
+        return self.max_count << self.spec.times.max_tick_shift
+
+
+class RairanForm(Follows["RairanTachometer"]):
+    """Finds the tables of Rairán's estimates and of their bounds."""
+
+    @property
+    def adaptive_dt(self) -> AdaptiveDt:
+        """The rule of dt, for a core that has an adaptive dt."""
+        assert self.spec.adaptive is not None
+        return AdaptiveDt(self.spec.adaptive, self.spec.times.max_tick_shift)
+
+    def max_dt(self, shift: int) -> int:
+        """Return greatest Ndt1 for dt·2^shift: how many of these the maximum time has."""
+        return self.spec.timing.max_ticks >> shift
+
+    @property
+    def depth(self) -> int:
+        """Entries of the table, a power of two: by Ndt1 and, for n3, by Nep1 − 1."""
+        return (
+            1
+            << max(
+                self.spec.timing.max_ticks, self.spec.widths.max_pulse_count - 1 if self.spec.estimate == "n3" else 0
+            ).bit_length()
+        )
+
+    @property
+    def table(self) -> tuple[int, ...]:
+        """Contents by address i; 0 at address 0 stands for the velocity 0.
+
+        n1, n2: ⌊2^f/d + ½⌋ with d = i and i + 1. n3: ⌊2^(f+2)/q⌋ with q = 2i + 1. q is odd, so no multiple of ½ is
+        among what is rounded, and with h the entry ⌊2^f·2/q + ½⌋ is ⌊(h + 1)/2⌋ (low) and ⌊2^f/(2q) + ½⌋ is
+        ⌊(h + 4)/8⌋ (high). If dt is adaptive, n1 and n2 have one more bit, ⌊2^(f+1)/d⌋, as they are rounded later.
+        """
+        f = self.spec.widths.native_frac_bits
+        if self.spec.estimate == "n3":
+            return (0, *((1 << (f + 2)) // (2 * i + 1) for i in range(1, self.depth)))
+        more = self.spec.estimate == "n2"
+        if self.spec.adaptive is not None:
+            return (0, *((1 << (f + 1)) // (i + more) for i in range(1, self.depth)))
+        return (0, *(((1 << (f + 1)) // (i + more) + 1) // 2 for i in range(1, self.depth)))
+
+    @property
+    def table_width(self) -> int:
+        """Bits of an entry."""
+        return max(self.table).bit_length()
+
+    def _bound(self, counts: Fraction, periods: int, shift: int, more: int, towards: int) -> int:
+        """Bound for so many counts in so many dt·2^shift, `more` clocks longer; outward, and clipped."""
+        clocks = (periods * self.spec.timing.tick_cycles << shift) + more
+        if clocks <= 0:
+            return self.spec.bound.absent
+        exact = counts * self.spec.timing.tick_cycles * (1 << self.spec.widths.native_frac_bits) / clocks
+        return min(math.floor(exact) if towards < 0 else math.ceil(exact), self.spec.bound.absent)
+
+    def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
+        """Return the table of a bound; `one` gives the entry for n, k and the regime.
+
+        An entry's address is twice that of the estimate, plus one if it is high. Where dt is adaptive, a leading one
+        tells the k of the address: for a low estimate k places below that of `low_depth`, for a high one k places above
+        that of `high_depth`. n is always less than this leading one.
+        """
+        if self.spec.adaptive is None:
+            return tuple(one(n, 0, high) for n in range(self.bound_depth) for high in (False, True))
+        entries = [0] * (2 * self.bound_depth)
+        for shift in range(self.spec.times.max_tick_shift + 1):
+            low, high = self.low_depth >> shift, self.high_depth << shift
+            entries[2 * low : 4 * low : 2] = [one(n, shift, False) for n in range(low)]
+            entries[2 * high + 1 : 4 * high + 1 : 2] = [one(n, shift, True) for n in range(high)]
+        return tuple(entries)
+
+    @property
+    def lower_table(self) -> tuple[int, ...]:
+        """Lower bounds: n2 for a dt, or for Ndt1 + 1 of them, that took a clock longer; 0 for the estimate 0.
+
+        With an edge error, there are as many again, for what implies no least speed: their negatives.
+        """
+
+        def lower(n: int, shift: int, high: bool) -> int:
+            counts = max(Fraction(n if high else 1) - self.spec.bound.edge_error, Fraction(0))
+            return self._bound(counts, 1 if high else n + 1, shift, 1, -1) if n or high else 0
+
+        def loose(n: int, shift: int, high: bool) -> int:
+            return self._bound(self.spec.bound.edge_error, n, shift, -1, 1) if n and not high else 0
+
+        return self._by_address(lower) + (self._by_address(loose) if self.spec.bound.edge_error else ())
+
+    @property
+    def upper_table(self) -> tuple[int, ...]:
+        """Upper bounds: n1 for a dt, or for Ndt1 of them, that took a clock less; absent for the estimate 0."""
+
+        def upper(n: int, shift: int, high: bool) -> int:
+            counts = (n if high else 0) + self.spec.bound.uncertainty
+            return self._bound(counts, 1 if high else n, shift, -1, 1) if n or high else self.spec.bound.absent
+
+        return self._by_address(upper)
+
+    @property
+    def low_depth(self) -> int:
+        """A power of two above every Ndt1."""
+        return 1 << self.spec.timing.max_ticks.bit_length()
+
+    @property
+    def high_depth(self) -> int:
+        """A power of two above every Nep1 − 1 of a dt as long as nominal."""
+        return 1 << (self.spec.widths.max_count - 1).bit_length()
+
+    @property
+    def bound_depth(self) -> int:
+        """Entries of each bound's table for low speeds, and for high ones: by Ndt1 and by Nep1 − 1."""
+        if self.spec.adaptive is None:
+            return max(self.low_depth, self.high_depth)
+        return 2 * max(self.low_depth, self.high_depth << self.spec.times.max_tick_shift)
+
+    def tie(self, shift: int) -> int | None:
+        """Return the Ndt1 for which n1 or n2 is just half an LSB, if there can be one: it is rounded up, to 1 or to
+        −0.
+        """
+        ndt1 = (2 << self.spec.widths.native_frac_bits >> shift) - (self.spec.estimate == "n2")
+        return ndt1 if self.spec.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
+
+
+class RairanLatency(Latency["RairanTachometer"]):
+    """Counts the clocks from a pin to the velocity of Rairán's core."""
+
+    @property
+    def tick(self) -> int:
+        # Where it can, a step waits in a register before it decides what a window is.
+        return super().tick + self.registers_steps
+
+    @property
+    def registers_steps(self) -> bool:
+        return self.spec.timing.tick_cycles > 1
+
+    @property
+    def serial(self) -> bool:
+        return False
+
+    @property
+    def datapath(self) -> int:
+        # From the end of dt or a count: a clock for the decision, one for the address, one for the table, one for the
+        # sum; of these `tick` takes two as well.
+        return 4 - super().tick
+
+
+class RairanRecovery(Recovery["RairanTachometer"]):
+    """Says how long Rairán's core takes until all is right again after an upset."""
+
+    @property
+    def clocks(self) -> int | None:
+        # Table 1 to the letter recovers only with counts.
+        return None if self.spec.paper_exact else super().clocks
+
+    @property
+    def remembered(self) -> int:
+        # Cdt may wrap before a count comes. The window up to the next count follows, and the one that this count opens.
+        spec = self.spec
+        dt = (1 << spec.widths.interval) + 2 * spec.timing.max_ticks + 3
+        return dt * spec.timing.tick_cycles << spec.times.max_tick_shift
+
+
+class RairanWords(Words["RairanTachometer"]):
+    """Says of Rairán's core what commands show."""
+
+    @property
+    def description(self) -> str:
+        return f"Rairan 2013, {self.spec.estimate}"
+
+    @property
+    def memory(self) -> tuple[str, int, int]:
+        return "table", self.spec.form.depth, self.spec.form.table_width
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,11 +268,22 @@ class RairanTachometer(TachometerSpec):
     )
 
     method = "rairan"
-    title = "Rairán's"
-    summary = "begins its ticks with a count (Rairán 2013)"
-    update_by = "count"
-    own_ticks = True
-    last_at_rest = True
+    facts = Facts(
+        title="Rairán's",
+        summary="begins its ticks with a count (Rairán 2013)",
+        update_by="count",
+        own_ticks=True,
+        bounds=True,
+        last_at_rest=True,
+        rest_tenths=17,
+        pairs_all=False,
+    )
+    form = cached_property(RairanForm)
+    times = cached_property(RairanTimes)
+    widths = cached_property(RairanWidths)
+    latency = cached_property(RairanLatency)
+    recovery = cached_property(RairanRecovery)
+    words = cached_property(RairanWords)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -75,10 +295,10 @@ class RairanTachometer(TachometerSpec):
             raise ParameterError(
                 "max_ticks", f"must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
             )
-        if (self.estimate == "n3" or self.bounds) and self.max_count > MAX_TABLE:
+        if (self.estimate == "n3" or self.bounds) and self.widths.max_count > MAX_TABLE:
             why = "estimate n3" if self.estimate == "n3" else "bounds"
             raise ParameterError(
-                "max_speed", f"must be at most {MAX_TABLE} counts per tick with {why}, not {self.max_count}"
+                "max_speed", f"must be at most {MAX_TABLE} counts per tick with {why}, not {self.widths.max_count}"
             )
         if self.adaptive is not None:
             self._check_adaptive(self.adaptive)
@@ -94,171 +314,28 @@ class RairanTachometer(TachometerSpec):
             raise ParameterError("adaptive", f"must be more than 0 and less than 1/3, not {float(target):.9g}")
         if self.timing.max_ticks < 4:
             raise ParameterError("max_ticks", f"must be at least 4 with adaptive, not {self.timing.max_ticks}")
-        if not self.max_shift:
+        if not self.times.max_tick_shift:
             most = MAX_TABLE // 2
             raise ParameterError(
-                "max_speed", f"must be at most {most} counts per tick with adaptive, not {self.max_count}"
+                "max_speed", f"must be at most {most} counts per tick with adaptive, not {self.widths.max_count}"
             )
-        if self.adaptive_dt.fewest > self.max_pulse_count:
-            least = rounded(Fraction(1, 2 * self.max_pulse_count - 1), up=True)
+        if self.form.adaptive_dt.fewest > self.widths.max_pulse_count:
+            least = rounded(Fraction(1, 2 * self.widths.max_pulse_count - 1), up=True)
             raise ParameterError(
                 "adaptive", f"must be at least {least} with this speed and time, not {float(target):.9g}"
             )
 
     @property
-    def description(self) -> str:
-        return f"Rairan 2013, {self.estimate}"
-
-    @property
-    def recovery_clocks(self) -> int | None:
-        # Table 1 to the letter recovers only with counts.
-        return None if self.paper_exact else super().recovery_clocks
-
-    @property
-    def max_shift(self) -> int:
-        """K: the greatest k for which a tick, of two dt at most, ends within the maximum time and fits the tables."""
-        if self.adaptive is None:
-            return 0
-        longest = (self.timing.max_ticks // 2).bit_length() - 1
-        if self.estimate == "n3" or self.bounds:
-            longest = min(longest, (MAX_TABLE // self.max_count).bit_length() - 1)
-        # Nep1 or Nep1 − 1 of 2^k dt is not rounded.
-        return longest if self.estimate == "n3" else min(longest, self.native_frac_bits)
-
-    @property
-    def max_tick_shift(self) -> int:
-        return self.max_shift
-
-    @property
-    def adaptive_dt(self) -> AdaptiveDt:
-        """The rule of dt, for a core that has an adaptive dt."""
-        assert self.adaptive is not None
-        return AdaptiveDt(self.adaptive, self.max_shift)
-
-    @property
-    def max_pulse_count(self) -> int:
-        return self.max_count << self.max_shift
-
-    def max_dt(self, shift: int) -> int:
-        """Return greatest Ndt1 for dt·2^shift: how many of these the maximum time has."""
-        return self.timing.max_ticks >> shift
-
-    @property
-    def depth(self) -> int:
-        """Entries of the table, a power of two: by Ndt1 and, for n3, by Nep1 − 1."""
-        return 1 << max(self.timing.max_ticks, self.max_pulse_count - 1 if self.estimate == "n3" else 0).bit_length()
-
-    @property
-    def table(self) -> tuple[int, ...]:
-        """Contents by address i; 0 at address 0 stands for the velocity 0.
-
-        n1, n2: ⌊2^f/d + ½⌋ with d = i and i + 1. n3: ⌊2^(f+2)/q⌋ with q = 2i + 1. q is odd, so no multiple of ½ is
-        among what is rounded, and with h the entry ⌊2^f·2/q + ½⌋ is ⌊(h + 1)/2⌋ (low) and ⌊2^f/(2q) + ½⌋ is
-        ⌊(h + 4)/8⌋ (high). If dt is adaptive, n1 and n2 have one more bit, ⌊2^(f+1)/d⌋, as they are rounded later.
-        """
-        f = self.native_frac_bits
-        if self.estimate == "n3":
-            return (0, *((1 << (f + 2)) // (2 * i + 1) for i in range(1, self.depth)))
-        more = self.estimate == "n2"
-        if self.adaptive is not None:
-            return (0, *((1 << (f + 1)) // (i + more) for i in range(1, self.depth)))
-        return (0, *(((1 << (f + 1)) // (i + more) + 1) // 2 for i in range(1, self.depth)))
-
-    @property
-    def table_width(self) -> int:
-        """Bits of an entry."""
-        return max(self.table).bit_length()
-
-    def _bound(self, counts: Fraction, periods: int, shift: int, more: int, towards: int) -> int:
-        """Bound for so many counts in so many dt·2^shift, `more` clocks longer; outward, and clipped."""
-        clocks = (periods * self.timing.tick_cycles << shift) + more
-        if clocks <= 0:
-            return self.absent_bound
-        exact = counts * self.timing.tick_cycles * (1 << self.native_frac_bits) / clocks
-        return min(math.floor(exact) if towards < 0 else math.ceil(exact), self.absent_bound)
-
-    def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
-        """Return the table of a bound; `one` gives the entry for n, k and the regime.
-
-        An entry's address is twice that of the estimate, plus one if it is high. Where dt is adaptive, a leading one
-        tells the k of the address: for a low estimate k places below that of `low_depth`, for a high one k places above
-        that of `high_depth`. n is always less than this leading one.
-        """
-        if self.adaptive is None:
-            return tuple(one(n, 0, high) for n in range(self.bound_depth) for high in (False, True))
-        entries = [0] * (2 * self.bound_depth)
-        for shift in range(self.max_shift + 1):
-            low, high = self.low_depth >> shift, self.high_depth << shift
-            entries[2 * low : 4 * low : 2] = [one(n, shift, False) for n in range(low)]
-            entries[2 * high + 1 : 4 * high + 1 : 2] = [one(n, shift, True) for n in range(high)]
-        return tuple(entries)
-
-    @property
-    def lower_table(self) -> tuple[int, ...]:
-        """Lower bounds: n2 for a dt, or for Ndt1 + 1 of them, that took a clock longer; 0 for the estimate 0.
-
-        With an edge error, there are as many again, for what implies no least speed: their negatives.
-        """
-
-        def lower(n: int, shift: int, high: bool) -> int:
-            counts = max(Fraction(n if high else 1) - self.edge_error, Fraction(0))
-            return self._bound(counts, 1 if high else n + 1, shift, 1, -1) if n or high else 0
-
-        def loose(n: int, shift: int, high: bool) -> int:
-            return self._bound(self.edge_error, n, shift, -1, 1) if n and not high else 0
-
-        return self._by_address(lower) + (self._by_address(loose) if self.edge_error else ())
-
-    @property
-    def upper_table(self) -> tuple[int, ...]:
-        """Upper bounds: n1 for a dt, or for Ndt1 of them, that took a clock less; absent for the estimate 0."""
-
-        def upper(n: int, shift: int, high: bool) -> int:
-            counts = (n if high else 0) + self.uncertainty
-            return self._bound(counts, 1 if high else n, shift, -1, 1) if n or high else self.absent_bound
-
-        return self._by_address(upper)
-
-    @property
-    def low_depth(self) -> int:
-        """A power of two above every Ndt1."""
-        return 1 << self.timing.max_ticks.bit_length()
-
-    @property
-    def high_depth(self) -> int:
-        """A power of two above every Nep1 − 1 of a dt as long as nominal."""
-        return 1 << (self.max_count - 1).bit_length()
-
-    @property
-    def bound_depth(self) -> int:
-        """Entries of each bound's table for low speeds, and for high ones: by Ndt1 and by Nep1 − 1."""
-        if self.adaptive is None:
-            return max(self.low_depth, self.high_depth)
-        return 2 * max(self.low_depth, self.high_depth << self.max_shift)
-
-    def tie(self, shift: int) -> int | None:
-        """Return the Ndt1 for which n1 or n2 is just half an LSB, if there can be one: it is rounded up, to 1 or to
-        −0.
-        """
-        ndt1 = (2 << self.native_frac_bits >> shift) - (self.estimate == "n2")
-        return ndt1 if self.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
-
-    @property
-    def memory(self) -> tuple[str, int, int]:
-        """The memory of the reciprocal: its kind, entries, bits of an entry."""
-        return "table", self.depth, self.table_width
-
-    @property
     def method_ports(self) -> tuple[Port, ...]:
         return (
             held(
-                *(UPDATE, "n_ep1", self.max_pulse_count.bit_length()),
+                *(UPDATE, "n_ep1", self.widths.max_pulse_count.bit_length()),
                 unit="counts",
                 help="Nep1 of the velocity: counts in a sampling period dt. With --paper-exact: the register Nep1 of "
                 "Table 1 as it is, whichever of Nep1 and Ndt1 the velocity comes from.",
             ),
             held(
-                *(UPDATE, "n_dt1", self.interval_width),
+                *(UPDATE, "n_dt1", self.widths.interval),
                 unit="dt",
                 help="Ndt1 of the velocity: sampling periods dt from one count to the next. With --paper-exact: the "
                 "register Ndt1 of Table 1 as it is.",
@@ -266,7 +343,7 @@ class RairanTachometer(TachometerSpec):
             *(
                 [
                     held(
-                        *(UPDATE, "dt_shift", self.max_shift.bit_length()),
+                        *(UPDATE, "dt_shift", self.times.max_tick_shift.bit_length()),
                         help="k: dt of this measurement is 2^k times the nominal one.",
                     )
                 ]
@@ -274,35 +351,3 @@ class RairanTachometer(TachometerSpec):
                 else []
             ),
         )
-
-    @property
-    def update_spacing(self) -> int:
-        """Fewest clocks between two updates: a count may come at any time."""
-        return 1
-
-    def has_room(self, clocks: int) -> bool:
-        return clocks <= self.update_spacing
-
-    @property
-    def remembered_clocks(self) -> int:
-        # Cdt may wrap before a count comes. The window up to the next count follows, and the one that this count opens.
-        return ((1 << self.interval_width) + 2 * self.timing.max_ticks + 3) * self.timing.tick_cycles << self.max_shift
-
-    @property
-    def serial(self) -> bool:
-        return False
-
-    @property
-    def datapath_latency(self) -> int:
-        # From the end of dt or a count: a clock for the decision, one for the address, one for the table, one for the
-        # sum; of these `tick` takes two as well.
-        return 4 - super().tick_latency
-
-    @property
-    def tick_latency(self) -> int:
-        # Where it can, a step waits in a register before it decides what a window is.
-        return super().tick_latency + self.registers_steps
-
-    @property
-    def registers_steps(self) -> bool:
-        return self.timing.tick_cycles > 1

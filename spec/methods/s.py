@@ -1,8 +1,15 @@
 """The S method of Tsuji 2009, Sec. V."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
+from tachometry.spec.core.facts import Facts
+from tachometry.spec.core.follows import Follows
+from tachometry.spec.core.latency import Latency
+from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.times import Times
+from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
 from tachometry.spec.language.option import ParameterError, option
@@ -11,6 +18,181 @@ from tachometry.spec.language.units import plural, signed_width
 # Up to this many ticks 1/m_s can be looked up in a table of block RAM.
 MAX_TABLE = 2048
 _SOURCES = ("serial", "table")
+
+
+class STimes(Times["STachometer"]):
+    """Says how far ticks and updates of an S-method core are apart."""
+
+    @property
+    def standstill_ticks(self) -> int:
+        # The count opens a window; the forced update at its end still weights it by one half, the next no longer
+        # contains it.
+        return 2 * self.spec.timing.max_ticks - self.spec.form.kept_ticks
+
+
+class SForm(Follows["STachometer"]):
+    """Finds the numbers of the datapath of the S method."""
+
+    @property
+    def kept_ticks(self) -> int:
+        """Ticks of the window that a forced update leaves open: its newer half."""
+        return self.spec.timing.max_ticks // 2
+
+    @property
+    def max_numerator(self) -> int:
+        """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
+        return 2 * self.spec.widths.max_count * self.numerator_per_count + self.spec.bounds * self.margin
+
+    @property
+    def numerator_width(self) -> int:
+        """Bits of N, signed; a product with N takes as many additions."""
+        return signed_width(self.max_numerator)
+
+    @property
+    def numerator_per_count(self) -> int:
+        """The number that one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17); or finer
+        parts.
+        """
+        return (2 if self.spec.cancel else 1) << self.finer
+
+    @property
+    def finer(self) -> int:
+        """Bits by which N is finer than the counts, for an edge error that is a fraction."""
+        return max(0, self.spec.bound.error_bits - self.spec.cancel)
+
+    @property
+    def margin(self) -> int:
+        """How far N is off for the bounds."""
+        return int(self.spec.bound.uncertainty * self.numerator_per_count)
+
+    @property
+    def _shape(self) -> tuple[int, int, int, int]:
+        spec = self.spec
+        return spec.timing.max_ticks, self.max_numerator, spec.widths.native_frac_bits, spec.cancel + self.finer
+
+    @cached_property
+    def reciprocal(self) -> Reciprocal | CarriedReciprocal:
+        """The reciprocal of m_s: the first that there is room for, as `reciprocal_source` says; else carried along."""
+        spec, found = self.spec, self.looked_up
+        has_table = spec.timing.max_ticks <= MAX_TABLE and spec.times.has_room(busy_clocks(found))
+        fitting = [found] if has_table else []
+        divided = DividedReciprocal(*self._shape, spec.bounds)
+        if spec.times.has_room(busy_clocks(divided)):
+            fitting.insert(0 if spec.reciprocal_source == "serial" else len(fitting), divided)
+        return fitting[0] if fitting else CarriedReciprocal(*self._shape, entry=self.kept_ticks + 1)
+
+    @property
+    def looked_up(self) -> Reciprocal:
+        """The reciprocal of m_s as a table, whether there is room for it or not."""
+        found = Reciprocal(*self._shape, self.spec.bounds)
+        return found if found.bounds or found.has_ties else NarrowReciprocal(*self._shape)
+
+    @property
+    def carried(self) -> bool:
+        """Whether the reciprocal is carried along."""
+        return isinstance(self.reciprocal, CarriedReciprocal)
+
+
+class SLatency(Latency["STachometer"]):
+    """Counts the clocks from a pin to the velocity of an S-method core."""
+
+    @property
+    def tick(self) -> int:
+        # What saturates has registers of its own: before the sum, and behind it.
+        return super().tick + 2 * (self.spec.widths.max_count < self.spec.times.longest_tick)
+
+    @property
+    def serial(self) -> bool:
+        """Whether ticks are far enough apart for one adder to form the velocity step by step."""
+        return not self.spec.form.carried
+
+    @property
+    def busy(self) -> int:
+        reciprocal = self.spec.form.reciprocal
+        assert isinstance(reciprocal, Reciprocal)
+        return busy_clocks(reciprocal)
+
+    @property
+    def datapath(self) -> int:
+        reciprocal = self.spec.form.reciprocal
+        if isinstance(reciprocal, Reciprocal):
+            return _serial_clocks(reciprocal)
+        # One clock for the table, one for its register, one for each bit of N and each digit of N·R/m, one to add b.
+        return self.spec.form.numerator_width + reciprocal.digits + 3
+
+
+def busy_clocks(reciprocal: Reciprocal) -> int:
+    """Return the clocks from tick to tick that a velocity takes with a reciprocal, where it is formed step by step."""
+    # One clock to start over with a new m_s, then a table takes two, and a division as many as its bits.
+    found = reciprocal.steps + 1 if isinstance(reciprocal, DividedReciprocal) else 2
+    return _serial_clocks(reciprocal) + 1 + found
+
+
+def _serial_clocks(reciprocal: Reciprocal) -> int:
+    # One clock for the product of each digit, which is added in the next.
+    return reciprocal.digits + 1
+
+
+class SRecovery(Recovery["STachometer"]):
+    """Says how long an S-method core takes until all is right again after an upset."""
+
+    @property
+    def remembered(self) -> int:
+        # The open window, whose length may wrap, and the next one.
+        spec = self.spec
+        return ((1 << spec.widths.interval) + spec.timing.max_ticks + 1) * spec.times.longest_tick
+
+
+class SWords(Words["STachometer"]):
+    """Says of an S-method core what commands show."""
+
+    @property
+    def description(self) -> str:
+        return "eq. (21), cancels alternate alterations" if self.spec.cancel else "eq. (17)"
+
+    @property
+    def heading(self) -> str:
+        return f"{super().heading}, eq. ({21 if self.spec.cancel else 17})"
+
+    @property
+    def remark(self) -> str:
+        return (
+            "At a multiple of the unit velocity m_s would be infinite. At one, and nearer to it than "
+            f"1/{self.spec.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error."
+        )
+
+    @property
+    def memory(self) -> tuple[str, int, int] | None:
+        reciprocal = self.spec.form.reciprocal
+        if isinstance(reciprocal, DividedReciprocal):
+            return None
+        return "table and carried on" if self.spec.form.carried else "table", reciprocal.depth, reciprocal.width
+
+    @property
+    def division(self) -> str:
+        reciprocal = self.spec.form.reciprocal
+        if not isinstance(reciprocal, DividedReciprocal):
+            return ""
+        native = self.spec.widths.native
+        two = f"; two adders for sums of {native + reciprocal.scale_bits} bits" if reciprocal.is_wide(native) else ""
+        return f"divided in {reciprocal.steps + 1} clocks between two ticks{two}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        spec = self.spec
+        divided = isinstance(spec.form.reciprocal, DividedReciprocal)
+        if divided == (spec.reciprocal_source == "serial") and not spec.form.carried:
+            return super().notes
+        short = f"a tick of {plural(spec.timing.tick_cycles, 'clock')} is too short to"
+        large = spec.timing.max_ticks > MAX_TABLE
+        no_table = f"a table has at most {MAX_TABLE} entries" if large else f"{short} look it up"
+        if divided:
+            reason = f"divided: {no_table}"
+        elif not spec.form.carried:
+            reason = f"from a table: {short} divide between two"
+        else:
+            reason = f"carried along: {short} divide between two, {f'and {no_table}' if large else 'or to look it up'}"
+        return (*super().notes, f"reciprocal {reason}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,157 +227,23 @@ class STachometer(TachometerSpec):
     )
 
     method = "s"
-    summary = "averages in step with the alterations of the pulse number"
-    update_by = "alteration"
-    pairs_all = True
+    facts = Facts(
+        title="S",
+        summary="averages in step with the alterations of the pulse number",
+        update_by="alteration",
+        own_ticks=False,
+        bounds=True,
+        last_at_rest=False,
+        rest_tenths=17,
+        pairs_all=True,
+    )
+    form = cached_property(SForm)
+    times = cached_property(STimes)
+    latency = cached_property(SLatency)
+    recovery = cached_property(SRecovery)
+    words = cached_property(SWords)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.reciprocal_source not in _SOURCES:
             raise ParameterError("reciprocal", f"must be serial or table, not {self.reciprocal_source!r}")
-
-    @property
-    def description(self) -> str:
-        return "eq. (21), cancels alternate alterations" if self.cancel else "eq. (17)"
-
-    @property
-    def heading(self) -> str:
-        return f"{super().heading}, eq. ({21 if self.cancel else 17})"
-
-    @property
-    def remark(self) -> str:
-        return (
-            "At a multiple of the unit velocity m_s would be infinite. At one, and nearer to it than "
-            f"1/{self.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error."
-        )
-
-    @property
-    def standstill_ticks(self) -> int:
-        # The count opens a window; the forced update at its end still weights it by one half, the next no longer
-        # contains it.
-        return 2 * self.timing.max_ticks - self.kept_ticks
-
-    @property
-    def kept_ticks(self) -> int:
-        """Ticks of the window that a forced update leaves open: its newer half."""
-        return self.timing.max_ticks // 2
-
-    @property
-    def max_numerator(self) -> int:
-        """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
-        return 2 * self.max_count * self.numerator_per_count + self.bounds * self.margin
-
-    @property
-    def numerator_per_count(self) -> int:
-        """The number that one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17); or finer
-        parts.
-        """
-        return (2 if self.cancel else 1) << self.finer
-
-    @property
-    def finer(self) -> int:
-        """Bits by which N is finer than the counts, for an edge error that is a fraction."""
-        return max(0, self.error_bits - self.cancel)
-
-    @property
-    def margin(self) -> int:
-        """How far N is off for the bounds."""
-        return int(self.uncertainty * self.numerator_per_count)
-
-    @property
-    def tick_latency(self) -> int:
-        # What saturates has registers of its own: before the sum, and behind it.
-        return super().tick_latency + 2 * (self.max_count < self.longest_tick)
-
-    @property
-    def reciprocal(self) -> Reciprocal | CarriedReciprocal:
-        """The reciprocal of m_s: the first that there is room for, as `reciprocal_source` says; else carried along."""
-        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
-        found = self.looked_up
-        fitting = [found] if self.timing.max_ticks <= MAX_TABLE and self.has_room(self._busy_clocks(found)) else []
-        divided = DividedReciprocal(*shape, self.bounds)
-        if self.has_room(self._busy_clocks(divided)):
-            fitting.insert(0 if self.reciprocal_source == "serial" else len(fitting), divided)
-        return fitting[0] if fitting else CarriedReciprocal(*shape, entry=self.kept_ticks + 1)
-
-    @property
-    def looked_up(self) -> Reciprocal:
-        """The reciprocal of m_s as a table, whether there is room for it or not."""
-        shape = (self.timing.max_ticks, self.max_numerator, self.native_frac_bits, self.cancel + self.finer)
-        found = Reciprocal(*shape, self.bounds)
-        return found if found.bounds or found.has_ties else NarrowReciprocal(*shape)
-
-    def _busy_clocks(self, reciprocal: Reciprocal) -> int:
-        # One clock to start over with a new m_s, then a table takes two, and a division as many as its bits.
-        found = reciprocal.steps + 1 if isinstance(reciprocal, DividedReciprocal) else 2
-        return self._serial_latency(reciprocal) + 1 + found
-
-    @property
-    def carried(self) -> bool:
-        """Whether the reciprocal is carried along."""
-        return isinstance(self.reciprocal, CarriedReciprocal)
-
-    @property
-    def memory(self) -> tuple[str, int, int] | None:
-        """The memory of the reciprocal: its kind, entries, bits of an entry."""
-        if isinstance(self.reciprocal, DividedReciprocal):
-            return None
-        return "table and carried on" if self.carried else "table", self.reciprocal.depth, self.reciprocal.width
-
-    @property
-    def division(self) -> str:
-        reciprocal = self.reciprocal
-        if not isinstance(reciprocal, DividedReciprocal):
-            return ""
-        bits = self.native_width + reciprocal.scale_bits
-        two = f"; two adders for sums of {bits} bits" if reciprocal.is_wide(self.native_width) else ""
-        return f"divided in {reciprocal.steps + 1} clocks between two ticks{two}"
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        divided = isinstance(self.reciprocal, DividedReciprocal)
-        if divided == (self.reciprocal_source == "serial") and not self.carried:
-            return super().notes
-        short = f"a tick of {plural(self.timing.tick_cycles, 'clock')} is too short to"
-        large = self.timing.max_ticks > MAX_TABLE
-        no_table = f"a table has at most {MAX_TABLE} entries" if large else f"{short} look it up"
-        if divided:
-            reason = f"divided: {no_table}"
-        elif not self.carried:
-            reason = f"from a table: {short} divide between two"
-        else:
-            reason = f"carried along: {short} divide between two, {f'and {no_table}' if large else 'or to look it up'}"
-        return (*super().notes, f"reciprocal {reason}")
-
-    @property
-    def numerator_width(self) -> int:
-        """Bits of N, signed; a product with N takes as many additions."""
-        return signed_width(self.max_numerator)
-
-    @property
-    def remembered_clocks(self) -> int:
-        # The open window, whose length may wrap, and the next one.
-        return ((1 << self.interval_width) + self.timing.max_ticks + 1) * self.longest_tick
-
-    @property
-    def serial(self) -> bool:
-        """Whether ticks are far enough apart for one adder to form the velocity step by step."""
-        return not self.carried
-
-    @property
-    def busy_clocks(self) -> int:
-        reciprocal = self.reciprocal
-        assert isinstance(reciprocal, Reciprocal)
-        return self._busy_clocks(reciprocal)
-
-    @property
-    def datapath_latency(self) -> int:
-        reciprocal = self.reciprocal
-        if isinstance(reciprocal, Reciprocal):
-            return self._serial_latency(reciprocal)
-        # One clock for the table, one for its register, one for each bit of N and each digit of N·R/m, one to add b.
-        return self.numerator_width + reciprocal.digits + 3
-
-    def _serial_latency(self, reciprocal: Reciprocal) -> int:
-        # One clock for the product of each digit, which is added in the next.
-        return reciprocal.digits + 1

@@ -1,26 +1,14 @@
 """The T method: the time from one count to the next (Tsuji 2009, Sec. IV-B)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
-from tachometry.spec.methods.timed import TimedTachometer
+from tachometry.spec.core.facts import Facts
+from tachometry.spec.methods.timed import TimedForm, TimedTachometer, TimedWidths
 
 
-@dataclass(frozen=True, kw_only=True)
-class TTachometer(TimedTachometer):
-    """T-method tachometer: one count over the time since the count before, eq. (9) of Tsuji 2009.
-
-    The velocity is in counts per tick, correctly rounded. It is 0 for two consecutive counts of opposite sign, which
-    are from the same edge of the encoder.
-    """
-
-    method = "t"
-    summary = "takes the time between two counts"
-    equation = 9
-
-    @property
-    def max_velocity(self) -> int:
-        # On the lattice at most one count in a tick.
-        return min(self.max_count, self.max_quotient)
+class TForm(TimedForm["TTachometer"]):
+    """Finds the numbers of timer and divider of the T method."""
 
     @property
     def max_interval(self) -> int:
@@ -38,3 +26,36 @@ class TTachometer(TimedTachometer):
     @property
     def flags_range(self) -> bool:
         return self.saturates or self.on_lattice
+
+
+class TWidths(TimedWidths["TTachometer"]):
+    """Counts the bits of the numbers of a T-method core."""
+
+    @property
+    def max_velocity(self) -> int:
+        # On the lattice at most one count in a tick.
+        return min(self.max_count, self.spec.form.max_quotient)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TTachometer(TimedTachometer):
+    """T-method tachometer: one count over the time since the count before, eq. (9) of Tsuji 2009.
+
+    The velocity is in counts per tick, correctly rounded. It is 0 for two consecutive counts of opposite sign, which
+    are from the same edge of the encoder.
+    """
+
+    method = "t"
+    facts = Facts(
+        title="T",
+        summary="takes the time between two counts",
+        update_by="count",
+        own_ticks=False,
+        bounds=True,
+        last_at_rest=False,
+        rest_tenths=22,
+        pairs_all=False,
+    )
+    equation = 9
+    form = cached_property(TForm)
+    widths = cached_property(TWidths)

@@ -6,21 +6,98 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.core.facts import Facts
+from tachometry.spec.core.follows import Follows
+from tachometry.spec.core.latency import Latency
+from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.words import Words
 from tachometry.spec.formats.tracking import Tracking
 from tachometry.spec.formats.tracking_program import Program
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
-from tachometry.spec.language.units import FRACTION, format_time, parse_bandwidth, read_exactly
+from tachometry.spec.language.units import FRACTION, Quantity, format_time, parse_bandwidth
 
 MOST_WIDTH = 64  # bits of a word
 MOST_ACCELERATION_WIDTH = 48
 FETCH_CLOCKS = 3  # to fetch the first instruction, to read its word, and to hold both
 
 
-def _fraction(what: str, text: str) -> Fraction:
-    return read_exactly(what, text, FRACTION)
+class Acceleration(Follows["TrackTachometer"]):
+    """Finds the format of the acceleration that the tracking method shows."""
+
+    @property
+    def _per_count(self) -> Fraction:
+        """One count per tick² in the unit."""
+        count = self.spec.scale.per_count
+        return count if self.spec.unit == NATIVE else count / self.spec.timing.tick_seconds
+
+    @property
+    def unit(self) -> str:
+        """The unit of the acceleration: that of the velocity per second, or counts per tick²."""
+        return {"rad/s": "rad/s²", "rev/s": "rev/s²", "rpm": "rpm/s"}.get(self.spec.unit, "count/tick²")
+
+    @property
+    def width(self) -> int:
+        """Bits of the acceleration: eight more than the velocity has."""
+        return min(self.spec.widths.velocity + 8, MOST_ACCELERATION_WIDTH)
+
+    @property
+    def of_form(self) -> Fraction:
+        """One LSB of the acceleration of the recursion in the unit."""
+        form = self.spec.form
+        return self._per_count / form.unit_ticks**2 / (1 << (form.frac_bits + form.extra_bits))
+
+    @cached_property
+    def frac_bits(self) -> int:
+        """Fraction bits of the acceleration: its error is at most a quarter of an LSB, and the greatest one fits."""
+        form, one = self.spec.form, self.of_form
+        fitting = math.floor(math.log2(((1 << (self.width - 1)) - 2) / (form.max_acceleration * one)))
+        return min(fitting, math.floor(-math.log2(8 * form.acceleration_error * one)))
+
+    @property
+    def rad_per_s2_per_lsb(self) -> float:
+        """One LSB in rad/s²; ticks are as long as nominal."""
+        counts = Fraction(1, 2) ** self.frac_bits / self._per_count
+        return self.spec.scale.unit_velocity * float(counts / self.spec.timing.tick_seconds)
+
+
+class TrackLatency(Latency["TrackTachometer"]):
+    """Counts the clocks from a pin to the velocity of a tracking core."""
+
+    @property
+    def serial(self) -> bool:
+        return True
+
+    @property
+    def datapath(self) -> int:
+        return self.spec.program.clocks + FETCH_CLOCKS
+
+
+class TrackRecovery(Recovery["TrackTachometer"]):
+    """Says how long a tracking core takes until all is right again after an upset."""
+
+    @property
+    def clocks(self) -> None:
+        # It forgets gradually, and wholly when the shaft has rested.
+        return None
+
+
+class TrackWords(Words["TrackTachometer"]):
+    """Says of a tracking core what commands show."""
+
+    @property
+    def description(self) -> str:
+        return f"third order, {float(self.spec.bandwidth):.4g} rad/s"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        disc = (
+            f"--edge-error {float(self.spec.edge_error):.4g} suits a disc whose (phase error + duty error)/180 °e + "
+            f"nonuniformity + 3 x jitter is no more"
+        )
+        return (*super().notes, disc)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +143,7 @@ class TrackTachometer(TachometerSpec):
         "The least weight of the past when a count comes, however long after the one before, 0.5 to 0.95.",
         text="0.7",
         metavar="THETA",
-        parse=_fraction,
+        parse=Quantity(FRACTION),
         tests=("", "0.5"),
     )
     edge_error: Fraction = option(  # noqa: RUF009
@@ -75,7 +152,7 @@ class TrackTachometer(TachometerSpec):
         "error of the disc.",
         text="0.4",
         metavar="E",
-        parse=_fraction,
+        parse=Quantity(FRACTION),
         tests=("", "0.7"),
     )
     agile: bool = option(True, "Follow counts that are off by more than --edge-error with four times the bandwidth.")
@@ -83,9 +160,20 @@ class TrackTachometer(TachometerSpec):
     fine_bits: int = option(6, "Fraction bits of position_fine, 1 to 16.", metavar="N", tests=("", "1", "16"))
 
     method = "track"
-    title = "Tracking"
-    summary = "tracks position, velocity and acceleration"
-    has_bounds = False
+    facts = Facts(
+        title="Tracking",
+        summary="tracks position, velocity and acceleration",
+        update_by="tick",
+        own_ticks=False,
+        bounds=False,
+        last_at_rest=False,
+        rest_tenths=17,
+        pairs_all=False,
+    )
+    acceleration = cached_property(Acceleration)
+    latency = cached_property(TrackLatency)
+    recovery = cached_property(TrackRecovery)
+    words = cached_property(TrackWords)
 
     def __post_init__(self) -> None:
         if not Fraction(1, 2) <= self.least_memory <= Fraction(19, 20):
@@ -97,6 +185,8 @@ class TrackTachometer(TachometerSpec):
                 "bandwidth",
                 f"must be more than 0 and at most {self.timing.clock_hz} rad/s here, not {float(self.bandwidth):.9g}",
             )
+        if not Fraction(1, 20) <= self.edge_error <= 2:
+            raise ParameterError("edge_error", f"must be from 0.05 to 2, not {float(self.edge_error):.9g}")
         super().__post_init__()
         if self.bounds:
             raise ParameterError("bounds", f"must not be given with method {self.method}: no window encloses its speed")
@@ -106,21 +196,13 @@ class TrackTachometer(TachometerSpec):
                 f"must not be {self.method} here: its words would have {self.form.width} bits, and {MOST_WIDTH} are "
                 "the most; a shorter max_time or tick, a lower max_speed, fewer frac_bits or another bandwidth helps",
             )
-        shortest = self.min_tick_cycles
+        shortest = self.times.min_tick_cycles
         if self.timing.tick_cycles < shortest:
             raise ParameterError(
                 "tick_cycles",
-                f"must be at least {shortest} ({format_time(self.seconds(shortest))}) with method {self.method} here, "
-                f"not {self.timing.tick_cycles}",
+                f"must be at least {shortest} ({format_time(self.times.seconds(shortest))}) with method {self.method} "
+                f"here, not {self.timing.tick_cycles}",
             )
-
-    def _check_edge_error(self) -> None:
-        if not Fraction(1, 20) <= self.edge_error <= 2:
-            raise ParameterError("edge_error", f"must be from 0.05 to 2, not {float(self.edge_error):.9g}")
-
-    @property
-    def description(self) -> str:
-        return f"third order, {float(self.bandwidth):.4g} rad/s"
 
     @cached_property
     def form(self) -> Tracking:
@@ -128,16 +210,16 @@ class TrackTachometer(TachometerSpec):
         return Tracking(
             clock_hz=self.timing.clock_hz,
             tick_cycles=self.timing.tick_cycles,
-            longest_tick=self.longest_tick,
+            longest_tick=self.times.longest_tick,
             max_ticks=self.timing.max_ticks,
-            max_count=self.max_count,
-            external=self.max_tick_cycles is not None,
+            max_count=self.widths.max_count,
+            external=self.external_tick,
             bandwidth=self.bandwidth,
             least_memory=self.least_memory,
             edge_error=self.edge_error,
             agile=self.agile,
             growing=self.growing_memory,
-            velocity_bits=self.native_frac_bits,
+            velocity_bits=self.widths.native_frac_bits,
             fine_bits=self.fine_bits,
         )
 
@@ -145,46 +227,17 @@ class TrackTachometer(TachometerSpec):
     def program(self) -> Program:
         """The program of the datapath from a tick to the update."""
         form = self.form
-        per_lsb = self._acceleration_per_count / (form.unit_ticks**2 * (1 << (form.frac_bits + form.extra_bits)))
-        delay = self.pin_to_count + self.tick_latency + FETCH_CLOCKS + self.low_pass_latency + self.output_latency
-        return Program(form, Fraction(2) ** self.acceleration_frac_bits * per_lsb, delay)
-
-    @property
-    def _acceleration_per_count(self) -> Fraction:
-        """One count per tick² in the unit of the acceleration."""
-        return self.per_count if self.unit == NATIVE else self.per_count / self.timing.tick_seconds
-
-    @property
-    def acceleration_unit(self) -> str:
-        """The unit of the acceleration: that of the velocity per second, or counts per tick²."""
-        return {"rad/s": "rad/s²", "rev/s": "rev/s²", "rpm": "rpm/s"}.get(self.unit, "count/tick²")
-
-    @property
-    def acceleration_width(self) -> int:
-        """Bits of the acceleration: eight more than the velocity has."""
-        return min(self.velocity_width + 8, MOST_ACCELERATION_WIDTH)
-
-    @cached_property
-    def acceleration_frac_bits(self) -> int:
-        """Fraction bits of the acceleration: its error is at most a quarter of an LSB, and the greatest one fits."""
-        form = self.form
-        one = self._acceleration_per_count / form.unit_ticks**2 / (1 << (form.frac_bits + form.extra_bits))  # LSB of a
-        fitting = math.floor(math.log2(((1 << (self.acceleration_width - 1)) - 2) / (form.max_acceleration * one)))
-        return min(fitting, math.floor(-math.log2(8 * form.acceleration_error * one)))
-
-    @property
-    def acceleration_per_lsb(self) -> float:
-        """One LSB of the acceleration in rad/s²; ticks are as long as nominal."""
-        counts = Fraction(1, 2) ** self.acceleration_frac_bits / self._acceleration_per_count
-        return self.unit_velocity * float(counts / self.timing.tick_seconds)
+        latency, acceleration = self.latency, self.acceleration
+        delay = latency.pin_to_count + latency.tick + FETCH_CLOCKS + latency.low_pass + latency.output
+        return Program(form, Fraction(2) ** acceleration.frac_bits * acceleration.of_form, delay)
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
         return (
             held(
-                *(UPDATE, "acceleration", self.acceleration_width),
+                *(UPDATE, "acceleration", self.acceleration.width),
                 signed=True,
-                unit=f"2^{-self.acceleration_frac_bits} {self.acceleration_unit}",
+                unit=f"2^{-self.acceleration.frac_bits} {self.acceleration.unit}",
                 help="Acceleration; multiplied by rad_per_s2_per_lsb of the manifest it is in rad/s².",
             ),
             held(
@@ -199,35 +252,10 @@ class TrackTachometer(TachometerSpec):
     def method_entries(self) -> dict[str, dict[str, Any]]:
         return {
             "acceleration": {
-                "width": self.acceleration_width,
-                "frac_bits": self.acceleration_frac_bits,
-                "unit": self.acceleration_unit,
-                "rad_per_s2_per_lsb": self.acceleration_per_lsb,
+                "width": self.acceleration.width,
+                "frac_bits": self.acceleration.frac_bits,
+                "unit": self.acceleration.unit,
+                "rad_per_s2_per_lsb": self.acceleration.rad_per_s2_per_lsb,
             },
             "position_fine": {"frac_bits": self.fine_bits},
         }
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        disc = (
-            f"--edge-error {float(self.edge_error):.4g} suits a disc whose (phase error + duty error)/180 °e + "
-            f"nonuniformity + 3 x jitter is no more"
-        )
-        return (*super().notes, disc)
-
-    @property
-    def standstill_ticks(self) -> int:
-        return self.timing.max_ticks
-
-    @property
-    def serial(self) -> bool:
-        return True
-
-    @property
-    def datapath_latency(self) -> int:
-        return self.program.clocks + FETCH_CLOCKS
-
-    @property
-    def recovery_clocks(self) -> int | None:
-        # It forgets gradually, and wholly when the shaft has rested.
-        return None

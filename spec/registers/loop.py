@@ -54,7 +54,7 @@ class LoopMap(RegisterMap):
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Ports with the registers, as of `RegisterMap.ports`."""
-        shown = (port for port in self.loop.outputs if port.held_by in (CONTROL, CURRENT) and not port.is_strobe)
+        shown = (port for port in self.loop.ports.outputs if port.held_by in (CONTROL, CURRENT) and not port.is_strobe)
         return (*super().ports, *shown)
 
     @property

@@ -3,12 +3,9 @@
 import re
 from typing import Any
 
-from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.control.ports import loop_entries
-from tachometry.spec.core.tachometer import TICK_IN_TO_WINDOW_END
+from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
-from tachometry.spec.methods.axes import AxesSpec
 
 _OF_PORTS = ("name", "direction", "width", "signed")
 _KEYWORDS = frozenset(
@@ -64,91 +61,12 @@ def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
     ValueError
         If `name` cannot be the name of a module.
     """
-    if isinstance(spec, AxesSpec):
-        return _of_axes(spec, name)
-    if isinstance(spec, LoopSpec):
-        return _of_loop(spec, name)
     if name in {port.name for port in spec.ports}:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
-    recovery = spec.recovery_clocks
     return {
         "module": check_module_name(name),
-        "method": spec.method,
-        "clock_hz": spec.timing.clock_hz,
-        "tick_cycles": spec.timing.tick_cycles,
-        "max_ticks": spec.timing.max_ticks,
-        "stalled_after_ticks": spec.stalled_after_ticks,
-        "counts_per_rev": spec.encoder.counts_per_rev,
-        "decoding": spec.encoder.decoding,
-        "velocity": {
-            "width": spec.velocity_width,
-            "frac_bits": spec.frac_bits,
-            "unit": spec.unit,
-            "rad_per_s_per_lsb": spec.rad_per_s_per_lsb,
-            "full_scale": spec.full_scale * 2.0**-spec.frac_bits,
-            "full_scale_rad_per_s": spec.full_scale * spec.rad_per_s_per_lsb,
-        },
-        **spec.method_entries,
-        "max_time_cycles": spec.max_time_cycles,
-        **({} if spec.min_time_cycles is None else {"min_time_cycles": spec.min_time_cycles}),
-        **({"bounds": {"none": spec.shown_absent_bound}} if spec.bounds else {}),
-        "interval_unit_cycles": spec.interval_unit_cycles,
-        "latency_cycles": {
-            "pin_to_count": spec.pin_to_count,
-            "tick_latency": spec.tick_latency,
-            "tick_to_velocity": spec.tick_to_velocity,
-            **({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if spec.max_tick_cycles else {}),
-        },
-        **({} if recovery is None else {"recovery_cycles": recovery}),
-        **(
-            {"external_tick_cycles": {"min": spec.min_tick_cycles, "max": spec.max_tick_cycles}}
-            if spec.max_tick_cycles
-            else {}
-        ),
+        **spec.entries,
         "ports": [described_port(port) for port in spec.ports],
         "parameters": spec.parameters,
-    }
-
-
-def _of_loop(spec: LoopSpec, name: str) -> dict[str, Any]:
-    """Return what a core with a control loop says beside its tachometer."""
-    if name in {port.name for port in spec.ports}:
-        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
-    found = manifest(spec.tachometer, name)
-    found.pop("recovery_cycles", None)  # filter and observer forget gradually
-    return found | {
-        "loop": loop_entries(spec),
-        "ports": [described_port(port) for port in spec.ports],
-        "parameters": spec.parameters,
-    }
-
-
-def _of_axes(spec: AxesSpec, name: str) -> dict[str, Any]:
-    """Return what a core of many axes says otherwise than one of one axis."""
-    if name in {port.name for port in spec.ports}:
-        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
-    alone, axis = spec.tachometer, spec.axis
-    found = manifest(alone, name)
-    of_velocity = {
-        "width": axis.velocity_width,
-        "full_scale": axis.full_scale * 2.0**-axis.frac_bits,
-        "full_scale_rad_per_s": axis.full_scale * alone.rad_per_s_per_lsb,
-    }
-    return found | {
-        "velocity": found["velocity"] | of_velocity,
-        "recovery_cycles": spec.recovery_clocks,
-        "axes": {
-            "axes": spec.axes,
-            "parallel": spec.parallel,
-            "round_cycles": spec.slots,
-            "turn_cycles": spec.turn_cycles,
-            "first_tick": spec.tick_clock(0, 0),
-        },
-        "latency_cycles": {
-            "pin_to_count": spec.pin_to_count,
-            "tick_latency": spec.tick_latency,
-            "tick_to_velocity": spec.tick_to_velocity,
-        },
-        "ports": [described_port(port) for port in spec.ports],
-        "parameters": spec.parameters,
+        "options": spec.options,
     }

@@ -188,7 +188,7 @@ class RegisterMap:
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Outputs of the core that are captured."""
-        return tuple(port for port in self.spec.outputs if port.held_by in _LIVE and not port.is_strobe)
+        return tuple(port for port in self.spec.ports.outputs if port.held_by in _LIVE and not port.is_strobe)
 
     @property
     def settings(self) -> tuple[Field, ...]:
@@ -211,14 +211,15 @@ class RegisterMap:
         found = {"decode_errors": "Clocks in which both lines changed at once."}
         found["overflows"] = "Ticks whose pulse_count was saturated."
         found["lost_updates"] = "Updates of the velocity that no capture has shown."
-        if self.spec.max_tick_cycles:
+        if self.spec.external_tick:
             found["tick_errors"] = "External ticks that were missing or came too early."
         return found
 
     @cached_property
     def configuration(self) -> int:
         """A hash of all that a driver relies on: a driver that was made for one core refuses another."""
-        described = [manifest(self.core), [(name, help) for name, help, *_ in self._captured()]]
+        core = {name: entry for name, entry in manifest(self.core).items() if name != "options"}
+        described = [core, [(name, help) for name, help, *_ in self._captured()]]
         return int.from_bytes(hashlib.sha256(json.dumps(described, sort_keys=True).encode()).digest()[:4], "big")
 
     def described(self) -> dict[str, Any]:

@@ -248,7 +248,7 @@ def test_without_seeds_there_is_no_fmax(monkeypatch: pytest.MonkeyPatch) -> None
     found = synthesis.measure_core(SPEC, size.TARGETS["ECP5"], "", {}, seeds=())
     assert "Fmax" not in found.figures
     table = size.target_table("ECP5", {("reference", "ECP5"): found})
-    assert table.rows[0][2:] == ["325", "215", "1", "0", "", str(SPEC.tick_to_velocity), ""]
+    assert table.rows[0][2:] == ["325", "215", "1", "0", "", str(SPEC.latency.tick_to_velocity), ""]
 
 
 def test_what_a_greatest_speed_changes() -> None:
@@ -259,7 +259,11 @@ def test_what_a_greatest_speed_changes() -> None:
     for name, without in pairs.items():
         with_, base = specs[name], specs[without]
         assert (with_.max_speed, base.max_speed) == (size.CONFIGURATIONS[0].spec.max_speed, None)
-        assert (with_.method, with_.timing, with_.max_tick_cycles) == (base.method, base.timing, base.max_tick_cycles)
+        assert (with_.method, with_.timing, with_.times.longest_tick) == (
+            base.method,
+            base.timing,
+            base.times.longest_tick,
+        )
     found = results()
     changes: dict[str, dict[str, float]] = {"ECP5": {"COMB": 264, "FF": 273}, "HX8K": {"LC": 330, "Fmax": 135.5}}
     for target, changed in changes.items():
@@ -363,6 +367,6 @@ def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
     bare = size.Measurement({"LC": 1}, "a → b")
     monkeypatch.setattr(synthesis, "measure_verilog", lambda *_: bare)
     loop = LoopSpec(tachometer=SPEC)
-    for spec, latency in ((SPEC, SPEC.tick_to_velocity), (loop, loop.latency)):
+    for spec, latency in ((SPEC, SPEC.latency.tick_to_velocity), (loop, loop.tick_to_current)):
         found = synthesis.measure_core(spec, size.TARGETS["HX8K"], "", {})
         assert found.figures == {"LC": 1, "latency": latency}

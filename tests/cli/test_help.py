@@ -106,7 +106,7 @@ def test_every_option_is_explained(
 def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture[str]) -> None:
     text = re.sub(r"(?<=-edge)- (?=error)", "-", " ".join(shown(capsys, "plan", "--help").split()))
     for method in METHODS:
-        assert f"{method} {METHODS[method].summary}" in text
+        assert f"{method} {METHODS[method].facts.summary}" in text
         for about in own_options(method):
             assert about.help in text, (method, about.name)
     for about in common_options():

@@ -319,6 +319,7 @@ def check_manifest(settings: Settings, manifest: Manifest, name: str) -> None:
     rest = dict(manifest)
     parameters, ports = rest.pop("parameters"), rest.pop("ports")
     assert rest.pop("module") == name
+    assert rest.pop("options")["method"] == settings.method  # which make the core again
     assert {"method", *WORDS[settings.method]} == set(parameters)
     for key in WORDS[settings.method]:
         assert parameters[key] == parameter(settings, key, parameters[key]), key

@@ -46,12 +46,12 @@ def differing(name: str, bits: Bits) -> int:
     """Return for how many N and m_s of a core the quotient is another one with these bits."""
     spec = next(case for case in CASES if case.name == name).spec
     assert isinstance(spec, STachometer)
-    form = spec.reciprocal
+    form = spec.form.reciprocal
     assert isinstance(form, DividedReciprocal)
     wrong = 0
     for m in range(1, form.max_m + 1):
         q = form.value(m)
-        for n in range(-spec.max_numerator, spec.max_numerator + 1):
+        for n in range(-spec.form.max_numerator, spec.form.max_numerator + 1):
             total = form.rounding()
             for place in range(form.digits):
                 below, low, high = (((n << 1) >> (2 * place + bit)) & 1 for bit in range(3))

@@ -74,12 +74,12 @@ def test_tests_that_take_next_to_no_time_come_first() -> None:
 
 def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:
     (tmp_path / "test_x.py").write_text(
-        "from tachometry.spec.language.units import PI\nfrom tachometry.spec.core import numbers\n"
+        "from tachometry.spec.language.units import PI\nfrom tachometry.spec.core import widths\n"
     )
     (tmp_path / "test_y.py").write_text("import tachometry.spec\n")
     entry, all_files = (
         {"seconds": 1.0, "lines": {"spec/language/units.py": [3]}},
-        ("spec/language/units.py", "spec/core/numbers.py", "x.py"),
+        ("spec/language/units.py", "spec/core/widths.py", "x.py"),
     )
     before = {
         "": {"seconds": 0.0, "lines": {file: [1] for file in all_files}},
@@ -88,9 +88,9 @@ def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:
     }
     found = with_imports(tmp_path, before)
     lines = found["test_x.py::test_pi"]["lines"]
-    assert (lines["spec/language/units.py"], lines["spec/core/numbers.py"]) == ([3], [])
-    assert found["test_y.py::test_all"]["lines"].keys() == {"spec/language/units.py", "spec/core/numbers.py"}
-    assert chosen_for(found, "spec/core/numbers.py", 5, 20) == ["test_x.py::test_pi", "test_y.py::test_all"]
+    assert (lines["spec/language/units.py"], lines["spec/core/widths.py"]) == ([3], [])
+    assert found["test_y.py::test_all"]["lines"].keys() == {"spec/language/units.py", "spec/core/widths.py"}
+    assert chosen_for(found, "spec/core/widths.py", 5, 20) == ["test_x.py::test_pi", "test_y.py::test_all"]
 
 
 SCRIPT = """

@@ -31,13 +31,13 @@ SMALL = LoopSpec(
     position_gain=Fraction(9000),
     velocity_gain=Fraction(200),
     observer=Fraction(2000),
-    filter=Fraction(1000),
-    period=50,
+    velocity_filter=Fraction(1000),
+    control_period=50,
     multiplier="parallel",
 )
-CONVENTIONAL = replace(SMALL, synchronised=False, filter=Fraction(3000))
-UNFILTERED = replace(SMALL, filter=None)
-SERIAL = replace(SMALL, multiplier="serial", period=320)
+CONVENTIONAL = replace(SMALL, synchronised=False, velocity_filter=Fraction(3000))
+UNFILTERED = replace(SMALL, velocity_filter=Fraction(0))
+SERIAL = replace(SMALL, multiplier="serial", control_period=320)
 WITH_INPUTS = replace(SMALL, gains="inputs")
 GENERATED = replace(SMALL, command="generator")
 USUAL = LoopSpec(
@@ -47,7 +47,7 @@ USUAL = LoopSpec(
     velocity_gain=Fraction(80),
     command="generator",
 )
-OFTEN = replace(USUAL, multiplier="parallel", period=96)  # a control tick in 2 µs
+OFTEN = replace(USUAL, multiplier="parallel", control_period=96)  # a control tick in 2 µs
 COLUMNS = ("current", "saturated", "y", "w")
 
 
@@ -95,7 +95,7 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
     form, period = spec.form, spec.period
     spacing = np.where(rng.random(n_ticks) < 0.7, spec.least_period, period)
     clock = 5 + np.cumsum(spacing)
-    n_clocks = int(clock[-1]) + spec.latency + 2
+    n_clocks = int(clock[-1]) + spec.tick_to_current + 2
     # Often none for longer than the longest measurement, often many between two control ticks.
     rate = np.repeat([0.02, 0.0, 0.5, 0.002], -(-n_clocks // 4))[:n_clocks]
     rate[:5] = 0.9  # before the first control tick
@@ -228,7 +228,7 @@ def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> Case:
         gains = gains_of(taken)
     of_tick = told(spec, taken)
     # Commands are there for the clock of the control tick alone, or for the one before, in which they are taken.
-    names = [port.name for port in spec.pins]
+    names = [port.name for port in spec.ports.pins]
     at = np.unique(np.concatenate([trace.clock, clock - 1, clock, clock + 1]))
     at = at[at < trace.n_clocks]
     held = np.searchsorted(trace.clock, at, side="right") - 1
@@ -249,12 +249,12 @@ def check_core(spec: LoopSpec, seed: int = 1, n_edges: int = 3) -> Run:
     """Hold a whole core against the golden model: what it must show."""
     trace, commands, gains, changes = core_case(spec, seed, n_edges)
     wanted = run_loop(spec, trace, commands, golden.tables, gains)
-    names = [port.name for port in spec.pins]
+    names = [port.name for port in spec.ports.pins]
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
     for clock, *values in changes.tolist():
         rows[clock] = dict(zip(names, values, strict=True))
-    seen = clock_by_clock(loop_core.LoopCore(spec), rows, [port.name for port in spec.outputs])
-    strobes = list(spec.strobes)
+    seen = clock_by_clock(loop_core.LoopCore(spec), rows, [port.name for port in spec.ports.outputs])
+    strobes = list(spec.ports.strobes)
     found = [[clock, *row.values()] for clock, row in enumerate(seen) if any(row[name] for name in strobes)]
     count, first = compare(wanted, observed(spec, trace.n_clocks, np.array(found)))
     assert not count, first

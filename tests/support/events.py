@@ -111,7 +111,7 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
     m_e, updates = run.ticks.pulse_count, run.updates
     if isinstance(spec, MTachometer):
         n = spec.average
-        kind = "one tick" if n == 1 else "a power of two" if spec.shift is not None else "another number"
+        kind = "one tick" if n == 1 else "a power of two" if spec.form.shift is not None else "another number"
         return {kind: len(updates.clock)}
     if isinstance(spec, RairanTachometer):
         rows, rest = len(updates.clock), updates.forced & (updates["n_ep1"] == 0)
@@ -141,7 +141,7 @@ def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
         "alteration at max_ticks": _count(by_count & (updates.interval == spec.timing.max_ticks)),
         "forced, then alteration": _count(updates.forced[:-1] & by_count[1:]),
         "m_s = 1": _count(updates.interval == 1),
-        "reciprocal carried": spec.carried and len(updates.clock),
+        "reciprocal carried": spec.form.carried and len(updates.clock),
     }
 
 
@@ -160,8 +160,8 @@ def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
         "rest": _count(rest),
         "first count": _count(rest[:-1] & ~updates.forced[1:]),
         "speed that falls": _count(updates.forced[1:] & (np.abs(np.diff(updates.velocity)) > 1)),
-        "greatest speed": _count(np.abs(updates.velocity) == spec.full_scale),
-        "tick as early as may be": _count(np.diff(run.ticks.clock) == spec.min_tick_cycles),
+        "greatest speed": _count(np.abs(updates.velocity) == spec.scale.full_scale),
+        "tick as early as may be": _count(np.diff(run.ticks.clock) == spec.times.min_tick_cycles),
     }
 
 
@@ -169,26 +169,30 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
     """Return the same for the methods that measure times."""
     updates, n = run.updates, len(run.updates.clock)
     velocity, forced, interval = updates.velocity, updates.forced, updates.interval
-    decay = forced & (interval < spec.max_periods) & (velocity != 0) if spec.decays else np.zeros(n, dtype=np.bool_)
+    decay = (
+        forced & (interval < spec.form.max_periods) & (velocity != 0)
+        if spec.form.decays
+        else np.zeros(n, dtype=np.bool_)
+    )
     overdue = forced & ~decay
     flagged = updates.get("out_of_range")
     return {
-        "times in ticks" if spec.on_lattice else "times in clocks": n,
+        "times in ticks" if spec.form.on_lattice else "times in clocks": n,
         "paper exact": n * spec.paper_exact,
         "reversal": _count(~forced & (velocity == 0)),
         "longer than the maximum time": _count(
-            np.abs(velocity) * interval > spec.timer_periods << spec.native_frac_bits + 1
+            np.abs(velocity) * interval > spec.form.timer_periods << spec.widths.native_frac_bits + 1
         ),
         "count after a silence": _count(overdue[:-1] & ~forced[1:]),
-        "count at the maximum time": _count(~forced & (interval == spec.max_periods)),
-        "one after the other": _count(np.diff(updates.clock) == spec.update_spacing),
+        "count at the maximum time": _count(~forced & (interval == spec.form.max_periods)),
+        "one after the other": _count(np.diff(updates.clock) == spec.times.update_spacing),
         "forced after the maximum time": _count(overdue),
         "forced again": _count(overdue[1:] & overdue[:-1]),
         "decay": _count(decay),
         "decay backward": _count(decay & (velocity < 0)),
         "decay again": _count(decay[1:] & decay[:-1]),
-        "out of range": _count(flagged) * spec.on_lattice,
-        "speed beyond the maximum": _count(flagged) * (not spec.on_lattice),
+        "out of range": _count(flagged) * spec.form.on_lattice,
+        "speed beyond the maximum": _count(flagged) * (not spec.form.on_lattice),
     }
 
 
@@ -205,13 +209,13 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
             "count after stalled": _count(np.diff(run.ticks.stalled.astype(np.int64)) < 0),
             "index captured": len(run.index.clock),
             "position reset": len(run.index.clock) * spec.index_reset,
-            "external tick": len(run.ticks.clock) * (spec.max_tick_cycles is not None),
+            "external tick": len(run.ticks.clock) * spec.external_tick,
             "external tick too early": _count(~np.isin(run.tick_errors, run.ticks.clock)),
             "external tick missing": _count(np.isin(run.tick_errors, run.ticks.clock)),
             "velocity saturated": _count(updates.get("velocity_overflow")),
             "filtered": len(updates.clock) * (spec.lowpass is not None),
             "waited for the filter": spec.lowpass is not None
-            and _count(np.diff(updates.clock) == spec.low_pass.latency - 2),
+            and _count(np.diff(updates.clock) == spec.scale.low_pass.latency - 2),
             "bounds": _count(updates.get("bounds_valid")),
             "aged": _count(run.ticks.get("age")),
             "update in every clock": _count(np.diff(updates.clock) == 1),

@@ -140,7 +140,7 @@ def check(simulate: Simulate, host: Host, bus: str, output: str, folder: Path, b
     captures = captures[captures >= START]
     lines = {**host.lines(n_clocks), "capture": np.zeros(n_clocks, np.uint8)}
     lines["capture"][captures] = 1
-    for pin in SPEC.pins:
+    for pin in SPEC.ports.pins:
         rows = np.searchsorted(trace.clock, np.arange(n_clocks), side="right") - 1
         lines[pin.name] = trace.lines[pin.name][rows]
     levels = np.zeros(n_clocks, np.uint8)

@@ -53,7 +53,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         max_ticks = min(max_ticks, 5)
     decoding = int(rng.choice([1, 2, 4, 4]))
     n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else fewest_ticks(method) + 20
-    external = tick_cycles > 1 and bool(rng.random() < 0.3) and not METHODS[method].own_ticks
+    external = tick_cycles > 1 and bool(rng.random() < 0.3) and not METHODS[method].facts.own_ticks
     if external:
         n_ticks += n_ticks // 4  # fewer may come
     band = [0.004, 0.05, 0.3, 1.003, 1.4, 3.25]
@@ -105,11 +105,12 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         filter_clocks=filter_of(method, int(rng.choice([0, 0, 0, 1, 2, 5])), tick_cycles),
         index=encoder.index,
         index_reset=encoder.index and bool(rng.random() < 0.5),
+        external_tick=external,
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3, 6] if method == "track" else [1, 2, 3]))
         if external
         else None,
         age=bool(rng.random() < 0.5),
-        bounds=bool(rng.random() < 0.5) and not options.get("paper_exact") and METHODS[method].has_bounds,
+        bounds=bool(rng.random() < 0.5) and not options.get("paper_exact") and METHODS[method].facts.bounds,
     )
     if rng.random() < 0.25 and getattr(spec, "adaptive", None) is None:
         spec = replace(spec, lowpass=Fraction(max(1, round(CLOCK_HZ / tick_cycles * 10 ** rng.uniform(-4, 0)))))
@@ -118,17 +119,17 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         spec = replace(spec, edge_error=Fraction(max(0, int(rng.spawn(1)[0].integers(-8, 9))), 8))
     if method == "mt" and rng.random() < 0.6:
         longest = int(rng.choice([2, max_ticks]))
-        unit_cycles = spec.interval_unit_cycles
+        unit_cycles = spec.times.interval_unit
         assert isinstance(spec, MTTachometer)
         spec = replace(spec, min_time=unit_cycles * int(rng.integers(1, longest * tick_cycles // unit_cycles + 1)))
     if isinstance(spec, RairanTachometer) and max_ticks >= 10 and not (spec.paper_exact or spec.lowpass):
         spec = replace(spec, adaptive=Fraction(1, 4))
-        spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.max_pulse_count))))
+        spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.widths.max_pulse_count))))
     spec = random_output(spec, rng)
-    earliest = spec.min_tick_cycles if method == "track" else 0  # elsewhere ticks are as short anyway
+    earliest = spec.times.min_tick_cycles if method == "track" else 0  # elsewhere ticks are as short anyway
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
     trace = encoding.recording.place(CLOCK_HZ)
-    return spec, encoding, trace if spec.max_tick_cycles is None else random_ticks(trace, tick_cycles, rng, earliest)
+    return spec, encoding, random_ticks(trace, tick_cycles, rng, earliest) if spec.external_tick else trace
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:
@@ -170,11 +171,11 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
     """Return velocity in another unit, with an LSB that it can have, or saturating."""
     unit = str(rng.choice(["count/tick"] * 4 + ["rad/s", "rev/s", "rpm"]))
     if unit != "count/tick":
-        coarsest, finest = spec.frac_bits_range(unit)
+        coarsest, finest = spec.widths.frac_bits_range(unit)
         spec = replace(spec, unit=unit, frac_bits=int(rng.integers(max(coarsest, finest - 12), finest + 1)))
     if rng.random() < 0.3:
         narrower = 10 if isinstance(spec, TimedTachometer) else 4
-        width = max(8, spec.velocity_width - int(rng.integers(-2, narrower)))
+        width = max(8, spec.widths.velocity - int(rng.integers(-2, narrower)))
         with suppress(ParameterError):
             return replace(spec, velocity_width=width)
         # Too narrow for the greatest speed: it saturates without one.
@@ -230,7 +231,7 @@ def _lost_counts(spec: TachometerSpec, encoding: Encoding, trace: PinTrace, run:
     """
     if len(run.errors) or run.ticks.get("swallowed_edges")[-1] or spec.index_reset:
         return []
-    sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / CLOCK_HZ
+    sampled = (run.ticks.clock - spec.latency.tick - spec.latency.pin_to_count) / CLOCK_HZ
     turned = encoding.true_position(sampled, spec.encoder.decoding) - _before_known(spec, trace)
     half = 1 << (spec.position_width - 1)
     difference = (run.ticks.position - turned + half) % (2 * half) - half

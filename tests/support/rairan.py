@@ -27,7 +27,7 @@ def steps_of(step: np.ndarray) -> Steps:
 
 def golden_updates(spec: RairanTachometer, step: np.ndarray) -> Table:
     """Return updates that are caused in the clocks of these steps; `clock` is that of the cause."""
-    delay = spec.registers_steps + DELAY
+    delay = spec.latency.registers_steps + DELAY
     updates = Model(spec).updates(None, steps_of(step), len(step) + delay)  # type: ignore[arg-type]
     updates.clock[:] -= delay
     return updates

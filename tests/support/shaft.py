@@ -27,7 +27,7 @@ class Double:
 
     def __init__(self, spec: LoopSpec) -> None:
         self._spec = spec
-        self._seconds = float(spec.seconds)
+        self._seconds = float(spec.units.seconds)
         self._inertia, self._torque_constant = float(spec.inertia), float(spec.torque_constant)
         self._k_p, self._k_v = float(spec.position_gain), float(spec.velocity_gain)
         self._observer, self._limit = float(spec.observer), float(spec.current_limit)
@@ -68,7 +68,7 @@ class Fixed:
 
     def __init__(self, spec: LoopSpec) -> None:
         self.control = Control(spec.form)
-        self._per_speed, self._amperes = 1 / float(spec.rad_per_s), float(spec.amperes)
+        self._per_speed, self._amperes = 1 / float(spec.units.rad_per_s), float(spec.units.amperes)
         self._command = (1 << spec.form.command_bits) * self._per_speed
         self._turn = spec.tachometer.encoder.counts_per_rev * (1 << POSITION_FRAC_BITS) / (2 * math.pi)
 
@@ -118,13 +118,13 @@ def run(spec: LoopSpec, loop: Loop, duration: float, seed: int, noise: float = 0
     white noise of `noise` Nm in each millisecond.
     """
     rng = np.random.default_rng(seed)
-    seconds = float(spec.seconds)
+    seconds = float(spec.units.seconds)
     n_ticks = round(duration / seconds)
     time = np.arange(n_ticks) * seconds
     commanded = 200 / math.pi * (1 - np.cos(math.pi / 10 * time))
     angles = 200 / math.pi * (time - 10 / math.pi * np.sin(math.pi / 10 * time))
     counts = spec.tachometer.encoder.counts_per_rev
-    pitch, lsb = 2 * math.pi / counts, float(spec.rad_per_s)
+    pitch, lsb = 2 * math.pi / counts, float(spec.units.rad_per_s)
     unit = pitch / seconds
     offset = rng.uniform(-0.1, 0.1, counts).tolist()
     torque = np.repeat(noise * rng.standard_normal(round(duration * 1000) + 1), round(1e-3 / seconds))[

@@ -32,10 +32,10 @@ def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list
     """
     tick = spec.timing.tick_cycles
     rows = []
-    for clock in range(n_clocks + spec.datapath_latency):
+    for clock in range(n_clocks + spec.latency.datapath):
         last = clock % tick == tick - 1
         row = {"tick": int(last)}
-        if spec.on_lattice:
+        if spec.form.on_lattice:
             row["pulse_count"] = counts.get(clock // tick, 0) if last else row.get("pulse_count", 0)
         else:
             row["step_before"] = counts.get(clock + 1, 0)
@@ -46,7 +46,7 @@ def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list
         held = row if row["velocity_valid"] else held
         assert {**row, "velocity_valid": 0} == {**held, "velocity_valid": 0}
     return [
-        (clock - spec.datapath_latency, row["velocity"], row["interval"], bool(row["forced"]))
+        (clock - spec.latency.datapath, row["velocity"], row["interval"], bool(row["forced"]))
         for clock, row in enumerate(seen)
         if row["velocity_valid"]
     ]

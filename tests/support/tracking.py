@@ -188,7 +188,10 @@ class Interpreter:
 def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tuple[Steps, NDArray[np.int64]]:
     """Return counts of random number, times and direction, and the last clock of every tick."""
     form = spec.form
-    longest, shortest = spec.longest_tick, spec.min_tick_cycles if form.external else spec.timing.tick_cycles
+    longest, shortest = (
+        spec.times.longest_tick,
+        spec.times.min_tick_cycles if form.external else spec.timing.tick_cycles,
+    )
     most = form.max_count
     clocks: list[NDArray[np.int64]] = []
     steps: list[NDArray[np.int64]] = []
@@ -226,7 +229,7 @@ def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tu
 
 def ticks_of(spec: TrackTachometer, windows: Windows, core: Interpreter) -> Iterator[Tick]:
     """Yield these windows, as the front end of the program gives them; `core` runs each of them before the next."""
-    most = spec.max_count
+    most = spec.widths.max_count
     silent, before = spec.timing.max_ticks, Phase.REST
     for i, number in enumerate(windows.number):
         alone = silent > 0 or before != Phase.TRACKS or number > most

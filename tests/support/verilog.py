@@ -51,7 +51,7 @@ endmodule
 
 def _ports(spec: AnySpec) -> tuple[list[Port], list[Port], list[str]]:
     """Return pins, outputs and strobes."""
-    return list(spec.pins), list(spec.outputs), list(spec.strobes)
+    return list(spec.ports.pins), list(spec.ports.outputs), list(spec.ports.strobes)
 
 
 def _filled(text: str, **parts: str | int) -> str:
@@ -84,7 +84,7 @@ class LintingVerilator(Verilator):
 
 def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
     """Compile the exported Verilog as Verilog-2001 with -Wall, any warning an error, and play a trace on it."""
-    return play_in_icarus(spec, folder, _changes(list(spec.pins), trace), trace.n_clocks)
+    return play_in_icarus(spec, folder, _changes(list(spec.ports.pins), trace), trace.n_clocks)
 
 
 def play_in_icarus(spec: AnySpec, folder: Path, changes: np.ndarray, n_clocks: int) -> Run:

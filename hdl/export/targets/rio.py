@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from tachometry.hdl.export.render import render_files
+from tachometry.spec.core.ports import bound_ports
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port
@@ -70,7 +71,7 @@ def rio(spec: TachometerSpec, name: str, verilog: str) -> dict[str, str]:
         events=events,
         sent=sent | dict.fromkeys(counted, EVENT_BITS),
         shift=WORD - spec.position_width,
-        counts_per_s=spec.rad_per_s_per_lsb / (2 * math.pi) * spec.encoder.counts_per_rev,
+        counts_per_s=spec.scale.rad_per_s_per_lsb / (2 * math.pi) * spec.encoder.counts_per_rev,
         values=values,
         counted=counted,
         sent_as=_sent_as,
@@ -111,14 +112,14 @@ def hal_pins(spec: TachometerSpec) -> dict[str, HalPin]:
 
 def _values(spec: TachometerSpec) -> tuple[Port, ...]:
     """Return the outputs that the frame has."""
-    left_out = {port.name for port in (*spec.method_ports, *spec.bound_ports)} | {*_NO_PIN} - {"velocity", "position"}
-    kept = (port for port in spec.outputs if port.held_by in (TICK, UPDATE, INDEX) and not port.is_strobe)
+    left_out = {port.name for port in (*spec.method_ports, *bound_ports(spec))} | {*_NO_PIN} - {"velocity", "position"}
+    kept = (port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE, INDEX) and not port.is_strobe)
     return tuple(port for port in kept if port.name not in left_out)
 
 
 def _connections(spec: TachometerSpec, values: Iterable[Port], happens: Iterable[str]) -> dict[str, object]:
     """Return what each port of the core is connected to, and the wires for it: what is widened, and what is counted."""
-    connected = {port.name: "" for port in spec.ports} | {pin.name: pin.name for pin in spec.pins}
+    connected = {port.name: "" for port in spec.ports} | {pin.name: pin.name for pin in spec.ports.pins}
     connected |= {"clk": "clk", "rst": "1'b0"} | {port.name: _sent_as(port) for port in values}
     narrow = [port for port in values if 1 < port.width < WORD]
     connected |= {port.name: f"core_{port.name}" for port in narrow}

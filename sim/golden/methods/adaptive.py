@@ -36,7 +36,7 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
     next_turn : int64 array, shape (n,)
         The first node from each on that is a count against the direction, or the end.
     """
-    clock, turn, rule = start.tolist(), next_turn.tolist(), spec.adaptive_dt
+    clock, turn, rule = start.tolist(), next_turn.tolist(), spec.form.adaptive_dt
     end, node, shift, falling = len(clock) - 1, 0, 0, False
     found: list[tuple[int, int, int]] = []
     while node != end:
@@ -44,11 +44,11 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
         after = bisect_left(clock, due, node + 1, end)
         then = min(after, turn[node + 1]) if node else 1
         found.append((node, then, shift))
-        c_ep = min(after - max(node, 1), spec.max_count << shift)
+        c_ep = min(after - max(node, 1), spec.widths.max_count << shift)
         waited = (clock[then] - clock[node] - 1) // (due - clock[node])
         high = c_ep > 1 and waited <= 1
-        n = c_ep if high else min(max(waited, 1), spec.max_dt(shift))
-        anew = not node or then == turn[then] or waited >= spec.max_dt(shift)
+        n = c_ep if high else min(max(waited, 1), spec.form.max_dt(shift))
+        anew = not node or then == turn[then] or waited >= spec.form.max_dt(shift)
         shift, falling = (0, False) if anew else next_shift(rule, shift, n, high=high, falling=falling)
         node = then
     nodes, thens, shifts = np.array(found, dtype=np.int64).T

@@ -6,7 +6,7 @@ from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Table
 from tachometry.spec import MTachometer
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 
 
 class Model:
@@ -32,8 +32,8 @@ class Model:
 
         def quotient(counts: int, towards: int) -> np.ndarray:
             # In eighths of a count, which edges may be off by.
-            more = int(8 * counts * (1 + self._spec.edge_error))
-            return round_quotient(8 * total + more, 8 * length, self._spec.native_frac_bits, towards)
+            more = int(8 * counts * (1 + self._spec.bound.edge_error))
+            return round_quotient(8 * total + more, 8 * length, self._spec.widths.native_frac_bits, towards)
 
         columns = {
             "velocity": quotient(0, 0),
@@ -43,4 +43,4 @@ class Model:
         if self._spec.bounds:
             columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}
             columns["bounds_valid"] = np.arange(len(m_e)) >= n
-        return Table(ticks.clock + self._spec.datapath_latency, columns)
+        return Table(ticks.clock + self._spec.latency.datapath, columns)

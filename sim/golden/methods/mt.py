@@ -29,11 +29,11 @@ class Model:
         counts = Counts.of(spec, ticks, steps, n_clocks)
         n, period = len(counts.period), counts.period
         # The first count after reset or a silence only opens.
-        first = (counts.gap > spec.max_periods) | (np.arange(n) == 0)
-        closing = not_before(period, period + spec.min_periods + 1)
+        first = (counts.gap > spec.form.max_periods) | (np.arange(n) == 0)
+        closing = not_before(period, period + spec.form.min_periods + 1)
         if spec.whole_cycles:
             closing = self._whole(counts, closing)
-        if spec.may_be_late:
+        if spec.form.may_be_late:
             closing = np.maximum(closing, self._free(counts, first))
         ends = np.flatnonzero(chain(np.minimum(closing, next_place(np.flatnonzero(first), n))))
         opening, ends = ends[:-1], ends[1:]
@@ -64,7 +64,7 @@ class Model:
         whole = opening + -(-through // cycle) * cycle
         turns = np.flatnonzero(counts.size[1:] != counts.size[:-1]) + 1
         turn = np.maximum(later, next_place(turns, n))
-        latest = np.searchsorted(counts.period, counts.period + 2 * spec.min_periods, side="right")
+        latest = np.searchsorted(counts.period, counts.period + 2 * spec.form.min_periods, side="right")
         return np.where(through < cycle, later, np.minimum(np.minimum(whole, turn), latest))
 
     def _free(self, counts: Counts, first: NDArray[np.bool_]) -> Ints:
@@ -73,10 +73,10 @@ class Model:
         What is being divided is the window that ended with the opening count, or the 0 forced before it.
         """
         clock = counts.clock(counts.period)
-        zeros = counts.clock(counts.silences(self._spec.max_periods))
-        forced = np.append(zeros, -self._spec.division_clocks)[np.searchsorted(zeros, clock) - 1]
+        zeros = counts.clock(counts.silences(self._spec.form.max_periods))
+        forced = np.append(zeros, -self._spec.form.division_clocks)[np.searchsorted(zeros, clock) - 1]
         begun = np.where(first, forced, clock)
-        return np.searchsorted(clock, begun + self._spec.division_clocks)
+        return np.searchsorted(clock, begun + self._spec.form.division_clocks)
 
     def _distance(self, size: Ints, opening: Ints, closing: Ints) -> Ints:
         """Return counts from the edge of an opening count to that of a closing one; on the lattice, the last of each

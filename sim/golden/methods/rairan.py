@@ -145,7 +145,7 @@ class Model:
         found, dt = windows(self._spec, steps, n_clocks), self._spec.timing.tick_cycles
         nth = counting(found.n_dt)
         last = np.repeat(found.start, found.n_dt) + (nth + 1) * np.repeat(dt << found.shift, found.n_dt)
-        beyond = (nth == 0) & np.repeat(found.c_ep > self._spec.max_count << found.shift, found.n_dt)
+        beyond = (nth == 0) & np.repeat(found.c_ep > self._spec.widths.max_count << found.shift, found.n_dt)
         return last, beyond, np.repeat(1 << found.shift, found.n_dt)
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
@@ -153,7 +153,7 @@ class Model:
         it.
         """
         spec = self._spec
-        delay = spec.tick_latency + spec.datapath_latency
+        delay = spec.latency.tick + spec.latency.datapath
         found = windows(spec, steps, n_clocks - delay)
         events = self._to_the_letter(found) if spec.paper_exact else self._events(found)
         columns = {
@@ -173,8 +173,8 @@ class Model:
         if not spec.bounds:
             return {}
         dt = one << events.shift
-        n, high, none = events.n, events.high, spec.absent_bound
-        bits, off = spec.native_frac_bits, int(8 * spec.edge_error)
+        n, high, none = events.n, events.high, spec.bound.absent
+        bits, off = spec.widths.native_frac_bits, int(8 * spec.bound.edge_error)
         least, most = 8 * np.where(high, n - 1, 1) - off, 8 * np.where(high, n, 1) + off
         lower = round_quotient(least * one, 8 * np.where(high, dt + 1, (n + 1) * dt + 1), bits, -1)
         # Where no least speed is implied, two edges may be off for all that.
@@ -200,7 +200,7 @@ class Model:
         Clocks, Nep1 or Ndt1, whether it is Nep1, whether it happens, and direction; shape (2n,).
         """
         spec = self._spec
-        n_ep = np.minimum(found.c_ep, spec.max_count << found.shift)
+        n_ep = np.minimum(found.c_ep, spec.widths.max_count << found.shift)
         n_dt = np.clip(found.n_dt, 1, spec.timing.max_ticks >> found.shift)
         shape = (len(found.start), 2)
         clock = np.stack([found.start + (spec.timing.tick_cycles << found.shift), found.end], axis=1)
@@ -291,4 +291,6 @@ class Model:
             # Eq. (11) of both.
             up = 2 * n_ep * np.where(high, n_ep - 1, 1)
             down = n_dt * np.where(high, n_ep - 1, 1) + n_ep * np.where(high, 1, n_dt + 1)
-        return round_quotient(np.where(n == 0, 0, events.sign * up), down << events.shift, self._spec.native_frac_bits)
+        return round_quotient(
+            np.where(n == 0, 0, events.sign * up), down << events.shift, self._spec.widths.native_frac_bits
+        )

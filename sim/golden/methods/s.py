@@ -7,7 +7,7 @@ from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Table
 from tachometry.spec import STachometer
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 
 
 def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -100,8 +100,8 @@ class Model:
         def quotient(counts: int, towards: int) -> NDArray[np.int64]:
             whole = 2 if spec.cancel else 1
             # In eighths of a count, which edges may be off by.
-            more = int(8 * counts * (1 + spec.edge_error))
-            return round_quotient(8 * numerator + whole * more, 8 * whole * m_s, spec.native_frac_bits, towards)
+            more = int(8 * counts * (1 + spec.bound.edge_error))
+            return round_quotient(8 * numerator + whole * more, 8 * whole * m_s, spec.widths.native_frac_bits, towards)
 
         columns = {
             "velocity": quotient(0, 0),
@@ -111,4 +111,4 @@ class Model:
         if spec.bounds:
             columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}
             columns["bounds_valid"] = np.arange(len(i)) > 0
-        return Table(ticks.clock[i] + spec.datapath_latency, columns)
+        return Table(ticks.clock[i] + spec.latency.datapath, columns)

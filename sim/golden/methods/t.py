@@ -42,10 +42,10 @@ class Model:
             most=most,
             known=~many,
         )
-        opened = (gap <= spec.max_periods) & (np.arange(len(gap)) > 0)
+        opened = (gap <= spec.form.max_periods) & (np.arange(len(gap)) > 0)
         asked = with_silences(spec, counts, found[opened | many])
         # What comes while the divider is at work is not measured; but a 0 is always forced.
-        following = not_before(asked.clock, asked.clock + spec.division_clocks)
+        following = not_before(asked.clock, asked.clock + spec.form.division_clocks)
         next_zero = next_place(np.flatnonzero(asked.forced), len(following))
         taken = asked[chain(np.minimum(following, next_zero))]
         return updates(spec, counts, taken, ticks)

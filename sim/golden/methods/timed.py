@@ -10,7 +10,7 @@ from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.ordered import chain, next_place, places, spans
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Table
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
 
 Ints = NDArray[np.int64]
@@ -38,11 +38,11 @@ class Counts:
     @classmethod
     def of(cls, spec: TimedTachometer, ticks: Table, steps: Steps, n_clocks: int) -> "Counts":
         """Return the counts that the datapath sees within `n_clocks`: steps, or ticks that are not empty."""
-        if spec.on_lattice:
+        if spec.form.on_lattice:
             period = np.flatnonzero(ticks.pulse_count)
             return cls(period, ticks.pulse_count[period], ticks.clock, len(ticks.clock))
-        seen = (steps.step != 0) & (steps.clock + spec.tick_latency < n_clocks)
-        return cls(steps.clock[seen] + spec.tick_latency, steps.step[seen], None, n_clocks)
+        seen = (steps.step != 0) & (steps.clock + spec.latency.tick < n_clocks)
+        return cls(steps.clock[seen] + spec.latency.tick, steps.step[seen], None, n_clocks)
 
     def clock(self, period: Ints) -> Ints:
         """Return clocks of some periods."""
@@ -109,7 +109,7 @@ class Measurements:
 
 def eighths(spec: TimedTachometer, counts: Any, side: int) -> Any:
     """Return counts in eighths, with what edges may be off by on this side, −1 or 1."""
-    return 8 * counts + side * int(8 * spec.edge_error)
+    return 8 * counts + side * int(8 * spec.bound.edge_error)
 
 
 def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, Ints] | tuple[None, None]:
@@ -132,9 +132,9 @@ def _between(spec: TimedTachometer, back: Ints, on: Ints, time: Ints) -> tuple[I
 
 def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) -> Measurements:
     """Return the measurements, and a forced 0 for every silence."""
-    period = counts.silences(spec.max_periods)
+    period = counts.silences(spec.form.max_periods)
     none = np.zeros(len(period), dtype=np.int64)
-    time = np.full(len(period), spec.max_periods)
+    time = np.full(len(period), spec.form.max_periods)
     # The shaft is between the same two edges at both ends.
     least, most = _between(spec, none - 1, none + 1, time)
     silent = Measurements(
@@ -153,8 +153,8 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
 
 def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, NDArray[np.bool_]]:
     """Return velocity in counts per tick of a distance in half counts, saturated, and whether that changed it."""
-    exact = round_quotient(distance * spec.timer_periods, time, spec.native_frac_bits - 1)
-    limit = spec.max_count << spec.native_frac_bits
+    exact = round_quotient(distance * spec.form.timer_periods, time, spec.widths.native_frac_bits - 1)
+    limit = spec.widths.max_count << spec.widths.native_frac_bits
     return np.clip(exact, -limit, limit), np.abs(exact) > limit
 
 
@@ -168,7 +168,7 @@ def _asking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: In
     # A velocity that is not 0 was measured at a count, so no silence is longer than the time up to the next one.
     latest = np.minimum(end, np.append(0, ticks.clock)[-1] + 1)
     longest = latest - taken.clock
-    if spec.on_lattice:
+    if spec.form.on_lattice:
         longest = places(ticks.clock, latest, "left") - places(ticks.clock, taken.clock, "left")
     may = np.flatnonzero(np.abs(_greatest(spec, held, np.maximum(longest, 1))) < np.abs(held))
     first = np.searchsorted(ticks.clock, taken.clock[may], side="right")
@@ -182,12 +182,12 @@ def _asking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: In
     order = np.argsort(clock)
     clock, measured = clock[order], order < len(may)
     following = np.minimum(
-        np.searchsorted(clock, clock + spec.datapath_latency), next_place(np.flatnonzero(measured), len(clock))
+        np.searchsorted(clock, clock + spec.latency.datapath), next_place(np.flatnonzero(measured), len(clock))
     )
     met = np.empty_like(measured)
     met[order] = chain(following)
     last = may[row]
-    compares = met[len(may) :] & (end[last] >= asked + spec.division_clocks)
+    compares = met[len(may) :] & (end[last] >= asked + spec.form.division_clocks)
     return asked[compares], last[compares]
 
 
@@ -202,7 +202,7 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     """Return ticks at which the velocity decays; `held` is the velocity after each measurement."""
     clock, last = _asking(spec, counts, taken, held, ticks)
     velocity = held[last]
-    period = np.searchsorted(ticks.clock, clock) if spec.on_lattice else clock
+    period = np.searchsorted(ticks.clock, clock) if spec.form.on_lattice else clock
     age = period - np.append(-1, counts.period)[np.searchsorted(counts.period, period)]
     sign = np.where(velocity < 0, -1, 1)
     greatest = np.abs(_greatest(spec, velocity, age))
@@ -222,10 +222,10 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
     """Return all updates with the velocity in counts per tick, as the datapath shows it."""
     # A forced 0 takes the divider, if ticks are so short that it is still at work.
-    finished = np.diff(taken.clock, append=np.iinfo(np.int64).max) >= spec.division_clocks
+    finished = np.diff(taken.clock, append=np.iinfo(np.int64).max) >= spec.form.division_clocks
     held, saturated = rounded(spec, taken.distance, taken.time)
     shown = _shown(spec, taken, held, saturated).rows(finished)
-    if spec.decays:
+    if spec.form.decays:
         slower = _decaying(spec, counts, taken, held, ticks)
         more = _shown(spec, slower, *rounded(spec, slower.distance, slower.time))
         at = np.searchsorted(shown.clock, more.clock)
@@ -242,7 +242,7 @@ def _shown(spec: TimedTachometer, taken: Measurements, velocity: Ints, saturated
         "forced": taken.forced,
         "out_of_range": saturated | taken.beyond,
     }
-    return Table(taken.clock + spec.datapath_latency, columns | (_bounds(spec, taken) if spec.bounds else {}))
+    return Table(taken.clock + spec.latency.datapath, columns | (_bounds(spec, taken) if spec.bounds else {}))
 
 
 def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any]]:
@@ -251,6 +251,8 @@ def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any
     for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
         assert ends is not None
         distance, time = ends.T
-        exact = round_quotient(distance * spec.timer_periods, 8 * np.maximum(time, 1), spec.native_frac_bits, towards)
-        found[name] = np.where(time > 0, exact, towards * spec.absent_bound)
+        exact = round_quotient(
+            distance * spec.form.timer_periods, 8 * np.maximum(time, 1), spec.widths.native_frac_bits, towards
+        )
+        found[name] = np.where(time > 0, exact, towards * spec.bound.absent)
     return found

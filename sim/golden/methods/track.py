@@ -242,7 +242,7 @@ class Model:
         it.
         """
         spec, form = self._spec, self._spec.form
-        windows = Windows.of(steps, ticks.clock - spec.tick_latency)
+        windows = Windows.of(steps, ticks.clock - spec.latency.tick)
         state = Recursion(spec)
         factor, shift = spec.program.acceleration_scale
         velocity_shift, fine_shift = spec.program.velocity_shift, form.frac_bits - spec.fine_bits
@@ -272,4 +272,4 @@ class Model:
             "acceleration": shown[1],
             "position_fine": shown[2],
         }
-        return Table(ticks.clock + spec.datapath_latency, columns)
+        return Table(ticks.clock + spec.latency.datapath, columns)

@@ -77,12 +77,12 @@ def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
     """Return what a core shows in a run."""
     updates = run.updates
     clock_hz = spec.timing.clock_hz
-    velocity = updates.velocity.astype(np.float64) * spec.rad_per_s_per_lsb
+    velocity = updates.velocity.astype(np.float64) * spec.scale.rad_per_s_per_lsb
     return Curve(
         name,
         f"{spec.method} method, tick {spec.timing.tick_cycles} clocks",
         baselines.Estimate(updates.clock / clock_hz, velocity),
-        updates.interval.astype(np.float64) * (spec.interval_unit_cycles / clock_hz),
+        updates.interval.astype(np.float64) * (spec.times.interval_unit / clock_hz),
     )
 
 

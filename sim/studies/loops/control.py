@@ -253,9 +253,9 @@ def in_gates(setting: Setting) -> Setting:
         "position_gain": exact(gains.position),
         "velocity_gain": exact(gains.velocity),
         "observer": exact(gains.observer),
-        "filter": None if math.isinf(gains.filter) else exact(gains.filter),
+        "velocity_filter": Fraction(0) if math.isinf(gains.filter) else exact(gains.filter),
         "current_limit": exact(gains.current_limit),
-        "period": round(gains.seconds * setting.spec.timing.clock_hz),
+        "control_period": round(gains.seconds * setting.spec.timing.clock_hz),
         "synchronised": gains.way is Observer.SYNCHRONISED,
     }
     try:

@@ -44,7 +44,7 @@ class Points(Grid[Point]):
     @property
     def unit(self) -> SpeedUnit:
         """The unit in which speeds are shown: that of all points, else rad/s."""
-        units = {point.spec.shown_unit for point in self.points.values()}
+        units = {point.spec.scale.shown_unit for point in self.points.values()}
         return units.pop() if len(units) == 1 else SpeedUnit("rad/s")
 
     @property

@@ -149,9 +149,9 @@ class Point:
     engine: str | None = None
 
     def __post_init__(self) -> None:
-        needed = self.spec.longest_tick + self.spec.tick_latency
+        needed = self.spec.times.longest_tick + self.spec.latency.tick
         if self.motion.duration * self.spec.timing.clock_hz < needed:
-            least = format_time(self.spec.seconds(needed))
+            least = format_time(self.spec.times.seconds(needed))
             raise ParameterError(
                 "motion", f"must last at least {needed} clocks of --clock ({least}), a tick and its latency"
             )
@@ -280,7 +280,7 @@ def _core(spec: TachometerSpec) -> Row:
     """Return columns of the configuration."""
 
     def seconds(clocks: int | None) -> float | None:
-        return None if clocks is None else float(spec.seconds(clocks))
+        return None if clocks is None else float(spec.times.seconds(clocks))
 
     timing = spec.timing
     own = {}
@@ -297,10 +297,10 @@ def _core(spec: TachometerSpec) -> Row:
         "clock_hz": timing.clock_hz,
         "tick_s": seconds(timing.tick_cycles),
         "max_time_s": seconds(timing.max_ticks * timing.tick_cycles),
-        "max_tick_period_s": seconds(spec.max_tick_cycles),
+        "max_tick_period_s": seconds(spec.parameters["max_tick_cycles"]),
         "unit": spec.unit,
-        "frac_bits": spec.frac_bits,
-        "velocity_width": spec.velocity_width,
+        "frac_bits": spec.widths.frac_bits,
+        "velocity_width": spec.widths.velocity,
         "max_speed_rad_s": None if spec.max_speed is None else spec.max_speed.rad_per_s,
         "position_width": spec.position_width,
         "filter": spec.filter_clocks,
@@ -308,7 +308,7 @@ def _core(spec: TachometerSpec) -> Row:
         "index_reset": spec.index_reset,
         "age": spec.age,
         "bounds": spec.bounds,
-        "edge_error": float(spec.edge_error) if spec.bounds else None,
+        "edge_error": float(spec.bound.edge_error) if spec.bounds else None,
         "lowpass_rad_s": None if spec.lowpass is None else float(spec.lowpass),
     } | own
 

@@ -72,11 +72,11 @@ def test_times_that_are_stretched_are_told(command: str, tmp_path: Path, capsys:
 def test_nothing_is_stretched_without_need() -> None:
     for method in ("t", "mt"):
         spec = of_texts(method, {"ppr": "500"})
-        assert spec.notes == ()
-        assert spec.max_time_cycles == 480_000
+        assert spec.words.notes == ()
+        assert spec.times.longest == 480_000
 
 
 def test_the_t_method_on_the_lattice_is_as_wide_as_one_count() -> None:
     spec = of_texts("t", {"ppr": "500", "timer": "tick"})
-    assert spec.velocity_width == 16 + 2
-    assert spec.full_scale == 1 << 16
+    assert spec.widths.velocity == 16 + 2
+    assert spec.scale.full_scale == 1 << 16

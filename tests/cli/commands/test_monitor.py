@@ -220,7 +220,7 @@ MANIFESTS = {
     "": "must be a file NAME.json that tachometry build writes, which",
     "[]": "must be a file NAME.json that tachometry build writes, which",
     "[" * 100_000: "must be a file NAME.json that tachometry build writes, which",
-    '{"module": "a", "parameters": {}, "registers": {}, "bus": "uart"}': "must be a file NAME.json",
+    '{"module": "a", "options": {}, "registers": {}, "bus": "uart"}': "must be a file NAME.json",
 }
 
 
@@ -237,8 +237,8 @@ def test_files_that_are_no_manifests(
     ("change", "message"),
     [
         ({"bus": "spi"}, "--manifest must be that of a board with --bus uart, not spi"),
-        ({"parameters": {"method": "x"}}, ": method must be one of s, m, t, mt, rairan, track, not 'x'"),
-        ({"parameters": {"method": "s", "loop": {}}}, "--manifest must be that of a board without --loop, whose"),
+        ({"options": {"method": "x"}}, ": method must be one of s, m, t, mt, rairan, track, not 'x'"),
+        ({"options": {"method": "s", "loop": "yes"}}, "--manifest must be that of a board without --loop, whose"),
         ({"registers": {"configuration": 5}}, "must be that of a demo which this version of tachometry makes: its "),
         ({"baud": 0}, ": baud must be at least 1, not 0"),
         ({"baud": "fast"}, "--manifest "),

@@ -48,9 +48,9 @@ def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[st
     assert {name: int(bits) for name, bits in (pair.split() for pair in rows["widths"].split(", "))} == {
         port["name"]: port["width"] for port in described["ports"] if port["width"] > 1
     }
-    assert isinstance(spec.reciprocal, DividedReciprocal)
+    assert isinstance(spec.form.reciprocal, DividedReciprocal)
     # All of its bits but the last, which is 1, the first digit, and a clock to begin.
-    assert rows["reciprocal"] == f"divided in {spec.reciprocal.width + 1} clocks between two ticks"
+    assert rows["reciprocal"] == f"divided in {spec.form.reciprocal.width + 1} clocks between two ticks"
     for name, clocks in described["latency_cycles"].items():
         assert rows[name].startswith(f"{clocks} clocks (")
     assert rows["pin_to_count"] == "5 clocks (104.2ns)"
@@ -77,7 +77,7 @@ def test_speeds_from_one_count_in_the_maximum_time_to_the_greatest(capsys: pytes
         scale = 1e-3 if t_m.endswith("ms") else 1e-6
         assert float(t_m[:-2]) * scale == pytest.approx(interval * 20e-6, rel=1e-3)
         assert float(q_v) == pytest.approx(50 * math.pi / (interval * (interval - 1)), rel=1e-3)
-        rounding = SPEC.rad_per_s_per_lsb / 2
+        rounding = SPEC.scale.rad_per_s_per_lsb / 2
         assert float(percent) == pytest.approx(100 * (float(q_v) + rounding) / float(speed), rel=1e-2)
         assert update_by == "alteration"
 

@@ -76,7 +76,7 @@ def test_trace_has_a_row_per_update(tmp_path: Path, golden_run: Run) -> None:
     assert rows[0] == ["clock", "tick", "interval", "forced", "velocity_raw", "velocity_rad_s"]
     updates = golden_run.updates
     assert [list(map(int, row[:5])) for row in rows[1:]] == [
-        [clock, (clock - SPEC.tick_to_velocity - SPEC.tick_latency + 1) // 20 - 1, m_s, forced, raw]
+        [clock, (clock - SPEC.latency.tick_to_velocity - SPEC.latency.tick + 1) // 20 - 1, m_s, forced, raw]
         for clock, m_s, forced, raw in zip(
             updates.clock.tolist(),
             updates.interval.tolist(),
@@ -85,7 +85,9 @@ def test_trace_has_a_row_per_update(tmp_path: Path, golden_run: Run) -> None:
             strict=True,
         )
     ]
-    assert [row[5] for row in rows[1:]] == [repr(raw * SPEC.rad_per_s_per_lsb) for raw in updates.velocity.tolist()]
+    assert [row[5] for row in rows[1:]] == [
+        repr(raw * SPEC.scale.rad_per_s_per_lsb) for raw in updates.velocity.tolist()
+    ]
 
 
 def test_counts_have_a_row_per_tick(tmp_path: Path, golden_run: Run) -> None:
@@ -113,7 +115,7 @@ def test_error_statistics(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("simulate", *CORE, "--motion", "constant:1.25rev/s:100ms") == 0
     table = summary(capsys.readouterr().out)
     assert table["counts in"] == table["counts out"]
-    unit = SPEC.unit_velocity
+    unit = SPEC.scale.unit_velocity
     assert float(table["velocity error, max"].split()[0]) <= unit
     assert abs(float(table["velocity error, mean"].split()[0])) < 0.1 * unit
     assert float(table["velocity error, RMS"].split()[0]) < 0.2 * unit

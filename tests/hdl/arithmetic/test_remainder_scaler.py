@@ -18,13 +18,15 @@ from tachometry.spec.formats.reciprocal import DividedReciprocal
 def long_spec(max_ticks: int, frac_bits: int, *, tick_cycles: int = 1, cancel: bool = True) -> STachometer:
     timing = Timing(48_000_000, tick_cycles, max_ticks)
     spec = STachometer(encoder=Encoder(500), timing=timing, frac_bits=frac_bits, cancel=cancel)
-    assert spec.carried
+    assert spec.form.carried
     return spec
 
 
 def wanted(spec: STachometer, operands: list[NDArray[np.int64]], towards: int = 0) -> NDArray[np.int64]:
     base, n, m = operands
-    return (base << spec.frac_bits) + round_quotient(n, m << spec.reciprocal.halvings, spec.frac_bits, towards)
+    return (base << spec.widths.frac_bits) + round_quotient(
+        n, m << spec.form.reciprocal.halvings, spec.widths.frac_bits, towards
+    )
 
 
 @pytest.mark.parametrize(
@@ -35,7 +37,7 @@ def wanted(spec: STachometer, operands: list[NDArray[np.int64]], towards: int = 
 def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bits: int, cancel: bool) -> None:
     """All N that one count per tick can give, and all m_s to the longest."""
     spec = long_spec(MAX_TICKS, frac_bits, cancel=cancel)
-    numerators = range(-spec.max_numerator, spec.max_numerator + 1)
+    numerators = range(-spec.form.max_numerator, spec.form.max_numerator + 1)
     *operands, got = every_quotient(spec, numerators, tmp_path)
     assert np.array_equal(got, wanted(spec, operands))
 
@@ -43,7 +45,7 @@ def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bit
 @nightly  # the longest and the shortest tick are tried above
 def test_every_interval_and_the_extreme_numerators_at_two_clocks_a_tick(tmp_path: Path) -> None:
     spec = long_spec(MAX_TICKS, 16, tick_cycles=2)
-    extreme = spec.max_numerator
+    extreme = spec.form.max_numerator
     *operands, got = every_quotient(spec, [-extreme, -1, 1, extreme], tmp_path)
     assert np.array_equal(got, wanted(spec, operands))
 
@@ -52,9 +54,9 @@ def test_every_interval_and_the_extreme_numerators_at_two_clocks_a_tick(tmp_path
 def test_long_measurements_that_are_divided(tmp_path: Path, max_ticks: int) -> None:
     """Every interval up to 2^16, or every 61st up to 2^20, from 960 counts a tick and 24 fraction bits."""
     spec = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, max_ticks), frac_bits=24)
-    assert isinstance(spec.reciprocal, DividedReciprocal)
+    assert isinstance(spec.form.reciprocal, DividedReciprocal)
     every = 1 if max_ticks < MAX_TICKS else 61
-    extreme = spec.max_numerator
+    extreme = spec.form.max_numerator
     *operands, got = every_quotient(spec, [-extreme, 1, extreme], tmp_path, every=every)
     assert np.array_equal(got, wanted(spec, operands))
 
@@ -78,7 +80,7 @@ def check_starts_over(*, frac_bits: int) -> None:
     spec = long_spec(2100, frac_bits, tick_cycles=2)
     rng = np.random.default_rng(1)
     m = [*range(1, 300), *range(1, 2101), *range(1051, 1200), *range(1, 20)]
-    n = rng.integers(-spec.max_numerator, spec.max_numerator + 1, len(m))
+    n = rng.integers(-spec.form.max_numerator, spec.form.max_numerator + 1, len(m))
     base = -(n >> 2)  # for which the ends of the window are within the range of m_e
     # What is started has been loaded the clock before.
     rows = [{"load": 1, "base": b, "numerator": k} for b, k in zip(base.tolist(), n.tolist(), strict=True)]

@@ -29,14 +29,14 @@ def default_spec(frac_bits: int = 16, **options: object) -> STachometer:
 @pytest.mark.parametrize(("frac_bits", "cancel"), only_rows([(4, True)], [(16, True), (4, True), (4, False)]))
 def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bool, source: str) -> None:
     spec = default_spec(frac_bits, cancel=cancel, reciprocal_source=source)
-    assert type(spec.reciprocal) is (
+    assert type(spec.form.reciprocal) is (
         DividedReciprocal if source == "serial" else Reciprocal if frac_bits == 4 else NarrowReciprocal
     )
     # Those of a sixth of the range, and the greatest.
-    few = spec.max_numerator // 6
-    numerators = [*range(-few, few + 1), -spec.max_numerator, spec.max_numerator]
+    few = spec.form.max_numerator // 6
+    numerators = [*range(-few, few + 1), -spec.form.max_numerator, spec.form.max_numerator]
     base, n, m, got = every_quotient(spec, numerators, tmp_path)
-    halvings = spec.reciprocal.halvings
+    halvings = spec.form.reciprocal.halvings
     wanted = (base << frac_bits) + round_quotient(n, m << halvings, frac_bits)
     ties = (n << (frac_bits + 1)) % (m << halvings) == 0
     ties &= (n << frac_bits) % (m << halvings) != 0
@@ -50,8 +50,8 @@ def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bo
 def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source: str) -> None:
     """All m_s and N, which have 6 bits, 3 and 7: an odd number of bits is a digit more."""
     spec = default_spec(max_speed=Speed.parse(max_speed), reciprocal_source=source)
-    assert spec.numerator_width == {"1000rad/s": 6, "150rad/s": 4, "2000rad/s": 7}[max_speed]
-    numerators = range(-spec.max_numerator, spec.max_numerator + 1)
+    assert spec.form.numerator_width == {"1000rad/s": 6, "150rad/s": 4, "2000rad/s": 7}[max_speed]
+    numerators = range(-spec.form.max_numerator, spec.form.max_numerator + 1)
     base, n, m, got = every_quotient(spec, numerators, tmp_path)
     assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
 
@@ -61,7 +61,7 @@ def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source:
 def test_every_bound(tmp_path: Path, source: str, towards: int) -> None:
     """Rounded down and up: at 4 fraction bits many quotients need no rounding at all."""
     spec = default_spec(4, reciprocal_source=source, bounds=True, max_speed=Speed.parse("2000rad/s"))
-    numerators = range(-spec.max_numerator, spec.max_numerator + 1)
+    numerators = range(-spec.form.max_numerator, spec.form.max_numerator + 1)
     base, n, m, got = every_quotient(spec, numerators, tmp_path, towards)
     assert np.count_nonzero(got != (base << 4) + round_quotient(n, 2 * m, 4, towards)) == 0
     assert len(got) == len(n)
@@ -75,8 +75,8 @@ def test_ties_base_and_tag() -> None:
     """Ties of both signs, between other values, at 4 fraction bits."""
     spec = default_spec(4, reciprocal_source="table")
     pairs = [(n, m) for m in (32, 96, 160, 480) for n in range(-18, 19)] + [(7, 3), (-7, 3), (1920, 1), (-3840, 500)]
-    assert isinstance(spec.reciprocal, Reciprocal)
-    pause = spec.reciprocal.digits + 4
+    assert isinstance(spec.form.reciprocal, Reciprocal)
+    pause = spec.form.reciprocal.digits + 4
     off = {"load": 0, "start": 0}
     rows: list[dict[str, int]] = []
     for n, m in pairs:
@@ -86,7 +86,7 @@ def test_ties_base_and_tag() -> None:
     found = [(clock, row["velocity"], row["m_out"]) for clock, row in enumerate(seen) if row["done"]]
     wanted = [rounded(Fraction(n, 2 * m) + base(n), 4) for n, m in pairs]
     assert found == [
-        (k * pause + 3 + spec.tick_to_velocity, velocity, m)
+        (k * pause + 3 + spec.latency.tick_to_velocity, velocity, m)
         for k, (velocity, (_, m)) in enumerate(zip(wanted, pairs, strict=True))
     ]
 
@@ -98,13 +98,15 @@ SERIAL = [(scaler.SerialScaler, "1000rad/s"), (scaler.WideSerialScaler, None)]
 def test_every_bit_of_the_sum_counts(kind: Any, max_speed: str | None) -> None:
     """The sum for odd q that are no reciprocals: those with which it is as near to the next result as it can be."""
     spec = default_spec(max_speed=max_speed and Speed.parse(max_speed))
-    form = spec.reciprocal
+    form = spec.form.reciprocal
     assert isinstance(form, DividedReciprocal)
-    assert form.is_wide(spec.velocity_width) == (kind is scaler.WideSerialScaler)
-    base_width, scale = spec.velocity_width - 16, 1 << form.scale_bits
-    dut = kind(form, base_width=base_width, numerator_width=spec.numerator_width, tag=data.StructLayout({"mark": 1}))
+    assert form.is_wide(spec.widths.velocity) == (kind is scaler.WideSerialScaler)
+    base_width, scale = spec.widths.velocity - 16, 1 << form.scale_bits
+    dut = kind(
+        form, base_width=base_width, numerator_width=spec.form.numerator_width, tag=data.StructLayout({"mark": 1})
+    )
     rng = np.random.default_rng(1)
-    numerators = {sign * int(n) | 1 for n in rng.integers(0, spec.max_numerator, 60) for sign in (-1, 1)}
+    numerators = {sign * int(n) | 1 for n in rng.integers(0, spec.form.max_numerator, 60) for sign in (-1, 1)}
     pairs = [
         (n, (end - form.rounding()) * pow(n, -1, scale) % scale + scale * int(rng.integers(1 << form.width - 23)))
         for n in numerators
@@ -122,10 +124,10 @@ def test_every_bit_of_the_sum_counts(kind: Any, max_speed: str | None) -> None:
 def check_wide(tmp_path: Path) -> None:
     """N at the ends of all digits, with every m."""
     spec = default_spec()
-    assert isinstance(spec.reciprocal, Reciprocal)
-    assert spec.reciprocal.is_wide(spec.velocity_width)
+    assert isinstance(spec.form.reciprocal, Reciprocal)
+    assert spec.form.reciprocal.is_wide(spec.widths.velocity)
     ends = [sign * (4**k // 2 + off) for k in range(7) for off in (-1, 0, 1) for sign in (-1, 1)]
-    numerators = [*ends, -spec.max_numerator, spec.max_numerator]
+    numerators = [*ends, -spec.form.max_numerator, spec.form.max_numerator]
     base, n, m, got = every_quotient(spec, numerators, tmp_path)
     assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
 
@@ -133,7 +135,7 @@ def check_wide(tmp_path: Path) -> None:
 def test_what_is_wide(tmp_path: Path) -> None:
     check_wide(tmp_path)
     assert not any(
-        one.reciprocal.is_wide(one.velocity_width)  # type: ignore[union-attr]
+        one.form.reciprocal.is_wide(one.widths.velocity)  # type: ignore[union-attr]
         for one in (default_spec(max_speed=Speed.parse("1000rad/s")), default_spec(reciprocal_source="table"))
     )
 
@@ -143,20 +145,20 @@ def test_what_is_wide(tmp_path: Path) -> None:
 def test_every_sum_over_a_constant(tmp_path: Path, average: int, towards: int) -> None:
     """The pipelined scaler, as the M method uses it where ticks are short."""
     spec = MTachometer(encoder=Encoder(500), timing=Timing(1000, 2, 10), average=average, frac_bits=4, bounds=True)
-    assert not spec.serial
+    assert not spec.latency.serial
     dut = scaler.PipelinedScaler(
-        spec.reciprocal,
+        spec.form.reciprocal,
         base_width=6,
-        numerator_width=spec.numerator_width,
+        numerator_width=spec.form.numerator_width,
         tag=data.StructLayout({"mark": 1}),
         towards=towards,
     )
     rows = [
-        {"load": 1, "start": 1, "numerator": n, "base": base(n), "q": spec.reciprocal.value(average)}
-        for n in range(-spec.max_numerator, spec.max_numerator + 1)
+        {"load": 1, "start": 1, "numerator": n, "base": base(n), "q": spec.form.reciprocal.value(average)}
+        for n in range(-spec.form.max_numerator, spec.form.max_numerator + 1)
     ]
-    seen = clock_by_clock(dut, rows + [{}] * (spec.numerator_width + 2), ["results.p.quotient"])
-    got = [row["results.p.quotient"] for row in seen[spec.numerator_width + 2 :]]
-    n = np.arange(-spec.max_numerator, spec.max_numerator + 1)
+    seen = clock_by_clock(dut, rows + [{}] * (spec.form.numerator_width + 2), ["results.p.quotient"])
+    got = [row["results.p.quotient"] for row in seen[spec.form.numerator_width + 2 :]]
+    n = np.arange(-spec.form.max_numerator, spec.form.max_numerator + 1)
     wanted = (base(n) << 4) + round_quotient(n, np.full(len(n), average), 4, towards)
     assert got == wanted.tolist()

@@ -43,9 +43,9 @@ def test_registers_are_those_of_the_golden_model(method: str, seed: int) -> None
     n_clocks = min(trace.n_clocks, CLOCKS)
     accesses, captures = random_accesses(registers, seed, n_clocks)
     rows: list[dict[str, int]] = [{"capture": 0, "bus.read": 0, "bus.write": 0} for _ in range(n_clocks)]
-    for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin.name] for pin in spec.pins), strict=True):
+    for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin.name] for pin in spec.ports.pins), strict=True):
         if clock < n_clocks:
-            rows[clock] |= {pin.name: int(level) for pin, level in zip(spec.pins, levels, strict=True)}
+            rows[clock] |= {pin.name: int(level) for pin, level in zip(spec.ports.pins, levels, strict=True)}
     for clock in captures:
         rows[clock]["capture"] = 1
     for access in accesses:

@@ -40,6 +40,7 @@ SPEC = STachometer(
     index=True,
     age=True,
     filter_clocks=2,
+    external_tick=True,
     max_tick_cycles=16,
 )
 MAP = RegisterMap(SPEC)
@@ -93,7 +94,7 @@ def wired(bus: str) -> str:
         kind, end = ("reg", " = 0") if port.direction == "input" else ("wire", "")
         return f"  {kind} [{port.width - 1}:0] {port.name} /* verilator public_flat_rw */{end};"
 
-    names = ["clk", "rst", *(pin.name for pin in SPEC.pins), CAPTURE.name, *(port.name for port in ports)]
+    names = ["clk", "rst", *(pin.name for pin in SPEC.ports.pins), CAPTURE.name, *(port.name for port in ports)]
     instance = f"  {NAMES[bus]} of_{NAMES[bus]} ({', '.join(f'.{name}({name})' for name in names)});"
     return "\n".join([*map(declared, ports), instance])
 
@@ -148,7 +149,7 @@ def play(folder: Path, simulator: str, seed: int, number: int, clocks_each: int)
     n_clocks = number * clocks_each
     trace, captures = motion(seed, n_clocks)
     plans = {bus: plan(seed, bus, number) for bus in NAMES}
-    names = [pin.name for pin in SPEC.pins]
+    names = [pin.name for pin in SPEC.ports.pins]
     # The pins, and `capture` for one clock at a time.
     high = set(captures)
     at = sorted({*trace.clock.tolist(), *captures, *(clock + 1 for clock in captures)})

@@ -85,7 +85,7 @@ def case() -> tuple[TachometerSpec, PinTrace]:
 
 def program(spec: TachometerSpec) -> str:
     registers = RegisterMap(spec)
-    names = [port.name for port in spec.outputs if not port.is_strobe] + ["updated", "indexed"]
+    names = [port.name for port in spec.ports.outputs if not port.is_strobe] + ["updated", "indexed"]
     shown = [f'  printf("{name} %" PRId64 "\\n", (int64_t)now.{name});' for name in names]
     counted = [f'  printf("{name} %d\\n", counters.{name});' for name in registers.counted]
     return (
@@ -145,8 +145,8 @@ def check(folder: Path) -> list[dict[str, float]]:
         velocity, position = values["velocity"], values["position"]
         counters = {field.name: word >> field.low & 0xFF for field in registers["COUNTERS"].fields}
         quantities = {
-            "rad_per_s": velocity * spec.rad_per_s_per_lsb,
-            "in_unit": velocity * 2.0**-spec.frac_bits,
+            "rad_per_s": velocity * spec.scale.rad_per_s_per_lsb,
+            "in_unit": velocity * 2.0**-spec.widths.frac_bits,
             "rad": pytest.approx(position * 2 * math.pi / spec.encoder.counts_per_rev, rel=1e-14),
         }
         assert one == {**values, **counters, **quantities}
@@ -204,9 +204,9 @@ def test_the_compiler_reads_the_numbers_of_the_map(tmp_path: Path) -> None:
         "TICK_CYCLES": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
         "COUNTS_PER_REV": spec.encoder.counts_per_rev,
-        "INTERVAL_UNIT_CYCLES": spec.interval_unit_cycles,
-        "UNIT_PER_LSB": 2.0**-spec.frac_bits,
-        "RAD_PER_S_PER_LSB": spec.rad_per_s_per_lsb,
+        "INTERVAL_UNIT_CYCLES": spec.times.interval_unit,
+        "UNIT_PER_LSB": 2.0**-spec.widths.frac_bits,
+        "RAD_PER_S_PER_LSB": spec.scale.rad_per_s_per_lsb,
         "RAD_PER_COUNT": 2 * math.pi / spec.encoder.counts_per_rev,
     }
     for one in registers:

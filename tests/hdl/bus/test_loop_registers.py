@@ -116,7 +116,7 @@ def check(spec: LoopSpec, seed: int, n_clocks: int = 1400) -> None:
 def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     """On the native bus, with a serial multiplier and units of another kind."""
     tachometer = replace(CORE.tachometer, unit="rad/s", max_speed=None, frac_bits=12)
-    spec = replace(SPECS["generator"], tachometer=tachometer, multiplier="serial", period=300)
+    spec = replace(SPECS["generator"], tachometer=tachometer, multiplier="serial", control_period=300)
     registers, trace, accesses, captures, rows = case(spec, 2, 9000)
     bus = bus_of("native")
     pins = [port for port in ports_on(spec, bus) if port.direction == "input" and port.name not in ("clk", "rst")]

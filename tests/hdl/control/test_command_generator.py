@@ -55,7 +55,7 @@ def test_as_the_golden_model(n_ticks: int) -> None:
 def test_with_a_serial_multiplier() -> None:
     """And with other units."""
     tachometer = replace(GENERATED.tachometer, unit="rad/s", frac_bits=4)
-    check(replace(GENERATED, multiplier="serial", period=320, tachometer=tachometer), 100)
+    check(replace(GENERATED, multiplier="serial", control_period=320, tachometer=tachometer), 100)
 
 
 def test_with_control_ticks_in_2_microseconds() -> None:

@@ -39,7 +39,7 @@ def test_an_edge_is_in_the_tick_that_ends_pin_to_count_after_it() -> None:
         found: list[int] = run.ticks.pulse_count[spec.axes : 2 * spec.axes].tolist()
         return found
 
-    last = 2 * TICK_CYCLES - 1 - spec.pin_to_count
+    last = 2 * TICK_CYCLES - 1 - spec.latency.pin_to_count
     assert counted(last) == [1] * spec.axes
     assert counted(last + 1)[0] == 0
 
@@ -87,7 +87,7 @@ class Restarted(AxesTachometer):
 def test_a_reset_clears_what_is_in_memory() -> None:
     """The content of the memories at a reset does not matter."""
     spec = small(2, index=True)
-    trace, names = motions(spec, 900), [port.name for port in spec.outputs]
+    trace, names = motions(spec, 900), [port.name for port in spec.ports.outputs]
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
     for clock, *levels in zip(trace.clock.tolist(), *(line.tolist() for line in trace.lines.values()), strict=True):
         rows[clock] = dict(zip(trace.lines, levels, strict=True))
@@ -96,7 +96,7 @@ def test_a_reset_clears_what_is_in_memory() -> None:
     before = [{**row, **({"a": row["b"], "b": row["a"]} if "a" in row else {})} for row in rows[:701]]
     seen = clock_by_clock(Restarted(spec), [*before, {"restart": 1}, *rows], names)
     fresh = clock_by_clock(Restarted(spec), rows, names)
-    strobes = {port.name: port.held_by for port in spec.outputs}
+    strobes = {port.name: port.held_by for port in spec.ports.outputs}
     for clock, (after, wanted) in enumerate(zip(seen[702:], fresh, strict=True)):
         for name, strobe in strobes.items():
             assert not wanted[strobe] or after[name] == wanted[name], (clock, name)
@@ -111,7 +111,7 @@ def test_all_ticks_come_in_step() -> None:
     wanted = [first + turn * axis + TICK_CYCLES * tick for tick in range(12) for axis in range(3)]
     assert ticks.clock.tolist() == wanted[: len(ticks)]
     assert ticks["axis"].tolist() == [0, 1, 2] * (len(ticks) // 3)
-    assert spec.tick_latency == first + 2 * turn - (TICK_CYCLES - 1)
+    assert spec.latency.tick == first + 2 * turn - (TICK_CYCLES - 1)
 
 
 def test_two_edges_within_a_round_are_illegal() -> None:

@@ -30,7 +30,9 @@ def test_as_the_golden_model() -> None:
     current = run.tables["current_valid"]
     assert 0.2 < np.mean(current.current_saturated) < 0.98
     assert np.diff(run.tables["control_tick"].clock).tolist() == [CORE.period] * (len(run.tables["control_tick"]) - 1)
-    assert (current.clock - run.tables["control_tick"].clock[: len(current)]).tolist() == [CORE.latency] * len(current)
+    assert (current.clock - run.tables["control_tick"].clock[: len(current)]).tolist() == [CORE.tick_to_current] * len(
+        current
+    )
 
 
 def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
@@ -48,7 +50,7 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
 @nightly  # the period in which both meet is one of many in tests/hdl/control
 def test_the_first_control_tick_has_the_first_update() -> None:
     """A period of a tick meets each update a clock after it has come."""
-    spec = replace(GENERATED, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), period=50)
+    spec = replace(GENERATED, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), control_period=50)
     run = check_core(spec, n_edges=1)
     apart = run.updates.clock[:, None] - run.tables["control_tick"].clock
     assert set(apart[np.abs(apart) < 25].tolist()) == {-1}
@@ -70,7 +72,7 @@ class Restarted(LoopCore):
 def test_a_reset_amid_a_program() -> None:
     """From a reset on the core shows what it shows after the first one, wherever the program was."""
     *_, changes = core_case(CORE, 5, 1)
-    names = [port.name for port in CORE.pins]
+    names = [port.name for port in CORE.ports.pins]
     rows: list[dict[str, int]] = [{} for _ in range(700)]
     for clock, *values in changes[changes[:, 0] < len(rows)].tolist():
         rows[clock] = dict(zip(names, values, strict=True))
@@ -78,7 +80,7 @@ def test_a_reset_amid_a_program() -> None:
     outputs = ("control_tick", "current_valid", "current", "filtered_velocity", "disturbance", "drive")
     whole = clock_by_clock(Restarted(CORE), rows, outputs)
     ticks = [clock for clock, row in enumerate(whole) if row["control_tick"]]
-    for amid in (9, CORE.latency - 1):
+    for amid in (9, CORE.tick_to_current - 1):
         until = ticks[3] + amid
         seen = clock_by_clock(Restarted(CORE), [*rows[:until], {"restart": 1}, *rows], outputs)[until + 1 :]
         assert [row["control_tick"] for row in seen] == [row["control_tick"] for row in whole]
@@ -104,20 +106,20 @@ def test_the_stream_of_bits() -> None:
 
 def test_what_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"^control_period must be at least 45 clocks, as long as the controller"):
-        replace(CORE, period=44)
+        replace(CORE, control_period=44)
 
 
 @pytest.mark.parametrize("multiplier", ["serial", "parallel"])
 @pytest.mark.parametrize("command", ["ports", "generator"])
 def test_the_least_control_period_is_told_whatever_was_asked_for(multiplier: str, command: str) -> None:
     """The shorter the period, the wider the words, and the longer they take."""
-    spec = replace(CORE, multiplier=multiplier, command=command, period=4800)
+    spec = replace(CORE, multiplier=multiplier, command=command, control_period=4800)
     told = set()
     for period in (1, 20, 40):
         with pytest.raises(ParameterError, match=r"^control_period must be at least (\d+) clocks, ") as refused:
-            replace(spec, period=period)
+            replace(spec, control_period=period)
         told.add(int(re.findall(r"\d+", str(refused.value))[0]))
     (least,) = told
-    assert replace(spec, period=least).period == least
+    assert replace(spec, control_period=least).period == least
     with pytest.raises(ParameterError, match=f"^control_period must be at least {least} clocks, "):
-        replace(spec, period=least - 1)
+        replace(spec, control_period=least - 1)

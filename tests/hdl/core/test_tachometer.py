@@ -34,7 +34,7 @@ def test_an_edge_is_counted_in_the_window_of_its_clock_and_pin_to_count(tick_cyc
     spec = make_spec(tick_cycles)
     for clock in range(1, 3 * tick_cycles + 2):
         ticks = PySim().run(spec, trace_of([(clock, 1)], n_clocks=8 * tick_cycles)).ticks
-        window = (clock + spec.pin_to_count) // tick_cycles
+        window = (clock + spec.latency.pin_to_count) // tick_cycles
         assert ticks.pulse_count.tolist() == [int(k == window) for k in range(len(ticks.clock))], clock
         assert ticks.position.tolist() == [int(k >= window) for k in range(len(ticks.clock))], clock
 
@@ -43,9 +43,11 @@ def test_an_edge_is_counted_in_the_window_of_its_clock_and_pin_to_count(tick_cyc
 def test_latencies_are_those_of_the_manifest(tick_cycles: int) -> None:
     spec = make_spec(tick_cycles)
     run = PySim().run(spec, trace_of([], n_clocks=20 * tick_cycles + 50))
-    assert run.ticks.clock[:20].tolist() == [(k + 1) * tick_cycles - 1 + spec.tick_latency for k in range(20)]
+    assert run.ticks.clock[:20].tolist() == [(k + 1) * tick_cycles - 1 + spec.latency.tick for k in range(20)]
     # At rest every update is forced: the first at tick 3, then every second tick.
-    assert run.updates.clock[:8].tolist() == [run.ticks.clock[3 + 2 * k] + spec.tick_to_velocity for k in range(8)]
+    assert run.updates.clock[:8].tolist() == [
+        run.ticks.clock[3 + 2 * k] + spec.latency.tick_to_velocity for k in range(8)
+    ]
 
 
 @pytest.mark.parametrize("start", range(4))
@@ -60,7 +62,7 @@ def test_no_count_and_no_error_after_reset_whatever_the_pins_rest_at(start: int)
 def test_the_first_clock_after_reset_is_the_first_that_can_see_a_change(start: int, by: int) -> None:
     run = PySim().run(make_spec(4), trace_of([(1, by)], 60, start))
     assert run.ticks.position[-1] == (0 if by == 2 else by)
-    assert run.errors.tolist() == ([1 + make_spec(4).pin_to_count] if by == 2 else [])
+    assert run.errors.tolist() == ([1 + make_spec(4).latency.pin_to_count] if by == 2 else [])
 
 
 def test_position_is_the_sum_of_the_pulse_numbers_while_tick_is_high() -> None:

@@ -31,7 +31,7 @@ def check(*, reset: bool, z: np.ndarray = Z, filter_clocks: int = 0) -> PinTrace
     run = PySim().run(spec, trace)
     assert compare(golden.run(spec, trace), run) == (0, [])
     rises = 10 * np.flatnonzero(np.diff(z.astype(int), prepend=z[0]) > 0)
-    assert run.index.clock.tolist() == (rises + spec.pin_to_count + 2).tolist()
+    assert run.index.clock.tolist() == (rises + spec.latency.pin_to_count + 2).tolist()
     # The edge that comes together with Z counts as before it.
     counted = rises // 10
     before = np.append(0, counted[:-1]) if reset else 0

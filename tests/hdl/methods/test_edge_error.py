@@ -51,4 +51,4 @@ def test_gates_have_the_bounds_of_the_golden_model(method: str, options: dict[st
 
 
 def test_it_is_rounded_up_to_eighths() -> None:
-    assert [spec_of("s", {}, text).edge_error * 8 for text in ("0.01", "0.125", "12.6%", "1")] == [1, 1, 2, 8]
+    assert [spec_of("s", {}, text).bound.edge_error * 8 for text in ("0.01", "0.125", "12.6%", "1")] == [1, 1, 2, 8]

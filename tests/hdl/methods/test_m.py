@@ -23,19 +23,19 @@ def check(average: int, *, tick_cycles: int = 3, frac_bits: int = 4, n: int = 30
         encoder=Encoder(25), timing=Timing(1_000_000, tick_cycles, 10), frac_bits=frac_bits, average=average
     )
     rng = np.random.default_rng(average)
-    limit = spec.max_count
+    limit = spec.widths.max_count
     m_e = [limit] * (average + 3) + [-limit] * (average + 3) + [0] * (average + 5) + [1]
     m_e += rng.integers(-limit, limit + 1, n).tolist()
     rows: list[dict[str, int]] = []
     for number in m_e:
         rows += [{"tick": 1, "pulse_count": number}, *[{"tick": 0}] * (tick_cycles - 1)]
-    seen = clock_by_clock(m_method.MMethod(spec), rows + [{"tick": 0}] * spec.datapath_latency, OUTPUTS)
+    seen = clock_by_clock(m_method.MMethod(spec), rows + [{"tick": 0}] * spec.latency.datapath, OUTPUTS)
     got = [(clock, *list(row.values())[1:]) for clock, row in enumerate(seen) if row["velocity_valid"]]
     wanted = []
     for tick in range(len(m_e)):
         window = m_e[max(tick - average + 1, 0) : tick + 1]
         velocity = rounded(Fraction(sum(window), average), frac_bits)
-        wanted.append((tick * tick_cycles + spec.datapath_latency, velocity, average, 0))
+        wanted.append((tick * tick_cycles + spec.latency.datapath, velocity, average, 0))
     assert got == wanted
 
 
@@ -48,7 +48,7 @@ def test_mean_of_the_last_ticks(average: int, tick_cycles: int) -> None:
 
 
 def test_step_by_step_where_there_is_time() -> None:
-    assert MTachometer(encoder=Encoder(25), timing=Timing(1_000_000, 40, 10), average=3).serial
+    assert MTachometer(encoder=Encoder(25), timing=Timing(1_000_000, 40, 10), average=3).latency.serial
     check(3, tick_cycles=40, frac_bits=16, n=20)
 
 

@@ -55,7 +55,7 @@ def test_dithering_on_one_edge_reads_0(timer: str) -> None:
 def test_a_count_while_the_divider_runs_goes_on() -> None:
     """A measurement lasts as long as a division, however short T_c is."""
     spec = spec_of("mt", min_time=1, bound_decay=False)
-    busy = spec.division_clocks
+    busy = spec.form.division_clocks
     steps = dict.fromkeys([5, 45, 45 + busy - 1, 45 + busy], 1)
     got = run(spec, steps, 46 + busy)
     assert got == [(45, speed(1, 40), 40, False), (45 + busy, speed(2, busy), busy, False)]

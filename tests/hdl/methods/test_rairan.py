@@ -12,7 +12,7 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.methods import rairan
 from tachometry.sim.golden.methods.rairan import Model
 from tachometry.spec import Speed
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 
 NAMES = ["velocity", "interval", "forced", "n_ep1", "n_dt1"]
 
@@ -21,10 +21,14 @@ def check(step: np.ndarray, dt: int = 6, max_ticks: int = 9, **options: object) 
     """Every update, in its clock, with every output; and every end of dt."""
     spec = make_spec(dt, max_ticks, **options)
     names = NAMES + [*BOUNDS, "bounds_valid"] * spec.bounds + ["dt_shift"] * (spec.adaptive is not None)
-    rows = [{"step_now": 0}] * spec.registers_steps + [{"step_now": int(s)} for s in step] + [{"step_now": 0}] * DELAY
+    rows = (
+        [{"step_now": 0}] * spec.latency.registers_steps
+        + [{"step_now": int(s)} for s in step]
+        + [{"step_now": 0}] * DELAY
+    )
     lengths = ["tick_shift"] * (spec.adaptive is not None)
     shown = ["velocity_valid", "last", "beyond", *lengths, *names]
-    seen = clock_by_clock(rairan.RairanMethod(spec), rows, shown)[spec.registers_steps :]
+    seen = clock_by_clock(rairan.RairanMethod(spec), rows, shown)[spec.latency.registers_steps :]
     got = [(clock, *(row[name] for name in names)) for clock, row in enumerate(seen) if row["velocity_valid"]]
     updates = golden_updates(spec, step)
     columns = [updates[name].astype(int).tolist() for name in names]

@@ -5,7 +5,7 @@ from support.timed import TICK, run, spec_of, speed
 
 def test_a_count_while_the_divider_runs_opens_the_next_window() -> None:
     spec = spec_of("t")
-    busy = spec.division_clocks
+    busy = spec.form.division_clocks
     at = {5: 1, 45: 1, 45 + busy - 1: 1, 45 + busy + 10: 1}
     got = run(spec, at, 45 + busy + 11)
     assert got == [(45, speed(1, 40), 40, False), (45 + busy + 10, speed(1, 11), 11, False)]
@@ -17,7 +17,7 @@ def test_a_count_while_the_divider_runs_opens_the_next_window() -> None:
 def test_lattice() -> None:
     """Ticks are the periods; more than one count in a tick is out of range: a count per tick, and flagged."""
     spec = spec_of("t", timer="tick", bound_decay=False)
-    assert spec.interval_unit_cycles == TICK
+    assert spec.times.interval_unit == TICK
     got = run(spec, {2: 1, 5: 1, 6: 0, 9: -1, 11: -1, 13: 3, 15: 1, 16: -2, 18: -1}, 19 * TICK)
     assert [(clock // TICK, velocity / 256, interval) for clock, velocity, interval, *_ in got] == [
         (5, 85 / 256, 3),

@@ -43,7 +43,7 @@ def check_standstill(method: str, sign: int = 1) -> None:
     moving = [(25, v, 20, False), (45, v, 20, False)]
     spec = timed(method)
     # The 0 takes the divider from the last of them.
-    decaying = decay(45, v, 45 + SILENCE - spec.division_clocks + 1)
+    decaying = decay(45, v, 45 + SILENCE - spec.form.division_clocks + 1)
     assert run(spec, steps, n) == moving + decaying + silence(45, n)
     without = run(timed(method, bound_decay=False), steps, n)
     assert without == moving + silence(45, n)
@@ -58,9 +58,9 @@ def test_standstill(method: str, sign: int) -> None:
 def check_greatest_speed(method: str, sign: int = 1) -> None:
     """Check that a speed that is too high is held at the limit, whichever way, and a lower one is not."""
     spec = timed(method, bound_decay=False, max_speed=Speed.parse("2rev/s"))
-    assert spec.saturates
+    assert spec.form.saturates
     # As many as a window takes; two counts.
-    fast = range(5, 5 + spec.min_periods + 2) if isinstance(spec, MTTachometer) else {5, 9}
+    fast = range(5, 5 + spec.form.min_periods + 2) if isinstance(spec, MTTachometer) else {5, 9}
     got = run(spec, dict.fromkeys([*fast, 139], sign), 180)
     last, first = max(fast), min(fast)
     velocities = [(last, 2 << FRAC_BITS, last - first), (139, speed(1, 139 - last), 139 - last)]
@@ -149,7 +149,7 @@ def test_a_measurement_takes_the_divider_from_a_decay(method: str) -> None:
         got = run(spec, {5: 1, 25: 1, 45: 1, clock: 1}, clock + 1)
         assert got[-1] == (clock, speed(1, clock - 45), clock - 45, False)
         decayed = (tick, speed(3, 2 * (tick - 45)), tick - 45, True)
-        assert (decayed in got) == (clock >= tick + spec.division_clocks)
+        assert (decayed in got) == (clock >= tick + spec.form.division_clocks)
 
 
 @pytest.mark.parametrize("method", METHODS)

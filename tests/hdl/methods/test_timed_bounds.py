@@ -13,7 +13,7 @@ from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Timing
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 
 CLOCKS = 2400
 NAMES = [*OUTPUTS[1:], *BOUNDS, "bounds_valid"]
@@ -45,14 +45,14 @@ def check(method: str, timer: str, seed: int = 1) -> None:
     m_e = step.reshape(-1, TICK).sum(axis=1)
     none = np.empty(0, np.int64)
     at = np.flatnonzero(step)
-    n_clocks = CLOCKS + spec.datapath_latency
-    steps = Steps(at - spec.tick_latency, step[at], none, none, none)
+    n_clocks = CLOCKS + spec.latency.datapath
+    steps = Steps(at - spec.latency.tick, step[at], none, none, none)
     golden = model(spec).updates(Table(tick, {"pulse_count": m_e}), steps, n_clocks)
     golden = golden.rows(golden.clock < n_clocks)
     rows = []
     for clock in range(n_clocks):
         row = {"tick": int(clock < CLOCKS and clock % TICK == TICK - 1)}
-        if spec.on_lattice:
+        if spec.form.on_lattice:
             row["pulse_count"] = int(m_e[min(clock, CLOCKS - 1) // TICK])
         else:
             row["step_before"] = int(step[clock + 1]) if clock + 1 < CLOCKS else 0

@@ -31,7 +31,7 @@ SPEC = TrackTachometer(
     least_memory=Fraction(9, 10),
     fine_bits=3,
 )
-EXTERNAL = replace(SPEC, timing=Timing(1_000_000, 1400, 10), max_tick_cycles=1400)
+EXTERNAL = replace(SPEC, timing=Timing(1_000_000, 1400, 10), external_tick=True, max_tick_cycles=1400)
 NAMES = ["velocity", "acceleration", "position_fine", "interval", "forced"]
 COMPILED = compiled.clock_by_clock  # mutants, which end soon, are not worth a compilation
 Update = tuple[int, ...]  # clock, and what the update says
@@ -53,13 +53,13 @@ class Resettable(Elaboratable):
 
 def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[dict[str, int]]:
     """Return inputs of every clock, until the last update has come."""
-    rows = [{"step": 0, "tick": 0, "rst": 0} for _ in range(int(last[-1]) + spec.datapath_latency + 1)]
+    rows = [{"step": 0, "tick": 0, "rst": 0} for _ in range(int(last[-1]) + spec.latency.datapath + 1)]
     for clock, step in zip(steps.clock.tolist(), steps.step.tolist(), strict=True):
         rows[clock]["step"] = step
     through = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, last, side="right")]
     half = 1 << (spec.position_width - 1)
     for clock, moved, end in zip(last.tolist(), np.diff(through, prepend=0).tolist(), through.tolist(), strict=True):
-        held = max(-spec.max_count, min(moved, spec.max_count))
+        held = max(-spec.widths.max_count, min(moved, spec.widths.max_count))
         position = (end + half) % (2 * half) - half
         rows[clock] |= {"tick": 1, "pulse_count": held, "overflow": int(held != moved), "position": position}
     return rows
@@ -67,7 +67,7 @@ def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> lis
 
 def updates_of(spec: TrackTachometer, rows: Sequence[Mapping[str, int]], play: Player = COMPILED) -> Iterator[Update]:
     """Yield all updates; from one to the next the outputs stay."""
-    names = [*NAMES, *(["updates.p.stamp"] if spec.stamp_width else [])]
+    names = [*NAMES, *(["updates.p.stamp"] if spec.widths.stamp else [])]
     seen = play(Resettable(track.TrackMethod(spec)), rows, ["velocity_valid", *names])
     held = dict.fromkeys(names, 0)
     for clock, (row, given) in enumerate(zip(seen, rows, strict=True)):
@@ -81,9 +81,9 @@ def updates_of(spec: TrackTachometer, rows: Sequence[Mapping[str, int]], play: P
 def golden(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[Update]:
     """Return the updates of the golden model, `datapath_latency` after every tick."""
     through = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, last, side="right")]
-    found = Model(spec).updates(Table(last + spec.tick_latency, {"position": through}), steps, int(last[-1]) + 1)
+    found = Model(spec).updates(Table(last + spec.latency.tick, {"position": through}), steps, int(last[-1]) + 1)
     columns = [found[name].astype(int).tolist() for name in NAMES]
-    return list(zip((last + spec.datapath_latency).tolist(), *columns, strict=True))
+    return list(zip((last + spec.latency.datapath).tolist(), *columns, strict=True))
 
 
 def regular(spec: TrackTachometer, speed: float, n_ticks: int, begin: int = 0) -> tuple[Steps, NDArray[np.int64]]:
@@ -129,7 +129,7 @@ def test_hostile_counts() -> None:
 def test_latency() -> None:
     """An update comes `datapath_latency` clocks after every tick, whatever was in it, and with the next one."""
     steps, last = hostile(EXTERNAL, np.random.default_rng(5), 40)
-    last = (np.arange(40) + 1) * EXTERNAL.min_tick_cycles - 1
+    last = (np.arange(40) + 1) * EXTERNAL.times.min_tick_cycles - 1
     few = steps.clock <= last[-1]
     steps = Steps(steps.clock[few], steps.step[few], steps.errors, steps.index, steps.swallowed)
     check(EXTERNAL, steps, last)
@@ -148,7 +148,7 @@ def test_reset(seed: int) -> None:
     """A reset leaves nothing behind, wherever the program is."""
     rng = np.random.default_rng(seed)
     before = rows_of(SPEC, *hostile(SPEC, rng, 10))
-    before = before[: int(rng.integers(7, 10)) * 1000 + int(rng.integers(0, SPEC.datapath_latency))]
+    before = before[: int(rng.integers(7, 10)) * 1000 + int(rng.integers(0, SPEC.latency.datapath))]
     steps, last = regular(SPEC, float(rng.choice([-1, 1]) * rng.choice([0.4, 1.3, 3.7])), 15, int(rng.integers(2000)))
     after = rows_of(SPEC, steps, last)
     reset = [{"step": 0, "tick": 0, "rst": 1}]
@@ -161,19 +161,19 @@ def test_reset_about_update() -> None:
     nothing = {"step": 0, "tick": 0, "rst": 0}
     rows: list[dict[str, int]] = []
     for before in range(8):
-        rows += [nothing | {"tick": 1}, *[nothing] * (SPEC.datapath_latency - before - 1), nothing | {"rst": 1}]
+        rows += [nothing | {"tick": 1}, *[nothing] * (SPEC.latency.datapath - before - 1), nothing | {"rst": 1}]
         rows += [nothing] * 6
     # The first one is shown in the clock of the reset.
-    assert [clock for clock, *_ in updates_of(SPEC, rows, clock_by_clock)] == [SPEC.datapath_latency]
+    assert [clock for clock, *_ in updates_of(SPEC, rows, clock_by_clock)] == [SPEC.latency.datapath]
 
 
 def test_stamp() -> None:
     """For the age, an update has the number of its tick, and not of one that came since."""
     spec = replace(EXTERNAL, age=True, lowpass=Fraction(100))
-    assert spec.stamp_width
+    assert spec.widths.stamp
     steps, last = regular(spec, 1.3, 12)
     rows = rows_of(spec, steps, last)
-    mask, ticks = (1 << spec.stamp_width) - 1, 0
+    mask, ticks = (1 << spec.widths.stamp) - 1, 0
     for row in rows:
         ticks += row["tick"]
         row["stamp"] = ticks & mask

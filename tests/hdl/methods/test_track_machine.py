@@ -54,6 +54,7 @@ def spec_of(external: bool, bandwidth: int = 200) -> TrackTachometer:
         bandwidth=Fraction(bandwidth),
         fine_bits=1,
         least_memory=Fraction(9, 10),
+        external_tick=external,
         max_tick_cycles=1200 if external else None,
     )
 
@@ -183,7 +184,7 @@ def check_random(seed: int) -> set[Op]:
     spec = spec_of(external=bool(seed % 2), bandwidth=int(rng.choice([50, 200, 500])))
     held = words(rng, spec.form.width)
     program = script([*random_steps(rng, held, spec, 60), *LEVELS_UP_AND_DOWN], held, spec)
-    executed = check(program, [tick(spec, rng) for _ in range(3)], spec.count_width, clock_by_clock)
+    executed = check(program, [tick(spec, rng) for _ in range(3)], spec.widths.count, clock_by_clock)
     return {each.instruction.op for run in executed for each in run}
 
 
@@ -206,7 +207,7 @@ def check_program(
     for one in ticks_of(spec, windows, core):
         core.run(one)
         ticks.append(one)
-    executed = check(spec.program, ticks, spec.count_width, play)
+    executed = check(spec.program, ticks, spec.widths.count, play)
     ways = {
         (now.instruction, now.clocks - before.clocks)
         for run in executed

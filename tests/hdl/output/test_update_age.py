@@ -39,11 +39,11 @@ def check_age(method: str, **texts: str) -> None:
     assert found.n_mismatches == 0, found.first
     run, ticks = found.actual, found.actual.ticks.clock
     # Of an update without a filter the cause is always as long ago.
-    cause = np.append(-1, run.updates.clock - spec.tick_to_velocity)
+    cause = np.append(-1, run.updates.clock - spec.latency.tick_to_velocity)
     last = cause[np.searchsorted(run.updates.clock, ticks, side="right")]
     since = [np.count_nonzero((ticks > then) & (ticks < now)) for then, now in zip(last, ticks, strict=True)]
     assert run.ticks["age"].tolist() == np.minimum(since, spec.timing.max_ticks).tolist()
-    inside = [((ticks > now - spec.tick_to_velocity) & (ticks < now)).any() for now in run.updates.clock]
+    inside = [((ticks > now - spec.latency.tick_to_velocity) & (ticks < now)).any() for now in run.updates.clock]
     assert any(inside)
 
 
@@ -67,4 +67,4 @@ def test_with_a_filter_that_is_slower_than_a_tick() -> None:
     spec = of_texts("s", {"ppr": "1", "clock": "1MHz", "tick": "4", "max-time": "40", "age": "yes", "lowpass": "1kHz"})
     found = lockstep(spec, stress(spec, 1, 40), PySim())
     assert found.n_mismatches == 0, found.first
-    assert found.actual.ticks["age"].max() > spec.low_pass_latency // 4
+    assert found.actual.ticks["age"].max() > spec.latency.low_pass // 4

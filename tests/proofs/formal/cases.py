@@ -73,8 +73,8 @@ _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_
 
 def _sum(spec: STachometer) -> tuple[dict[str, int], dict[str, str]]:
     """Return the sum of a window's steps: how it is kept, and where."""
-    start = raised_for(spec.longest_tick, spec.max_count)
-    width = signed_width(spec.longest_tick + start)
+    start = raised_for(spec.times.longest_tick, spec.widths.max_count)
+    width = signed_width(spec.times.longest_tick + start)
     return {"START": start, "SUM_WIDTH": width}, {"core_sum": f"pulse_counter.{'raised' if start else 'count'}"}
 
 
@@ -85,20 +85,20 @@ def front(name: str, spec: STachometer) -> Proof:
         "DECODING": spec.encoder.decoding,
         "FILTER": spec.filter_clocks,
         "T": spec.timing.tick_cycles,
-        "TICK_LATENCY": spec.tick_latency,
-        "MAX_COUNT": spec.max_count,
-        "COUNT_WIDTH": spec.count_width,
+        "TICK_LATENCY": spec.latency.tick,
+        "MAX_COUNT": spec.widths.max_count,
+        "COUNT_WIDTH": spec.widths.count,
         "POSITION_WIDTH": spec.position_width,
     }
     probes |= _FRONT_PROBES | within("glitch", _FILTER_PROBES, spec.filter_clocks > 0)
     probes |= within("window", _WINDOW_PROBES, spec.timing.tick_cycles > 1)
-    return Proof(name, spec, "front", parameters, probes, depth=3 + spec.tick_latency)
+    return Proof(name, spec, "front", parameters, probes, depth=3 + spec.latency.tick)
 
 
 def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_table: int | None = None) -> Proof:
     """Return P4, P5 and standstill: the S method, from ticks to updates."""
     with patch("tachometry.spec.methods.s.MAX_TABLE", max_table or 2048):
-        latency, serial, used = spec.tick_to_velocity, spec.serial, spec.reciprocal
+        latency, serial, used = spec.latency.tick_to_velocity, spec.latency.serial, spec.form.reciprocal
     carried = {}
     if isinstance(used, CarriedSpec):
         carried = {"CARRIED": used.depth, "C": used.scale}
@@ -106,14 +106,14 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
     parameters = kept | {
         "T": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
-        "MAX_COUNT": spec.max_count,
-        "COUNT_WIDTH": spec.count_width,
-        "INTERVAL_WIDTH": spec.interval_width,
-        "NUMERATOR_WIDTH": spec.numerator_width,
-        "FRAC_BITS": spec.frac_bits,
+        "MAX_COUNT": spec.widths.max_count,
+        "COUNT_WIDTH": spec.widths.count,
+        "INTERVAL_WIDTH": spec.widths.interval,
+        "NUMERATOR_WIDTH": spec.form.numerator_width,
+        "FRAC_BITS": spec.widths.frac_bits,
         "CANCEL": int(spec.cancel),
         "SERIAL": int(serial),
-        "TICK_LATENCY": spec.tick_latency,
+        "TICK_LATENCY": spec.latency.tick,
         "TICK_TO_VELOCITY": latency,
         "AGE": int(spec.age),
     }
@@ -130,13 +130,13 @@ def m_method(name: str, spec: MTachometer) -> Proof:
     """Return the M method, from ticks to updates."""
     parameters = {
         "N": spec.average,
-        "MAX_COUNT": spec.max_count,
-        "COUNT_WIDTH": spec.count_width,
+        "MAX_COUNT": spec.widths.max_count,
+        "COUNT_WIDTH": spec.widths.count,
         "MAX_TICKS": spec.timing.max_ticks,
-        "INTERVAL_WIDTH": spec.interval_width,
-        "BOUND_WIDTH": spec.bound_width,
-        "FRAC_BITS": spec.frac_bits,
-        "TICK_TO_VELOCITY": spec.tick_to_velocity,
+        "INTERVAL_WIDTH": spec.widths.interval,
+        "BOUND_WIDTH": spec.bound.width,
+        "FRAC_BITS": spec.widths.frac_bits,
+        "TICK_TO_VELOCITY": spec.latency.tick_to_velocity,
     }
     return Proof(
         name,
@@ -144,18 +144,18 @@ def m_method(name: str, spec: MTachometer) -> Proof:
         "m_method",
         parameters,
         STANDSTILL_PROBES,
-        depth=max(spec.tick_to_velocity + spec.average + 2, 3 * spec.average + 1),
+        depth=max(spec.latency.tick_to_velocity + spec.average + 2, 3 * spec.average + 1),
     )
 
 
 def reciprocal(name: str, spec: STachometer, max_table: int | None = None) -> Proof:
     """Return the carried reciprocal."""
     with patch("tachometry.spec.methods.s.MAX_TABLE", max_table or 2048):
-        carried = spec.reciprocal
+        carried = spec.form.reciprocal
     assert isinstance(carried, CarriedSpec)
     parameters = {
         "MAX_TICKS": spec.timing.max_ticks,
-        "INTERVAL_WIDTH": spec.interval_width,
+        "INTERVAL_WIDTH": spec.widths.interval,
         "C": carried.scale,
         "CARRIED": carried.depth,
     }
@@ -204,14 +204,14 @@ _RAIRAN_PROBES = {
 def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof:
     """Return PR: the method of Rairán, from steps to updates."""
     spec = RairanTachometer(**counting(tick_cycles, max_ticks, max_count))
-    assert spec.max_count == max_count, spec.max_count
+    assert spec.widths.max_count == max_count, spec.widths.max_count
     parameters = {
         "T": tick_cycles,
         "MAX_TICKS": max_ticks,
         "MAX_COUNT": max_count,
-        "COUNT_WIDTH": spec.count_width,
-        "VELOCITY_WIDTH": spec.velocity_width,
-        "FRAC_BITS": spec.frac_bits,
+        "COUNT_WIDTH": spec.widths.count,
+        "VELOCITY_WIDTH": spec.widths.velocity,
+        "FRAC_BITS": spec.widths.frac_bits,
     }
     return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES | STANDSTILL_PROBES, depth=10)
 
@@ -223,7 +223,7 @@ def after_upset(name: str, proof: Proof, lemmas: str, without: str = "") -> Proo
     Neither core nor checker is reset, so what holds in one clock after any state holds in all that follow.
     """
     parameters = proof.parameters | ({} if proof.checker == "m_method" else {"UPSET": 1})
-    clocks = proof.spec.recovery_clocks
+    clocks = proof.spec.recovery.clocks
     assert clocks is not None
     return replace(
         proof, name=name, parameters=parameters, depth=1, recovers=clocks, only=f"p* {lemmas}", without=without

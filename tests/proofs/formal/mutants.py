@@ -125,7 +125,7 @@ MUTANTS = [
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
     Mutant("M of 3", "pm_velocity", MovingSum, "Mux(full, read.data, 0)", "read.data"),
     Mutant("M of 4", "pm_stalled", Standstill, "init=most)", "init=most - 1)"),
-    Mutant("M of 3", "pm_bounds", MMethod, "margin=spec.margin", "margin=0"),
+    Mutant("M of 3", "pm_bounds", MMethod, "margin=spec.form.margin", "margin=0"),
     Mutant(
         "M of 4", "pm_known", MMethod, "known.bounds_valid.eq(seen >= spec.average)", "known.bounds_valid.eq(seen != 0)"
     ),

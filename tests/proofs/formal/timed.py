@@ -55,37 +55,39 @@ def timed(
 ) -> Proof:
     """Return PT: the T and the M/T method, from steps and ticks to updates."""
     spec = method(**counting(tick_cycles, max_ticks, max_count), **options)
-    assert spec.max_count == max_count, spec.max_count
+    assert spec.widths.max_count == max_count, spec.widths.max_count
     mt = isinstance(spec, MTTachometer)
     parameters = {
         "MT": int(mt),
-        "LATTICE": int(spec.on_lattice),
+        "LATTICE": int(spec.form.on_lattice),
         "T": tick_cycles,
-        "COUNT_WIDTH": spec.count_width,
+        "COUNT_WIDTH": spec.widths.count,
         "MAX_COUNT": max_count,
-        "MAX_VELOCITY": spec.max_velocity,
-        "VELOCITY_WIDTH": spec.velocity_width,
+        "MAX_VELOCITY": spec.widths.max_velocity,
+        "VELOCITY_WIDTH": spec.widths.velocity,
         "MAX_TICKS": max_ticks,
-        "MAX_PERIODS": spec.max_periods,
-        "MIN_PERIODS": spec.min_periods if isinstance(spec, MTTachometer) else 0,
-        "CYCLE": spec.cycle_counts if isinstance(spec, MTTachometer) else 1,
-        "MAX_QUOTIENT": spec.max_quotient,
-        "SATURATES": int(spec.saturates),
-        "FLAGS": int(spec.flags_range),
-        "INTEGER_BITS": spec.max_quotient.bit_length() + 1,
-        "QUOTIENT_BITS": spec.quotient_bits,
-        "INTERVAL_WIDTH": spec.interval_width,
-        "FRAC_BITS": spec.frac_bits,
-        "DIVISION_CLOCKS": spec.division_clocks,
+        "MAX_PERIODS": spec.form.max_periods,
+        "MIN_PERIODS": spec.form.min_periods if isinstance(spec, MTTachometer) else 0,
+        "CYCLE": spec.form.cycle_counts if isinstance(spec, MTTachometer) else 1,
+        "MAX_QUOTIENT": spec.form.max_quotient,
+        "SATURATES": int(spec.form.saturates),
+        "FLAGS": int(spec.form.flags_range),
+        "INTEGER_BITS": spec.form.max_quotient.bit_length() + 1,
+        "QUOTIENT_BITS": spec.form.quotient_bits,
+        "INTERVAL_WIDTH": spec.widths.interval,
+        "FRAC_BITS": spec.widths.frac_bits,
+        "DIVISION_CLOCKS": spec.form.division_clocks,
     }
     probes = _TIMED_PROBES | STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
     probes |= within("cycles", _CYCLES_OF_MT_PROBES, parameters["CYCLE"] > 1)
-    probes |= within("clocked", _CLOCKED_PROBES, not spec.on_lattice)
-    probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.on_lattice)
-    probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.flags_range)
+    probes |= within("clocked", _CLOCKED_PROBES, not spec.form.on_lattice)
+    probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.form.on_lattice)
+    probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.form.flags_range)
     held = {"core_back": "negative", "core_most": "most"}
-    probes |= within("holds", {name: f"datapath.quotient_velocity.{at}" for name, at in held.items()}, spec.saturates)
-    probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.flags_range)
+    probes |= within(
+        "holds", {name: f"datapath.quotient_velocity.{at}" for name, at in held.items()}, spec.form.saturates
+    )
+    probes |= within("flag", {"core_beyond": "datapath.quotient_velocity.beyond"}, spec.form.flags_range)
     return Proof(name, spec, "timed", parameters, probes, depth=4)
 
 
@@ -105,13 +107,13 @@ def mt_after_upset(name: str, proof: Proof) -> list[Proof]:
     From any state that is given which holds some clocks before the end; at the end what is shown is of a division that
     began since then; and what such a division shows is right, by induction.
     """
-    spec, clocks = proof.spec, proof.spec.recovery_clocks
+    spec, clocks = proof.spec, proof.spec.recovery.clocks
     assert isinstance(spec, MTTachometer)
     assert clocks is not None
-    settled = clocks - spec.max_periods - spec.max_interval - spec.division_clocks - 1
+    settled = clocks - spec.form.max_periods - spec.form.max_interval - spec.form.division_clocks - 1
     upset = replace(proof, parameters=proof.parameters | {"UPSET": 1, "SETTLED": 0})
     late = upset.parameters | {"SETTLED": settled}
-    parts = _MT_GIVEN | (_CYCLES_GIVEN if spec.cycle_counts > 1 else {})
+    parts = _MT_GIVEN | (_CYCLES_GIVEN if spec.form.cycle_counts > 1 else {})
     return [
         *(
             replace(upset, name=f"{name}: {part}", depth=1, recovers=settled, only=given)

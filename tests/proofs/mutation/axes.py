@@ -68,7 +68,7 @@ def _motion(spec: STachometer, rng: np.random.Generator, number: int) -> PinTrac
         return bursts(spec, rng)
     if kind == 1:
         return steady(spec, rng)
-    longest = spec.longest_tick * spec.timing.max_ticks
+    longest = spec.times.longest_tick * spec.timing.max_ticks
     return noise(spec, rng, int(rng.integers(4, 20 * longest)), 20)
 
 

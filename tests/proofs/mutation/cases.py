@@ -106,7 +106,7 @@ class Case:
         return Pins(
             tuple(port for port in ports if port.direction == "input"),
             tuple(port for port in ports if port.direction == "output"),
-            tuple(self.spec.strobes),
+            tuple(self.spec.ports.strobes),
         )
 
 
@@ -153,6 +153,7 @@ CASES = [
         average=4,
         unit="rpm",
         frac_bits=6,
+        external_tick=True,
         max_tick_cycles=9,
         lowpass=Fraction(1, 2),
     ),
@@ -160,11 +161,22 @@ CASES = [
     _case("t", "in ticks", 5, 44, None, timer="tick", unit="rpm", frac_bits=5, velocity_width=8, **_FRONT),
     _case("mt", "in clocks", 7, 5, 3, bounds=True, age=True),
     _case("mt", "whole cycles", 7, 5, 1, 340, whole_cycles=True),
-    _case("mt", "in ticks", 9, 12, 1, timer="tick", max_tick_cycles=11, decoding=1),
+    _case("mt", "in ticks", 9, 12, 1, timer="tick", external_tick=True, max_tick_cycles=11, decoding=1),
     _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),
     _case("rairan", "n2", 5, 6, 2, 340, estimate="n2", **_FRONT),
     _case("rairan", "to the letter", 3, 6, 2, 340, estimate="n1", paper_exact=True),
     _case("track", "age", 761, 6, 2, 340, bandwidth=Fraction(5), age=True, fine_bits=1),
-    _case("track", "external tick", 761, 6, 2, 340, bandwidth=Fraction(5), max_tick_cycles=801, fine_bits=1),
+    _case(
+        "track",
+        "external tick",
+        761,
+        6,
+        2,
+        340,
+        bandwidth=Fraction(5),
+        external_tick=True,
+        max_tick_cycles=801,
+        fine_bits=1,
+    ),
     _case("track", "index", 761, 6, 2, 340, bandwidth=Fraction(5), fine_bits=1, **_FRONT),
 ]

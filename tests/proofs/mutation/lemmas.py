@@ -35,7 +35,7 @@ def _tick(spec: STachometer) -> list[str]:
     if cycles >= 16:
         return []  # the sampling clock is no counter
     left = "$signed({sampling_clock.left})"
-    start = raised_for(cycles, spec.max_count)
+    start = raised_for(cycles, spec.widths.max_count)
     name = f"pulse_counter.{'raised' if start else 'count'}"
     return [
         f"{left} >= -1 && {left} <= {cycles - 2}",
@@ -51,13 +51,13 @@ def _window(spec: STachometer) -> list[str]:
     counts = ("pulse_counter.pulse_count", "alteration.offset", "interval.opening")
     return [
         f"{{m_s}} >= 1 && {{m_s}} <= {longest} && {{longest}} == ({{m_s}} == {longest})",
-        *(_within(name, spec.max_count) for name in counts),
+        *(_within(name, spec.widths.max_count) for name in counts),
     ]
 
 
 def _gap(spec: TimedTachometer) -> list[str]:
     """Return the last count's age, and its sign, which counts for nothing if it is too old."""
-    longest = spec.max_periods
+    longest = spec.form.max_periods
     return [
         f"{{gap_timer.age}} >= 1 && {{gap_timer.age}} <= {longest} && {{longest}} == ({{gap_timer.age}} == {longest})",
         "!{gap_timer.opened} || {was_negative} == [was_negative]",

@@ -102,7 +102,7 @@ class LoopCase(Case):
             return bursts(spec, rng)
         if kind == 2:
             return steady(spec, rng)
-        longest = self.spec.period * (self.spec.longest + 3)
+        longest = self.spec.period * (self.spec.units.longest + 3)
         return noise(spec, rng, int(rng.integers(4, 20 * longest)), 20, still=bool(rng.random() < 0.2))
 
     def _commanded(self, trace: PinTrace, rng: np.random.Generator) -> tuple[NDArray[np.uint64], list[Command]]:
@@ -144,7 +144,7 @@ _CONVENTIONAL: dict[str, Any] = {
     "multiplier": "parallel",
     "synchronised": False,
     "observer": Fraction(2),
-    "filter": Fraction(3),
+    "velocity_filter": Fraction(3),
     "current_width": 10,
 }
 
@@ -175,17 +175,17 @@ def _case(
         "position_gain": Fraction(1),
         "velocity_gain": Fraction(1),
         "observer": Fraction(1, 2),
-        "filter": Fraction(3, 4),
+        "velocity_filter": Fraction(3, 4),
         "current_limit": Fraction(1),
         "current_width": 12,
     }
-    return LoopCase(f"loop, {name}", kind(tachometer=tachometer, period=period, **options | loop), mutants)
+    return LoopCase(f"loop, {name}", kind(tachometer=tachometer, control_period=period, **options | loop), mutants)
 
 
 LOOPS = [
     # What is held from a control tick to the next is read an odd number of clocks after it: an inverter would be seen.
-    _case("serial", 82, 10, 164, 300, filter=None, current_width=13),
+    _case("serial", 82, 10, 164, 300, velocity_filter=Fraction(0), current_width=13),
     _case("parallel", 26, 12, 52, 160, kind=_Short, method="t", multiplier="parallel"),
     _case("conventional", 52, 2, 52, 120, **_CONVENTIONAL),
-    _case("unfiltered", 26, 4, 52, 80, method="t", multiplier="parallel", filter=None),
+    _case("unfiltered", 26, 4, 52, 80, method="t", multiplier="parallel", velocity_filter=Fraction(0)),
 ]

@@ -92,7 +92,7 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     n_clocks = int(clock[-1]) + 1
     level = _levels(clock, quarter, n_clocks)
     (z,) = noise_lines(rng, n_clocks, 1)
-    tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.longest_tick + 2) == 0
+    tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.times.longest_tick + 2) == 0
     return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
 
 
@@ -117,7 +117,7 @@ def steps(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     lengths.
     """
     longest = spec.timing.max_ticks
-    most = min(spec.timing.tick_cycles, (spec.max_count + 1) * 4 // spec.encoder.decoding)
+    most = min(spec.timing.tick_cycles, (spec.widths.max_count + 1) * 4 // spec.encoder.decoding)
     lasts = rng.integers(1, longest + 2, _STEPS)
     counts = np.where(rng.random(_STEPS) < 0.3, rng.integers(-2, 3, _STEPS), rng.integers(-most, most + 1, _STEPS))
     return _of_counts(spec, np.repeat(np.clip(counts, -most, most), lasts))
@@ -133,16 +133,16 @@ def hard(spec: STachometer, form: Reciprocal) -> PinTrace:
     for m in range(1, form.max_m + 1):
 
         def near(d: int, m: int = m) -> int:
-            past = ((d << spec.finer) * form.value(m) + form.rounding()) % one
+            past = ((d << spec.form.finer) * form.value(m) + form.rounding()) % one
             return min(past, one - past)
 
-        for d in sorted(range(-4 * spec.max_count, 4 * spec.max_count + 1), key=near)[:_HARD]:
-            b = int(np.sign(d)) * -max(0, (abs(d) - 2 * spec.max_count + 1) // 2)
+        for d in sorted(range(-4 * spec.widths.max_count, 4 * spec.widths.max_count + 1), key=near)[:_HARD]:
+            b = int(np.sign(d)) * -max(0, (abs(d) - 2 * spec.widths.max_count + 1) // 2)
             first = (d + 2 * b) // 2
             counts += [b, b, first, *[b] * (m - 1), d + 2 * b - first]
     # The longest one between two empty ticks is no standstill.
     counts += [1, 1, 0, *[1] * (form.max_m - 1), 0, 1, 1]
-    return _of_counts(spec, np.array(counts), spec.pin_to_count)
+    return _of_counts(spec, np.array(counts), spec.latency.pin_to_count)
 
 
 def _of_counts(spec: TachometerSpec, counts: NDArray[np.int64], earlier: int = 0) -> PinTrace:
@@ -173,12 +173,12 @@ def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
     found = []
     for before in range(-3, 10):
         for of_tick in (True, False):
-            trace = noise(spec, rng, 4 * spec.longest_tick, 2)
+            trace = noise(spec, rng, 4 * spec.times.longest_tick, 2)
             while not len((run := golden.run(spec, trace)).updates.clock):
-                trace = noise(spec, rng, 4 * spec.longest_tick, 2)
-            clocks = run.ticks.clock - spec.tick_latency if of_tick else run.updates.clock
+                trace = noise(spec, rng, 4 * spec.times.longest_tick, 2)
+            clocks = run.ticks.clock - spec.latency.tick if of_tick else run.updates.clock
             found.append(trace.until(max(int(rng.choice(clocks[:2])) - before, 1)))
-    return [*found, noise(spec, rng, 4 * spec.longest_tick, 2)]
+    return [*found, noise(spec, rng, 4 * spec.times.longest_tick, 2)]
 
 
 def _levels(clock: NDArray[np.int64], quarter: NDArray[np.int64], n_clocks: int) -> NDArray[np.uint8]:
@@ -210,7 +210,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
     long = spec.timing.tick_cycles > _LONG
     n_clocks *= 10 if long else 1
     period = 64 if long else 8  # with more resets between
-    longest = spec.longest_tick * spec.timing.max_ticks
+    longest = spec.times.longest_tick * spec.timing.max_ticks
     n_silences = 10 if long else 40
 
     def add(trace: PinTrace, resets: int) -> None:
@@ -256,8 +256,8 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
         add(trace, int(rng.choice([1, 1, 2, 5])))
     last = ending(spec, rng) if long else []
-    if isinstance(spec, STachometer) and isinstance(spec.reciprocal, Reciprocal):
-        last = [*ending(spec, rng), hard(spec, spec.reciprocal)]
+    if isinstance(spec, STachometer) and isinstance(spec.form.reciprocal, Reciprocal):
+        last = [*ending(spec, rng), hard(spec, spec.form.reciprocal)]
     for trace in last:
         add(trace, 1)
     return Stimulus(np.concatenate(pins).astype(np.uint64)[:, np.newaxis], traces, starts)

@@ -61,7 +61,7 @@ def _definitions(spec: TrackTachometer) -> list[str]:
     left = f"[{width - 1}:{width - more}]"
     lines += [f"wire [{more - 1}:0] done_steps = now_word{left} - {{datapath.machine.now}}{left};"]
     lines += ["wire signed [15:0] now_since = $signed({1'b0, now_begins}) + $signed({1'b0, done_steps}) + 2;"]
-    start = spec.longest_tick - 2
+    start = spec.times.longest_tick - 2
     return [*lines, *_left(spec, start), f"wire signed [15:0] since = {start - 2} - left;"]
 
 
@@ -69,7 +69,7 @@ def _left(spec: TrackTachometer, start: int) -> list[str]:
     """Return the clocks that are left of a tick: that is what an external tick counts; else each state has its
     number.
     """
-    if spec.max_tick_cycles:
+    if spec.external_tick:
         return ["wire signed [15:0] left = $signed({sampling_clock.left});"]
     states = SamplingClock(spec.timing.tick_cycles).states
     bits = max(states).bit_length()
@@ -92,7 +92,7 @@ def _lemmas(spec: TrackTachometer) -> list[str]:
     fetched, held, active = (f"{{datapath.machine.{name}}}" for name in ("fetched", "held", "active"))
     now = "{datapath.machine.now}"
     rest = f"[{width - more - 1}:0]"
-    start = spec.longest_tick - 2
+    start = spec.times.longest_tick - 2
     length = len(spec.program.instructions)
     length_clocks = begins(spec.program.instructions)[-1]
     elapsed = "{tick_counts.elapsed}"
@@ -114,7 +114,7 @@ def _lemmas(spec: TrackTachometer) -> list[str]:
         f"!{{pulse_counter.complete}} || left == {start}",
         f"!{{pulse_counter.tick}} || left == {start - 1}",
         "{datapath.machine.phase} != 3",
-        f"{{tick_counts.number}} <= {spec.max_count} && {{tick_counts.open_number}} <= {spec.max_count}",
+        f"{{tick_counts.number}} <= {spec.widths.max_count} && {{tick_counts.open_number}} <= {spec.widths.max_count}",
         f"{elapsed} <= {spec.timing.max_ticks}",
         "{tick_counts.counted} == |{tick_counts.number}",
     ]
@@ -123,8 +123,8 @@ def _lemmas(spec: TrackTachometer) -> list[str]:
     found += [
         f"!{{updates__valid}} || since == {length_clocks + 3} || {{pulse_counter.complete}} || {{pulse_counter.tick}}",
     ]
-    if spec.min_tick_cycles and spec.max_tick_cycles:
-        found.append(f"!{{enough}} || left < {start - (spec.min_tick_cycles - 2)}")
+    if spec.times.min_tick_cycles and spec.external_tick:
+        found.append(f"!{{enough}} || left < {start - (spec.times.min_tick_cycles - 2)}")
     return found
 
 

@@ -274,24 +274,23 @@ _argue(
     "In general a ratio of 1 is 2^shift, all of whose zeros are dropped: 1 and no shift. No ratio is 2 or 0.",
     *("1 → 2", "1 → 0"),
 )
-_argue("spec/core/numbers.py: Numbers", "It declares no parameters of its own.", "True → False #2")
 _argue(
-    "spec/core/numbers.py: Numbers.min_tick_cycles",
+    "spec/core/times.py: Times.min_tick_cycles",
     "It is 2 at least anyway.",
     *("0 → 1", "0 → 1 #2", "0 → -1", "0 → -1 #2"),
 )
 _argue(
-    "spec/methods/rairan.py: RairanTachometer._bound",
+    "spec/methods/rairan.py: RairanForm._bound",
     "It is only asked for −1 and 1.",
     "towards < 0 → towards <= 0",
 )
 _argue(
-    "spec/methods/rairan.py: RairanTachometer.lower_table.loose",
+    "spec/methods/rairan.py: RairanForm.lower_table.loose",
     "Whatever is not negative is rounded up.",
     "1 → 0 #2",
 )
 _argue(
-    "spec/core/numbers.py: Numbers.needed_velocity_width",
+    "spec/core/widths.py: Widths.needed_velocity",
     "The greatest output does not depend on the width that it is held within.",
     *("0 → 1", "0 → -1"),
 )
@@ -351,7 +350,7 @@ _argue("spec/methods/axes.py: _nearest", "No tick of one clock has a turn of an 
 _argue("hdl/export/registers/values.py: CapturedValue.field", "A register of a value has one field.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled", "It is replaced when the address is known.", "0 → -1 #2")
 _argue("spec/formats/tracking_code.py: assembled.wait", "A wait does not use the word that is read.", "0 → 1")
-_argue("spec/methods/mt.py: MTTachometer.max_interval", "A window takes a period at least anyway.", "0 → -1")
+_argue("spec/methods/mt.py: MTForm.max_interval", "A window takes a period at least anyway.", "0 → -1")
 for _where in ("_narrowest", "_fewest"):
     _argue(f"spec/formats/reciprocal.py: {_where}", "There are as many fractions as divisors.", "True → False")
 _argue(

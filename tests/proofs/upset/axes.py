@@ -44,7 +44,7 @@ def _from(trace: PinTrace, clock: int) -> PinTrace:
 
 def _columns(spec: AxesSpec) -> list[tuple[str, str]]:
     """Return what is compared, and the strobe with which it is."""
-    found = [(name, strobe) for strobe, names in spec.strobes.items() for name in (strobe, *names)]
+    found = [(name, strobe) for strobe, names in spec.ports.strobes.items() for name in (strobe, *names)]
     return [(name, strobe) for name, strobe in found if not name.startswith(_OF_POSITION)]
 
 
@@ -61,8 +61,8 @@ def upsets(n: int, seed: int = 1, only: str = "") -> Campaign:
     """Run a campaign, as `campaign.upsets` does."""
     spec, trace = SPEC, _trace(SPEC, seed)
     core = Upsettable(spec, trace)
-    bound = spec.recovery_clocks
-    ports = [port.name for port in spec.outputs]
+    bound = spec.recovery.clocks
+    ports = [port.name for port in spec.ports.outputs]
     columns = [(ports.index(name), ports.index(strobe)) for name, strobe in _columns(spec)]
     compared, strobes = (np.array(places) for places in zip(*columns, strict=True))
     tick, axis = ports.index("tick"), ports.index("axis")
@@ -72,7 +72,7 @@ def upsets(n: int, seed: int = 1, only: str = "") -> Campaign:
         phase = 0
         begun = np.flatnonzero(shown[:, tick].astype(bool) & (shown[:, axis] == 0))
         if len(begun):
-            phase = int((clock + begun[-1] - spec.tick_clock(0, 0)) % spec.longest_tick)
+            phase = int((clock + begun[-1] - spec.tick_clock(0, 0)) % spec.times.longest_tick)
         if phase not in expected:
             late = AxesTrace(tuple(_from(each, phase) for each in trace.each))
             expected[phase] = _dense(spec, golden.run(spec, late), phase)

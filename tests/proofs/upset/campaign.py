@@ -38,7 +38,7 @@ def spec_of(method: str) -> TachometerSpec:
         "encoder": Encoder(500, 4),
         "timing": Timing(5_000_000, TICK_CYCLES, MAX_TICKS),
         "age": True,
-        "bounds": METHODS[method].has_bounds,
+        "bounds": METHODS[method].facts.bounds,
     }
     return METHODS[method](**options | _OPTIONS.get(method, {}))
 
@@ -133,7 +133,7 @@ def _expected(spec: TachometerSpec, trace: PinTrace, phase: int) -> NDArray[np.i
     """Return what the golden model shows whose windows end in clocks `phase`, `phase` + T …; outputs in order of the
     ports.
     """
-    last = np.arange(phase, trace.n_clocks - spec.tick_latency, spec.timing.tick_cycles, dtype=np.int64)
+    last = np.arange(phase, trace.n_clocks - spec.latency.tick, spec.timing.tick_cycles, dtype=np.int64)
     with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
         found = dense(spec, golden.run(spec, trace))
     return np.stack([found[name] for name in _compared(spec)], axis=1)
@@ -149,15 +149,15 @@ def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> 
     What forgets only gradually forgets all at rest: when there is no count for the maximum time, and before it there
     was one that is surely right.
     """
-    if spec.recovery_clocks is not None:
-        return np.full(len(clock), spec.recovery_clocks)
+    if spec.recovery.clocks is not None:
+        return np.full(len(clock), spec.recovery.clocks)
     silent = np.flatnonzero(
-        np.diff(trace.clock, append=trace.n_clocks) > (spec.timing.max_ticks + 1) * spec.longest_tick
+        np.diff(trace.clock, append=trace.n_clocks) > (spec.timing.max_ticks + 1) * spec.times.longest_tick
     )
     last = trace.clock[silent]  # counts before a rest
-    rest = (spec.timing.max_ticks + 1) * spec.longest_tick + spec.pin_to_count + spec.tick_latency
-    found = np.searchsorted(last, clock + spec.front_recovery_clocks)
-    return np.append(last, trace.n_clocks)[found] + rest + spec.tick_to_velocity - clock
+    rest = (spec.timing.max_ticks + 1) * spec.times.longest_tick + spec.latency.pin_to_count + spec.latency.tick
+    found = np.searchsorted(last, clock + spec.recovery.front)
+    return np.append(last, trace.n_clocks)[found] + rest + spec.latency.tick_to_velocity - clock
 
 
 def _forgive(shown: NDArray[np.int64], right: NDArray[np.int64], column: int, fine_bits: int) -> None:
@@ -185,8 +185,8 @@ def upsets(method: str, n: int, seed: int = 1) -> Campaign:
         shown = rows[:, compared]
         shown[:, age] *= shown[:, tick]
         phase = 0
-        if not spec.own_ticks and shown[:, tick].any():
-            own = clock + np.flatnonzero(shown[:, tick])[-1] - spec.tick_latency
+        if not spec.facts.own_ticks and shown[:, tick].any():
+            own = clock + np.flatnonzero(shown[:, tick])[-1] - spec.latency.tick
             phase = int(own % spec.timing.tick_cycles)
         if phase not in expected:
             expected[phase] = _expected(spec, trace, phase)

@@ -37,15 +37,15 @@ SPEC = LoopSpec(
     position_gain=Fraction(1_000_000),
     velocity_gain=Fraction(2000),
     observer=Fraction(25_000),
-    filter=Fraction(20_000),
-    period=100,
+    velocity_filter=Fraction(20_000),
+    control_period=100,
     multiplier="parallel",
 )
 
 
 LOOPS = {
     "loop": SPEC,
-    "loop, serial": replace(SPEC, multiplier="serial", period=200),
+    "loop, serial": replace(SPEC, multiplier="serial", control_period=200),
     "loop, conventional": replace(SPEC, synchronised=False),
 }
 
@@ -73,7 +73,7 @@ def _forgets(spec: LoopSpec) -> int:
     e^(−G·t) is left of y and of z, and once more as one drives the other.
     """
     slower = min(spec.observer, spec.filter or spec.observer)
-    return math.ceil(2 * math.log(2 * spec.form.most_w) / float(slower * spec.seconds)) + spec.longest
+    return math.ceil(2 * math.log(2 * spec.form.most_w) / float(slower * spec.units.seconds)) + spec.units.longest
 
 
 def _trace(spec: LoopSpec, seed: int) -> CommandedTrace:
@@ -113,12 +113,12 @@ class _Right:
     def of(cls, spec: LoopSpec, trace: CommandedTrace, ticks: int, control_ticks: int, away: int) -> "_Right":
         """Return with windows and control ticks of these phases, and a position that is so many counts off."""
         alone = spec.tachometer
-        last = np.arange(ticks, trace.n_clocks - alone.tick_latency, alone.longest_tick, dtype=np.int64)
+        last = np.arange(ticks, trace.n_clocks - alone.latency.tick, alone.times.longest_tick, dtype=np.int64)
         with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
             updates = golden.tables(alone, trace.pins)[UPDATE]
         clock = np.arange(control_ticks, trace.n_clocks, spec.period, dtype=np.int64)
         # The position is as late as a tick shows it.
-        places, _ = count(alone, decoded(alone, trace.pins), clock - alone.tick_latency)
+        places, _ = count(alone, decoded(alone, trace.pins), clock - alone.latency.tick)
         return cls(clock, control(spec, clock, places.position + away, updates, trace.command(clock)))
 
     def dense(self, first: int, n: int) -> NDArray[np.int64]:
@@ -136,7 +136,7 @@ def _allowed(spec: LoopSpec, trace: CommandedTrace) -> NDArray[np.int64]:
     """Return clocks after which all must be right: the tachometer is first, then control ticks come again, and then the
     current has not been enabled for as long as y and z take to forget.
     """
-    own = spec.tachometer.recovery_clocks
+    own = spec.tachometer.recovery.clocks
     assert own is not None
     counters = own + (1 << (spec.period - 1).bit_length()) + 2 * spec.period
     at, enable = trace.commands["clock"], trace.commands["enable"]
@@ -151,7 +151,7 @@ def upsets(name: str, n: int, seed: int = 1, only: str = "") -> Campaign:
     spec = LOOPS[name]
     trace = _trace(spec, seed)
     core = Upsettable(spec, trace)  # type: ignore[arg-type]
-    ports = [port.name for port in spec.outputs]
+    ports = [port.name for port in spec.ports.outputs]
     compared = [ports.index(name) for name in _COMPARED]
     position, tick, control_tick = (ports.index(name) for name in ("position", "tick", "control_tick"))
     expected: dict[tuple[int, int, int], _Right] = {}
@@ -162,10 +162,10 @@ def upsets(name: str, n: int, seed: int = 1, only: str = "") -> Campaign:
         ticks, controls = (np.flatnonzero(shown[:, place]) for place in (tick, control_tick))
         if not len(ticks) or not len(controls):
             return np.ones(len(shown), dtype=bool)
-        last = clock + int(ticks[-1]) - alone.tick_latency
+        last = clock + int(ticks[-1]) - alone.latency.tick
         right_position, _ = count(alone, steps, np.array([last]))
         away = int(shown[ticks[-1], position] - right_position.position[0])
-        key = (last % alone.longest_tick, (clock + int(controls[-1])) % spec.period, away)
+        key = (last % alone.times.longest_tick, (clock + int(controls[-1])) % spec.period, away)
         if key not in expected:
             expected[key] = _Right.of(spec, trace, *key)
         seen = shown[:, compared]

@@ -69,7 +69,7 @@ class Upsettable:
     """
 
     def __init__(self, spec: AnySpec, trace: Trace) -> None:
-        self._design = design = Design(spec, list(spec.pins))
+        self._design = design = Design(spec, list(spec.ports.pins))
         self._trace = trace
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         text = translate(netlist)

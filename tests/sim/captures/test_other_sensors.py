@@ -25,7 +25,7 @@ def counts(recording: Recording, sensor: str, decoding: int) -> tuple[np.ndarray
         "s", {"ppr": "36", "clock": "100kHz", "tick": str(TICK), "max-time": "5000", "decoding": str(decoding)}
     )
     ticks = golden.run(spec, PinTrace.of(other_sensors.converted(recording, sensor, spec), spec)).ticks
-    return ticks.pulse_count, ticks.clock - spec.tick_latency - spec.pin_to_count
+    return ticks.pulse_count, ticks.clock - spec.latency.tick - spec.latency.pin_to_count
 
 
 def in_ticks(times: np.ndarray, steps: np.ndarray, ends: np.ndarray) -> np.ndarray:

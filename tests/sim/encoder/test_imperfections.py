@@ -213,7 +213,7 @@ def golden_run(encoding: Encoding, clock_hz: int, filter_clocks: int = 0) -> tup
     """Return the core's golden model, and the true position that each tick should show."""
     spec = STachometer(encoder=SpecEncoder(PPR), timing=Timing(clock_hz, 100, 10), filter_clocks=filter_clocks)
     run = golden.run(spec, encoding.recording.place(clock_hz))
-    sampled = (run.ticks.clock - spec.tick_latency - spec.pin_to_count) / clock_hz
+    sampled = (run.ticks.clock - spec.latency.tick - spec.latency.pin_to_count) / clock_hz
     return run, encoding.true_position(sampled)
 
 

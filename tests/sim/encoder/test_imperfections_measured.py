@@ -26,7 +26,7 @@ def steady(encoding: Encoding, run: Run) -> None:
 
 
 def behind(encoding: Encoding, run: Run) -> int:
-    sampled = (run.ticks.clock[-1] - CORE.tick_latency - CORE.pin_to_count) / CLOCK_HZ
+    sampled = (run.ticks.clock[-1] - CORE.latency.tick - CORE.latency.pin_to_count) / CLOCK_HZ
     return int(encoding.true_position(sampled) - run.ticks.position[-1])
 
 

@@ -163,7 +163,7 @@ def test_every_method_has_a_core_that_settles_at_once() -> None:
 
     for method in METHODS.values():
         spec: TachometerSpec = method(
-            encoder=Encoder(100), timing=Timing(100_000, 1000, 10), bounds=method.has_bounds, age=True
+            encoder=Encoder(100), timing=Timing(100_000, 1000, 10), bounds=method.facts.bounds, age=True
         )
         text = translate(rtlil.convert(Tachometer(spec), name="top", emit_src=False))
         assert "bool converged = true;" in text

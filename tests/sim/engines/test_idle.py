@@ -55,10 +55,10 @@ def check_core(spec: TachometerSpec) -> None:
     if trace.n_clocks > 5e6:
         trace = trace.until(5_000_000)
     check(spec, trace)
-    cycles = spec.longest_tick
+    cycles = spec.times.longest_tick
     slow = turning([3 * cycles + 1, 5, max(cycles - 1, 1)], 12, 5 * cycles)
     low = np.zeros(12, dtype=np.uint8)
-    others: dict[str, Any] = {pin.name: low for pin in spec.pins if pin.name not in slow.lines}
+    others: dict[str, Any] = {pin.name: low for pin in spec.ports.pins if pin.name not in slow.lines}
     check(spec, replace(slow, **others))
 
 

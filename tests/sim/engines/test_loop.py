@@ -86,7 +86,7 @@ def test_counts_are_those_of_the_virtual_encoder(encoder: VirtualEncoder) -> Non
     fast = 2 * PLAIN.torque_constant / PLAIN.inertia * 0.1
     motion = parse_motion(f"ramp:0:{fast!r}:100ms+ramp:{fast!r}:{-2 * fast!r}:300ms+ramp:{-2 * fast!r}:0:200ms")
     encoding = replace(encoder, start_angle_rad=encoder.disc.pitch_rad / 2).record(motion)
-    time = log["time"][1:] - (S_CORE.pin_to_count + 1) / S_CORE.timing.clock_hz
+    time = log["time"][1:] - (S_CORE.latency.pin_to_count + 1) / S_CORE.timing.clock_hz
     expected = encoding.true_position(time) - encoding.true_position(0.0)
     wrong = log["position"][1:] - expected
     assert np.abs(wrong).max() <= 1
@@ -125,7 +125,9 @@ def weights_of_eq_22(way: Observer, simulation: LoopSimulation | None = None) ->
     names = ("time", "position", "held", "y", "z", "disturbance", "current")
     time, position, held, y, z, disturbance, current = (log[name][part].tolist() for name in names)
     to_speed = gains.torque_constant / (gains.inertia * gains.observer)
-    first = (S_CORE.pin_to_count + S_CORE.tick_latency + S_CORE.tick_to_velocity + 1) / S_CORE.timing.clock_hz
+    first = (
+        S_CORE.latency.pin_to_count + S_CORE.latency.tick + S_CORE.latency.tick_to_velocity + 1
+    ) / S_CORE.timing.clock_hz
     conventional, last, tested = way is Observer.CONVENTIONAL, 0, 0
     for k in range(1, len(y)):
         if conventional or y[k] != y[k - 1]:

@@ -27,7 +27,7 @@ def states(form: GeneratorForm, demands: list[Demand], position: int = 0) -> np.
 
 def check_sine(hertz: float, amplitude: float, n: int) -> None:
     """A sine is one for ever, and place and speed are sums, in every bit."""
-    turn = math.pi * hertz * float(USUAL.seconds)
+    turn = math.pi * hertz * float(USUAL.units.seconds)
     rate = round(4 * math.sin(turn) ** 2 * 2**RATE_FRAC_BITS)
     angle = 2 * math.asin(math.sqrt(rate / 2**RATE_FRAC_BITS) / 2)
     found = states(FORM, [Demand(SINE, amplitude=round(amplitude * 256), rate=rate)] * n, 7)
@@ -65,7 +65,7 @@ def test_the_commands_are_in_the_units_of_the_ports(spec: LoopSpec) -> None:
     form = spec.generator
     assert (form.acceleration.shift < 0) == (spec is OFTEN)
     count = 2 * math.pi / spec.tachometer.encoder.counts_per_rev
-    tick, velocity = float(spec.seconds), float(spec.rad_per_s / (1 << spec.command_bits))
+    tick, velocity = float(spec.units.seconds), float(spec.units.rad_per_s / (1 << spec.units.command_bits))
     most = (1 << 19) - 1
     generator = command_generator.Generator(form)
     for raw, bound in ((123_456_789, 1 << 30), (-1_000_000_007, 87_000), (3, 1000), (-2_000_000, 7), (5, 1 << 31)):
@@ -73,7 +73,7 @@ def test_the_commands_are_in_the_units_of_the_ports(spec: LoopSpec) -> None:
         command = generator.command()
         speed = generator.speed / 2**form.fraction * count / tick / velocity
         assert command.velocity == pytest.approx(speed, abs=0.57)
-        change = generator.change / 2**form.fraction * count / tick**2 * 2.0**spec.acceleration_frac_bits
+        change = generator.change / 2**form.fraction * count / tick**2 * 2.0**spec.units.acceleration_frac_bits
         assert command.acceleration == pytest.approx(np.clip(change, -most, most), abs=0.57)
         assert abs(command.acceleration) < most or bound > 1 << 20
 

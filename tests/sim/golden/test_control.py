@@ -29,7 +29,7 @@ def check_side_by_side(spec: LoopSpec) -> None:
     """Given the same updates, positions and commands both have the same y, z and currents, whatever the limit does."""
     rng = np.random.default_rng(5)
     fixed, double = control_of(spec), Double(spec)
-    lsb, amperes = float(spec.rad_per_s), float(spec.amperes)
+    lsb, amperes = float(spec.units.rad_per_s), float(spec.units.amperes)
     unit = lsb / 2**spec.form.extra_bits
     pitch = 2 * math.pi / CORE.encoder.counts_per_rev
     errors = []
@@ -64,8 +64,8 @@ def control_of(spec: LoopSpec) -> Fixed:
 SPECS = {
     "synchronised": loop(80),
     "conventional": loop(80, synchronised=False),
-    "no filter": loop(40, filter=None),
-    "two filters": loop(160, filter=Fraction(500)),
+    "no filter": loop(40, velocity_filter=Fraction(0)),
+    "two filters": loop(160, velocity_filter=Fraction(500)),
     "no position": loop(20, position_gain=Fraction(0)),
 }
 

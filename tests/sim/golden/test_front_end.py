@@ -104,7 +104,7 @@ def test_the_index_takes_its_position_off() -> None:
 def test_ticks_of_a_method_that_ends_them_itself_stay_saturated() -> None:
     """The sum of the first left the bound and came back; that of the third is at it; the method flags the last."""
     spec = of_texts("rairan", SMALL | {"max-speed": "39269rad/s"})  # two counts a tick
-    assert spec.max_pulse_count == 2
+    assert spec.widths.max_pulse_count == 2
     steps = steps_of([*range(5), *range(20, 23), 40, 41, 60], [-1, -1, -1, 1, 1, 1, 1, 1, 1, 1, 1])
     ticks, _ = count(spec, steps, np.array([9, 29, 49, 69, 89]), np.array([False, False, False, False, True]))
     assert ticks["pulse_count"].tolist() == [-2, 2, 2, 1, 0]

@@ -91,7 +91,7 @@ def test_before_the_first_update_only_the_velocity_is_defined() -> None:
     """The first update is in clock 12; a value of a tick is 0 before the first tick, and defined all the same."""
     bank = Bank(pins(), bounds="yes", age="yes", average="2")
     names = ("VELOCITY", "VELOCITY_LOWER", "VELOCITY_UPPER", "PULSE_COUNT", "AGE")
-    first = 11 + bank.map.spec.datapath_latency
+    first = 11 + bank.map.spec.latency.datapath
     assert bank.at(10, *names) == [0, None, None, 0, 0]
     assert bank.at(first - 1, *names) == [0, None, None, twos(-1), 1]
     assert bank.at(first, *names) == [twos(-8), twos(-16), 0, twos(-1), 0]

@@ -14,9 +14,11 @@ N_ROWS = 4
 
 def spec_of(method: str) -> TachometerSpec:
     """Return a core with as many outputs as the method can have."""
-    bounds = METHODS[method].has_bounds
+    bounds = METHODS[method].facts.bounds
     options: dict[str, object] = {"bounds": bounds, "age": True, "index": True, "filter_clocks": 2, "unit": "rpm"}
-    own: dict[str, object] = {"adaptive": Fraction(1, 10)} if method == "rairan" else {"max_tick_cycles": 2000}
+    own: dict[str, object] = (
+        {"adaptive": Fraction(1, 10)} if method == "rairan" else {"external_tick": True, "max_tick_cycles": 2000}
+    )
     return METHODS[method](encoder=Encoder(500), timing=TIMING, **options, **own)  # type: ignore[arg-type]
 
 
@@ -24,7 +26,7 @@ def run_of(spec: TachometerSpec) -> Run:
     """Return a run with some rows in every table, and another number in every cell."""
     numbers = iter(range(10**6))
     tables = {}
-    for strobe, names in spec.strobes.items():
+    for strobe, names in spec.ports.strobes.items():
         columns = {name: np.array([next(numbers) for _ in range(N_ROWS)]) for name in names}
         tables[strobe] = Table(np.arange(N_ROWS) * 7 + 3, columns)
     return Run(1000, tables)
@@ -32,7 +34,7 @@ def run_of(spec: TachometerSpec) -> Run:
 
 def cells(spec: TachometerSpec) -> list[tuple[str, str]]:
     """Return every column of every table."""
-    return [(strobe, name) for strobe, names in spec.strobes.items() for name in ("clock", *names)]
+    return [(strobe, name) for strobe, names in spec.ports.strobes.items() for name in ("clock", *names)]
 
 
 def with_cell(run: Run, strobe: str, name: str, row: int, change: int) -> Run:
@@ -46,9 +48,9 @@ def with_cell(run: Run, strobe: str, name: str, row: int, change: int) -> Run:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_output_of_the_manifest_is_compared(method: str) -> None:
     spec = spec_of(method)
-    compared = {name for strobe, names in spec.strobes.items() for name in (strobe, *names)}
-    assert compared == {port.name for port in spec.outputs}
-    bounds = {"velocity_lower", "velocity_upper", "bounds_valid"} if METHODS[method].has_bounds else set[str]()
+    compared = {name for strobe, names in spec.ports.strobes.items() for name in (strobe, *names)}
+    assert compared == {port.name for port in spec.ports.outputs}
+    bounds = {"velocity_lower", "velocity_upper", "bounds_valid"} if METHODS[method].facts.bounds else set[str]()
     assert {*bounds, "interval", "stalled", "age"} <= compared
 
 
@@ -75,7 +77,7 @@ def test_any_cell(method: str, change: int) -> None:
 def test_rows_that_only_one_run_has(method: str) -> None:
     spec = spec_of(method)
     run = run_of(spec)
-    for strobe, names in spec.strobes.items():
+    for strobe, names in spec.ports.strobes.items():
         for kept in (slice(0, N_ROWS - 1), slice(0, 1), slice(0, 0)):
             fewer = Run(run.n_clocks, run.tables | {strobe: run.tables[strobe].rows(kept)})
             missing = N_ROWS - kept.stop
@@ -91,7 +93,7 @@ def test_rows_that_only_one_run_has(method: str) -> None:
 def test_a_row_that_is_missing_at_the_begin_or_in_the_middle(method: str) -> None:
     spec = spec_of(method)
     run = run_of(spec)
-    for strobe in spec.strobes:
+    for strobe in spec.ports.strobes:
         for missing in range(N_ROWS - 1):
             rows = np.delete(np.arange(N_ROWS), missing)
             fewer = Run(run.n_clocks, run.tables | {strobe: run.tables[strobe].rows(rows)})

@@ -54,7 +54,7 @@ def core() -> TachometerSpec:
 def test_a_run_is_read_from_the_ports() -> None:
     """A row of outputs in every clock in which a strobe is high; each table takes those of its own strobe."""
     spec = core()
-    names = [port.name for port in spec.outputs]
+    names = [port.name for port in spec.ports.outputs]
     rows = np.zeros((3, 1 + len(names)), dtype=np.int64)
     rows[:, 0] = [11, 12, 20]
     for row, name, value in (

@@ -6,7 +6,6 @@ import pytest
 
 from tachometry.sim.studies.pairs import apart, configurations, factors, rows, spec_of
 from tachometry.spec import METHODS, TachometerSpec, common_options, own_options
-from tachometry.spec.language.option import is_derived
 
 # What cannot be together at all, of every method that has both.
 APART = {
@@ -74,9 +73,9 @@ def test_the_extremes_are_there() -> None:
     for method in METHODS:
         # Tracking takes hundreds of clocks.
         assert values(method, "tick_cycles") >= ({(960,)} if method == "track" else {(1,), (3,), (960,)})
-        widths = [spec for spec in cores[method] if not is_derived(spec.velocity_width)]
+        widths = [spec for spec in cores[method] if spec.velocity_width is not None]
         assert 0 < len(widths) < len(cores[method])
-        assert any(spec.native_frac_bits == 24 for spec in cores[method])
+        assert any(spec.widths.native_frac_bits == 24 for spec in cores[method])
         assert any(spec.max_speed for spec in cores[method])
 
 
@@ -89,7 +88,7 @@ def test_every_option_is_a_factor(method: str) -> None:
     never = {"rairan": {"external-tick"}, "track": {"tick", "bounds"}}
     assert without == {"ppr", "clock", "dt", "lsb"} | never.get(method, set())
     assert "yes index-reset" in found["index"]
-    assert ("yes edge-error 0.3" in found.get("bounds", ())) == METHODS[method].has_bounds
+    assert ("yes edge-error 0.3" in found.get("bounds", ())) == METHODS[method].facts.bounds
 
 
 def test_words_and_specs_are_the_same() -> None:
@@ -97,4 +96,4 @@ def test_words_and_specs_are_the_same() -> None:
         for words in configurations(method):
             spec = spec_of(words)
             assert spec.method == method
-            assert not is_derived(spec.velocity_width) or "--velocity-width" not in words
+            assert ("velocity-width" in f" {words}") == (spec.velocity_width is not None)

@@ -14,7 +14,7 @@ from tachometry.sim.studies.plan import Plan, Plans, default_range, dense_speeds
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 50), frac_bits=24)
-HALF_LSB = 2.0 ** -(SPEC.frac_bits + 1)
+HALF_LSB = 2.0 ** -(SPEC.widths.frac_bits + 1)
 
 
 def with_max_ticks(max_ticks: int, *, cancel: bool = True) -> STachometer:
@@ -24,8 +24,8 @@ def with_max_ticks(max_ticks: int, *, cancel: bool = True) -> STachometer:
 def updates_of(spec: STachometer, m_e: NDArray[np.int64]) -> Table:
     """Return what the golden model makes of pulse numbers; `clock` is the tick that caused the update."""
     ticks = Table(np.arange(len(m_e)), {"pulse_count": m_e})
-    updates = Model(spec).updates(ticks, None, len(m_e) + spec.datapath_latency)
-    return updates.having(clock=updates.clock - spec.datapath_latency)
+    updates = Model(spec).updates(ticks, None, len(m_e) + spec.latency.datapath)
+    return updates.having(clock=updates.clock - spec.latency.datapath)
 
 
 def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Table, NDArray[np.float64]]:
@@ -33,11 +33,11 @@ def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Table, 
     position = (np.arange(n_ticks + 1) * units.numerator + units.denominator // 3) // units.denominator
     updates = updates_of(spec, np.diff(position))
     updates = updates.rows(updates.clock > 200)  # more than two windows, and two equal pulse numbers
-    return updates, np.abs(updates.velocity / 2.0**spec.frac_bits - float(units))
+    return updates, np.abs(updates.velocity / 2.0**spec.widths.frac_bits - float(units))
 
 
 def plan_in_units(spec: STachometer, units: F) -> Plan:
-    return plan_at(spec, [float(units) * spec.unit_velocity])
+    return plan_at(spec, [float(units) * spec.scale.unit_velocity])
 
 
 @pytest.mark.parametrize("cancel", [True, False])
@@ -53,7 +53,7 @@ def test_updates_by_alteration(units: F, cancel: bool) -> None:
     assert updates.interval.mean() == pytest.approx(expected.interval[0], abs=1 / len(updates.interval))
     assert expected.interval[0] == pytest.approx(float(1 / abs(units - round(units))))
     assert expected.measurement_time[0] == pytest.approx(20e-6 * expected.interval[0])
-    assert error.max() <= expected.resolution[0] / spec.unit_velocity + HALF_LSB
+    assert error.max() <= expected.resolution[0] / spec.scale.unit_velocity + HALF_LSB
 
 
 @pytest.mark.parametrize("max_ticks", [2, 9, 50])
@@ -71,7 +71,7 @@ def test_forced_updates(max_ticks: int, cancel: bool) -> None:
         assert expected.forced[0]
         assert updates.forced.any()
         assert expected.interval[0] == updates.interval.max() == max_ticks
-        bound = expected.resolution[0] / spec.unit_velocity
+        bound = expected.resolution[0] / spec.scale.unit_velocity
         assert error.max() <= bound + HALF_LSB
         used = max(used, error.max() / bound)
     assert bound == pytest.approx(1 / max_ticks if cancel else 1 / (max_ticks // 2 + 1))
@@ -88,7 +88,7 @@ def test_unevenly_long_intervals_stay_within_the_resolution_of_their_mean() -> N
     for units in (F(int(n), 10_007) for n in rng.integers(210, 50_000, size=40)):
         expected = plan_in_units(SPEC, units)
         _, error = measure(SPEC, units, 5000)
-        assert error.max() <= expected.resolution[0] / SPEC.unit_velocity + HALF_LSB, units
+        assert error.max() <= expected.resolution[0] / SPEC.scale.unit_velocity + HALF_LSB, units
 
 
 @pytest.mark.parametrize("cancel", [True, False])
@@ -104,9 +104,9 @@ def test_standstill(max_ticks: int, cancel: bool) -> None:
         last = updates.clock[np.flatnonzero(updates.velocity)[-1]]
         zero = updates.clock[updates.clock > last][0]
         longest = max(longest, zero - len(moving))
-    assert longest <= spec.standstill_ticks
+    assert longest <= spec.times.standstill_ticks
     if cancel:
-        assert longest == spec.standstill_ticks
+        assert longest == spec.times.standstill_ticks
 
 
 @pytest.mark.parametrize(
@@ -123,17 +123,17 @@ def test_standstill(max_ticks: int, cancel: bool) -> None:
 def test_default_range(max_speed: str | None, tick_cycles: int, low: float, high: float) -> None:
     timing = Timing(tick_cycles * 50_000, tick_cycles, 50)
     spec = replace(SPEC, timing=timing, max_speed=None if max_speed is None else Speed.parse(max_speed))
-    assert default_range(spec) == pytest.approx((low * spec.unit_velocity, high * spec.unit_velocity))
+    assert default_range(spec) == pytest.approx((low * spec.scale.unit_velocity, high * spec.scale.unit_velocity))
 
 
 def test_one_count_in_the_maximum_time_is_an_alteration() -> None:
     for max_ticks in range(2, 2001):
         spec = with_max_ticks(max_ticks)
-        assert not plan_at(spec, spec.unit_velocity / max_ticks).forced
+        assert not plan_at(spec, spec.scale.unit_velocity / max_ticks).forced
 
 
 def test_dense_speeds_meet_every_peak() -> None:
-    unit = SPEC.unit_velocity
+    unit = SPEC.scale.unit_velocity
     speed = dense_speeds(SPEC, 0.03 * unit, 7.2 * unit)
     assert (speed[0], speed[-1]) == (0.03 * unit, 7.2 * unit)
     assert np.all(np.diff(speed) > 0)
@@ -147,7 +147,7 @@ def test_dense_speeds_meet_every_peak() -> None:
 
 @pytest.mark.parametrize("high", [1.0, 100.0, 1e6])
 def test_dense_speeds_are_not_too_many(high: float) -> None:
-    assert len(dense_speeds(SPEC, 1e-9 * SPEC.unit_velocity, high * SPEC.unit_velocity)) < 40_000
+    assert len(dense_speeds(SPEC, 1e-9 * SPEC.scale.unit_velocity, high * SPEC.scale.unit_velocity)) < 40_000
 
 
 def test_csv(tmp_path: Path) -> None:
@@ -160,4 +160,4 @@ def test_csv(tmp_path: Path) -> None:
     assert table["measurement_time_s"].tolist() == expected.measurement_time.tolist()
     assert table["forced"].tolist() == expected.forced.tolist()
     assert np.allclose(table["relative_resolution"] * table["speed_rad_s"], expected.resolution)
-    assert np.allclose(table["counts_per_tick"] * SPEC.unit_velocity, expected.speed)
+    assert np.allclose(table["counts_per_tick"] * SPEC.scale.unit_velocity, expected.speed)

@@ -47,17 +47,17 @@ def test_no_error_is_greater_than_the_resolution(method: str) -> None:
     tick = float(spec.timing.tick_seconds)
     reached = []
     for units in speeds():
-        speed = units * spec.unit_velocity
+        speed = units * spec.scale.unit_velocity
         encoder = VirtualEncoder(spec.encoder.pulses_per_rev, start_angle_rad=0.001)
         recording = encoder.record(parse_motion(f"constant:{speed!r}rad/s:{TICKS * tick!r}s")).recording
         updates = golden.run(spec, recording.place(spec.timing.clock_hz)).updates
         settled = updates.clock > SETTLED.get(method, 150) * spec.timing.tick_cycles
-        error = np.abs(updates.velocity[settled] * spec.rad_per_s_per_lsb - speed)
+        error = np.abs(updates.velocity[settled] * spec.scale.rad_per_s_per_lsb - speed)
         # A count's time is told to a clock. That is in the resolution of methods that measure times by the clock, and
         # not in that of Rairán's, to which the speed is a clock in dt higher or lower.
         clock = speed / spec.timing.tick_cycles if spec.method == "rairan" else 0.0
         expected = plan_at(spec, speed + clock * np.array([-1, 0, 1])).resolution.max()
-        bound = expected + clock + 0.51 * spec.rad_per_s_per_lsb
+        bound = expected + clock + 0.51 * spec.scale.rad_per_s_per_lsb
         assert error.max() <= bound, units
         reached.append(error.max() / bound)
     assert max(reached) > 0.6
@@ -69,11 +69,13 @@ def test_standstill(method: str) -> None:
     tick = float(spec.timing.tick_seconds)
     for units in (0.05, 0.9, 5.3):
         moving = 1000
-        motion = f"constant:{units * spec.unit_velocity!r}rad/s:{moving * tick!r}s+stop:{300 * tick!r}s"
+        motion = f"constant:{units * spec.scale.unit_velocity!r}rad/s:{moving * tick!r}s+stop:{300 * tick!r}s"
         recording = VirtualEncoder(500).record(parse_motion(motion)).recording
         run = golden.run(spec, recording.place(spec.timing.clock_hz))
         latest = (
-            (moving + spec.standstill_ticks + 1) * spec.timing.tick_cycles + spec.tick_latency + spec.tick_to_velocity
+            (moving + spec.times.standstill_ticks + 1) * spec.timing.tick_cycles
+            + spec.latency.tick
+            + spec.latency.tick_to_velocity
         )
         zero = run.updates.clock > latest
         held = run.updates.velocity[~zero][-1]

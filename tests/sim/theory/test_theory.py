@@ -16,18 +16,18 @@ from tachometry.spec import Encoder, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), frac_bits=20)
 TICK = float(SPEC.timing.tick_seconds)
-HALF_LSB = 2.0 ** -(SPEC.frac_bits + 1)
+HALF_LSB = 2.0 ** -(SPEC.widths.frac_bits + 1)
 
 
 def measure(
     units: float, n_ticks: int, spec: STachometer = SPEC, jitter: float = 0.0
 ) -> tuple[Table, NDArray[np.float64], NDArray[np.int64]]:
     """Run a constant speed, given in unit velocities: updates, their velocities in the same unit, pulse numbers."""
-    speed = units * spec.unit_velocity
+    speed = units * spec.scale.unit_velocity
     encoder = VirtualEncoder(spec.encoder.pulses_per_rev, jitter=jitter, start_angle_rad=0.001, seed=1)
     encoding = encoder.record(parse_motion(f"constant:{speed!r}rad/s:{n_ticks * TICK!r}s"))
     run = golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
-    return run.updates, run.updates.velocity / 2.0**spec.frac_bits, run.ticks.pulse_count
+    return run.updates, run.updates.velocity / 2.0**spec.widths.frac_bits, run.ticks.pulse_count
 
 
 def speeds_over_four_decades() -> list[float]:
@@ -40,7 +40,7 @@ def speeds_over_four_decades() -> list[float]:
 @pytest.mark.parametrize("cancel", only([True], [True, False]))  # eq. (21), which is the default
 def test_interval_and_error_at_constant_speed(cancel: bool) -> None:
     far = 0
-    spec = STachometer(encoder=SPEC.encoder, timing=SPEC.timing, frac_bits=SPEC.frac_bits, cancel=cancel)
+    spec = STachometer(encoder=SPEC.encoder, timing=SPEC.timing, frac_bits=SPEC.widths.frac_bits, cancel=cancel)
     for units in speeds_over_four_decades():
         updates, velocity, m_e = measure(units, 8000, spec)
         # The offset is known once a pulse number has come twice; then the second window counts.
@@ -49,10 +49,10 @@ def test_interval_and_error_at_constant_speed(cancel: bool) -> None:
         m_s, error = updates.interval[first:], np.abs(velocity[first:] - units)
         if abs(units - round(units)) > 1 / spec.timing.max_ticks:
             far += 1
-            wanted = tsuji.tsuji_eq20_interval(units * spec.unit_velocity, spec.encoder.counts_per_rev, TICK)
+            wanted = tsuji.tsuji_eq20_interval(units * spec.scale.unit_velocity, spec.encoder.counts_per_rev, TICK)
             assert not updates.forced[first:].any(), units
             assert abs(m_s.mean() - wanted) <= 1 / len(m_s) + 1e-9, units
-            bound = tsuji.tsuji_eq18_resolution(m_s, spec.encoder.counts_per_rev, TICK) / spec.unit_velocity
+            bound = tsuji.tsuji_eq18_resolution(m_s, spec.encoder.counts_per_rev, TICK) / spec.scale.unit_velocity
         else:
             bound = 1 / m_s
         assert np.all(error <= bound + HALF_LSB), units
@@ -79,7 +79,7 @@ def test_disordered_alterations_near_multiples_are_cancelled(units: float, allow
 
 def test_standstill_reads_zero_in_one_and_a_half_times_the_maximum() -> None:
     moving, rest = 1000, 1500
-    speed = 1.37 * SPEC.unit_velocity
+    speed = 1.37 * SPEC.scale.unit_velocity
     motion = parse_motion(f"constant:{speed!r}rad/s:{moving * TICK!r}s+stop:{rest * TICK!r}s")
     trace = VirtualEncoder(500).record(motion).recording.place(SPEC.timing.clock_hz)
     updates = golden.run(SPEC, trace).updates

@@ -82,13 +82,13 @@ def deviations(spec: TrackTachometer, trace: PinTrace, recursion: Recursion) -> 
     found = track(Tuning.of(spec), steps.clock[counted], steps.step[counted], last, recursion)
     tick = float(spec.timing.tick_seconds)
     per_second = 1.0 if spec.unit == "count/tick" else tick
-    velocity = found.velocity[:n] * tick * float(spec.per_count) * 2.0**spec.frac_bits
-    acceleration = found.acceleration[:n] * tick**2 * float(spec.per_count) / per_second
+    velocity = found.velocity[:n] * tick * float(spec.scale.per_count) * 2.0**spec.widths.frac_bits
+    acceleration = found.acceleration[:n] * tick**2 * float(spec.scale.per_count) / per_second
     fine = updates["position_fine"] - (ticks.position[:n] << spec.fine_bits)
     return np.array(
         [
             updates.velocity - velocity,
-            updates["acceleration"] - acceleration * 2.0**spec.acceleration_frac_bits,
+            updates["acceleration"] - acceleration * 2.0**spec.acceleration.frac_bits,
             fine - found.place[:n] * 2.0**spec.fine_bits,
         ]
     )

@@ -112,8 +112,8 @@ def test_plan_bounds_the_error_at_constant_speed(speed: float, growing: bool) ->
     planned = PERFORMANCES["track"](spec, np.array([speed]))
     trace = VirtualEncoder(500, seed=1).record(parse_motion(f"constant:{speed}rad/s:1.5s"))
     run = golden.run(spec, trace.recording.place(spec.timing.clock_hz))
-    error = np.abs(run.updates.velocity * spec.rad_per_s_per_lsb - speed)
+    error = np.abs(run.updates.velocity * spec.scale.rad_per_s_per_lsb - speed)
     settled = error[len(error) * 2 // 3 :].max()
-    lsb = spec.rad_per_s_per_lsb
+    lsb = spec.scale.rad_per_s_per_lsb
     assert settled <= planned.resolution[0] + lsb, (settled, planned.resolution[0], lsb)
     assert planned.time[0] >= 1e-3

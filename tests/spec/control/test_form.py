@@ -53,7 +53,7 @@ def random_spec(seed: int, gains: str = "fixed") -> LoopSpec:
         position_gain=velocity**2 / 4 if rng.random() < 0.8 else Fraction(0),
         velocity_gain=velocity,
         observer=observer,
-        filter=(observer, about(200, 1), None)[int(rng.integers(3))],
+        velocity_filter=(observer, about(200, 1), Fraction(0))[int(rng.integers(3))],
         current_limit=about(10, 1),
         synchronised=bool(rng.random() < 0.7),
         current_width=int(rng.choice([8, 16, 24])),
@@ -148,13 +148,13 @@ def test_gains_of_the_options(seed: int) -> None:
     spec = random_spec(seed, "inputs")
     nominal = {Term.POSITION: spec.position_gain, Term.VELOCITY: spec.velocity_gain}
     for term, raw in spec.form.reset_gains.items():
-        lsb, wanted = gain_per_lsb(spec, term), nominal.get(term, Fraction(1))
+        lsb, wanted = gain_per_lsb(spec.units, spec.form, term), nominal.get(term, Fraction(1))
         assert abs(raw * lsb - wanted) <= lsb / 2
         assert spec.form.most_gain * lsb > 15.9 * wanted
     assert spec.form.most_gain == 2**spec.form.gain_bits - 1
     # Where k_p is 0 the range is that for two equal poles.
     none = replace(spec, position_gain=Fraction(0))
-    most = none.form.most_gain * gain_per_lsb(none, Term.POSITION)
+    most = none.form.most_gain * gain_per_lsb(none.units, none.form, Term.POSITION)
     assert 15.9 < most / (spec.velocity_gain / 2) ** 2 < 33
     # An error is held within 16 times what the gain of the option needs, or a usual one, a 32nd of the greatest.
     for form in (spec.form, none.form):
@@ -188,8 +188,8 @@ def test_formats_are_no_wider_than_needed(name: str, wrong: Any, monkeypatch: py
 def test_coefficients_are_those_of_the_equations(number: int) -> None:
     spec = SPECS[number]
     form = spec.form
-    time, unit = float(spec.seconds), float(spec.rad_per_s) / 2**form.extra_bits
-    part, inertia, constant = float(spec.amperes) / 16, float(spec.inertia), float(spec.torque_constant)
+    time, unit = float(spec.units.seconds), float(spec.units.rad_per_s) / 2**form.extra_bits
+    part, inertia, constant = float(spec.units.amperes) / 16, float(spec.inertia), float(spec.torque_constant)
     rate = float(spec.observer)
     wanted = {
         Term.OBSERVER: lambda n: -math.expm1(-rate * time * n),
@@ -264,18 +264,18 @@ def test_a_tracking_core_has_no_filter() -> None:
     core = TrackTachometer(encoder=Encoder(500), max_speed=Speed.parse("1000rad/s"), velocity_width=16)
     assert LoopSpec(tachometer=core).filter is None
     assert LoopSpec(tachometer=CORE).filter == 40
-    (told,) = (about for about in options_of(LoopSpec) if about.field == "filter")
+    (told,) = (about for about in options_of(LoopSpec) if about.field == "velocity_filter")
     assert told.parse is not None
-    assert [told.parse("x", text) for text in ("none", " NONE ", "40rad/s")] == [None, None, 40]
+    assert [told.parse("x", text) for text in ("none", " NONE ", "40rad/s")] == [0, 0, 40]
     assert replace(LoopSpec(tachometer=CORE), observer=Fraction(80)).period == 960
 
 
 def test_a_long_measurement_is_cut_into_parts() -> None:
     spec = LoopSpec(tachometer=replace(CORE, timing=Timing.parse("48MHz", "20us", "100ms")))
-    assert spec.longest == 1023
-    assert LoopSpec(tachometer=CORE).longest == 511
+    assert spec.units.longest == 1023
+    assert LoopSpec(tachometer=CORE).units.longest == 511
     # Two ticks, as the update may come late in one, and as control ticks need not come with them: all bits of 4.
-    assert LoopSpec(tachometer=replace(CORE, timing=Timing(48_000_000, 960, 2)), period=960).longest == 7
+    assert LoopSpec(tachometer=replace(CORE, timing=Timing(48_000_000, 960, 2)), control_period=960).units.longest == 7
 
 
 def test_a_coefficient_just_below_a_power_of_two_has_all_bits() -> None:
@@ -294,7 +294,7 @@ def test_words_of_80_bits() -> None:
             torque_constant=Fraction(1, 10**9),
             position_gain=Fraction(10**12),
             velocity_gain=Fraction(10**6),
-            filter=None,
+            velocity_filter=Fraction(0),
             current_limit=Fraction(10**9),
         )
 
@@ -307,13 +307,13 @@ def test_times() -> None:
     """Seven products, one for each term, and two clocks to hold their sum; without the filter three for the first."""
     for multiplier, filter, clocks in (
         *(("serial", Fraction(40), lambda p: 7 * (p + 4) + 2), ("parallel", Fraction(40), lambda p: 7 * 6 + 2)),
-        *(("serial", None, lambda p: 6 * (p + 4) + 3 + 2), ("parallel", None, lambda p: 6 * 6 + 3 + 2)),
+        *(("serial", Fraction(0), lambda p: 6 * (p + 4) + 3 + 2), ("parallel", Fraction(0), lambda p: 6 * 6 + 3 + 2)),
     ):
-        spec = LoopSpec(tachometer=CORE, multiplier=multiplier, filter=filter)
-        assert spec.latency == clocks(spec.form.factor_bits)
-        assert spec.least_period == spec.latency + 1
+        spec = LoopSpec(tachometer=CORE, multiplier=multiplier, velocity_filter=filter)
+        assert spec.tick_to_current == clocks(spec.form.factor_bits)
+        assert spec.least_period == spec.tick_to_current + 1
         # A control tick comes a clock behind the first update, which is late from the last clock of the tick on.
-        assert spec.first_tick == 959 + CORE.tick_latency + CORE.tick_to_velocity + 1
+        assert spec.first_tick == 959 + CORE.latency.tick + CORE.latency.tick_to_velocity + 1
 
 
 def test_gains_that_are_inputs_have_24_bits_at_most() -> None:
@@ -335,14 +335,14 @@ def test_coefficients_of_40_bits() -> None:
 
 def test_limits() -> None:
     assert LoopSpec(tachometer=CORE).current_width == 16
-    assert LoopSpec(tachometer=CORE, filter=Fraction(1, 2)).filter == Fraction(1, 2)
+    assert LoopSpec(tachometer=CORE, velocity_filter=Fraction(1, 2)).filter == Fraction(1, 2)
     # 16 bits hold 2^15 − 1 LSB, and not one more.
     just = Fraction(2**15 - 1, 2**10)
     assert [
-        LoopSpec(tachometer=CORE, current_limit=just + more).current_frac_bits for more in (0, Fraction(1, 2**10))
+        LoopSpec(tachometer=CORE, current_limit=just + more).units.current_frac_bits for more in (0, Fraction(1, 2**10))
     ] == [10, 9]
-    with pytest.raises(ParameterError, match=r"^velocity_filter must be greater than 0, not 0$"):
-        LoopSpec(tachometer=CORE, filter=Fraction(0))
+    with pytest.raises(ParameterError, match=r"^velocity_filter must be at least 0, not -1$"):
+        LoopSpec(tachometer=CORE, velocity_filter=Fraction(-1))
     with pytest.raises(ParameterError, match=r"^observer must be from 0\.01193 to 3\.015e\+08 rad/s here, not 1e\+09$"):
         LoopSpec(tachometer=CORE, observer=Fraction(10**9))
     with pytest.raises(ParameterError, match=r"^current_width must be from 8 to 24, not 25$"):
@@ -351,4 +351,4 @@ def test_limits() -> None:
         LoopSpec(tachometer=CORE, position_gain=Fraction(-1, 2))
     for period in (0, (1 << 24) + 1):
         with pytest.raises(ParameterError, match=rf"^control_period must be from 1 to {1 << 24} clocks, not {period}$"):
-            LoopSpec(tachometer=CORE, period=period)
+            LoopSpec(tachometer=CORE, control_period=period)

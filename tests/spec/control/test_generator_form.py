@@ -30,17 +30,17 @@ def bits_of(*values: int) -> int:
 def test_what_the_formats_hold(number: int) -> None:
     spec = SPECS[number]
     form, shown = spec.generator, 8  # fraction bits of the commanded position
-    count, tick = 2 * math.pi / spec.tachometer.encoder.counts_per_rev, float(spec.seconds)
+    count, tick = 2 * math.pi / spec.tachometer.encoder.counts_per_rev, float(spec.units.seconds)
     # The greatest acceleration of its port fits a bound of 32 bits, and half of it, with as fine a fraction as may be.
-    greatest = 2**19 / 2**spec.acceleration_frac_bits / count * tick**2  # counts per control tick squared
+    greatest = 2**19 / 2**spec.units.acceleration_frac_bits / count * tick**2  # counts per control tick squared
     assert shown <= form.fraction <= 36
     if form.fraction > shown:
         assert greatest * 2**form.fraction <= 2**31 * (1 + 1e-9)
     if form.fraction < 36:
         assert greatest * 2 ** (form.fraction + 1) > 2**31 * (1 - 1e-9)
     # A velocity is the greatest that the tachometer shows, or one of 32 bits.
-    lsb = float(spec.tachometer.rad_per_s_per_lsb)
-    fastest = math.ceil(spec.tachometer.full_scale * lsb / count * tick * 2**form.fraction * (1 - 1e-12))
+    lsb = float(spec.tachometer.scale.rad_per_s_per_lsb)
+    fastest = math.ceil(spec.tachometer.scale.full_scale * lsb / count * tick * 2**form.fraction * (1 - 1e-12))
     assert form.velocity_bits == max(31, fastest.bit_length())
     assert form.velocity_shift == form.velocity_bits - 31
     assert form.most_velocity == 2**form.velocity_bits - 1
@@ -56,12 +56,12 @@ def test_what_the_formats_hold(number: int) -> None:
         words.append(width - scale.shift)
         assert 2**27 <= scale.factor <= 2**28
     assert form.word_width == max(words)
-    velocity = count / tick / 2**form.fraction / float(spec.rad_per_s) * 2**spec.command_bits
-    acceleration = count / tick**2 / 2**form.fraction * 2**spec.acceleration_frac_bits
+    velocity = count / tick / 2**form.fraction / float(spec.units.rad_per_s) * 2**spec.units.command_bits
+    acceleration = count / tick**2 / 2**form.fraction * 2**spec.units.acceleration_frac_bits
     for scale, ratio in ((form.velocity, velocity), (form.acceleration, acceleration)):
         assert scale.factor / 2.0 ** (32 + scale.shift) == pytest.approx(ratio, rel=2**-27)
     assert form.acceleration_width == 20
-    assert form.command_width == spec.tachometer.velocity_width + spec.command_bits
+    assert form.command_width == spec.tachometer.widths.velocity + spec.units.command_bits
 
 
 def test_the_clocks_of_a_step() -> None:

@@ -24,11 +24,11 @@ SPEC = replace(
     position_gain=Fraction(900),
     velocity_gain=Fraction(70),
     observer=Fraction(250),
-    filter=None,
+    velocity_filter=Fraction(0),
     current_limit=Fraction(12),
 )
 IN_RAD_PER_S = replace(USUAL.tachometer, unit="rad/s", frac_bits=6)
-SPECS = [SPEC, replace(SPEC, tachometer=IN_RAD_PER_S, multiplier="parallel", period=480)]
+SPECS = [SPEC, replace(SPEC, tachometer=IN_RAD_PER_S, multiplier="parallel", control_period=480)]
 
 
 def described(spec: LoopSpec) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def test_velocity_and_disturbance(spec: LoopSpec) -> None:
     per_lsb = float(manifest(spec, "loop")["velocity"]["rad_per_s_per_lsb"])
     assert loop.y * entries["filtered_velocity"]["rad_per_s_per_lsb"] == pytest.approx(1234 * per_lsb)
     loop = Control(spec.form)
-    held = Command(acceleration=int(5 * CONSTANT_OF_TORQUE / INERTIA * 2**spec.acceleration_frac_bits))
+    held = Command(acceleration=int(5 * CONSTANT_OF_TORQUE / INERTIA * 2**spec.units.acceleration_frac_bits))
     currents = []
     for _ in range(12):  # the observer lags, so it is not all that is found in a few ticks
         loop.tick(0, held)
@@ -88,7 +88,7 @@ def test_velocity_and_disturbance(spec: LoopSpec) -> None:
     # dw/dt = ω·(T − w), from a tick to the next, T the torque of the current before.
     torque = 0.0
     for current in currents[:-1]:
-        torque += (current * CONSTANT_OF_TORQUE - torque) * -math.expm1(-OBSERVER * float(spec.seconds))
+        torque += (current * CONSTANT_OF_TORQUE - torque) * -math.expm1(-OBSERVER * float(spec.units.seconds))
     assert abs(torque) > 1e-3
     assert loop.w * entries["disturbance"]["torque_per_lsb"] == pytest.approx(torque, rel=2e-3)
 

@@ -113,7 +113,7 @@ def test_errors_say_what_is_wrong_and_what_is_allowed(make: object, message: str
 )
 def test_max_speed_in_counts_per_tick(text: str, counts: int) -> None:
     spec = STachometer(encoder=Encoder(500), timing=TIMING, max_speed=Speed.parse(text))
-    assert spec.max_count == counts
+    assert spec.widths.max_count == counts
 
 
 @pytest.mark.parametrize("text", ["12.5rad/s", "1.98943678864869rev/s", "119.366207318922rpm"])
@@ -122,22 +122,22 @@ def test_speed_in_rad_per_s(text: str) -> None:
 
 
 def test_memory_is_the_table() -> None:
-    assert STachometer(encoder=Encoder(500), timing=TIMING).memory is None  # the reciprocal is divided
+    assert STachometer(encoder=Encoder(500), timing=TIMING).words.memory is None  # the reciprocal is divided
     spec = STachometer(encoder=Encoder(500), timing=TIMING, reciprocal_source="table")
-    assert spec.memory is not None
-    kind, entries, width = spec.memory
+    assert spec.words.memory is not None
+    kind, entries, width = spec.words.memory
     assert kind == "table"
-    assert isinstance(spec.reciprocal, Reciprocal)
-    assert entries == len(spec.reciprocal.table)
-    assert width == max(spec.reciprocal.table).bit_length()
+    assert isinstance(spec.form.reciprocal, Reciprocal)
+    assert entries == len(spec.form.reciprocal.table)
+    assert width == max(spec.form.reciprocal.table).bit_length()
 
 
 def test_widths_hold_what_they_must() -> None:
     spec = STachometer(encoder=Encoder(500), timing=TIMING)
-    assert spec.max_count == 960
-    assert (spec.count_width, spec.velocity_width, spec.interval_width) == (11, 27, 9)
-    assert spec.unit_velocity == pytest.approx(50 * math.pi)
-    assert spec.rad_per_s_per_lsb == pytest.approx(50 * math.pi / 65536)
+    assert spec.widths.max_count == 960
+    assert (spec.widths.count, spec.widths.velocity, spec.widths.interval) == (11, 27, 9)
+    assert spec.scale.unit_velocity == pytest.approx(50 * math.pi)
+    assert spec.scale.rad_per_s_per_lsb == pytest.approx(50 * math.pi / 65536)
 
 
 def test_manifest_names_every_option_and_survives_json() -> None:

@@ -48,7 +48,7 @@ def test_ends_of_timing() -> None:
 
 def test_the_edge_error_is_rounded_up_to_eighths() -> None:
     given = [Fraction(0), Fraction(1, 1000), Fraction(1, 8), Fraction(126, 1000), Fraction(99, 100), Fraction(1)]
-    assert [8 * spec_of(bounds=True, edge_error=error).edge_error for error in given] == [0, 1, 1, 2, 8, 8]
+    assert [8 * spec_of(bounds=True, edge_error=error).bound.edge_error for error in given] == [0, 1, 1, 2, 8, 8]
     for wrong in (Fraction(-1, 100), Fraction(101, 100)):
         with pytest.raises(ValueError, match=f"^edge_error must be from 0 to 1, not {float(wrong)}$"):
             spec_of(bounds=True, edge_error=wrong)
@@ -57,15 +57,15 @@ def test_the_edge_error_is_rounded_up_to_eighths() -> None:
 
 
 def test_ends_of_external_ticks() -> None:
-    assert spec_of(2, max_tick_cycles=2).longest_tick == 2
-    assert spec_of(20, max_tick_cycles=MAX_TICK_CYCLES).longest_tick == 1 << 20
+    assert spec_of(2, external_tick=True, max_tick_cycles=2).times.longest_tick == 2
+    assert spec_of(20, external_tick=True, max_tick_cycles=MAX_TICK_CYCLES).times.longest_tick == 1 << 20
     for tick, longest, message in (
         (1, 2, "tick_cycles must be at least 2 with an external tick, not 1"),
         (20, 19, "max_tick_cycles must be from 20, one tick, to 1048576, not 19"),
         (20, (1 << 20) + 1, "max_tick_cycles must be from 20, one tick, to 1048576, not 1048577"),
     ):
         with pytest.raises(ValueError, match=f"^{message}$"):
-            spec_of(tick, max_tick_cycles=longest)
+            spec_of(tick, external_tick=True, max_tick_cycles=longest)
 
 
 def test_the_fastest_filter_is_2_pi_times_the_clock() -> None:
@@ -86,46 +86,46 @@ def test_recovery() -> None:
     """
     for tick, begun in ((1, 2), (2, 2), (3, 3), (4, 5), (20, 33)):
         spec = spec_of(tick)
-        assert spec.recovery_clocks == 2 + 1 + begun + silence(10, tick) + 2
+        assert spec.recovery.clocks == 2 + 1 + begun + silence(10, tick) + 2
     for clocks, held in ((1, 2), (2, 2), (3, 4), (5, 8), (255, 256)):
-        assert spec_of(20, filter_clocks=clocks).recovery_clocks == 2 + held + clocks + 1 + 33 + silence(10, 20) + 2
+        assert spec_of(20, filter_clocks=clocks).recovery.clocks == 2 + held + clocks + 1 + 33 + silence(10, 20) + 2
     # From 16 clocks on the tick is counted otherwise.
-    assert [spec_of(tick).front_recovery_clocks for tick in (15, 16, 17)] == [2 + 1 + 1 + bits for bits in (16, 32, 32)]
+    assert [spec_of(tick).recovery.front for tick in (15, 16, 17)] == [2 + 1 + 1 + bits for bits in (16, 32, 32)]
     long = spec_of(20, average=200)
-    assert long.recovery_clocks == 2 + 1 + 33 + 201 * 20 + long.tick_to_velocity + 2
-    assert spec_of(20, max_tick_cycles=50).recovery_clocks == 2 + 1 + 65 + silence(10, 50) + 2
-    assert spec_of(20, lowpass=Fraction(100)).recovery_clocks is None
+    assert long.recovery.clocks == 2 + 1 + 33 + 201 * 20 + long.latency.tick_to_velocity + 2
+    assert spec_of(20, external_tick=True, max_tick_cycles=50).recovery.clocks == 2 + 1 + 65 + silence(10, 50) + 2
+    assert spec_of(20, lowpass=Fraction(100)).recovery.clocks is None
     rairan = RairanTachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10), paper_exact=True)
-    assert rairan.recovery_clocks is None
+    assert rairan.recovery.clocks is None
 
 
 def test_ticks_between_a_cause_and_its_update() -> None:
     """An update that a tick causes has passed this one; one that a count causes has not."""
 
     def ticks(spec: STachometer | MTachometer | TTachometer) -> int:
-        shortest = spec.timing.tick_cycles if spec.max_tick_cycles is None else spec.min_tick_cycles
-        whole = next(n for n in range(999) if n * shortest >= spec.tick_to_velocity + spec.low_pass_latency)
-        return whole - (spec.update_by != "count")
+        shortest = spec.times.shortest_tick
+        whole = next(n for n in range(999) if n * shortest >= spec.latency.tick_to_velocity + spec.latency.low_pass)
+        return whole - (spec.facts.update_by != "count")
 
     for tick in (1, 2, 3, 7, 20):
         for made in (STachometer, MTachometer, TTachometer):
-            for options in ({}, {"lowpass": Fraction(1000)}, {"max_tick_cycles": 4 * tick}):
+            for options in ({}, {"lowpass": Fraction(1000)}, {"external_tick": True, "max_tick_cycles": 4 * tick}):
                 if tick > 1 or "max_tick_cycles" not in options:
                     spec = made(encoder=Encoder(8), timing=Timing(1_000_000, tick, 10), age=True, **options)
-                    assert spec.stamp_width == ticks(spec).bit_length()
-    assert spec_of(1).stamp_width == 0
+                    assert spec.widths.stamp == ticks(spec).bit_length()
+    assert spec_of(1).widths.stamp == 0
 
 
 def test_standstill() -> None:
     spec = spec_of(20, 10)
-    assert (spec.max_time_cycles, spec.stalled_after_ticks, spec.max_tick_shift) == (200, 11, 0)
-    assert (spec.min_time_cycles, spec.memory, MTachometer.last_at_rest) == (None, None, False)
-    assert STachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).standstill_ticks == 15
-    assert TTachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).standstill_ticks == 10
-    assert [one.pairs_all for one in (STachometer, MTachometer, TTachometer, RairanTachometer)] == [
+    assert (spec.times.longest, spec.times.stalled_after_ticks, spec.times.max_tick_shift) == (200, 11, 0)
+    assert (spec.times.shortest, spec.words.memory, MTachometer.facts.last_at_rest) == (None, None, False)
+    assert STachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).times.standstill_ticks == 15
+    assert TTachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).times.standstill_ticks == 10
+    assert [one.facts.pairs_all for one in (STachometer, MTachometer, TTachometer, RairanTachometer)] == [
         *(True, False, False, False)
     ]
-    assert [one.own_ticks for one in (STachometer, MTachometer, TTachometer, RairanTachometer)] == [
+    assert [one.facts.own_ticks for one in (STachometer, MTachometer, TTachometer, RairanTachometer)] == [
         *(False, False, False, True)
     ]
-    assert [one.last_at_rest for one in (STachometer, TTachometer, RairanTachometer)] == [False, False, True]
+    assert [one.facts.last_at_rest for one in (STachometer, TTachometer, RairanTachometer)] == [False, False, True]

@@ -2,32 +2,35 @@
 
 import importlib
 import inspect
-import json
 import pickle
 import pkgutil
 import re
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from support.options import had_by
 
 import tachometry.spec
+from tachometry.hdl.export import export
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import (
     METHODS,
-    TWO_TICKS,
     Encoder,
+    LoopSpec,
     ParameterError,
     STachometer,
     Timing,
     common_options,
-    of_parameters,
+    of_manifest,
+    of_options,
     of_texts,
     own_options,
 )
-from tachometry.spec.language.units import Speed
+from tachometry.spec.control import AnySpec
+from tachometry.spec.language.units import PI, Speed
 from tachometry.spec.methods.axes import AxesSpec
-from tachometry.spec.registers.manifest import manifest
+from tachometry.spec.registers.buses import BUSES
 
 PPR = {"ppr": "500"}
 
@@ -49,20 +52,20 @@ def test_what_is_described_does_not_change() -> None:
 def test_defaults_are_those_of_python(method: str) -> None:
     made = METHODS[method]
     assert of_texts(method, PPR) == made(encoder=Encoder(500))
-    assert of_texts(method, PPR).timing == Timing() == Timing(48_000_000, 960, 500)
-    assert Timing(10_000_000) == Timing.parse("10MHz", "20us", "10ms") == Timing(10_000_000, 200, 500)
+    assert of_texts(method, PPR).timing == Timing.parse() == Timing(48_000_000, 960, 500)
+    assert Timing.parse("10MHz") == Timing.parse("10MHz", "20us", "10ms") == Timing(10_000_000, 200, 500)
     for unit in ("count/tick", "rad/s", "rev/s", "rpm"):
         spec = made(encoder=Encoder(500), unit=unit)
         assert of_texts(method, PPR | {"unit": unit}) == spec
-        assert spec.frac_bits == (16 if unit == "count/tick" else 10)
+        assert spec.widths.frac_bits == (16 if unit == "count/tick" else 10)
     texts = had_by(method, {"ppr": "20", "clock": "100MHz", "tick": "4", "max-time": "2000", "unit": "rpm"})
     coarse = Timing(100_000_000, int(texts["tick"]), 500)
     assert of_texts(method, texts) == made(encoder=Encoder(20), timing=coarse, unit="rpm")
-    assert of_texts(method, texts).frac_bits < 10  # as many as there can be
-    if not made.own_ticks:
+    assert of_texts(method, texts).widths.frac_bits < 10  # as many as there can be
+    if not made.facts.own_ticks:
         external = of_texts(method, PPR | {"external-tick": "yes", "clock": "50MHz"})
-        assert external == made(encoder=Encoder(500), timing=Timing(50_000_000), max_tick_cycles=TWO_TICKS)
-        assert external.max_tick_cycles == 2000
+        assert external == made(encoder=Encoder(500), timing=Timing.parse("50MHz"), external_tick=True)
+        assert external.times.longest_tick == 2000
 
 
 def test_every_option_does_what_it_says() -> None:
@@ -73,6 +76,7 @@ def test_every_option_does_what_it_says() -> None:
     assert spec == STachometer(
         encoder=Encoder(24, 2),
         timing=Timing(1_000_000, 100, 50),
+        external_tick=True,
         max_tick_cycles=150,
         unit="rpm",
         frac_bits=3,
@@ -107,7 +111,6 @@ def test_what_help_shows_and_what_pairwise_tests_take() -> None:
     assert [options[name].tested for name in ("cancel", "index", "bound-decay", "timer")] == [
         *(("", "no"), ("", "yes"), ("", "no"), ("", "tick"))
     ]
-    assert Timing() == Timing.parse()
     assert [options[name].few for name in ("tick", "max-time", "decoding")] == [3, 3, 2]
 
 
@@ -153,26 +156,49 @@ def test_parameters_name_every_field() -> None:
     for method in METHODS:
         spec = of_texts(method, PPR)
         fields = {about.field for about in (*common_options(), *own_options(method))}
-        assert set(spec.parameters) == fields | {"method"}
+        assert set(spec.parameters) == fields - {"external_tick"} | {"method"}
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_parameters_say_which_core_it_is(method: str) -> None:
+def test_options_say_which_core_it_is(method: str) -> None:
     for words in configurations(method):
         spec = spec_of(words)
-        described = manifest(spec)
-        assert manifest(of_parameters(json.loads(json.dumps(described["parameters"])))) == described, words
+        assert of_options(spec.options) == spec, words
 
 
-def test_parameters_of_another_version_are_refused() -> None:
-    parameters = of_texts("s", {"ppr": "8"}).parameters
-    with pytest.raises(
-        ParameterError, match=r"^parameters must be those that this version of tachometry writes: later is none"
+@pytest.mark.parametrize("bus", ["none", *BUSES])
+def test_a_manifest_says_which_core_it_is(bus: str, tmp_path: Path) -> None:
+    core = of_texts("s", PPR | {"max-speed": "7000rpm", "tick": "0.1ms", "clock": "30MHz", "max-time": "3ms"})
+    assert isinstance(core, STachometer)
+    cores: list[AnySpec] = [
+        core,
+        LoopSpec(tachometer=core, gains="inputs"),
+        LoopSpec(
+            tachometer=of_texts("track", PPR | {"tick": "6001", "max-time": "600100", "bandwidth": "150Hz"}),
+            gains="inputs",
+        ),
+        LoopSpec(tachometer=core, gains="inputs", observer=Fraction(50, 3), velocity_filter=Fraction(0)),
+        LoopSpec(tachometer=core, gains="inputs", control_period=9000, velocity_filter=2 * PI * 50),
+    ]
+    if bus == "none":
+        cores += [AxesSpec(tachometer=core, axes=axes, parallel=axes > 1) for axes in (1, 8)]
+    for spec in cores:
+        (tmp_path / "core.json").write_text(export(spec, "core", bus)["core.json"])
+        assert of_manifest(tmp_path / "core.json") == spec
+
+
+def test_what_is_no_manifest_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "core.json"
+    for text in ("", "[]", "{}", '{"options": 1}', "[" * 100_000):
+        path.write_text(text)
+        with pytest.raises(ValueError, match="must be a manifest that tachometry writes"):
+            of_manifest(path)
+    options = of_texts("s", PPR).options
+    for more, message in (
+        ({"later": "1"}, "later must not be given with method s: there is no such option"),
+        ({"method": "x"}, "method must be one of s, m, t, mt, rairan, track, not 'x'"),
+        ({"tick": "0"}, "tick must be longer than 0"),
+        ({"method": "m", "axes": "2"}, "method must be s together with axes, not m"),
     ):
-        of_parameters(parameters | {"later": 1})
-    with pytest.raises(ParameterError, match=r": max_ticks is missing$"):
-        of_parameters({name: value for name, value in parameters.items() if name != "max_ticks"})
-    with pytest.raises(ParameterError, match=r"^method must be one of s, m, t, mt, rairan, track, not 'x'$"):
-        of_parameters(parameters | {"method": "x"})
-    with pytest.raises(ParameterError, match="must be"):
-        of_parameters(parameters | {"tick_cycles": 0})
+        with pytest.raises(ParameterError, match=f"^{message}"):
+            of_options({name: text for name, text in (options | more).items() if name not in ("cancel", "reciprocal")})

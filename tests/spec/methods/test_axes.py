@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, STachometer, Timing
-from tachometry.spec.core.parameters import TWO_TICKS
 from tachometry.spec.registers.manifest import manifest
 
 ALONE = STachometer(
@@ -39,10 +38,10 @@ def test_an_axis_is_a_core_whose_clock_is_a_round() -> None:
     assert spec.axis.timing.tick_cycles == 120
     assert spec.axis.timing.max_ticks == 500
     # The greatest speed is as many counts in a tick as of a core of its own, if it can be looked at so often.
-    assert spec.axis.max_count == ALONE.max_count == 7
-    assert spec_of(8, max_speed=None).axis.max_count == 120
-    assert spec_of(64, tick=2560, max_speed=Speed(Fraction(10**6))).axis.max_count == 40
-    assert spec.axis.velocity_width == ALONE.velocity_width
+    assert spec.axis.widths.max_count == ALONE.widths.max_count == 7
+    assert spec_of(8, max_speed=None).axis.widths.max_count == 120
+    assert spec_of(64, tick=2560, max_speed=Speed(Fraction(10**6))).axis.widths.max_count == 40
+    assert spec.axis.widths.velocity == ALONE.widths.velocity
 
 
 def test_it_is_the_same_in_another_process() -> None:
@@ -61,7 +60,7 @@ def test_ports() -> None:
     widths = [next(port.width for port in spec_of(axes).ports if port.name == "axis") for axes in (1, 2, 8, 9)]
     assert widths == [1, 1, 3, 4]  # no port has no bits
     held = spec_of(5, index=True, parallel=True)
-    values = {name for strobe in held.axis.strobes.values() for name in strobe}
+    values = {name for strobe in held.axis.ports.strobes.values() for name in strobe}
     assert {port.name for port in held.ports} == {
         *strobed.keys() - values,
         *(f"{name}_{axis}" for name in values for axis in range(5)),
@@ -107,10 +106,10 @@ def test_latencies(parallel: bool) -> None:
 def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
     """In rounds; and two ticks and a round for what all axes share."""
     for spec in (spec_of(), spec_of(3, tick=1000), spec_of(5, tick=1000)):
-        own = spec.axis.recovery_clocks
+        own = spec.axis.recovery.clocks
         assert own is not None
         shared = 2 * spec.timing.tick_cycles + {8: 8, 4: 4, 5: 8}[spec.slots]
-        assert spec.recovery_clocks == manifest(spec, "t")["recovery_cycles"] == spec.slots * own + shared
+        assert spec.recovery.clocks == manifest(spec, "t")["recovery_cycles"] == spec.slots * own + shared
 
 
 @pytest.mark.parametrize(
@@ -125,7 +124,7 @@ def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
         ),
         (8, {"filter_clocks": 2}, "filter_clocks must not be given together with axes: "),
         (8, {"index": True, "index_reset": True}, "index_reset must not be given together with axes: "),
-        (8, {"max_tick_cycles": TWO_TICKS}, "external-tick must not be given together with axes: "),
+        (8, {"external_tick": True}, "external_tick must not be given together with axes: "),
         (8, {"age": True}, "age must not be given together with axes: "),
         (8, {"bounds": True}, "bounds must not be given together with axes: "),
         (8, {"lowpass": Fraction(100)}, "lowpass must not be given together with axes: "),
@@ -188,8 +187,8 @@ def test_times_are_in_clocks_of_the_core() -> None:
 
 
 def test_a_speed_that_is_looked_at_too_seldom_is_told() -> None:
-    assert spec_of(8).notes == spec_of(8, max_speed=None).notes == ()
-    (note,) = spec_of(8, max_speed=Speed(Fraction(10**6))).notes
+    assert spec_of(8).words.notes == spec_of(8, max_speed=None).words.notes == ()
+    (note,) = spec_of(8, max_speed=Speed(Fraction(10**6))).words.notes
     assert note.startswith("greatest speed: an axis is looked at 120 times in a tick")
 
 
@@ -197,4 +196,4 @@ def test_the_reciprocal_is_that_of_a_table() -> None:
     for source in ("serial", "table"):
         spec = spec_of(8, reciprocal_source=source)
         assert spec.parameters["reciprocal_source"] == "table"
-        assert spec.memory[0] == "table"
+        assert spec.words.memory[0] == "table"

@@ -215,12 +215,12 @@ def test_ends_of_ranges() -> None:
 
 
 def test_widths_and_delays() -> None:
-    assert [spec_of(velocity_width=width).acceleration_width for width in ("30", "39", "40", "60")] == [38, 47, 48, 48]
+    assert [spec_of(velocity_width=width).acceleration.width for width in ("30", "39", "40", "60")] == [38, 47, 48, 48]
     for unit in ("count/tick", "rpm"):
         spec = spec_of(unit=unit, lowpass="100Hz")
-        assert spec.low_pass_latency > 0
-        assert (spec.output_latency > 0) == (unit == "rpm")
-        program, around = spec.low_pass_latency + spec.output_latency, spec.pin_to_count + spec.tick_latency
+        assert spec.latency.low_pass > 0
+        assert (spec.latency.output > 0) == (unit == "rpm")
+        program, around = spec.latency.low_pass + spec.latency.output, spec.latency.pin_to_count + spec.latency.tick
         assert spec.program.delay == around + 3 + program
     wide = {"tick": "40us", "max_time": "20s", "frac_bits": "24"}
     assert spec_of(bandwidth="20rad/s", **wide).form.width == 64
@@ -233,8 +233,8 @@ def test_the_shortest_tick_is_that_of_the_program() -> None:
     def with_tick(cycles: int) -> TrackTachometer:
         return spec_of(tick=str(cycles), max_time=str(500 * cycles))
 
-    shortest = with_tick(900).min_tick_cycles
-    assert with_tick(shortest).min_tick_cycles == shortest
+    shortest = with_tick(900).times.min_tick_cycles
+    assert with_tick(shortest).times.min_tick_cycles == shortest
     with pytest.raises(ParameterError, match=f"^tick_cycles must be at least {shortest} "):
         with_tick(shortest - 1)
 
@@ -253,11 +253,11 @@ def test_the_acceleration_has_the_most_fraction_bits(unit: str, options: dict[st
 
     def fits(bits: int) -> bool:
         one = lsb * Fraction(2) ** bits  # in LSB of the output
-        room = 2 ** (spec.acceleration_width - 1) - 2
+        room = 2 ** (spec.acceleration.width - 1) - 2
         return form.max_acceleration * one <= room and form.acceleration_error * one <= 1 / 8
 
-    assert spec.acceleration_frac_bits == max(bits for bits in range(-60, 60) if fits(bits))
-    assert spec.program.acceleration_factor == lsb * Fraction(2) ** spec.acceleration_frac_bits
+    assert spec.acceleration.frac_bits == max(bits for bits in range(-60, 60) if fits(bits))
+    assert spec.program.acceleration_factor == lsb * Fraction(2) ** spec.acceleration.frac_bits
 
 
 def test_the_velocity_is_shown_up_to_two_units_of_time_ahead() -> None:

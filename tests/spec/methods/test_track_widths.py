@@ -21,7 +21,7 @@ def check(spec: TrackTachometer, seed: int, n_ticks: int = TICKS) -> int:
     steps, last = hostile(spec, rng, n_ticks)
     windows = Windows.of(steps, last)
     position = rng.integers(-(1 << spec.position_width - 1), 1 << spec.position_width - 1, n_ticks)
-    ticks = Table(last + spec.tick_latency, {"position": position})
+    ticks = Table(last + spec.latency.tick, {"position": position})
     updates = Model(spec).updates(ticks, steps, int(last[-1]) + 1)
     core = Interpreter(spec.program)
     half, shift = 1 << (spec.position_width + spec.fine_bits - 1), spec.form.frac_bits - spec.fine_bits
@@ -31,8 +31,8 @@ def check(spec: TrackTachometer, seed: int, n_ticks: int = TICKS) -> int:
         shown = (core.mq, core.ac, (fine + half) % (2 * half) - half)
         names = ("velocity", "acceleration", "position_fine")
         assert shown == tuple(int(updates[name][i]) for name in names), f"seed {seed}, tick {i}"
-        assert abs(core.mq) < 1 << (spec.native_width - 1)
-        assert abs(core.ac) < 1 << (spec.acceleration_width - 1)
+        assert abs(core.mq) < 1 << (spec.widths.native - 1)
+        assert abs(core.ac) < 1 << (spec.acceleration.width - 1)
     return core.widest
 
 

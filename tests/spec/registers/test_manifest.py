@@ -23,23 +23,23 @@ def test_entries_are_there_where_they_apply(method: str) -> None:
     assert ("recovery_cycles" in plain) == (method != "track")  # which forgets gradually
     for port in ("acceleration", "position_fine"):
         assert (port in plain) == (method == "track")
-    if not METHODS[method].own_ticks:
+    if not METHODS[method].facts.own_ticks:
         external = manifest(of_texts(method, base | {"external-tick": "yes"}))
         assert external.keys() == plain.keys() | {"external_tick_cycles"}
         assert external["external_tick_cycles"]["max"] == 2 * int(base["tick"])
         assert external["latency_cycles"]["tick_in_to_window_end"] == 2
 
 
-@pytest.mark.parametrize("method", [name for name, spec in METHODS.items() if spec.has_bounds])
+@pytest.mark.parametrize("method", [name for name, spec in METHODS.items() if spec.facts.bounds])
 def test_bounds_are_there_where_they_apply(method: str) -> None:
     spec = of_texts(method, BASE | {"bounds": "yes"})
     bounded = manifest(spec)
     assert bounded.keys() == manifest(of_texts(method, BASE)).keys() | {"bounds"}
-    assert bounded["bounds"] == {"none": 2 ** (spec.bound_width - 1) - 1}
+    assert bounded["bounds"] == {"none": 2 ** (spec.bound.width - 1) - 1}
 
 
 def test_tracking_has_no_bounds() -> None:
-    assert [name for name, spec in METHODS.items() if not spec.has_bounds] == ["track"]
+    assert [name for name, spec in METHODS.items() if not spec.facts.bounds] == ["track"]
     with pytest.raises(ParameterError, match=r"^bounds must not be given with method track"):
         of_texts("track", had_by("track", BASE) | {"bounds": "yes"})
 
@@ -60,7 +60,7 @@ def test_acceleration_and_fine_position() -> None:
         described = manifest(spec := of_texts("track", texts))
         acceleration = described["acceleration"]
         assert acceleration["unit"] == own
-        assert acceleration["width"] == min(48, spec.velocity_width + 8)
+        assert acceleration["width"] == min(48, spec.widths.velocity + 8)
         assert acceleration["rad_per_s2_per_lsb"] == pytest.approx(one * 0.5 ** acceleration["frac_bits"], rel=1e-12)
         assert described["position_fine"] == {"frac_bits": 3}
 

@@ -131,7 +131,7 @@ def check_client(registers: RegisterMap, text: str, folder: Path) -> None:
     memory = {one.offset: one.reset for one in registers}
     values = {
         port.name: 1 - (1 << port.width - 1) if port.signed else (1 << port.width) - 1
-        for port in spec.outputs
+        for port in spec.ports.outputs
         if not port.is_strobe
     }
     for one in registers:
@@ -141,7 +141,7 @@ def check_client(registers: RegisterMap, text: str, folder: Path) -> None:
     snapshot = Client(memory.__getitem__, memory.__setitem__, described).snapshot()
     assert dict(snapshot) == values | {"updated": 1} | ({"indexed": 1} if spec.index else {})
     assert snapshot.flags.keys() == flags(spec) | {"updated"} | ({"indexed"} if spec.index else set())
-    assert snapshot.velocity_rad_per_s == values["velocity"] * spec.rad_per_s_per_lsb
+    assert snapshot.velocity_rad_per_s == values["velocity"] * spec.scale.rad_per_s_per_lsb
 
 
 def check_driver(registers: RegisterMap, text: str, folder: Path) -> None:
@@ -150,7 +150,7 @@ def check_driver(registers: RegisterMap, text: str, folder: Path) -> None:
     members = dict(reversed(row) for row in re.findall(r"^  (\w+) (\w+);$", struct[: struct.index("};")], re.MULTILINE))
     spec = registers.spec
     expected = {"updated": "bool"} | ({"indexed": "bool"} if spec.index else {})
-    for port in spec.outputs:
+    for port in spec.ports.outputs:
         if not port.is_strobe:
             bits = 64 if port.width > 32 else 32
             expected[port.name] = "bool" if port.width == 1 else f"{'' if port.signed else 'u'}int{bits}_t"
@@ -160,7 +160,7 @@ def check_driver(registers: RegisterMap, text: str, folder: Path) -> None:
 
 
 def flags(spec: TachometerSpec) -> set[str]:
-    return {port.name for port in spec.outputs if port.width == 1 and not port.is_strobe}
+    return {port.name for port in spec.ports.outputs if port.width == 1 and not port.is_strobe}
 
 
 Check = Callable[[RegisterMap, str, Path], None]

@@ -33,9 +33,9 @@ def case(method: str, seed: int) -> tuple[RegisterMap, PinTrace, list[dict[str, 
     spec = replace(spec, velocity_width=40) if (method, seed) == WIDE else spec
     n_clocks = min(trace.n_clocks, CLOCKS)
     rows: list[dict[str, int]] = [{"bus.read": 0, "bus.write": 0} for _ in range(n_clocks)]
-    for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin.name] for pin in spec.pins), strict=True):
+    for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin.name] for pin in spec.ports.pins), strict=True):
         if clock < n_clocks:
-            rows[clock] |= {pin.name: int(level) for pin, level in zip(spec.pins, levels, strict=True)}
+            rows[clock] |= {pin.name: int(level) for pin, level in zip(spec.ports.pins, levels, strict=True)}
     return RegisterMap(spec), PinTrace(trace.clock, trace.a, trace.b, n_clocks, trace.z, trace.tick_in), rows
 
 

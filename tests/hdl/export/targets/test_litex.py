@@ -175,8 +175,8 @@ def test_offsets_and_ports_are_those_of_the_core(method: str) -> None:
     names: dict[str, object] = {}
     exec(tables, names)
     assert names["REGISTERS"] == {register.name.lower(): register.offset for register in RegisterMap(core)}
-    assert names["PINS"] == [pin.name for pin in core.pins]
-    assert names["OUTPUTS"] == {port.name: (port.width, port.signed) for port in core.outputs}
+    assert names["PINS"] == [pin.name for pin in core.ports.pins]
+    assert names["OUTPUTS"] == {port.name: (port.width, port.signed) for port in core.ports.outputs}
     assert names["CLOCK_HZ"] == core.timing.clock_hz
     # An address is one of bytes, two bits of which are left out.
     (high,) = re.findall(r"self\.bus\.adr\[:(\d+)\]", text)

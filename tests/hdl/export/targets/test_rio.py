@@ -93,7 +93,7 @@ def run(seed: int, folder: Path) -> tuple[list[int], list[dict[str, float]]]:
     spec, trace = case(seed)
     texts = exported(seed)
     plugin = loaded(texts[PLUGIN], spec.timing.clock_hz)
-    sent, pins = plugin.interface_data(), [pin.name for pin in spec.pins]
+    sent, pins = plugin.interface_data(), [pin.name for pin in spec.ports.pins]
     # HAL takes what RIO sends as signed.
     wires = [f"wire {'signed ' * (one['size'] > 1)}[{one['size'] - 1}:0] {name};" for name, one in sent.items()]
     parts = {
@@ -138,10 +138,10 @@ def check(seed: int, folder: Path) -> None:
     ticks, updates, index = tables[TICK], tables[UPDATE], tables[INDEX]
     overflows = ticks.clock[ticks.overflow.astype(bool)]
     counted = {"decode-errors": tables["decode_error"].clock, "overflows": overflows}
-    counted |= {"tick-errors": tables["tick_error"].clock} if spec.max_tick_cycles else {}
+    counted |= {"tick-errors": tables["tick_error"].clock} if spec.external_tick else {}
     period, before = 1 << spec.position_width, clocks[0]
     through = dict(zip(ticks.clock.tolist(), np.unwrap(ticks.position, period=period).tolist(), strict=True))
-    per_lsb = spec.rad_per_s_per_lsb
+    per_lsb = spec.scale.rad_per_s_per_lsb
     first = ticks.rows(ticks.clock == clocks[0])
     origin, enabled, resets = through[clocks[0]] - int(first.position[0]), False, 0
     assert len(clocks) == len(ticks.clock[::EVERY_FRAME][START:]) == len(shown)
@@ -172,7 +172,7 @@ def check(seed: int, folder: Path) -> None:
             "swallowed-edges": ticks.swallowed_edges[at],
             **{name: np.count_nonzero(events < clock) for name, events in counted.items()},
         }
-        if spec.output:
+        if spec.scale.output:
             expected["velocity-overflow"] = updates.velocity_overflow[row] if row >= 0 else 0
         assert found == expected, (frame, clock)
     assert resets >= 1
@@ -206,7 +206,7 @@ def test_the_plugin_fits_its_verilog_and_the_core(method: str, tmp_path: Path) -
     ports = {name: (direction, int(high or 0) + 1) for direction, high, name in found}
     sent = {name: ("output", one["size"]) for name, one in plugin.INTERFACE.items()}
     assert ports == {"clk": ("input", 1)} | {pin: ("input", 1) for pin in plugin.PINDEFAULTS} | sent
-    assert list(plugin.PINDEFAULTS) == [pin.name for pin in spec.pins]
+    assert list(plugin.PINDEFAULTS) == [pin.name for pin in spec.ports.pins]
     assert [plugin.NAME, *plugin.VERILOGS] == ["spindle_rio", "spindle_rio.v", "spindle.v"]
     assert {name: hal_type(pin) for name, pin in plugin.SIGNALS.items()} == {
         name: pin.kind for name, pin in hal_pins(spec).items()
@@ -220,7 +220,7 @@ def test_numbers_come_from_the_spec() -> None:
     """As RIO's test programs show them."""
     spec = core("m")
     plugin = loaded(made("m")[PLUGIN], 1_000_000)
-    rpm = spec.rad_per_s_per_lsb * 30 / np.pi
+    rpm = spec.scale.rad_per_s_per_lsb * 30 / np.pi
     for value in (-5, 0, 1000):
         assert plugin.convert("velocity-rpm", {}, value) == pytest.approx(value * rpm)
         assert plugin.convert("velocity", {}, value) == pytest.approx(value * rpm / 60 * spec.encoder.counts_per_rev)

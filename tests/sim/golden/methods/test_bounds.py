@@ -41,7 +41,7 @@ def true_travel(
 def displaced(spec: TachometerSpec, angle: NDArray[np.int64], seed: int) -> NDArray[np.int64]:
     """Tell how much later than that of an ideal disc each edge comes: half because of the disc, half of the lines."""
     rng = np.random.default_rng(seed)
-    most = int(spec.edge_error * SUBCOUNTS) // 2
+    most = int(spec.bound.edge_error * SUBCOUNTS) // 2
     disc = rng.choice([0, most], 101) if seed % 2 else rng.integers(0, most + 1, 101)
     return disc[angle // SUBCOUNTS % 101] + rng.integers(0, most + 1, len(angle))
 
@@ -50,21 +50,21 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
     """Return every window of random motions; how many there were, and how near the truth came to a bound, in counts."""
     windows, nearest = 0, 1.0
     for seed in range(n_motions):
-        angle = motion(n_ticks + 1, spec.max_count, seed)
+        angle = motion(n_ticks + 1, spec.widths.max_count, seed)
         seen = angle[1:] - displaced(spec, angle[1:], seed)
         updates = model(spec).updates(ticks_of(seen), None, 1 << 40)
-        at = updates.clock - spec.tick_to_velocity
+        at = updates.clock - spec.latency.tick_to_velocity
         m_s, valid = updates.interval, updates["bounds_valid"]
         windows += int(np.count_nonzero(valid))
         # Twice the travel in LSB · ticks, so that all is whole.
-        travel = true_travel(spec, angle, at, m_s) << spec.native_frac_bits
+        travel = true_travel(spec, angle, at, m_s) << spec.widths.native_frac_bits
         above = (2 * updates["velocity_upper"] * m_s * SUBCOUNTS - travel)[valid]
         below = (travel - 2 * updates["velocity_lower"] * m_s * SUBCOUNTS)[valid]
         assert (above >= 0).all(), f"seed {seed}: above the upper bound at {at[valid][above < 0][:1]}"
         assert (below >= 0).all(), f"seed {seed}: below the lower bound at {at[valid][below < 0][:1]}"
         width = updates["velocity_upper"] - updates["velocity_lower"]
-        assert (width * m_s < 2 * (1 + spec.edge_error) * (1 << spec.native_frac_bits) + 2 * m_s).all()
-        scale = 2 * SUBCOUNTS << spec.native_frac_bits
+        assert (width * m_s < 2 * (1 + spec.bound.edge_error) * (1 << spec.widths.native_frac_bits) + 2 * m_s).all()
+        scale = 2 * SUBCOUNTS << spec.widths.native_frac_bits
         nearest = min(nearest, above.min() / scale, below.min() / scale)
     return windows, nearest
 

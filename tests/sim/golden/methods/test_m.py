@@ -31,7 +31,7 @@ def test_means_are_correctly_rounded_and_enclosed(n: int, frac_bits: int, edge_e
     ticks = [Tick(k, number, False, 0, not number) for k, number in enumerate(NUMBERS)]
     wanted = m_updates(Settings("m", {"average": str(n), "edge-error": str(edge_error)}), ticks)
     one = 2**frac_bits
-    assert found.clock.tolist() == (clock + spec.datapath_latency).tolist()
+    assert found.clock.tolist() == (clock + spec.latency.datapath).tolist()
     assert found.velocity.tolist() == [rounded(update.speed, frac_bits) for update in wanted]
     assert found["velocity_lower"].tolist() == [math.floor((update.lower or 0) * one) for update in wanted]
     assert found["velocity_upper"].tolist() == [math.ceil((update.upper or 0) * one) for update in wanted]

@@ -17,7 +17,7 @@ from tachometry.sim.golden.methods.rairan import Model, orbit
 from tachometry.sim.signals.run import Table
 from tachometry.sim.theory.rairan import rairan_eq13_max_error
 from tachometry.spec import RairanTachometer, Speed
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.adaptive import parse_target
 
 
@@ -45,11 +45,11 @@ def test_to_the_letter_it_is_table_1_at_every_ts(dt: int) -> None:
 def check_description(spec: RairanTachometer, step: np.ndarray) -> list[Update]:
     """Hold every update and every end of dt against the description; these updates."""
     words = {"dt": str(spec.timing.tick_cycles), "max-time": str(spec.timing.tick_cycles * spec.timing.max_ticks)}
-    words |= {"estimate": spec.estimate, "frac-bits": str(spec.frac_bits)}
+    words |= {"estimate": spec.estimate, "frac-bits": str(spec.widths.frac_bits)}
     words |= {"bound-decay": "yes" if spec.bound_decay else "no"}
     words |= {} if spec.adaptive is None else {"adaptive": str(spec.adaptive)}
     settings = Settings("rairan", words)
-    assert settings.greatest_shift == spec.max_shift
+    assert settings.greatest_shift == spec.times.max_tick_shift
     steps = {int(clock): int(step[clock]) for clock in np.flatnonzero(step)}
     found, ends = rairan_updates(settings, Front(len(step), steps))
     updates = golden_updates(spec, step)
@@ -59,7 +59,7 @@ def check_description(spec: RairanTachometer, step: np.ndarray) -> list[Update]:
     assert updates.interval.tolist() == [one.interval for one in found]
     for name in found[0].others:
         assert updates[name].tolist() == [one.others[name] for one in found], name
-    assert updates.velocity.tolist() == [rounded(one.speed, spec.frac_bits) for one in found]
+    assert updates.velocity.tolist() == [rounded(one.speed, spec.widths.frac_bits) for one in found]
     assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
     return found
 
@@ -100,7 +100,7 @@ def test_adaptive_dt_clock_by_clock(dt: int, max_ticks: int, target: str, bound_
         rng = np.random.default_rng([dt, seed])
         step = steady_steps(rng, 60_000, dt) if seed < 3 else random_steps(rng, 60_000, dt)
         found = check_description(spec, step)
-        assert {one.others["dt_shift"] for one in found} == set(range(spec.max_shift + 1))
+        assert {one.others["dt_shift"] for one in found} == set(range(spec.times.max_tick_shift + 1))
 
 
 def test_orbit_follows_to_the_end() -> None:
@@ -150,7 +150,7 @@ def test_a_bound_that_would_divide_by_0_is_absent() -> None:
     step[[0, 1, 2, 3, 7, 8, 9, 12, 14]] = 1
     updates = golden_updates(spec, step)
     low, high = (dict(zip(updates.clock.tolist(), updates[name].tolist(), strict=True)) for name in BOUNDS)
-    none = spec.absent_bound
+    none = spec.bound.absent
     # t − 1/T = 0 for one dt of one clock.
     assert (low[10], high[10]) == (-none, none)
     # −E/(1 − 1/2) and (1 + E)/(1 − 1/2) counts per dt of two clocks, which has two ticks.
@@ -326,7 +326,10 @@ def test_a_burst_after_standstill() -> None:
             "adaptive must be at least 0.03226 with this speed and time, not 0.001",
         ),
         ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
-        ({"max_tick_cycles": 100}, "method must be another than rairan for an external tick: it makes its own ticks"),
+        (
+            {"external_tick": True, "max_tick_cycles": 100},
+            "method must be another than rairan for an external tick: it makes its own ticks",
+        ),
     ],
 )
 def test_bad_parameters(parameters: dict[str, Any], message: str) -> None:
@@ -351,8 +354,8 @@ def test_bad_targets(text: str) -> None:
 def test_at_a_steady_speed_eq13_is_within_the_target_and_dt_no_longer_than_that_takes(target: Fraction) -> None:
     dt, looked_at, shifts = 48, 0, set()
     spec = make_spec(dt, 300, adaptive=target, max_speed=Speed.parse("5000rev/s"))
-    rule, most = spec.adaptive_dt, spec.max_shift
-    assert (spec.max_count, most) == (24, 6)
+    rule, most = spec.form.adaptive_dt, spec.times.max_tick_shift
+    assert (spec.widths.max_count, most) == (24, 6)
     for period in np.geomspace(2.1, 2.2 * rule.fewest * dt, 40):
         gap = Fraction(period).limit_denominator(1000)
         step = pulses(gap, int(30 * gap) + (12 * dt << most))

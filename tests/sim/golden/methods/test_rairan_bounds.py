@@ -44,11 +44,11 @@ def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float,
     part = np.where(straight, np.clip(end - true[last], 0, gap), 0)
     # travelled/time in counts per dt is (whole·gap + part)·dt·FINE / (gap·time)
     # Each edge comes later by up to the edge error, in eighths: because of the disc, or of the lines.
-    late = sign * rng.integers(0, int(8 * spec.edge_error) + 1, len(at))
+    late = sign * rng.integers(0, int(8 * spec.bound.edge_error) + 1, len(at))
     late = np.append(late, late[-1:])
     whole, time = 8 * (last - opening) + late[last] - late[opening], end - true[opening]
     travelled = sign[last] * (whole * gap + part * (8 + late[following] - late[last])) * dt * FINE << FRAC_BITS
-    none = spec.absent_bound
+    none = spec.bound.absent
     assert ((8 * lower * gap * time <= travelled) | (lower == -none)).all()
     assert ((travelled <= 8 * upper * gap * time) | (upper == none)).all()
 

@@ -32,7 +32,7 @@ def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, 
     """Return (tick, m_s, forced, stalled, raw velocity) of every update; `stalled` is that of the tick."""
     s_model, ticks = model(max_ticks, **options), as_ticks(m_e)
     found = s_model.updates(ticks, None, 1 << 40)
-    cause = (found.clock - s_model._spec.datapath_latency) // 16
+    cause = (found.clock - s_model._spec.latency.datapath) // 16
     stalled = with_stalled(s_model._spec, ticks, np.ones(len(m_e), dtype=np.int64)).stalled[cause]
     columns = (cause, found.interval, found.forced, stalled, found.velocity)
     return list(zip(*(column.tolist() for column in columns), strict=True))

@@ -25,7 +25,7 @@ def rms(spec: TachometerSpec, motion: str, begin: float, end: float, jitter: flo
     updates = golden.run(spec, encoding.recording.place(spec.timing.clock_hz)).updates
     instants = np.arange(begin, end, 1e-5)
     at = np.searchsorted(updates.clock, instants * spec.timing.clock_hz, side="right") - 1
-    error = updates.velocity[at] * spec.rad_per_s_per_lsb - encoding.motion.speed(instants)
+    error = updates.velocity[at] * spec.scale.rad_per_s_per_lsb - encoding.motion.speed(instants)
     return float(np.sqrt(np.mean(np.square(error)))), updates
 
 
@@ -83,4 +83,4 @@ def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
     assert found.n_mismatches == 0, f"seed {seed}: {found.first}"
     updates = found.actual.updates
     assert np.count_nonzero(updates.velocity) > 20
-    assert np.diff(updates.clock).min() >= spec.division_clocks
+    assert np.diff(updates.clock).min() >= spec.form.division_clocks

@@ -13,7 +13,7 @@ from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTTachometer, Timing, TTachometer
-from tachometry.spec.core.tachometer import BOUNDS
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
 
 INSTANTS = 1 << 10  # in a clock
@@ -39,10 +39,10 @@ def edges(n: int, seed: int) -> tuple[Ints, Ints]:
 def check_silence(spec: TimedTachometer, updates: Table) -> None:
     """Without a count the shaft may have come within a hair of the next edge, and over none."""
     forced = updates.forced & updates["bounds_valid"]
-    lasted = (updates.interval * spec.interval_unit_cycles)[forced]
+    lasted = (updates.interval * spec.times.interval_unit)[forced]
     lower, upper = (updates[name][forced] * lasted for name in BOUNDS)
-    off = int(spec.edge_error * (TICK << spec.native_frac_bits))
-    one, velocity = (TICK << spec.native_frac_bits) + off, updates.velocity[forced]
+    off = int(spec.bound.edge_error * (TICK << spec.widths.native_frac_bits))
+    one, velocity = (TICK << spec.widths.native_frac_bits) + off, updates.velocity[forced]
     assert (velocity == 0).sum() > 5
     assert ((upper >= one) & (upper < one + lasted))[velocity >= 0].all()
     assert ((lower <= -one) & (lower > -one - lasted))[velocity <= 0].all()
@@ -65,13 +65,13 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     tick = np.arange(TICK - 1, n_clocks, TICK)
     through = np.append(0, np.cumsum(step))
     m_e = np.diff(through[np.searchsorted(clock, tick, side="right")], prepend=0)
-    ticks = Table(tick + spec.tick_latency, {"pulse_count": m_e})
+    ticks = Table(tick + spec.latency.tick, {"pulse_count": m_e})
     updates = model(spec).updates(ticks, Steps(clock, step, none, none, none), n_clocks)
 
     # The edge that each count is: on the lattice the last in the tick that leads to where the tick ends.
     updates = updates.rows(updates.clock < n_clocks)
-    end = updates.clock - spec.datapath_latency - spec.tick_latency
-    if spec.on_lattice:
+    end = updates.clock - spec.latency.datapath - spec.latency.tick
+    if spec.form.on_lattice:
         period = np.searchsorted(tick, clock)
         leads = (step == np.sign(m_e)[period]) & (through[1:] == through[np.searchsorted(clock, tick, "right")][period])
         edge_of = np.full(len(tick), -1)
@@ -87,18 +87,18 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
     # Where the shaft is when it passes: half a count before or after the counts on its sides.
     way = through[last + 1] - through[first + 1] - (step[last] - step[first]) // 2
     # Each edge comes later by up to the edge error: half because of the disc, half of the lines.
-    rng, most = np.random.default_rng(seed), int(8 * spec.edge_error)
+    rng, most = np.random.default_rng(seed), int(8 * spec.bound.edge_error)
     late = rng.integers(0, most + 1, 64)[(through[1:] + through[:-1] + 1) // 2 % 64] + rng.integers(
         0, most + 1, len(step)
     )
     way = 16 * way + late[last] - late[first]
-    scale = INSTANTS * TICK << spec.native_frac_bits
+    scale = INSTANTS * TICK << spec.widths.native_frac_bits
     lasted = time[last] - time[first]
     lower, upper = updates["velocity_lower"][chosen], updates["velocity_upper"][chosen]
-    above, below = upper == spec.absent_bound, lower == -spec.absent_bound  # there is none
+    above, below = upper == spec.bound.absent, lower == -spec.bound.absent  # there is none
     assert (below | (16 * lower * lasted <= way * scale)).all()
     assert (above | (16 * upper * lasted >= way * scale)).all()
-    if not spec.saturates:
+    if not spec.form.saturates:
         # A velocity that decays is that of half a count more than can have been.
         measured = updates["bounds_valid"] & ~(updates.forced & (updates.velocity != 0))
         assert (updates["velocity_lower"] <= updates.velocity)[measured].all()

@@ -28,5 +28,5 @@ def test_a_constant_speed_is_settled_upon(start: str, options: dict[str, str]) -
         clock, position = places(start, spec.timing.tick_cycles / counts_per_tick)
         level = quadrature(np.append(0, position))
         trace = PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + 10)
-        velocity = golden.run(spec, trace).updates.velocity[-300:] / 2.0**spec.frac_bits
+        velocity = golden.run(spec, trace).updates.velocity[-300:] / 2.0**spec.widths.frac_bits
         assert np.abs(velocity) == pytest.approx(np.full(300, counts_per_tick), rel=2e-3), counts_per_tick

@@ -33,10 +33,10 @@ def windows(spec: MTTachometer, clock: Ints, step: Ints) -> tuple[Ints, Ints]:
     """Tell which counts open and close the measurements of the golden model."""
     none, n_clocks = np.empty(0, np.int64), int(clock[-1]) + 10 * TICK
     tick = np.arange(TICK - 1, n_clocks, TICK)
-    ticks = Table(tick + spec.tick_latency, {"pulse_count": np.zeros(len(tick), np.int64)})
+    ticks = Table(tick + spec.latency.tick, {"pulse_count": np.zeros(len(tick), np.int64)})
     updates = mt.Model(spec).updates(ticks, Steps(clock, step, none, none, none), n_clocks)
     measured = updates.rows(~updates.forced & (updates.clock < n_clocks))
-    end = measured.clock - spec.datapath_latency - spec.tick_latency
+    end = measured.clock - spec.latency.datapath - spec.latency.tick
     return np.searchsorted(clock, end - measured.interval), np.searchsorted(clock, end)
 
 
@@ -98,7 +98,7 @@ def errors(speed: float, **options: str) -> Any:
     recording = encoder.record(parse_motion(f"constant:{speed}rad/s:50ms")).recording
     spec = of_texts("mt", DRIVE | options)
     updates = golden.run(spec, recording.place(spec.timing.clock_hz)).updates
-    return updates.velocity[3:] * spec.rad_per_s_per_lsb - speed
+    return updates.velocity[3:] * spec.scale.rad_per_s_per_lsb - speed
 
 
 @pytest.mark.parametrize("decoding", ["4", "2"])

@@ -91,7 +91,7 @@ def test_without_offsets_it_is_the_golden_model(option: str) -> None:
     counts = Counts.of(encoding)
     found = by_counts(counts, counts.coordinate(np.zeros(1)), 300e-6, option == "yes")
     assert len(found.velocity) == len(updates.clock) > 100
-    np.testing.assert_allclose(found.velocity, updates.velocity * spec.rad_per_s_per_lsb, atol=0.02)
+    np.testing.assert_allclose(found.velocity, updates.velocity * spec.scale.rad_per_s_per_lsb, atol=0.02)
 
 
 def test_offsets_take_phase_and_duty_errors_out() -> None:
@@ -117,7 +117,7 @@ def test_tracking() -> None:
     without = by_tracking(counts, counts.coordinate(np.zeros(1)), tuning)
     instants = np.arange(0.05, 0.2, 1e-4)
     seen = updates.velocity[np.searchsorted(updates.clock, instants * TRACK.timing.clock_hz, side="right") - 1]
-    assert np.sqrt(np.mean(np.square(without.at(instants) - seen * TRACK.rad_per_s_per_lsb))) < 0.05
+    assert np.sqrt(np.mean(np.square(without.at(instants) - seen * TRACK.scale.rad_per_s_per_lsb))) < 0.05
     truth = encoding.true_speed(instants)
     known = by_tracking(counts, counts.coordinate(perfect_offsets(encoding, CYCLE)), tuning)
     assert rms(known, truth, instants) < 0.8 * rms(without, truth, instants)

@@ -60,7 +60,9 @@ def test_every_method_fills_the_columns(method: str) -> None:
 
 
 def test_options_in_units() -> None:
-    spec: Any = MTTachometer(encoder=Encoder(100), timing=TIMING, min_time=3000, max_tick_cycles=1500)
+    spec: Any = MTTachometer(
+        encoder=Encoder(100), timing=TIMING, min_time=3000, external_tick=True, max_tick_cycles=1500
+    )
     encoder = VirtualEncoder(100, vibration=Vibration(1e-3, 50), bounce=Bounce(2, 5e-6), seed=3)
     row = run_point(replace(POINT, spec=spec, encoder=encoder))
     assert (row["min_time_s"], row["max_tick_period_s"]) == (3e-3, 1.5e-3)

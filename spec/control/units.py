@@ -1,0 +1,84 @@
+"""Units of a control loop: what an LSB of its numbers is, and how many control ticks an update can stand for."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tachometry.spec.control import form
+from tachometry.spec.control.form import ACCELERATION_WIDTH
+from tachometry.spec.control.law import Law
+from tachometry.spec.language.units import PI
+
+MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
+
+
+@dataclass(frozen=True)
+class Units:
+    """Says how much an LSB of each number of a loop is; much of it follows from the control period.
+
+    Parameters
+    ----------
+    law : Law
+    current_width : int
+        Bits of `current`.
+    period : int
+        Clocks between two control ticks.
+    """
+
+    law: Law
+    current_width: int
+    period: int
+
+    @property
+    def seconds(self) -> Fraction:
+        """T_c, the time between two control ticks."""
+        return self.law.tachometer.times.seconds(self.period)
+
+    @property
+    def longest(self) -> int:
+        """Most control ticks that an update can stand for; then the velocity that is held is taken as one."""
+        if not self.law.synchronised:
+            return 1
+        spec = self.law.tachometer
+        ticks = -(-(spec.timing.max_ticks * spec.times.longest_tick) // self.period) + 2
+        return min((1 << ticks.bit_length()) - 1, MAX_INTERVAL)
+
+    @property
+    def rad_per_s(self) -> Fraction:
+        """One LSB of the velocity in rad/s."""
+        spec = self.law.tachometer
+        counts = spec.encoder.counts_per_rev * spec.timing.tick_seconds * spec.scale.per_count
+        return 2 * PI / (counts * Fraction(2) ** spec.widths.frac_bits)
+
+    @property
+    def current_frac_bits(self) -> int:
+        """One LSB of `current` is 2^−this A."""
+        return math.floor(math.log2(((1 << (self.current_width - 1)) - 1) / self.law.current_limit))
+
+    @property
+    def amperes(self) -> Fraction:
+        """One LSB of `current` in A."""
+        return Fraction(2) ** -self.current_frac_bits
+
+    @property
+    def acceleration_frac_bits(self) -> int:
+        """One LSB of the commanded acceleration is 2^−this rad/s²: twice what the greatest current makes fits."""
+        most = 2 * self.law.torque_constant * self.law.current_limit / self.law.inertia
+        return math.floor(math.log2(((1 << (ACCELERATION_WIDTH - 1)) - 1) / most))
+
+    @property
+    def extra_bits(self) -> int:
+        """f: bits of y and of w below an LSB of the velocity."""
+        law = self.law
+        least = [rate * self.seconds for rate in (law.observer, law.filter) if rate is not None]
+        return form.extra_bits(*(1 - form.decay(one) for one in least))
+
+    @property
+    def fine(self) -> Fraction:
+        """One LSB of y and of w in rad/s."""
+        return self.rad_per_s / (1 << self.extra_bits)
+
+    @property
+    def command_bits(self) -> int:
+        """Fraction bits of the commanded velocity, below an LSB of the velocity."""
+        return min(self.extra_bits, 8)

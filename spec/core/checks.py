@@ -1,0 +1,111 @@
+"""Checks of a core: that its numbers are in range, and fit each other."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from tachometry.spec.core.timing import MAX_TICK_CYCLES
+from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
+from tachometry.spec.formats.velocity_output import NATIVE, UNITS
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.units import PI, rounded, signed_width
+
+if TYPE_CHECKING:
+    from tachometry.spec.core.tachometer import TachometerSpec
+
+
+def check(spec: TachometerSpec) -> None:
+    """Check what is asked for.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range.
+    """
+    if spec.unit not in UNITS:
+        raise ParameterError("unit", f"must be one of {', '.join(UNITS)}, not {spec.unit!r}")
+    _check_ticks(spec)
+    if spec.velocity_width is not None and not 8 <= spec.velocity_width <= 64:
+        raise ParameterError("velocity_width", f"must be from 8 to 64, not {spec.velocity_width}")
+    _check_velocity(spec)
+    if not 8 <= spec.position_width <= 48:
+        raise ParameterError("position_width", f"must be from 8 to 48, not {spec.position_width}")
+    if not 0 <= spec.filter_clocks <= 255:
+        raise ParameterError("filter_clocks", f"must be from 0 to 255, not {spec.filter_clocks}")
+    if spec.index_reset and not spec.index:
+        raise ParameterError("index_reset", "must be given together with an index")
+    if spec.facts.bounds:
+        _check_edge_error(spec)
+    if spec.lowpass is not None:
+        _check_lowpass(spec, spec.lowpass)
+
+
+def _check_edge_error(spec: TachometerSpec) -> None:
+    if not 0 <= spec.edge_error <= 1:
+        raise ParameterError("edge_error", f"must be from 0 to 1, not {float(spec.edge_error):.9g}")
+    if spec.edge_error and not spec.bounds:
+        raise ParameterError("edge_error", "must be given together with bounds")
+
+
+def _check_lowpass(spec: TachometerSpec, bandwidth: Fraction) -> None:
+    least = 4 / (spec.timing.tick_seconds * (1 << MAX_EXTRA_BITS))
+    greatest = 2 * PI * spec.timing.clock_hz  # nothing is faster than the clock
+    if bandwidth <= 0 or spec.scale.low_pass.extra_bits > MAX_EXTRA_BITS or bandwidth > greatest:
+        raise ParameterError(
+            "lowpass",
+            f"must be from {rounded(least, up=True)} to {rounded(greatest, up=False)} rad/s here, "
+            f"not {float(bandwidth):.9g} rad/s",
+        )
+
+
+def _check_ticks(spec: TachometerSpec) -> None:
+    if not spec.external_tick:
+        if spec.max_tick_cycles is not None:
+            raise ParameterError("max_tick_cycles", "must be given together with an external tick")
+        return
+    if spec.facts.own_ticks:
+        raise ParameterError(
+            "method", f"must be another than {spec.method} for an external tick: it makes its own ticks"
+        )
+    shortest = spec.timing.tick_cycles
+    if shortest < 2:
+        raise ParameterError("tick_cycles", "must be at least 2 with an external tick, not 1")
+    if not shortest <= spec.times.longest_tick <= MAX_TICK_CYCLES:
+        raise ParameterError(
+            "max_tick_cycles",
+            f"must be from {shortest}, one tick, to {MAX_TICK_CYCLES}, not {spec.max_tick_cycles}",
+        )
+
+
+def _check_velocity(spec: TachometerSpec) -> None:
+    coarsest, finest = spec.widths.frac_bits_range(spec.unit)
+    if coarsest <= spec.widths.frac_bits <= finest:
+        _check_full_scale(spec, coarsest)
+        return
+    if spec.unit == NATIVE:
+        raise ParameterError("frac_bits", f"must be from {coarsest} to {finest}, not {spec.widths.frac_bits}")
+    raise ParameterError(
+        "lsb",
+        f"must be from 2^{-finest} to 2^{-coarsest} {spec.unit} with this encoder and tick, "
+        f"not 2^{-spec.widths.frac_bits}",
+    )
+
+
+def _check_full_scale(spec: TachometerSpec, coarsest: int) -> None:
+    """Check that a velocity of so many bits shows the greatest speed."""
+    if spec.max_speed is None or spec.velocity_width is None:
+        return
+    counts = spec.max_speed.counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
+    counts = min(counts, Fraction(spec.widths.max_velocity))
+    fitting = spec.widths.fitting_frac_bits(counts)
+    if spec.widths.frac_bits <= fitting:
+        return
+    needs = f"to show {spec.max_speed} in {spec.velocity_width} bits"
+    if fitting < coarsest:
+        width = signed_width(math.ceil(counts * spec.scale.per_count * Fraction(2) ** coarsest))
+        raise ParameterError("velocity_width", f"must be at least {width} to show {spec.max_speed} in {spec.unit}")
+    if spec.unit == NATIVE:
+        raise ParameterError("frac_bits", f"must be at most {fitting} {needs}, not {spec.widths.frac_bits}")
+    raise ParameterError("lsb", f"must be at least 2^{-fitting} {spec.unit} {needs}, not 2^{-spec.widths.frac_bits}")
