@@ -118,6 +118,31 @@ def test_only_engines_import_hdl() -> None:
     }
 
 
+def functions(file: Path, package: str) -> list[str]:
+    """Return what a file imports from a package in lower case: functions and modules, no classes and constants."""
+    nodes = [node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom)]
+    return [
+        alias.name
+        for node in nodes
+        if (node.module or "").startswith(package)
+        for alias in node.names
+        if alias.name.islower()
+    ]
+
+
+def test_reports_call_no_functions_of_sim() -> None:
+    """They format results, and compute nothing."""
+    assert {file.name: called for file in files("cli/reports") if (called := functions(file, "tachometry.sim"))} == {}
+
+
+def test_a_command_calls_one_study() -> None:
+    """It returns one result, which one report prints. Sizes are of Verilog, which no study can export."""
+    called = {file.stem: functions(file, "tachometry.sim.studies") for file in files("cli/commands")}
+    assert {name: names for name, names in called.items() if len(names) > 1} == {
+        "compare": ["comparison", "measure_core", "versions"]
+    }
+
+
 @pytest.mark.parametrize("layer", LAYERS)
 def test_there_is_no_circle(layer: str) -> None:
     """Rooms of a layer can be put in an order in which each imports only those before it."""

@@ -168,7 +168,7 @@ def test_sweep(scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tachometry.cli.commands.verify.configurations", lambda method: configurations(method)[:1])
+    monkeypatch.setattr("tachometry.sim.studies.verify.configurations", lambda method: configurations(method)[:1])
     options = ["--methods", "x", "--engines", "pysim", "--jobs", "1", "-o", tmp_path]
     assert run("verify", *options) == 0
     assert "PASS: pysim and golden models agree" in told(capsys)

@@ -1,4 +1,4 @@
-"""Configurations of every method in which every two options meet, as words of the command line.
+"""Configurations of every method in which every two options meet, and of many axes, as words of the command line.
 
 The factors are the options that a method declares, with the values that these declare for tests. Pairs of values that
 exclude each other are found by trying.
@@ -8,7 +8,16 @@ from fractions import Fraction
 from functools import cache
 from itertools import combinations, product
 
-from tachometry.spec import TachometerSpec, common_options, of_texts, own_options, spec_class
+from tachometry.spec import (
+    AxesSpec,
+    CoreSpec,
+    STachometer,
+    TachometerSpec,
+    common_options,
+    of_texts,
+    own_options,
+    spec_class,
+)
 from tachometry.spec.language.option import Option
 
 _PPR = 500
@@ -107,6 +116,32 @@ def spec_of(words: tuple[str, ...]) -> TachometerSpec:
         else:
             texts[name] = "yes" if known[name].flag else next(each)
     return of_texts(method, texts)
+
+
+def _axes_words(axes: int, tick: int, max_ticks: int, *more: str) -> tuple[str, ...]:
+    core = ("--ppr", "500", "--clock", "48000000", "--tick", str(tick), "--max-time", str(tick * max_ticks))
+    return ("--method", "s", *core, *more, "--axes", str(axes))
+
+
+# Few and many axes, all slots taken and not, turns that fill the tick, and every option that many axes have.
+AXES: tuple[tuple[str, ...], ...] = (
+    _axes_words(8, 960, 20, "--max-speed", "1000rad/s"),
+    (*_axes_words(5, 120, 3, "--max-speed", "10000rad/s", "--index"), "--parallel"),
+    _axes_words(3, 40, 2, "--decoding", "2", "--position-width", "8"),
+    _axes_words(1, 63, 2048, "--no-cancel", "--index"),
+    _axes_words(64, 960, 5, "--max-speed", "500rad/s", "--decoding", "1", "--frac-bits", "4", "--position-width", "48"),
+    (*_axes_words(17, 1000, 4, "--frac-bits", "24", "--index"), "--parallel"),
+)
+
+
+def core_of(words: tuple[str, ...]) -> CoreSpec:
+    """Return the core that the command line makes of these words, which may be one of many axes."""
+    if "--axes" not in words:
+        return spec_of(words)
+    place = words.index("--axes")
+    alone = spec_of(words[:place])
+    assert isinstance(alone, STachometer)
+    return AxesSpec(tachometer=alone, axes=int(words[place + 1]), parallel="--parallel" in words)
 
 
 def _possible(method: str, row: Texts) -> bool:

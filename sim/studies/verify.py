@@ -1,8 +1,15 @@
-"""One core on seeded motions, by several engines, against its golden model."""
+"""Cores on seeded motions, by several engines, against their golden models."""
 
+import os
+import signal
+import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
+from multiprocessing import Pool, parent_process
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,9 +18,14 @@ from tachometry.sim.encoder.stress import stress_of
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.axes import Trace
+from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.run import Mismatch, Run
 from tachometry.sim.studies.lockstep import lockstep
+from tachometry.sim.studies.pairs import AXES, configurations, core_of
 from tachometry.spec import CoreSpec
+
+Core = TypeVar("Core")
+Result = TypeVar("Result")
 
 _EDGES, _MOST_EDGES = 300, 50_000  # at a speed, of a motion
 # Some thousand times slower than the others, it runs a thousandth of their clocks.
@@ -57,6 +69,113 @@ class Outcome:
     n_mismatches: int = 0
     seconds: float = 0.0
     failure: Failure | None = None
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Describes a core; `name` is that of its captures, and `words` are those of the command line."""
+
+    name: str
+    method: str
+    words: tuple[str, ...]
+
+    @property
+    def spec(self) -> CoreSpec:
+        """The core."""
+        return core_of(self.words)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Holds the outcomes of configurations.
+
+    Parameters
+    ----------
+    outcomes : list of (Configuration, dict of str to Outcome)
+        By the engine.
+    n_cores : int
+        Configurations that there are; after Ctrl-C not all have an outcome.
+    """
+
+    outcomes: list[tuple[Configuration, dict[str, Outcome]]]
+    n_cores: int
+
+
+def verification(
+    methods: Sequence[str],
+    engines: Sequence[str],
+    n_clocks: int,
+    seed: int,
+    jobs: int | None,
+    bar: Bar,
+    save: Callable[[Configuration, str, Failure], None],
+) -> Verification:
+    """Verify all configurations of methods, in so many processes; method s is also that of many axes.
+
+    Parameters
+    ----------
+    methods, engines : sequence of str
+    n_clocks : int
+        That each engine is to run, spread over the configurations.
+    seed : int
+    jobs : int or None
+        None: one for each core of the computer.
+    bar : Bar
+    save : callable
+        Is given a configuration and an engine that has failed, as soon as it has.
+    """
+    for engine in engines:
+        pick(engine)  # what is missing is reported at once
+    cores = [
+        Configuration(f"{method}{number}", method, words)
+        for method in methods
+        for number, words in enumerate([*configurations(method), *(AXES if method == "s" else ())], 1)
+    ]
+    check = partial(_check, engines=engines, n_clocks=-(-n_clocks // len(cores)), seed=seed)
+    found = Verification([], len(cores))
+    with (
+        suppress(KeyboardInterrupt),
+        _each(check, cores, jobs or os.cpu_count() or 1) as results,
+        bar("verifying", len(cores), "configurations") as report,
+    ):
+        for core, outcomes in results:
+            for engine, outcome in outcomes.items():
+                if outcome.failure is not None:
+                    save(core, engine, outcome.failure)
+            found.outcomes.append((core, outcomes))
+            report(len(found.outcomes))
+    return found
+
+
+def _check(
+    core: Configuration, *, engines: Sequence[str], n_clocks: int, seed: int
+) -> tuple[Configuration, dict[str, Outcome]]:
+    return core, verify(core.spec, engines, n_clocks, seed)
+
+
+def _heed_only_the_pool() -> None:
+    """In a process of the pool: ignore Ctrl-C, which the main process handles by ending the others; end after it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+
+
+def _end_with_the_parent() -> None:
+    """End with the main process, which may be killed: nobody else ends this one then."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+@contextmanager
+def _each(check: Callable[[Core], Result], cores: list[Core], n_jobs: int) -> Iterator[Iterable[Result]]:
+    """Yield results as they come; what still runs ends with the context."""
+    if n_jobs == 1:
+        yield map(check, cores)
+        return
+    with Pool(n_jobs, _heed_only_the_pool) as pool:
+        yield pool.imap_unordered(check, cores)
 
 
 def motions(spec: CoreSpec, seed: int, n_clocks: int) -> Iterator[tuple[int, Trace]]:

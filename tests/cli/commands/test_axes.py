@@ -11,9 +11,9 @@ from support.command import run
 from support.compiled import lint
 from support.nightly import only
 
-from tachometry.cli.commands import verify as command
 from tachometry.hdl.export import export
-from tachometry.sim.studies.axes import AXES, core_of
+from tachometry.sim.studies import verify as study
+from tachometry.sim.studies.pairs import AXES, core_of
 
 CORE = "--ppr 25 --clock 20kHz --tick 2ms --max-time 8ms --max-speed 100rad/s --engine pysim".split()
 MOTIONS = "ramp:0:60:100ms,constant:-40:100ms"
@@ -114,7 +114,7 @@ def test_no_figure_of_many(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command, "configurations", lambda method: [])
-    monkeypatch.setattr(command, "AXES", AXES[2:3])
+    monkeypatch.setattr(study, "configurations", lambda method: [])
+    monkeypatch.setattr(study, "AXES", AXES[2:3])
     assert run("verify", "--methods", "s", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out") == 0
     assert rows(capsys)[1].split()[:3] == ["s", "pysim", "1"]

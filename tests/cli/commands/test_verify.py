@@ -12,10 +12,10 @@ import pytest
 from support.command import run
 from support.nightly import nightly
 
-from tachometry.cli.commands import verify as command
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.methods import m as golden_m
 from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.studies import verify as study
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.sim.studies.verify import motions
 from tachometry.spec import METHODS, MTachometer
@@ -31,8 +31,8 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
     def short(method: str) -> list[tuple[str, ...]]:
         return sorted(configurations(method), key=lambda words: spec_of(words).timing.tick_cycles)[:number]
 
-    monkeypatch.setattr(command, "configurations", short)
-    monkeypatch.setattr(command, "AXES", ())
+    monkeypatch.setattr(study, "configurations", short)
+    monkeypatch.setattr(study, "AXES", ())
     return number
 
 
@@ -62,7 +62,7 @@ def test_a_difference_is_saved_with_the_command_that_replays_it(
 ) -> None:
     cores = {words: spec_of(words) for words in configurations("m")}
     averaging = [words for words, spec in cores.items() if isinstance(spec, MTachometer) and spec.average > 2][:3]
-    monkeypatch.setattr(command, "configurations", lambda method: averaging)
+    monkeypatch.setattr(study, "configurations", lambda method: averaging)
     options = ["--methods", "m", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out"]
     with monkeypatch.context() as patch:
         patch.setattr(golden_m, "round_quotient", lambda *numbers: round_quotient(*numbers) + 1)
@@ -98,8 +98,8 @@ def test_ctrl_c_tells_what_was_done(
         checked.append(core)
         return real(core, **options)  # type: ignore[arg-type]
 
-    real = command._check
-    monkeypatch.setattr(command, "_check", check)
+    real = study._check
+    monkeypatch.setattr(study, "_check", check)
     assert run("verify", "--methods", "m", "--engines", "pysim", "--jobs", "1") == 130
     told = capsys.readouterr()
     assert told.out.splitlines()[1].split()[:3] == ["m", "pysim", "1"]
@@ -118,7 +118,7 @@ def test_workers_end_with_a_command_that_is_killed() -> None:
     if child == 0:
         try:
             check: Any = partial(begin_and_wait, begun[1])
-            with command._each(check, [None, None], 2) as results:  # type: ignore[list-item]
+            with study._each(check, [None, None], 2) as results:
                 list(results)
         finally:
             os._exit(1)

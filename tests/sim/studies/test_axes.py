@@ -15,8 +15,8 @@ from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.signals.axes import AxesTrace, of_axis
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.tables import write_counts, write_trace
-from tachometry.sim.studies.axes import AXES, core_of
 from tachometry.sim.studies.lockstep import lockstep
+from tachometry.sim.studies.pairs import AXES, core_of
 from tachometry.spec import AxesSpec
 
 
