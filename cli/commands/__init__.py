@@ -6,7 +6,7 @@ from importlib import import_module
 import click
 
 from tachometry.cli.files import DISK, writable_caches
-from tachometry.cli.options.option import told
+from tachometry.cli.options.option import message_of
 
 COMMANDS = {
     "plan": "Show what a core can measure: resolution and time over speed.",
@@ -100,7 +100,7 @@ def run(args: Sequence[str]) -> int:
     except OSError as error:
         raise Refused(_of_system(error)) from error
     except ValueError as error:
-        raise Refused(told(error)) from error
+        raise Refused(message_of(error)) from error
     except (OverflowError, MemoryError) as error:
         raise Refused(f"a number is too large for this computer: {error or type(error).__name__}") from error
 

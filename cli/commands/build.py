@@ -15,7 +15,7 @@ from tachometry.cli.options.board import board_argument, boards_help, default_fo
 from tachometry.cli.options.core import board_core_options
 from tachometry.cli.options.loop import loop_options
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
-from tachometry.cli.reports.terminal import print_rows
+from tachometry.cli.reports.build import print_build
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
@@ -126,7 +126,7 @@ def build(
     for kind in suffixes:
         click.echo(click.format_filename(folder / f"{name}{kind}"))
     click.echo()
-    _print(board, built, time.monotonic() - begun)
+    print_build(board, built, time.monotonic() - begun)
     return 0
 
 
@@ -137,15 +137,3 @@ def _made(board: Board, name: str, built: Built) -> dict[str, Any]:
         "tools": dict(built.tools),
         **({} if built.seed is None else {"seed": built.seed}),
     }
-
-
-def _print(board: Board, built: Built, seconds: float) -> None:
-
-    rows = [("board", board.title)]
-    rows += [(kind, f"{used:,} of {there:,}") for kind, (used, there) in built.cells.items() if there]
-    if built.fmax is not None:
-        rows.append(("Fmax", f"{built.fmax:.1f} MHz, the clock has {board.clock_hz / 1e6:g} MHz"))
-    else:
-        rows.append(("project", "unpack it and run build_top.sh or build_top.bat, with the vendor's tools on the PATH"))
-    rows.append(("time", f"{seconds:.1f} s"))
-    print_rows(rows)

@@ -144,7 +144,7 @@ def compare(
     if source.true_speed is None and (tune or tradeoff is not None):
         raise ValueError(f"{'--tune' if tune else '--tradeoff'} must be given together with --motion")
     with outputs:
-        found = comparison(
+        result = comparison(
             spec,
             named.specs,
             make,
@@ -155,9 +155,9 @@ def compare(
             tradeoff=tradeoff is not None,
             bar=progress_bar,
         )
-        sizes = _sizes(found, tools) if size else {}
-        _write(found, sizes, outputs)
-    print_comparison(found, sizes, named.left_out)
+        sizes = _sizes(result, tools) if size else {}
+        _write(result, sizes, outputs)
+    print_comparison(result, sizes, named.left_out)
     return 0
 
 
@@ -176,19 +176,19 @@ def _source(
     return Source("--motion", truth.recording, truth.true_speed)
 
 
-def _write(found: Comparison, sizes: Mapping[str, Measurement], outputs: Outputs) -> None:
+def _write(result: Comparison, sizes: Mapping[str, Measurement], outputs: Outputs) -> None:
     if path := outputs.get("--csv"):
-        write_csv(path, *comparison_table(found, sizes))
+        write_csv(path, *comparison_table(result, sizes))
     if path := outputs.get("--plot"):
         from tachometry.sim.plots.compare import save_comparison  # Matplotlib is slow to import
 
-        save_comparison(path, found.spec, found.curves, found.scores, found.instants, found.true_speed)
+        save_comparison(path, result.spec, result.curves, result.scores, result.instants, result.true_speed)
     if (path := outputs.get("--tradeoff")) and path.suffix.lower() == ".csv":
-        write_csv(path, *cost_table(found))
+        write_csv(path, *cost_table(result))
     elif path:
         from tachometry.sim.plots.tradeoff import save_tradeoff
 
-        save_tradeoff(path, found.spec, found.costs, found.rms_speed)
+        save_tradeoff(path, result.spec, result.costs, result.rms_speed)
 
 
 def _tools() -> dict[str, str]:
@@ -199,9 +199,9 @@ def _tools() -> dict[str, str]:
         raise click.ClickException(f"--size needs the extra `size`: {error}") from error
 
 
-def _sizes(found: Comparison, tools: dict[str, str]) -> dict[str, Measurement]:
+def _sizes(result: Comparison, tools: dict[str, str]) -> dict[str, Measurement]:
     """Return COMB, FF and Fmax of the cores on an ECP5, by name."""
-    specs = {name: spec for name, spec in found.specs.items() if spec is not None}
+    specs = {name: spec for name, spec in result.specs.items() if spec is not None}
     sizes = {}
     with progress_bar("measuring sizes", len(specs), "cores") as report:
         for done, (name, spec) in enumerate(specs.items(), 1):

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.text import Text
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
-from tachometry.cli.reports.terminal import print_table, progress_bar, stdout_console
+from tachometry.cli.reports.figures import print_figures
+from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.progress import Progress
 
 if TYPE_CHECKING:  # numpy and Amaranth are slow to import, and --help needs neither
@@ -78,7 +78,7 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
             before += entry.seconds
             report(before)
         write_claims(outputs[_SUMMARY], results)
-    _print(results, labs, directory)
+    print_figures(results, labs, directory)
     return 1 if any(lab.mismatches for lab in labs.values()) else 0
 
 
@@ -99,25 +99,3 @@ def _chosen(only: str) -> list[Entry]:
 def _within(report: Progress, before: float, entry: Entry) -> Progress:
     """Return what a figure's lab reports to: the share of the figure that is done."""
     return lambda share: report(before + share * entry.seconds)
-
-
-def _print(results: dict[str, Result], labs: dict[str, Lab], directory: Path) -> None:
-
-    heads, rows = ("figure", "paper", "agrees", "hardware"), []
-    for name, result in results.items():
-        agreeing, lab = sum(claim.agrees for claim in result.claims), labs[name]
-        agrees = "yes" if result.agrees else f"in {agreeing} of {len(result.claims)} claims"
-        rows.append(
-            (name, result.source, agrees, f"{lab.mismatches} mismatches in {lab.locked} clocks" if lab.locked else "-")
-        )
-    print_table(heads, rows, left=range(len(heads)))
-    console = stdout_console()
-    for name, result in results.items():
-        for claim in result.claims:
-            if not claim.agrees:
-                console.print(Text(f"\n{name}: the paper says: {claim.paper}. Found: {claim.found}."))
-    for name, lab in labs.items():
-        for mismatch in lab.first:
-            console.print(Text(f"{name}: first mismatch in {mismatch}", style="bold red"))
-    agreeing = sum(result.agrees for result in results.values())
-    console.print(Text(f"\n{agreeing} of {len(results)} figures agree with all that the papers say; see {directory}."))

@@ -64,7 +64,7 @@ def replay(
     else:
         recordings = [read(capture, spec)]
     with outputs:
-        found = simulation_of(
+        simulation = simulation_of(
             spec,
             str(capture),
             recordings,
@@ -74,5 +74,5 @@ def replay(
             vcd=outputs.get("--vcd"),
             bar=progress_bar,
         )
-        write_outputs(found, outputs.get)
-    return print_simulation(found)
+        write_outputs(simulation, outputs.get)
+    return print_simulation(simulation)

@@ -68,7 +68,7 @@ def simulate(
         truths = [record(spec)]
     recordings = [truth.recording for truth in truths]
     with outputs:
-        found = simulation_of(
+        simulation = simulation_of(
             spec,
             "--motion",
             recordings,
@@ -78,5 +78,5 @@ def simulate(
             vcd=outputs.get("--vcd"),
             bar=progress_bar,
         )
-        write_outputs(found, outputs.get)
-    return print_simulation(found)
+        write_outputs(simulation, outputs.get)
+    return print_simulation(simulation)

@@ -84,8 +84,8 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
         lines = [f"{core.name}, seed {failure.seed}, {engine}:", *map(str, failure.first), command]
         differences.append("\n  ".join(lines))
 
-    found = verification(chosen, used, clocks, seed, jobs, progress_bar, save)
-    return print_verification(found, chosen, used, differences)
+    result = verification(chosen, used, clocks, seed, jobs, progress_bar, save)
+    return print_verification(result, chosen, used, differences)
 
 
 def _listed(what: str, text: str, known: list[str]) -> list[str]:

@@ -112,7 +112,7 @@ def _of_axis(line: str, text: str | None, axis: int, axes: int | None) -> str | 
         return line if text is None and line == "z" else text
     if text is None:
         return f"{line}{axis}"
-    found = [word.strip() for word in text.split(",")]
-    if len(found) != axes:
+    channels = [word.strip() for word in text.split(",")]
+    if len(channels) != axes:
         raise ValueError(f"--{line} must be {axes} channels with commas between, one for each axis, not {text!r}")
-    return found[axis]
+    return channels[axis]

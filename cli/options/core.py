@@ -63,14 +63,14 @@ def _otherwise(name: str) -> str:
 
 def own_click_options() -> Sequence[click.Option]:
     """Return the options that not all methods have; without defaults, so that it is seen where they do not belong."""
-    found: dict[str, dict[str, declaration.Option]] = {}
+    declarations: dict[str, dict[str, declaration.Option]] = {}
     common = {about.name for about in common_options()}
     for method in METHODS:
         for about in own_options(method):
             if about.name in common:  # whose help says so
                 continue
-            found.setdefault(about.name, {})[method] = about
-    return tuple(_made_own(name, tuple(by_method.items())) for name, by_method in found.items())
+            declarations.setdefault(about.name, {})[method] = about
+    return tuple(_made_own(name, tuple(by_method.items())) for name, by_method in declarations.items())
 
 
 @cache
@@ -78,10 +78,10 @@ def _made_own(name: str, by_method: tuple[tuple[str, declaration.Option], ...]) 
     """Return the option of one or several methods: if they say different things of it, its help has all of them."""
     about = by_method[0][1]
     alike = len({default_of(one) for _, one in by_method}) == 1
-    said: dict[str, list[str]] = {}
+    helps: dict[str, list[str]] = {}
     for method, one in by_method:
-        said.setdefault(one.help + default_of(one) * (not alike), []).append(method)
-    help_ = " ".join(f"{', '.join(methods)}: {text}" if len(said) > 1 else text for text, methods in said.items())
+        helps.setdefault(one.help + default_of(one) * (not alike), []).append(method)
+    help_ = " ".join(f"{', '.join(methods)}: {text}" if len(helps) > 1 else text for text, methods in helps.items())
     help_ += default_of(about) * alike
     words = [f"--{name}/--no-{name}" if about.flag else f"--{name}", _argument(name)]
     kind = {} if about.flag else kind_of(about)
@@ -227,12 +227,12 @@ def optional_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _common_optional() -> tuple[click.Option, ...]:
-    found = _made_common(
+    options = _made_common(
         tuple(
             replace(about, shown="that of the board") if about.name == "clock" else about for about in common_options()
         )
     )
-    return tuple(_not_required(option) for option in found)
+    return tuple(_not_required(option) for option in options)
 
 
 def _not_required(option: click.Option) -> click.Option:

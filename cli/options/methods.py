@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from tachometry.cli.options.core import Make, Texts, own_texts
-from tachometry.cli.options.option import told
+from tachometry.cli.options.option import message_of
 from tachometry.spec import METHODS, TachometerSpec
 
 
@@ -49,7 +49,7 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
             try:
                 specs[name] = make(name, {})
             except ValueError as error:
-                left_out[name] = told(error)
+                left_out[name] = message_of(error)
         return Methods(specs | dict.fromkeys(others), left_out)
     specs = {}
     for name, method, given in listed_methods(text, others):
@@ -65,13 +65,13 @@ def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, s
     ValueError
         If a name is not known.
     """
-    found: list[tuple[str, str | None, Texts]] = []
+    methods: list[tuple[str, str | None, Texts]] = []
     for name in (word.strip() for word in text.split(",")):
         method, *words = name.split(":")
         if method in METHODS:
-            found.append((name, method, own_texts(method, words)))
+            methods.append((name, method, own_texts(method, words)))
         elif method in others:
-            found.append((name, None, {}))
+            methods.append((name, None, {}))
         else:
             raise ValueError(f"--methods must be of {', '.join([*METHODS, *others])}, or all, not {name!r}")
-    return found
+    return methods

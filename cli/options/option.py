@@ -18,7 +18,7 @@ from tachometry.spec.language.option import options_of, read_options
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-def told(error: ValueError) -> str:
+def message_of(error: ValueError) -> str:
     """Return what is wrong, with the option in place of a parameter: "--max-time, in ticks, must be …"."""
     if not isinstance(error, ParameterError):
         return str(error)
@@ -50,7 +50,7 @@ def options_named() -> Iterator[None]:
     try:
         yield
     except ParameterError as error:
-        raise ValueError(told(error)) from error
+        raise ValueError(message_of(error)) from error
 
 
 class Option(click.Option):
@@ -78,10 +78,10 @@ class Option(click.Option):
         super().__init__(*args, **attributes)
         self.group = group
         self.fractional = fractional or isinstance(self.type, click.types.FloatParamType)
-        self._asked = (help, metavar)
+        self._texts = (help, metavar)
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        help, metavar = self._asked
+        help, metavar = self._texts
         self.help = help if isinstance(help, str) else help()
         self.metavar = metavar() if callable(metavar) else metavar
         return super().get_help_record(ctx)
@@ -122,10 +122,10 @@ class GroupedCommand(click.Command):
             return super().invoke(ctx)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        found: list[click.Parameter] = []
+        parameters: list[click.Parameter] = []
         for parameter in super().get_params(ctx):
-            found += parameter.make() if isinstance(parameter, Later) else [parameter]
-        return found
+            parameters += parameter.make() if isinstance(parameter, Later) else [parameter]
+        return parameters
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         groups: dict[str, list[tuple[str, str]]] = {}

@@ -11,7 +11,7 @@ import click
 from tachometry.cli.options.closed_loop import LOOP, loop_click_options, loop_options
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.methods import listed_methods
-from tachometry.cli.options.option import told
+from tachometry.cli.options.option import message_of
 from tachometry.cli.options.settings import Settings, Text, arguments
 from tachometry.cli.options.sweep import ENCODER, by_name, point_options
 from tachometry.sim.encoder.motion import parse_motion
@@ -135,8 +135,8 @@ def _spec(method: str, texts: tuple[tuple[str, Text], ...]) -> TachometerSpec:
 
 def _parsed_encoder(words: Words) -> tuple[Callable[[TachometerSpec], VirtualEncoder], str]:
     with ENCODER.make_context("sweep", list(words)) as context:
-        found: tuple[Callable[[TachometerSpec], VirtualEncoder], str] = ENCODER.invoke(context)
-        return found
+        encoder_and_motion: tuple[Callable[[TachometerSpec], VirtualEncoder], str] = ENCODER.invoke(context)
+        return encoder_and_motion
 
 
 def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
@@ -206,7 +206,7 @@ def _fill(
             try:
                 point = make(name, method, given, fixed | at)
             except (ValueError, click.UsageError) as error:
-                message = error.format_message() if isinstance(error, click.UsageError) else told(error)
+                message = error.format_message() if isinstance(error, click.UsageError) else message_of(error)
                 where = ", ".join(f"{key}={text or 'none'}" for key, text in at.items())
                 if everything or where or not alone:
                     message += f" (method {name}{', ' * bool(where)}{where})"

@@ -152,21 +152,21 @@ def _items(name: str, value: Any) -> list[str]:
 def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]) -> list[Text]:
     """Return values of an axis: items are values, `none`, or ranges."""
     option = options.get(name)
-    found: list[Text] = []
+    values: list[Text] = []
     for item in (item.strip() for item in items):
         if not item:
             raise ValueError(f"values of {name} must be separated by one comma, and none may be empty")
         if match := _RANGE.fullmatch(item):
-            found += _range(name, item, match, whole=option is not None and not getattr(option, "fractional", False))
+            values += _range(name, item, match, whole=option is not None and not getattr(option, "fractional", False))
         elif re.match(rf"{QUANTITY}\s*\.\.", item):
             raise ValueError(f"a range of {name} must be LO..HI:N, or LO..HI:Nlog, not {item!r}")
         else:
-            found.append(None if item == "none" and option is not None else item)
-    if not found:
+            values.append(None if item == "none" and option is not None else item)
+    if not values:
         raise ParameterError(name, "must have values to be varied")
-    if len(found) > _MOST:
-        raise ParameterError(name, f"must have at most {_MOST} values, not {len(found)}")
-    return list(dict.fromkeys(found))
+    if len(values) > _MOST:
+        raise ParameterError(name, f"must have at most {_MOST} values, not {len(values)}")
+    return list(dict.fromkeys(values))
 
 
 def _range(name: str, item: str, match: re.Match[str], whole: bool) -> list[str]:

@@ -127,15 +127,15 @@ def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:
     if "loop" in options:
         raise ValueError("--manifest must be that of a board without --loop, whose registers other programs read")
     try:
-        found = DemoMap(of_options(options).tachometer)
+        demo = DemoMap(of_options(options).tachometer)
         line = bus_of(_BUS, baud)
         assert line is not None
-        demo_manifest(found, line, module)
+        demo_manifest(demo, line, module)
     except (ValueError, TypeError, AttributeError) as error:
         raise ValueError(f"--manifest {path}: {error}") from error
-    if configuration != found.configuration:
+    if configuration != demo.configuration:
         raise ValueError(
             f"--manifest {path} must be that of a demo which this version of tachometry makes: its configuration would "
-            f"be 0x{found.configuration:08x}, not {configuration!r}"
+            f"be 0x{demo.configuration:08x}, not {configuration!r}"
         )
-    return Target(port, f"{port}: {found.spec.words.heading}", found, line, module)
+    return Target(port, f"{port}: {demo.spec.words.heading}", demo, line, module)

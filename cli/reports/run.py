@@ -15,11 +15,11 @@ from tachometry.spec.language.units import format_time, plural
 
 def print_simulation(simulation: Simulation) -> int:
     """Print what was simulated, what the core cannot have seen rightly, and the verdict; the exit status."""
-    found, spec, axes = simulation.lockstep, simulation.spec, simulation.axes
-    run = found.actual
+    lockstep, spec, axes = simulation.lockstep, simulation.spec, simulation.axes
+    run = lockstep.actual
     time, n_ticks = format_time(spec.times.seconds(run.n_clocks)), len(run.ticks) // len(axes)
     simulated = ("simulated", f"{run.n_clocks} clocks ({time}), {n_ticks} ticks")
-    mismatches = ("mismatches", str(found.n_mismatches))
+    mismatches = ("mismatches", str(lockstep.n_mismatches))
     if isinstance(spec, AxesSpec):
         rows = [simulated, mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))]
         warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
@@ -29,11 +29,11 @@ def print_simulation(simulation: Simulation) -> int:
         warnings = _warnings(axis)
     print_rows([("engine", simulation.engine), *rows])
     console = stdout_console()
-    for mismatch in found.first:
+    for mismatch in lockstep.first:
         console.print(Text(f"first mismatch in {mismatch}"))
     print_warnings(warnings)
-    console.print(_verdict(run, found.n_mismatches, warned=bool(warnings)))
-    if found.n_mismatches:
+    console.print(_verdict(run, lockstep.n_mismatches, warned=bool(warnings)))
+    if lockstep.n_mismatches:
         return 1
     if run.n_clocks == simulation.wanted:
         return 0
@@ -59,15 +59,15 @@ def merged_edges(n_merged: int) -> list[str]:
 
 def _warnings(axis: Axis) -> list[str]:
     """Tell why the core cannot have counted what the shaft did."""
-    found = merged_edges(axis.n_merged)
+    warnings = merged_edges(axis.n_merged)
     if axis.truth is None and (together := axis.recording.n_together):
-        found.append(
+        warnings.append(
             f"at {plural(together, 'instant')} of the capture both lines change: it was sampled more slowly than the "
             "edges came, or the encoder is at fault; counts and velocity are wrong there"
         )
     if axis.difference:
-        found.append(f"counts out differ from counts in by {axis.difference:+d}")
-    return found
+        warnings.append(f"counts out differ from counts in by {axis.difference:+d}")
+    return warnings
 
 
 def _merged_looks(spec: AxesSpec, number: int, n_merged: int) -> str:

@@ -13,14 +13,14 @@ _HEADS = ("method", "engine", "configurations", "motions", "clocks", "ticks", "u
 
 
 def print_verification(
-    found: Verification, methods: Sequence[str], engines: Sequence[str], differences: Sequence[str]
+    verification: Verification, methods: Sequence[str], engines: Sequence[str], differences: Sequence[str]
 ) -> int:
     """Print the table, the differences and, if there is one, the verdict; the exit status."""
     rows = []
     total = dict.fromkeys(_HEADS[3:], 0.0)
     for method in methods:
         for engine in engines:
-            outcomes = [outcome[engine] for core, outcome in found.outcomes if core.method == method]
+            outcomes = [outcome[engine] for core, outcome in verification.outcomes if core.method == method]
             sums = {
                 head: sum(getattr(outcome, head if head == "seconds" else f"n_{head}") for outcome in outcomes)
                 for head in total
@@ -32,14 +32,14 @@ def print_verification(
     console = stdout_console()
     for difference in differences:
         console.print(Text(f"differs: {difference}"), soft_wrap=True)
-    n_done, failed = len(found.outcomes), bool(total["mismatches"])
+    n_done, failed = len(verification.outcomes), bool(total["mismatches"])
     if failed:
         verdict = f"FAIL: hardware and golden model differ in {total['mismatches']:.0f} values"
         console.print(Text(verdict, style="bold red"), soft_wrap=True)
-    elif n_done == found.n_cores:
+    elif n_done == verification.n_cores:
         agreement = f"{total['updates']:.0f} updates and {total['ticks']:.0f} ticks"
         verdict = f"PASS: {', '.join(engines)} and golden models agree in every bit of {agreement}"
         console.print(Text(verdict, style="bold green"), soft_wrap=True)
-    if n_done < found.n_cores:
-        print(f"tachometry: interrupted after {n_done} of {found.n_cores} configurations", file=sys.stderr)
-    return 1 if failed else INTERRUPTED if n_done < found.n_cores else 0
+    if n_done < verification.n_cores:
+        print(f"tachometry: interrupted after {n_done} of {verification.n_cores} configurations", file=sys.stderr)
+    return 1 if failed else INTERRUPTED if n_done < verification.n_cores else 0
