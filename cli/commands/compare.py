@@ -9,10 +9,10 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.capture import capture_options
-from tachometry.cli.options.core import Make, common_core_options
+from tachometry.cli.options.capture import CAPTURE_OPTIONS
+from tachometry.cli.options.core import COMMON_CORE_OPTIONS, Make
 from tachometry.cli.options.methods import named_methods
-from tachometry.cli.options.motion import FORMS, optional_motion_options
+from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.reports.compare import comparison_table, cost_table, print_comparison, shown_time
 from tachometry.cli.reports.terminal import progress_bar
@@ -43,7 +43,7 @@ Examples:
       --jitter 0.05 --nonuniformity 0.1 --tradeoff delays.png
   tachometry compare --ppr 500 --clock 200kHz --tick 1ms --replay ramp.sr""",
 )
-@common_core_options
+@COMMON_CORE_OPTIONS
 @option(
     "Methods",
     "--methods",
@@ -62,7 +62,7 @@ Examples:
     "one with the least RMS error. Its name has the options, and can be given to --methods. All other cores are as "
     "they are given. It needs --motion.",
 )
-@optional_motion_options
+@OPTIONAL_MOTION_OPTIONS
 @option(
     "Capture",
     "--replay",
@@ -71,7 +71,7 @@ Examples:
     type=FilePath(),
     help="Captured lines instead of a --motion: .sr, .csv, .csv.gz or .vcd, as `tachometry replay` takes them.",
 )
-@capture_options
+@CAPTURE_OPTIONS
 @option(
     "Methods",
     "--from",

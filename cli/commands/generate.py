@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.axes import axes_options
-from tachometry.cli.options.core import core_options
-from tachometry.cli.options.loop import loop_options
-from tachometry.cli.options.motion import FORMS, optional_motion_options
+from tachometry.cli.options.axes import AXES_OPTIONS
+from tachometry.cli.options.core import CORE_OPTIONS
+from tachometry.cli.options.loop import LOOP_OPTIONS
+from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.cli.reports.axes import print_axes_core
 from tachometry.cli.reports.core import print_core
@@ -68,9 +68,9 @@ Examples:
   tachometry generate --ppr 500 --max-speed 1000rad/s --loop \\
       --gains inputs --command generator --bus axi-lite -o drive""",
 )
-@core_options
-@axes_options
-@loop_options
+@CORE_OPTIONS
+@AXES_OPTIONS
+@LOOP_OPTIONS
 @option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
 @option(
     "Files",
@@ -115,7 +115,7 @@ Examples:
     + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())
     + ".",
 )
-@optional_motion_options
+@OPTIONAL_MOTION_OPTIONS
 def generate(
     spec: AnySpec,
     name: str,

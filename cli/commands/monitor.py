@@ -23,7 +23,7 @@ from tachometry.boards.monitor.session import Session, connected
 from tachometry.boards.monitor.settings import emulator_settings
 from tachometry.boards.monitor.watch import State, watch
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.core import CoreTexts, optional_core_options
+from tachometry.cli.options.core import OPTIONAL_CORE_OPTIONS, CoreTexts
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.options.target import SIMULATED, Target, target_of
 from tachometry.cli.reports.monitor import SelftestReport, display
@@ -108,7 +108,7 @@ Examples:
     suffixes=(".csv", ".parquet"),
     help="Table with a row for each frame: time, and everything that the core shows; .csv or .parquet.",
 )
-@optional_core_options
+@OPTIONAL_CORE_OPTIONS
 def monitor(
     port: str,
     core: CoreTexts,

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.core import Make, core_and_make_options
+from tachometry.cli.options.core import CORE_AND_MAKE_OPTIONS, Make
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.cli.reports.plan import print_plan, print_plans
@@ -28,7 +28,7 @@ Examples:
   tachometry plan --ppr 2048 --clock 100MHz --tick 50us --max-time 20ms \\
       --speeds 1:6000rpm --plot plan.pdf --csv plan.csv""",
 )
-@core_and_make_options
+@CORE_AND_MAKE_OPTIONS
 @option(
     "Range",
     "--speeds",

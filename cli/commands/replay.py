@@ -8,12 +8,12 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.axes import axes_options
-from tachometry.cli.options.capture import capture_options
-from tachometry.cli.options.core import core_options
-from tachometry.cli.options.engine import engine_options
+from tachometry.cli.options.axes import AXES_OPTIONS
+from tachometry.cli.options.capture import CAPTURE_OPTIONS
+from tachometry.cli.options.core import CORE_OPTIONS
+from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.option import FilePath, GroupedCommand
-from tachometry.cli.options.outputs import output_options, refuse_plot, write_outputs
+from tachometry.cli.options.outputs import OUTPUT_OPTIONS, refuse_plot, write_outputs
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.recording import Recording
@@ -34,11 +34,11 @@ Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
 a --clock that is a few times the edge rate then. Edges closer than a clock are flagged as errors or lost.""",
 )
 @click.argument("capture", type=FilePath())
-@core_options
-@axes_options
-@capture_options
-@output_options
-@engine_options
+@CORE_OPTIONS
+@AXES_OPTIONS
+@CAPTURE_OPTIONS
+@OUTPUT_OPTIONS
+@ENGINE_OPTIONS
 def replay(
     spec: CoreSpec,
     capture: Path,

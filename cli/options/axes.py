@@ -1,10 +1,8 @@
 """Options of cores of many axes."""
 
-import functools
-from collections.abc import Callable
 from typing import Any
 
-from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.option import Group, option
 from tachometry.spec import AxesSpec, ParameterError, STachometer, TachometerSpec
 from tachometry.spec.methods.axes import MAX_AXES
 
@@ -23,20 +21,14 @@ _OPTIONS = [
 ]
 
 
-def axes_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command, below that of the options of the core: `spec` is that of many axes, if there are to be
-    many.
-    """
+def _read(*, spec: TachometerSpec, axes: int | None, parallel: bool, **others: Any) -> dict[str, Any]:
+    if axes is None and parallel:
+        raise ParameterError("parallel", "must be given together with --axes")
+    return dict(spec=spec if axes is None else of_axes(spec, axes, parallel), **others)
 
-    @functools.wraps(command)
-    def build(*, spec: TachometerSpec, axes: int | None, parallel: bool, **others: Any) -> Any:
-        if axes is None:
-            if parallel:
-                raise ParameterError("parallel", "must be given together with --axes")
-            return command(spec=spec, **others)
-        return command(spec=of_axes(spec, axes, parallel), **others)
 
-    return all_of(_OPTIONS, build)
+AXES_OPTIONS = Group(_OPTIONS, _read)
+"""Below the options of the core: `spec` is that of many axes, if there are to be many."""
 
 
 def of_axes(spec: TachometerSpec, axes: int, parallel: bool) -> AxesSpec:

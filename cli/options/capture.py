@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tachometry.cli.options.option import all_of, option, refuse_without
+from tachometry.cli.options.option import Group, option, refuse_without
 from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.language.units import parse_frequency
 
@@ -66,44 +64,40 @@ _OPTIONS = [
 ]
 
 
-def capture_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: handed to the command as `read`, which reads a capture for a spec, or for an axis of so
-    many.
-    """
+def _read(
+    *,
+    a: str | None,
+    b: str | None,
+    z: str | None,
+    tick_in: str | None,
+    time: str | None,
+    samplerate: str | None,
+    sensor: str,
+    **others: Any,
+) -> dict[str, Any]:
+    def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
+        from tachometry.sim.captures.file import SAME, OptionError
+        from tachometry.sim.captures.other_sensors import converted
+        from tachometry.sim.captures.read import read_capture, with_last_tick
 
-    @functools.wraps(command)
-    def build(
-        *,
-        a: str | None,
-        b: str | None,
-        z: str | None,
-        tick_in: str | None,
-        time: str | None,
-        samplerate: str | None,
-        sensor: str,
-        **others: Any,
-    ) -> Any:
-        def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
-            from tachometry.sim.captures.file import SAME, OptionError
-            from tachometry.sim.captures.other_sensors import converted
-            from tachometry.sim.captures.read import read_capture, with_last_tick
+        alone, axes = spec.tachometer, spec.axes if isinstance(spec, AxesSpec) else None
+        if sensor == "pulses" and b is not None:
+            raise OptionError("b", "must not be given together with --sensor pulses")
+        line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
+        index = _of_axis("z", z, axis, axes) if z is not None or alone.index else None
+        tick = "tick_in" if tick_in is None and alone.external_tick else tick_in
+        rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
+        second = SAME if sensor == "pulses" else line_b
+        recording = read_capture(capture, line_a, second, rate, index, tick, time)
+        return with_last_tick(converted(recording, sensor, alone), spec)
 
-            alone, axes = spec.tachometer, spec.axes if isinstance(spec, AxesSpec) else None
-            if sensor == "pulses" and b is not None:
-                raise OptionError("b", "must not be given together with --sensor pulses")
-            line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
-            index = _of_axis("z", z, axis, axes) if z is not None or alone.index else None
-            tick = "tick_in" if tick_in is None and alone.external_tick else tick_in
-            rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
-            second = SAME if sensor == "pulses" else line_b
-            recording = read_capture(capture, line_a, second, rate, index, tick, time)
-            return with_last_tick(converted(recording, sensor, alone), spec)
+    if others.get("capture") is None:
+        refuse_without("--replay", _OPTIONS)
+    return dict(read=read, **others)
 
-        if others.get("capture") is None:
-            refuse_without("--replay", _OPTIONS)
-        return command(read=read, **others)
 
-    return all_of(_OPTIONS, build)
+CAPTURE_OPTIONS = Group(_OPTIONS, _read)
+"""Handed over as `read`, which reads a capture for a spec, or for an axis of so many."""
 
 
 def _of_axis(line: str, text: str | None, axis: int, axes: int | None) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tachometry.cli.options.core import core_click_options
-from tachometry.cli.options.motion import disc_options
-from tachometry.cli.options.option import all_of, declared, option, take_values
+from tachometry.cli.options.motion import DISC_OPTIONS
+from tachometry.cli.options.option import Group, declared, option, take_values
 from tachometry.cli.options.sweep import by_name
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import TachometerSpec
@@ -116,17 +115,13 @@ def _load(text: str | None) -> Load | None:
     return Load(torque=torque, begin=begin, seconds=seconds)
 
 
-def _setting_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: all options of a loop but those of its core, handed over as a function that makes a
-    `Setting`.
-    """
-
-    @functools.wraps(command)
-    def build(*, motion: str, **given: Any) -> Any:
-        faults = take_values(EncoderOptions, given)
-        return command(lambda spec: _setting(spec, motion, faults, **given), motion, faults.get("seed", 0))
-
-    return disc_options(all_of(_OPTIONS, build))
+def _read(*, motion: str, **given: Any) -> dict[str, Any]:
+    faults = take_values(EncoderOptions, given)
+    return {
+        "make": lambda spec: _setting(spec, motion, faults, **given),
+        "motion": motion,
+        "seed": faults.get("seed", 0),
+    }
 
 
 def _setting(
@@ -219,7 +214,7 @@ def _motor_and_gains(
 
 
 # Gives what makes a setting of a core, the motion in words, and the first seed.
-LOOP = click.command("loop")(_setting_options(lambda make, motion, seed: (make, motion, seed)))
+LOOP = click.command("loop")(Group([*DISC_OPTIONS, *_OPTIONS], _read)(lambda make, motion, seed: (make, motion, seed)))
 
 
 def loop_click_options() -> dict[str, click.Option]:

@@ -1,6 +1,5 @@
 """Options of the core: what all methods share, and what each has of its own, as spec/ declares them."""
 
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -10,7 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from tachometry.cli.options.option import Option, all_of, default_of, kind_of, later, option
+from tachometry.cli.options.option import Group, Option, default_of, kind_of, later, option
 from tachometry.spec import (
     METHODS,
     ParameterError,
@@ -117,59 +116,28 @@ def _taken(given: dict[str, Any]) -> Texts:
     return texts
 
 
-def common_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: what all methods share, handed to the command as `make`, which makes a spec of a method.
-
-    `make` takes the method's name and what is given of its own options, as texts by their names.
-    """
-
-    @functools.wraps(command)
-    def build(**given: Any) -> Any:
-        texts = _taken(given)
-        return command(make=lambda method, own: of_texts(method, texts | own), **given)
-
-    return later("core-options", _common)(build)
+def _read_make(**given: Any) -> dict[str, Any]:
+    texts = _taken(given)
+    return dict(make=lambda method, own: of_texts(method, texts | own), **given)
 
 
-def core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: the options of the core, handed to the command as one argument `spec`."""
-
-    @functools.wraps(command)
-    def build(*, make: Make, **others: Any) -> Any:
-        return command(**others)
-
-    return core_and_make_options(build)
+def _read_spec_and_make(*, method: str, **given: Any) -> dict[str, Any]:
+    texts = _taken(given)
+    common = {name: text for name, text in texts.items() if not methods_with(name)}
+    return dict(spec=of_texts(method, texts), make=lambda other, own: of_texts(other, common | own), **given)
 
 
-def core_and_make_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command as `core_options`, with what makes a spec of another method as `make`, see
-    `common_core_options`.
-    """
-
-    @functools.wraps(command)
-    def build(*, method: str, **given: Any) -> Any:
-        texts = _taken(given)
-        common = {name: text for name, text in texts.items() if not methods_with(name)}
-        return command(spec=of_texts(method, texts), make=lambda other, own: of_texts(other, common | own), **given)
-
-    options = [later("core-options", _common), _METHOD, later("method-options", own_click_options)]
-    return all_of(options, build)
+def _read_spec(*, method: str, **given: Any) -> dict[str, Any]:
+    texts = _taken(given)
+    return dict(spec=of_texts(method, texts), **given)
 
 
-def board_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command as `core_options`, of a command that is given a `board`, whose clock is that of the core."""
-
-    @functools.wraps(command)
-    def build(*, method: str, board: Any, **given: Any) -> Any:
-        texts = _taken(given)
-        text = texts.pop(_CLOCK, None)
-        if text is not None and parse_frequency(_CLOCK, text) != board.clock_hz:
-            raise ParameterError(_CLOCK, f"must be that of the board, {board.clock_hz} Hz, not {text}: there is no PLL")
-        spec = of_texts(method, {**texts, _CLOCK: str(board.clock_hz)})
-        return command(spec=spec, board=board, **given)
-
-    options = [later("core-options", _common_of_board), _METHOD, later("method-options", own_click_options)]
-    return all_of(options, build)
+def _read_spec_of_board(*, method: str, board: Any, **given: Any) -> dict[str, Any]:
+    texts = _taken(given)
+    text = texts.pop(_CLOCK, None)
+    if text is not None and parse_frequency(_CLOCK, text) != board.clock_hz:
+        raise ParameterError(_CLOCK, f"must be that of the board, {board.clock_hz} Hz, not {text}: there is no PLL")
+    return dict(spec=of_texts(method, {**texts, _CLOCK: str(board.clock_hz)}), board=board, **given)
 
 
 def _common_of_board() -> tuple[click.Option, ...]:
@@ -213,17 +181,10 @@ class CoreTexts:
         return of_texts(self.method, {**self.texts, _CLOCK: str(clock_hz)})
 
 
-def optional_core_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command as `core_options`, but none must be given; handed to the command as `core`, of `CoreTexts`."""
-
-    @functools.wraps(command)
-    def build(*, method: str, **given: Any) -> Any:
-        texts = _taken(given)
-        source = click.get_current_context().get_parameter_source("method")
-        return command(core=CoreTexts(method, texts, bool(texts) or source is ParameterSource.COMMANDLINE), **given)
-
-    options = [later("core-options", _common_optional), _METHOD, later("method-options", own_click_options)]
-    return all_of(options, build)
+def _read_core(*, method: str, **given: Any) -> dict[str, Any]:
+    texts = _taken(given)
+    source = click.get_current_context().get_parameter_source("method")
+    return dict(core=CoreTexts(method, texts, bool(texts) or source is ParameterSource.COMMANDLINE), **given)
 
 
 def _common_optional() -> tuple[click.Option, ...]:
@@ -239,6 +200,24 @@ def _not_required(option: click.Option) -> click.Option:
     option = copy(option)
     option.required = False
     return option
+
+
+_OWN = later("method-options", own_click_options)
+
+CORE_OPTIONS = Group([later("core-options", _common), _METHOD, _OWN], _read_spec)
+"""The options of the core, handed to the command as one argument `spec`."""
+
+CORE_AND_MAKE_OPTIONS = Group(CORE_OPTIONS.options, _read_spec_and_make)
+"""As `CORE_OPTIONS`, with what makes a spec of another method as `make`, see `COMMON_CORE_OPTIONS`."""
+
+COMMON_CORE_OPTIONS = Group([later("core-options", _common)], _read_make)
+"""What all methods share, handed over as `make`: of a method's name and texts of its own options it makes a spec."""
+
+BOARD_CORE_OPTIONS = Group([later("core-options", _common_of_board), _METHOD, _OWN], _read_spec_of_board)
+"""As `CORE_OPTIONS`, of a command that is given a `board`, whose clock is that of the core."""
+
+OPTIONAL_CORE_OPTIONS = Group([later("core-options", _common_optional), _METHOD, _OWN], _read_core)
+"""As `CORE_OPTIONS`, but none must be given; handed over as `core`, of `CoreTexts`."""
 
 
 def core_click_options() -> dict[str, click.Option]:

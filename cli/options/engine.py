@@ -1,18 +1,16 @@
 """Options of the simulation: what runs the hardware, and which part of it the waveform shows."""
 
-import functools
-from collections.abc import Callable
 from typing import Any
 
 import click
 
-from tachometry.cli.options.option import all_of, option
+from tachometry.cli.options.option import Group, option
 from tachometry.spec import ParameterError, TachometerSpec
 from tachometry.spec.language.units import parse_time
 
 _SIMULATION = "Simulation"
 
-_ENGINE_OPTIONS = [
+_OPTIONS = [
     option(
         _SIMULATION,
         "--engine",
@@ -38,27 +36,24 @@ _ENGINE_OPTIONS = [
 ]
 
 
-def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: handed to the command as `engine`, a name, and `window`, a function of spec and number of
-    clocks.
+def _read(*, vcd_from: str | None, vcd_to: str | None, **others: Any) -> dict[str, Any]:
+    def window(spec: TachometerSpec, n_clocks: int) -> tuple[int, int]:
+        begin = 0 if vcd_from is None else _clock("vcd_from", vcd_from, spec)
+        end = n_clocks if vcd_to is None else min(_clock("vcd_to", vcd_to, spec), n_clocks)
+        if begin >= end:
+            raise ValueError(f"--vcd-from must be before --vcd-to and the end of the run, clock {end}, not {begin}")
+        return begin, end
 
-    The function gives the first clock of the waveform and the one after the last; ValueError if there is none.
-    """
+    if (vcd_from is not None or vcd_to is not None) and "--vcd" not in others["targets"]:
+        raise ValueError("--vcd must be given together with --vcd-from and --vcd-to")
+    return dict(window=window, **others)
 
-    @functools.wraps(command)
-    def collect(*, vcd_from: str | None, vcd_to: str | None, **others: Any) -> Any:
-        def window(spec: TachometerSpec, n_clocks: int) -> tuple[int, int]:
-            begin = 0 if vcd_from is None else _clock("vcd_from", vcd_from, spec)
-            end = n_clocks if vcd_to is None else min(_clock("vcd_to", vcd_to, spec), n_clocks)
-            if begin >= end:
-                raise ValueError(f"--vcd-from must be before --vcd-to and the end of the run, clock {end}, not {begin}")
-            return begin, end
 
-        if (vcd_from is not None or vcd_to is not None) and "--vcd" not in others["targets"]:
-            raise ValueError("--vcd must be given together with --vcd-from and --vcd-to")
-        return command(window=window, **others)
+ENGINE_OPTIONS = Group(_OPTIONS, _read)
+"""Handed over as `engine`, a name, and `window`, a function of spec and number of clocks.
 
-    return all_of(_ENGINE_OPTIONS, collect)
+The function gives the first clock of the waveform and the one after the last; ValueError if there is none.
+"""
 
 
 def _clock(what: str, text: str, spec: TachometerSpec) -> int:

@@ -1,10 +1,8 @@
 """Options of cores with a control loop."""
 
-import functools
-from collections.abc import Callable
 from typing import Any
 
-from tachometry.cli.options.option import all_of, declared, option, take_texts
+from tachometry.cli.options.option import Group, declared, option, take_texts
 from tachometry.spec import AxesSpec, CoreSpec, ParameterError
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.language.option import options_of, read_options
@@ -24,17 +22,13 @@ _OPTIONS = [
 ]
 
 
-def loop_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command, below that of the axes: `spec` is that of a core with a control loop, if there is to be
-    one.
-    """
+def _read(*, spec: CoreSpec, loop: bool, **others: Any) -> dict[str, Any]:
+    texts = take_texts(LoopSpec, others)
+    return dict(spec=of_loop(spec, texts) if loop else _alone(spec, texts), **others)
 
-    @functools.wraps(command)
-    def build(*, spec: CoreSpec, loop: bool, **others: Any) -> Any:
-        texts = take_texts(LoopSpec, others)
-        return command(spec=of_loop(spec, texts) if loop else _alone(spec, texts), **others)
 
-    return all_of(_OPTIONS, build)
+LOOP_OPTIONS = Group(_OPTIONS, _read)
+"""Below those of the axes: `spec` is that of a core with a control loop, if there is to be one."""
 
 
 def _alone(spec: CoreSpec, texts: dict[str, str]) -> CoreSpec:

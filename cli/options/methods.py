@@ -32,7 +32,7 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
     text : str
         Of names, a core's with options after a colon: `m:average=10`.
     make : callable
-        See `core.common_core_options`.
+        See `core.COMMON_CORE_OPTIONS`.
     others : collection of str
         Names that are no methods of cores; what is behind a colon of such a name is not read here.
 

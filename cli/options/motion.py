@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tachometry.cli.options.option import all_of, declared, option, refuse_without, take_values
+from tachometry.cli.options.option import Group, declared, option, refuse_without, take_values
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.option import options_of
@@ -46,80 +45,60 @@ _OPTIONS = [declared(about.group, about) for about in options_of(EncoderOptions)
 _OF_LOOPS = ("jitter", "nonuniformity", "phase-error", "duty-error", "seed")
 
 
-def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: the options of the virtual encoder, handed to the command as two arguments.
-
-    `record` gives what the encoder of a spec, or that of an axis, records of the motion; `tables` are the files that it
-    reads.
-    """
-    return all_of([_motion(required=True), *_OPTIONS], _recording(command))
-
-
-def disc_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: the motion, and what may be wrong with the disc and its edges where a loop is closed about
-    them.
-
-    They are handed over as `motion`, and texts by the parameters of `EncoderOptions`.
-    """
-    kept = [declared(about.group, about) for about in options_of(EncoderOptions) if about.name in _OF_LOOPS]
-    return all_of([_motion(required=True), *kept], command)
-
-
-def optional_motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command as `motion_options`, but without a motion `record` is None."""
-    return all_of([_motion(required=False), *_OPTIONS], _recording(command))
-
-
-def encoder_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command as `motion_options`, but handed over as `motion`, a text, and `encoder`, a function of a
-    spec.
-    """
-    return all_of([_motion(required=True), *_OPTIONS], _encoding(command))
-
-
 def tables_of(motion: str) -> list[Path]:
     """Return files that a motion reads, or the motions of several axes."""
     parts = [part.strip().partition(":") for part in {motion, *motion.split(",")}]
     return [Path(table) for kind, _, table in parts if kind == "csv"]
 
 
-def _recording(command: Callable[..., Any]) -> Callable[..., Any]:
+def _read_encoder(**given: Any) -> dict[str, Any]:
+    values = take_values(EncoderOptions, given)
 
-    @functools.wraps(command)
-    def build(*, motion: str | None, encoder: Callable[[TachometerSpec], VirtualEncoder], **others: Any) -> Any:
-        def record(spec: TachometerSpec, axis: int | None = None, axes: int = 1) -> Encoding:
-            from tachometry.sim.encoder.motion import parse_motion
+    def encoder(spec: TachometerSpec) -> VirtualEncoder:
+        from tachometry.sim.encoder.virtual import VirtualEncoder
 
-            assert motion is not None
-            own = encoder(spec)
-            if axis is None:
-                return own.record(parse_motion(motion))
-            each = motion.split(",")
-            if len(each) > axes:
-                raise ValueError(
-                    f"--motion must have at most one motion for each of the --axes {axes}, not {len(each)}"
-                )
-            return replace(own, seed=own.seed + axis).record(parse_motion(each[min(axis, len(each) - 1)]))
+        return VirtualEncoder(spec.encoder.pulses_per_rev, index=spec.index, **values)
 
-        if motion is None:
-            refuse_without("--motion", _OPTIONS)
-            return command(record=None, tables=[], **others)
-        return command(record=record, tables=tables_of(motion), **others)
-
-    return _encoding(build)
+    return dict(encoder=encoder, **given)
 
 
-def _encoding(command: Callable[..., Any]) -> Callable[..., Any]:
+def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
+    others = _read_encoder(**given)
+    encoder = others.pop("encoder")
 
-    @functools.wraps(command)
-    def build(**given: Any) -> Any:
-        values = take_values(EncoderOptions, given)
+    def record(spec: TachometerSpec, axis: int | None = None, axes: int = 1) -> Encoding:
+        from tachometry.sim.encoder.motion import parse_motion
 
-        def encoder(spec: TachometerSpec) -> VirtualEncoder:
-            from tachometry.sim.encoder.virtual import VirtualEncoder
+        assert motion is not None
+        own: VirtualEncoder = encoder(spec)
+        if axis is None:
+            return own.record(parse_motion(motion))
+        each = motion.split(",")
+        if len(each) > axes:
+            raise ValueError(f"--motion must have at most one motion for each of the --axes {axes}, not {len(each)}")
+        return replace(own, seed=own.seed + axis).record(parse_motion(each[min(axis, len(each) - 1)]))
 
-            return VirtualEncoder(spec.encoder.pulses_per_rev, index=spec.index, **values)
+    if motion is None:
+        refuse_without("--motion", _OPTIONS)
+        return dict(record=None, tables=[], **others)
+    return dict(record=record, tables=tables_of(motion), **others)
 
-        return command(encoder=encoder, **given)
 
-    return build
+MOTION_OPTIONS = Group([_motion(required=True), *_OPTIONS], _read_record)
+"""The options of the virtual encoder, handed over as two arguments.
+
+`record` gives what the encoder of a spec, or that of an axis, records of the motion; `tables` are the files that it
+reads.
+"""
+
+OPTIONAL_MOTION_OPTIONS = Group([_motion(required=False), *_OPTIONS], _read_record)
+"""As `MOTION_OPTIONS`, but without a motion `record` is None."""
+
+ENCODER_OPTIONS = Group(MOTION_OPTIONS.options, _read_encoder)
+"""As `MOTION_OPTIONS`, but handed over as `motion`, a text, and `encoder`, a function of a spec."""
+
+DISC_OPTIONS = [
+    _motion(required=True),
+    *(declared(about.group, about) for about in options_of(EncoderOptions) if about.name in _OF_LOOPS),
+]
+"""The motion, and what may be wrong with the disc and its edges where a loop is closed about them."""

@@ -1,5 +1,6 @@
 """Options that commands share, and how they are shown and explained."""
 
+import functools
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -183,7 +184,7 @@ def take_texts(spec: type[Any], given: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:
+def refuse_without(needed: str, options: Sequence[Callable[[Any], Any]]) -> None:
     """Check that none of some options is given to the running command: without another one they have no effect.
 
     Raises
@@ -201,7 +202,29 @@ def refuse_without(needed: str, options: list[Callable[[Any], Any]]) -> None:
             raise ValueError(f"{parameter.opts[0]} must be given together with {needed}")
 
 
-def all_of(options: list[Callable[[Any], Any]], command: Callable[..., Any]) -> Callable[..., Any]:
+class Group:
+    """Adds options to a command that it decorates, and reads them.
+
+    Parameters
+    ----------
+    options : sequence of callable
+        Decorators, each of which adds an option, or those of `later`.
+    read : callable
+        Makes the arguments of the command of all that click gives it, among these options.
+    """
+
+    def __init__(self, options: Sequence[Callable[[Any], Any]], read: Callable[..., dict[str, Any]]) -> None:
+        self.options, self._read = options, read
+
+    def __call__(self, command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def run(**given: Any) -> Any:
+            return command(**self._read(**given))
+
+        return all_of(self.options, run)
+
+
+def all_of(options: Sequence[Callable[[Any], Any]], command: Callable[..., Any]) -> Callable[..., Any]:
     """Return a command with all of these options, in order."""
     for decorate in reversed(options):
         command = decorate(command)

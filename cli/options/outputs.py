@@ -1,11 +1,10 @@
 """Options of the files that a simulation writes, and what writes each."""
 
-import functools
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tachometry.cli.options.option import all_of, output
+from tachometry.cli.options.option import Group, output
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.signals.tables import write_counts, write_events, write_trace
 from tachometry.sim.studies.simulation import Simulation
@@ -38,36 +37,30 @@ _OPTIONS = [
 ]
 
 
-def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a command: the outputs of a simulation, handed to the command as `targets`, a dictionary of option to
-    path.
+def _read(
+    *,
+    vcd: Path | None,
+    plot: Path | None,
+    trace: Path | None,
+    counts: Path | None,
+    events: Path | None,
+    save_capture: Path | None,
+    **others: Any,
+) -> dict[str, Any]:
+    given = {
+        "--vcd": vcd,
+        "--vcd (its .gtkw)": None if vcd is None else vcd.with_suffix(".gtkw"),
+        "--plot": plot,
+        "--trace": trace,
+        "--counts": counts,
+        "--events": events,
+        "--save-capture": save_capture,
+    }
+    return dict(targets={what: path for what, path in given.items() if path is not None}, **others)
 
-    A `.gtkw` comes with `--vcd`.
-    """
 
-    @functools.wraps(command)
-    def collect(
-        *,
-        vcd: Path | None,
-        plot: Path | None,
-        trace: Path | None,
-        counts: Path | None,
-        events: Path | None,
-        save_capture: Path | None,
-        **others: Any,
-    ) -> Any:
-        given = {
-            "--vcd": vcd,
-            "--vcd (its .gtkw)": None if vcd is None else vcd.with_suffix(".gtkw"),
-            "--plot": plot,
-            "--trace": trace,
-            "--counts": counts,
-            "--events": events,
-            "--save-capture": save_capture,
-        }
-        return command(targets={what: path for what, path in given.items() if path is not None}, **others)
-
-    return all_of(_OPTIONS, collect)
+OUTPUT_OPTIONS = Group(_OPTIONS, _read)
+"""Handed over as `targets`, a dictionary of option to path; a `.gtkw` comes with `--vcd`."""
 
 
 def refuse_plot(targets: Mapping[str, Path]) -> None:

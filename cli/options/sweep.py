@@ -7,12 +7,12 @@ from typing import Any
 import click
 
 from tachometry.cli.options.core import core_click_options
-from tachometry.cli.options.motion import encoder_options
+from tachometry.cli.options.motion import ENCODER_OPTIONS
 from tachometry.cli.options.option import GroupedCommand, options_named
 from tachometry.cli.options.settings import arguments, of_command_line, of_file
 
 # Gives what the options of the encoder make.
-ENCODER = click.command("sweep")(encoder_options(lambda encoder, motion: (encoder, motion)))
+ENCODER = click.command("sweep")(ENCODER_OPTIONS(lambda encoder, motion: (encoder, motion)))
 
 
 def by_name(command: click.Command) -> dict[str, click.Option]:
