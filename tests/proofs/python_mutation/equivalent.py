@@ -381,7 +381,6 @@ _argue(
 )
 for _where in ("form.py: ControlForm._most_error_of_gains", "coefficients.py: control_form"):
     _argue(f"spec/control/{_where}", "A gain has one coefficient.", "0 → -1 #2")
-_argue("spec/control/form.py: Term", "No other product has this number.", "0 → -1")
 _argue("spec/registers/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))
 _argue(
     "spec/language/docstrings.py: with_inherited",
