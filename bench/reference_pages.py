@@ -34,8 +34,16 @@ EVERYTHING: dict[str, str | None] = {
 EXTERNAL = {"external-tick": "yes"}
 # The core whose registers are shown: that of docs/guides/integration.md.
 SPEED = {
-    **{"ppr": "2500", "max-speed": "4000rpm", "clock": "100MHz", "tick": "50us", "max-time": "10ms"},
-    **{"external-tick": "yes", "unit": "rpm", "lsb": "2^-4", "velocity-width": "18", "age": "yes"},
+    "ppr": "2500",
+    "max-speed": "4000rpm",
+    "clock": "100MHz",
+    "tick": "50us",
+    "max-time": "10ms",
+    "external-tick": "yes",
+    "unit": "rpm",
+    "lsb": "2^-4",
+    "velocity-width": "18",
+    "age": "yes",
 }
 _HEADER = ["port", "when", "kind", "meaning"]
 _LOOP = LoopSpec(tachometer=of_texts("s", {"ppr": "500", "max-speed": "1000rad/s"}))

@@ -16,9 +16,22 @@ from tachometry.spec import of_texts
 
 TICKS = ("100us", "20us")
 SHOWN = (
-    *("ramp", "ramp, real", "slow, jitter", "slow, real", "fast, jitter", "fast, real", "unit velocity, vibration"),
-    *("reversals, jitter", "reversals, real", "slow sine, real", "fast sine, real", "trapezoid, real", "stop"),
-    *("ramp, bad", "reversals, bad", "fast, bad"),
+    "ramp",
+    "ramp, real",
+    "slow, jitter",
+    "slow, real",
+    "fast, jitter",
+    "fast, real",
+    "unit velocity, vibration",
+    "reversals, jitter",
+    "reversals, real",
+    "slow sine, real",
+    "fast sine, real",
+    "trapezoid, real",
+    "stop",
+    "ramp, bad",
+    "reversals, bad",
+    "fast, bad",
 )
 
 

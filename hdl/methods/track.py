@@ -59,12 +59,18 @@ class TrackMethod(wiring.Component):
         with m.If(self.tick):
             m.d.sync += position.eq(self.position)
         m.d.comb += [
-            *(counts.tick.eq(self.tick), counts.step.eq(self.step), counts.tracks.eq(machine.tracks)),
+            counts.tick.eq(self.tick),
+            counts.step.eq(self.step),
+            counts.tracks.eq(machine.tracks),
             machine.begin.eq(self.tick),
-            *(machine.counted.eq(counts.counted), machine.beyond.eq(self.overflow)),
+            machine.counted.eq(counts.counted),
+            machine.beyond.eq(self.overflow),
             machine.quiet.eq(counts.quiet),
-            *(machine.number.eq(counts.number), machine.times.eq(counts.times), machine.places.eq(counts.places)),
-            *(machine.moved.eq(self.pulse_count), machine.length.eq(counts.length)),
+            machine.number.eq(counts.number),
+            machine.times.eq(counts.times),
+            machine.places.eq(counts.places),
+            machine.moved.eq(self.pulse_count),
+            machine.length.eq(counts.length),
         ]
         new = self.updates.p
         shift = spec.form.frac_bits - spec.fine_bits

@@ -61,10 +61,7 @@ _CONTROLS: dict[Op, dict[str, int]] = {
 }
 
 
-_LINES = (
-    *("clear", "reads", "multiply", "divide", "subtract", "by_sign"),
-    *("to_ac", "to_mq", "input", "write", "keep", "positive", "negative"),
-)
+_LINES = tuple("clear reads multiply divide subtract by_sign to_ac to_mq input write keep positive negative".split())
 
 
 def _layout(address: int) -> data.StructLayout:
@@ -159,7 +156,8 @@ class TrackMachine(wiring.Component):
         m.d.comb += [
             done.eq(~active | ~now.more.any()),
             place.eq(Mux(taken, now.address, pc)),
-            *(fetch.addr.eq(place), fetch.en.eq(done | self.begin)),
+            fetch.addr.eq(place),
+            fetch.en.eq(done | self.begin),
             read.en.eq(done & ~write.en),  # the program never reads while it writes
         ]
         valid = ~taken & ~stop
@@ -225,7 +223,8 @@ class TrackMachine(wiring.Component):
             m.d.sync += mq.eq(Mux(now.multiply, mq >> 1, Mux(now.divide, Cat(~total[-1], mq), ac)))
         m.d.comb += [
             write.addr.eq(now.address[: (STATES - 1).bit_length()]),
-            *(write.data.eq(ac), write.en.eq(work & now.write)),
+            write.data.eq(ac),
+            write.en.eq(work & now.write),
         ]
         with m.If(work & now.keep):
             m.d.sync += sign.eq(negative)
@@ -248,7 +247,9 @@ class TrackMachine(wiring.Component):
         m.d.comb += [
             self.tracks.eq(phase == Phase.TRACKS),
             self.out.eq(stop),
-            *(self.velocity.eq(mq), self.acceleration.eq(ac), self.p.eq(x)),
+            self.velocity.eq(mq),
+            self.acceleration.eq(ac),
+            self.p.eq(x),
         ]
         return m
 

@@ -50,9 +50,15 @@ class _BoardDesign(Design):
 
 class _Transfer(ctypes.Structure):
     _fields_ = (
-        *(("clocks", ctypes.c_int64), ("in", ctypes.c_void_p), ("n_in", ctypes.c_int64), ("taken", ctypes.c_int64)),
-        *(("out", ctypes.c_void_p), ("n_out", ctypes.c_int64), ("capacity", ctypes.c_int64)),
-        *(("lines", ctypes.c_int64), ("broken", ctypes.c_int64)),
+        ("clocks", ctypes.c_int64),
+        ("in", ctypes.c_void_p),
+        ("n_in", ctypes.c_int64),
+        ("taken", ctypes.c_int64),
+        ("out", ctypes.c_void_p),
+        ("n_out", ctypes.c_int64),
+        ("capacity", ctypes.c_int64),
+        ("lines", ctypes.c_int64),
+        ("broken", ctypes.c_int64),
     )
 
 

@@ -208,15 +208,22 @@ class Play:
 
         class Job(ctypes.Structure):
             _fields_ = (
-                *(("clock", long), ("end", long), ("at", pointer), ("level", pointer)),
-                *(("n_changes", long), ("next", long), ("rows", pointer), ("n_rows", long), ("capacity", long)),
-                *(("shown", pointer), ("n_shown", long), ("shown_capacity", long)),
-                *(
-                    ("shown_from", long),
-                    ("shown_to", long),
-                    ("every_clock", long),
-                    ("last", ctypes.c_uint32 * (self._n_words + 1)),
-                ),
+                ("clock", long),
+                ("end", long),
+                ("at", pointer),
+                ("level", pointer),
+                ("n_changes", long),
+                ("next", long),
+                ("rows", pointer),
+                ("n_rows", long),
+                ("capacity", long),
+                ("shown", pointer),
+                ("n_shown", long),
+                ("shown_capacity", long),
+                ("shown_from", long),
+                ("shown_to", long),
+                ("every_clock", long),
+                ("last", ctypes.c_uint32 * (self._n_words + 1)),
             )
 
         return Job(

@@ -98,8 +98,12 @@ class GateLoop:
         per_count = 2 * math.pi / spec.tachometer.encoder.counts_per_rev
         rad_per_s, y = float(spec.units.rad_per_s), float(spec.units.rad_per_s / (1 << form.extra_bits))
         gates = _GATES(
-            *(float(spec.units.amperes), y, float(spec.inertia * spec.observer) * y),
-            *(per_count / 256, rad_per_s / (1 << form.command_bits), 2.0**-spec.units.acceleration_frac_bits),
+            float(spec.units.amperes),
+            y,
+            float(spec.inertia * spec.observer) * y,
+            per_count / 256,
+            rad_per_s / (1 << form.command_bits),
+            2.0**-spec.units.acceleration_frac_bits,
             feed_forward,
             *((1 << (widths[name] - 1)) - 1 for name in ("command_velocity", "command_acceleration")),
             (1 << widths["command_position"]) - 1,

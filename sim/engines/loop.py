@@ -265,7 +265,10 @@ class LoopSimulation:
             motor=_MOTOR(**{field.name: getattr(motor, field.name) for field in fields(Motor)}),
             encoder=_ENCODER(
                 2 * np.pi / (4 * spec.encoder.pulses_per_rev),
-                *(offset.ctypes.data, len(offset), jitter.ctypes.data, len(jitter)),
+                offset.ctypes.data,
+                len(offset),
+                jitter.ctypes.data,
+                len(jitter),
             ),
             controller=controller,
             core=self._core(),
@@ -294,9 +297,19 @@ class LoopSimulation:
         first = (spec.latency.pin_to_count + spec.latency.tick + spec.latency.tick_to_velocity + 1) % clocks
         delay = min(round(gains.delay * spec.timing.clock_hz), clocks)
         return CONTROLLER(
-            *(gains.position, gains.velocity, gains.observer, gains.filter),
-            *(gains.inertia, gains.torque_constant, gains.current_limit),
-            *(gains.way, gains.on_filtered, gains.feed_forward, clocks, first, delay),
+            gains.position,
+            gains.velocity,
+            gains.observer,
+            gains.filter,
+            gains.inertia,
+            gains.torque_constant,
+            gains.current_limit,
+            gains.way,
+            gains.on_filtered,
+            gains.feed_forward,
+            clocks,
+            first,
+            delay,
         )
 
     def _core(self) -> Any:

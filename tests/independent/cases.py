@@ -89,7 +89,10 @@ CASES = [
     _case(
         "mt_rad",
         "tick=400 max-time=1200 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes whole-cycles=yes",
-        *(24000, 1, True, 150),
+        24000,
+        1,
+        True,
+        150,
     ),
     _case("mt_rev", "tick=256 max-time=512 unit=rev/s lsb=2^-8 bound-decay=no min-time=512", 20000, 1, True, 100),
     _case(
@@ -117,7 +120,8 @@ CASES = [
         "track_rpm",
         "tick=1200 max-time=7200 max-speed=100rpm velocity-width=14 lsb=2^-4 edge-error=0.2 least-memory=0.5 "
         f"fine-bits=4 bandwidth=200rad/s agile=no growing-memory=no {_PORTS}",
-        *(120_000, 4),
+        120_000,
+        4,
         seed="track_rpm2",  # with more counts in a tick than may be
     ),
     _case(

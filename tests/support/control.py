@@ -76,9 +76,13 @@ class Beside(wiring.Component):
         m.submodules.window = window = self.window
         m.submodules.controller = controller = self.controller
         m.d.comb += [
-            *(window.tick.eq(self.tick), window.update.eq(self.update), window.velocity.eq(self.velocity)),
-            *(window.clear.eq(controller.clear), window.add.eq(controller.valid)),
-            *(window.current.eq(controller.current), controller.tick.eq(self.tick)),
+            window.tick.eq(self.tick),
+            window.update.eq(self.update),
+            window.velocity.eq(self.velocity),
+            window.clear.eq(controller.clear),
+            window.add.eq(controller.valid),
+            window.current.eq(controller.current),
+            controller.tick.eq(self.tick),
             *(getattr(controller, name).eq(getattr(window, name)) for name in ("due", "held", "n", "current_sum")),
             *(getattr(controller, name).eq(getattr(self, name)) for name in self.inputs),
             *(getattr(self, name).eq(getattr(controller, name)) for name in ("valid", *COLUMNS)),

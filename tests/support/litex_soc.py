@@ -35,7 +35,9 @@ class Clock(LiteXModule):
 platform = GenericPlatform(
     "any",
     [
-        *(("clk", 0, Pins(1)), ("rst", 0, Pins(1)), ("bus", 0, *lines(**BUS))),
+        ("clk", 0, Pins(1)),
+        ("rst", 0, Pins(1)),
+        ("bus", 0, *lines(**BUS)),
         ("encoder", 0, *lines(**dict.fromkeys(example.PINS, 1))),
     ],
 )

@@ -179,7 +179,10 @@ class OtherCode(ImportError):
 
 # Code that decides the row of a point, and, where an engine runs the hardware beside the golden model, that, too.
 _CODE = (
-    *("spec", "sim/golden", "sim/encoder", "sim/signals"),
+    "spec",
+    "sim/golden",
+    "sim/encoder",
+    "sim/signals",
     *(f"sim/studies/{name}.py" for name in ("__init__", "lockstep", "sweeping/__init__", "sweeping/sweep")),
     *(f"sim/studies/comparing/{name}.py" for name in ("__init__", "compare", "baselines")),
 )

@@ -46,7 +46,12 @@ def test_registers_move_into_the_block_ram() -> None:
     memory = cells["memory"]
     assert memory["parameters"] == {"REGMODE_A": "OUTREG", "REGMODE_B": "OUTREG"}
     assert {name: memory["connections"][name] for name in ("DOA0", "DOA1", "DOB0", "DOB1", "OCEA", "OCEB")} == {
-        **{"DOA0": [20], "DOA1": [21], "DOB0": [22], "DOB1": [13], "OCEA": ["1"], "OCEB": ["1"]}
+        "DOA0": [20],
+        "DOA1": [21],
+        "DOB0": [22],
+        "DOB1": [13],
+        "OCEA": ["1"],
+        "OCEB": ["1"],
     }
     assert cells["gate"] == netlist()["modules"]["top"]["cells"]["gate"]
     # It has them now.

@@ -41,9 +41,13 @@ def test_settings() -> None:
     client.enable(True)
     client.set(gain_position=100.0, current_limit=20.0, command_position=-0.5)
     assert there.written == [
-        *(("LOOP", 1), ("LOOP", 3), ("GAIN_POSITION", form.reset_gains[Term.POSITION])),
-        *(("CURRENT_LIMIT", form.current_limit), ("COMMAND_POSITION_LOW", (1 << 32) - 128)),
-        *(("COMMAND_POSITION_HIGH", (1 << 32) - 1), ("LOOP", 1)),
+        ("LOOP", 1),
+        ("LOOP", 3),
+        ("GAIN_POSITION", form.reset_gains[Term.POSITION]),
+        ("CURRENT_LIMIT", form.current_limit),
+        ("COMMAND_POSITION_LOW", (1 << 32) - 128),
+        ("COMMAND_POSITION_HIGH", (1 << 32) - 1),
+        ("LOOP", 1),
     ]
     there.written.clear()
     with pytest.raises(ValueError, match=r"^current_limit must be from 0 to 20, not 20\.5$"):

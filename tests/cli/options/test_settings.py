@@ -96,16 +96,29 @@ speed = [1, 2.5, "3rad/s"]
 bounds = [true, false]
 """
     line = {
-        **{"core_ppr": "500", "core_clock": "10MHz", "core_tick": "200", "jitter": "0.02"},
-        **{"core_index": True, "core_cancel": False},
-        **{"methods": "s,m:average=8", "motion": "constant:{speed}:1s"},
+        "core_ppr": "500",
+        "core_clock": "10MHz",
+        "core_tick": "200",
+        "jitter": "0.02",
+        "core_index": True,
+        "core_cancel": False,
+        "methods": "s,m:average=8",
+        "motion": "constant:{speed}:1s",
         "vary": ("speed=1,2.5,3rad/s", "bounds=yes,no"),
     }
     settings = read(tmp_path, text)
     assert settings == of_command_line(line, OPTIONS)
     assert arguments(settings.first(), OPTIONS | {"speed": OPTIONS["tick"]}) == [
-        *("--ppr=500", "--clock=10MHz", "--tick=200", "--jitter=0.02", "--index", "--no-cancel"),
-        *("--methods=s,m:average=8", "--motion=constant:{speed}:1s", "--tick=1", "--bounds"),
+        "--ppr=500",
+        "--clock=10MHz",
+        "--tick=200",
+        "--jitter=0.02",
+        "--index",
+        "--no-cancel",
+        "--methods=s,m:average=8",
+        "--motion=constant:{speed}:1s",
+        "--tick=1",
+        "--bounds",
     ]
 
 

@@ -90,7 +90,9 @@ def template(op: Op, rng: np.random.Generator, width: int) -> list[Step]:
         Op.MUL: [*factor, Do(Op.MUL, any_word, int(rng.integers(1, width + 1)))],
         Op.DIV: [*factor, Do(Op.DIV, constants[1], width + int(rng.choice([0, few]))), Do(Op.FROM_MQ)],
         Op.FRACTION: [
-            *(*nothing, Do(Op.LOAD, constants[0]), Do(Op.FRACTION, constants[1], int(rng.integers(1, width)))),
+            *nothing,
+            Do(Op.LOAD, constants[0]),
+            Do(Op.FRACTION, constants[1], int(rng.integers(1, width))),
             Do(Op.FROM_MQ),
         ],
         Op.DOUBLE: [*factor, Do(Op.LOAD, states[0]), Do(Op.DOUBLE, steps=few)],

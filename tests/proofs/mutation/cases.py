@@ -148,7 +148,11 @@ CASES = [
     _case("s", "carried, bounds", 3, 9, 1, 340, max_table=4, bounds=True, cancel=False),
     _case("m", "of 3", 3, 2, 2, average=3, bounds=True, age=True),
     _case(
-        *("m", "of 4, rpm, low pass", 5, 2, 3),
+        "m",
+        "of 4, rpm, low pass",
+        5,
+        2,
+        3,
         decoding=2,
         average=4,
         unit="rpm",

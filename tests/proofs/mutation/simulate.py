@@ -96,8 +96,13 @@ def run(
 
     class Job(ctypes.Structure):
         _fields_ = (
-            *(("n_clocks", long), ("pins", pointer), ("n_mutants", long), ("killed", pointer)),
-            *(("rows", pointer), ("n_rows", long), ("capacity", long)),
+            ("n_clocks", long),
+            ("pins", pointer),
+            ("n_mutants", long),
+            ("killed", pointer),
+            ("rows", pointer),
+            ("n_rows", long),
+            ("capacity", long),
         )
 
     job = Job(len(pins), pins.ctypes.data, n_mutants, killed.ctypes.data, rows.ctypes.data, 0, n_rows)

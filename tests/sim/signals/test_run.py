@@ -58,14 +58,24 @@ def test_a_run_is_read_from_the_ports() -> None:
     rows = np.zeros((3, 1 + len(names)), dtype=np.int64)
     rows[:, 0] = [11, 12, 20]
     for row, name, value in (
-        *((0, "tick", 1), (0, "position", -5), (0, "pulse_count", 3)),
-        *((1, "velocity_valid", 1), (1, "velocity", 77), (1, "position", 9)),
-        *((2, "tick", 1), (2, "position", -6), (2, "velocity", 8), (2, "stalled", 1)),
+        (0, "tick", 1),
+        (0, "position", -5),
+        (0, "pulse_count", 3),
+        (1, "velocity_valid", 1),
+        (1, "velocity", 77),
+        (1, "position", 9),
+        (2, "tick", 1),
+        (2, "position", -6),
+        (2, "velocity", 8),
+        (2, "stalled", 1),
     ):
         rows[row, 1 + names.index(name)] = value
     run = observed(spec, 30, rows)
     assert {strobe: table.clock.tolist() for strobe, table in run.tables.items()} == {
-        **{"velocity_valid": [12], "tick": [11, 20], "decode_error": [], "index_valid": []}
+        "velocity_valid": [12],
+        "tick": [11, 20],
+        "decode_error": [],
+        "index_valid": [],
     }
     assert run.ticks.position.tolist() == [-5, -6]
     assert run.ticks.stalled.tolist() == [False, True]

@@ -306,8 +306,10 @@ def test_words_of_80_bits() -> None:
 def test_times() -> None:
     """Seven products, one for each term, and two clocks to hold their sum; without the filter three for the first."""
     for multiplier, filter, clocks in (
-        *(("serial", Fraction(40), lambda p: 7 * (p + 4) + 2), ("parallel", Fraction(40), lambda p: 7 * 6 + 2)),
-        *(("serial", Fraction(0), lambda p: 6 * (p + 4) + 3 + 2), ("parallel", Fraction(0), lambda p: 6 * 6 + 3 + 2)),
+        ("serial", Fraction(40), lambda p: 7 * (p + 4) + 2),
+        ("parallel", Fraction(40), lambda p: 7 * 6 + 2),
+        ("serial", Fraction(0), lambda p: 6 * (p + 4) + 3 + 2),
+        ("parallel", Fraction(0), lambda p: 6 * 6 + 3 + 2),
     ):
         spec = LoopSpec(tachometer=CORE, multiplier=multiplier, velocity_filter=filter)
         assert spec.tick_to_current == clocks(spec.form.factor_bits)

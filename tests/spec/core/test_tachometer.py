@@ -123,9 +123,15 @@ def test_standstill() -> None:
     assert STachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).times.standstill_ticks == 15
     assert TTachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).times.standstill_ticks == 10
     assert [one.facts.pairs_all for one in (STachometer, MTachometer, TTachometer, RairanTachometer)] == [
-        *(True, False, False, False)
+        True,
+        False,
+        False,
+        False,
     ]
     assert [one.facts.own_ticks for one in (STachometer, MTachometer, TTachometer, RairanTachometer)] == [
-        *(False, False, False, True)
+        False,
+        False,
+        False,
+        True,
     ]
     assert [one.facts.last_at_rest for one in (STachometer, TTachometer, RairanTachometer)] == [False, False, True]

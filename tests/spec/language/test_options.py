@@ -104,12 +104,20 @@ def test_what_help_shows_and_what_pairwise_tests_take() -> None:
     assert {
         name: shown[name] for name in ("lowpass", "adaptive", "index", "decoding", "timer", "min-time", "tick")
     } == {
-        **{"lowpass": None, "adaptive": None, "index": None, "decoding": "4", "timer": "clock"},
-        **{"min-time": "a tick", "tick": "20us"},
+        "lowpass": None,
+        "adaptive": None,
+        "index": None,
+        "decoding": "4",
+        "timer": "clock",
+        "min-time": "a tick",
+        "tick": "20us",
     }
     options = {about.name: about for method in METHODS for about in (*common_options(), *own_options(method))}
     assert [options[name].tested for name in ("cancel", "index", "bound-decay", "timer")] == [
-        *(("", "no"), ("", "yes"), ("", "no"), ("", "tick"))
+        ("", "no"),
+        ("", "yes"),
+        ("", "no"),
+        ("", "tick"),
     ]
     assert [options[name].few for name in ("tick", "max-time", "decoding")] == [3, 3, 2]
 

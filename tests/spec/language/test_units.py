@@ -119,8 +119,12 @@ def test_pi_to_50_digits() -> None:
 def test_logarithms_are_rounded_up(k: int) -> None:
     power = Fraction(2) ** k
     for number, wanted in (
-        *((power, k), (power * Fraction(10**9 + 1, 10**9), k + 1), (power * Fraction(10**9 - 1, 10**9), k)),
-        *((power * Fraction(3, 2), k + 1), (power * Fraction(2, 3), k), (power * Fraction(4, 7), k)),
+        (power, k),
+        (power * Fraction(10**9 + 1, 10**9), k + 1),
+        (power * Fraction(10**9 - 1, 10**9), k),
+        (power * Fraction(3, 2), k + 1),
+        (power * Fraction(2, 3), k),
+        (power * Fraction(4, 7), k),
     ):
         assert ceil_log2(number) == wanted
 

@@ -125,7 +125,9 @@ def test_speeds_beyond_the_range() -> None:
     assert [one.widths.max_count for one in (t(**slow), t())] == [1, 20]
     assert [one.form.flags_range for one in (t(), t(**slow), mt(), mt(**slow))] == [False, True, False, True]
     assert [one.form.flags_range for one in (t(timer="tick"), mt(timer="tick"), mt(timer="tick", **slow))] == [
-        *(True, False, False)
+        True,
+        False,
+        False,
     ]
     assert [len(one.method_ports) for one in (t(), t(**slow))] == [0, 1]
     assert [one.widths.max_velocity for one in (t(), t(timer="tick"), mt(timer="tick"))] == [20, 1, 20]
@@ -189,14 +191,12 @@ def kind(spec: STachometer) -> type:
 def test_the_reciprocal_of_s() -> None:
     """Divided where a tick leaves the time, or from a table of up to 2048 ticks; otherwise it is carried along."""
     assert [kind(s(tick)) for tick in (960, 19, 18, 7, 6, 1)] == [
-        *(
-            DividedReciprocal,
-            DividedReciprocal,
-            NarrowReciprocal,
-            NarrowReciprocal,
-            CarriedReciprocal,
-            CarriedReciprocal,
-        )
+        DividedReciprocal,
+        DividedReciprocal,
+        NarrowReciprocal,
+        NarrowReciprocal,
+        CarriedReciprocal,
+        CarriedReciprocal,
     ]
     assert [kind(s(tick, reciprocal_source="table")) for tick in (960, 7, 6)] == [
         NarrowReciprocal,
@@ -210,7 +210,9 @@ def test_the_reciprocal_of_s() -> None:
     assert kind(s(18, 2049)) is CarriedReciprocal
     assert s(1, 5001).form.reciprocal.entry == 2501  # type: ignore[union-attr]
     assert [one.words.memory and one.words.memory[:2] for one in (s(960), s(18), s(1, 5000))] == [
-        *(None, ("table", 16), ("table and carried on", 4))
+        None,
+        ("table", 16),
+        ("table and carried on", 4),
     ]
 
 

@@ -137,13 +137,27 @@ def test_constants_of_the_program() -> None:
     form = spec_of(max_speed="1000rad/s").form
     program, one = Program(form, Fraction(1, 100), 10), 2.0**form.frac_bits
     expected = {
-        **{"length": 960, "length_shifted": 960 * 2 ** (form.gain_bits - 8), "several": 2 * 2**form.mean_bits},
-        **{"one": one, "three": 3 * one, "three_quarters": 0.75 * one, "lsb": 1, "lost": form.max_error * one},
-        **{"most_v": form.max_velocity, "most_a": form.max_acceleration},
-        **{"coarse_v": form.max_velocity // 2**form.start_bits, "least_gap": form.least_gap},
-        **{"error": 0.4 * one, "errors": 0.8 * one, "some_error": 0.1 * one, "late": 1.1 * one},
-        **{"mean_limit": form.mean_threshold, "rate0": form.rates[0], "agile_rate": form.agile_rate},
-        **{"most_x0": -math.log(0.7) * one, "lead": 10 + program.clocks},
+        "length": 960,
+        "length_shifted": 960 * 2 ** (form.gain_bits - 8),
+        "several": 2 * 2**form.mean_bits,
+        "one": one,
+        "three": 3 * one,
+        "three_quarters": 0.75 * one,
+        "lsb": 1,
+        "lost": form.max_error * one,
+        "most_v": form.max_velocity,
+        "most_a": form.max_acceleration,
+        "coarse_v": form.max_velocity // 2**form.start_bits,
+        "least_gap": form.least_gap,
+        "error": 0.4 * one,
+        "errors": 0.8 * one,
+        "some_error": 0.1 * one,
+        "late": 1.1 * one,
+        "mean_limit": form.mean_threshold,
+        "rate0": form.rates[0],
+        "agile_rate": form.agile_rate,
+        "most_x0": -math.log(0.7) * one,
+        "lead": 10 + program.clocks,
     }
     factor, shift = program.acceleration_scale
     assert shift == form.width - 2

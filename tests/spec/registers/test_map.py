@@ -31,7 +31,9 @@ def test_values_are_told_with_their_units() -> None:
     registers = map_of(position_width="48")
     position = next(value for value in captured_values(registers) if value.name == "position")
     assert (position.bits, position.field.shift, [word.name for word in position.words]) == (
-        *(64, 0, ["POSITION_LOW", "POSITION_HIGH"]),
+        64,
+        0,
+        ["POSITION_LOW", "POSITION_HIGH"],
     )
     assert in_unit(Field("x", 1, unit="960 clocks")) == "One LSB is 960 clocks."
     assert in_unit(Field("x", 1, unit="2^-16 rad/s")) == "One LSB is 2^-16 rad/s."
@@ -47,10 +49,9 @@ def test_masks() -> None:
 
 def test_registers_follow_each_other() -> None:
     registers = map_of()
-    assert [one.name for one in registers] == [
-        *("IDENTIFICATION", "CONFIGURATION", "CONTROL", "COUNTERS", "VELOCITY", "STATUS"),
-        *("INTERVAL", "PULSE_COUNT", "POSITION"),
-    ]
+    assert [
+        one.name for one in registers
+    ] == "IDENTIFICATION CONFIGURATION CONTROL COUNTERS VELOCITY STATUS INTERVAL PULSE_COUNT POSITION".split()
     assert [one.offset for one in registers] == [*range(0, 36, 4)]
     assert registers.address_width == 6  # there is an address behind the last register, 36
     assert [one.name for one in registers if one.captures] == ["VELOCITY"]
@@ -64,7 +65,10 @@ def test_bits_of_control_counters_and_status() -> None:
     assert bits(registers, "CONTROL") == [("clear", 0, 1), ("hold", 1, 1)]
     assert [(one.access, one.reset) for one in registers["CONTROL"].fields] == [("wo", 0), ("rw", 0)]
     assert bits(registers, "COUNTERS") == [
-        *(("decode_errors", 0, 8), ("overflows", 8, 8), ("lost_updates", 16, 8), ("tick_errors", 24, 8))
+        ("decode_errors", 0, 8),
+        ("overflows", 8, 8),
+        ("lost_updates", 16, 8),
+        ("tick_errors", 24, 8),
     ]
     assert bits(registers, "STATUS") == [
         (name, low, 1) for low, name in enumerate(("updated", "indexed", "forced", "overflow", "stalled"))
@@ -80,7 +84,8 @@ def test_values_of_more_than_a_word_have_two() -> None:
     for name in ("POSITION", "VELOCITY"):
         low, high = (registers[f"{name}_{end}"] for end in ("LOW", "HIGH"))
         assert [(one.fields[0].shift, one.fields[0].width, one.fields[0].low) for one in (low, high)] == [
-            *((0, 32, 0), (32, 32, 0))
+            (0, 32, 0),
+            (32, 32, 0),
         ]
         assert high.offset in (low.offset + 4, low.offset + 8)  # STATUS comes behind the first register
         assert (low.help.split()[0], high.help.split()[0]) == ("Lower", "Upper")

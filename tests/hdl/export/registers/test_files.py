@@ -37,11 +37,19 @@ def check_rdl(registers: RegisterMap, text: str, folder: Path) -> None:
     assert (top.inst_name, top.total_size) == ("spindle", len(registers.registers) * 4)
     found = [
         (
-            *(one.inst_name, one.absolute_address, one.size * 8, one.get_property("accesswidth")),
+            one.inst_name,
+            one.absolute_address,
+            one.size * 8,
+            one.get_property("accesswidth"),
             [
                 (
-                    *(field.inst_name, field.low, field.width, field.get_property("reset")),
-                    *(field.is_sw_readable, field.is_sw_writable, bool(field.get_property("singlepulse"))),
+                    field.inst_name,
+                    field.low,
+                    field.width,
+                    field.get_property("reset"),
+                    field.is_sw_readable,
+                    field.is_sw_writable,
+                    bool(field.get_property("singlepulse")),
                     field.is_hw_writable,
                 )
                 for field in one.fields()
@@ -51,11 +59,19 @@ def check_rdl(registers: RegisterMap, text: str, folder: Path) -> None:
     ]
     assert found == [
         (
-            *(one.name, one.offset, 32, 32),
+            one.name,
+            one.offset,
+            32,
+            32,
             [
                 (
-                    *(field.name, field.low, field.width, field.reset),
-                    *(field.access != "wo", field.access != "ro", field.single),
+                    field.name,
+                    field.low,
+                    field.width,
+                    field.reset,
+                    field.access != "wo",
+                    field.access != "ro",
+                    field.single,
                     field.access == "ro" and not one.constant,
                 )
                 for field in one.fields
