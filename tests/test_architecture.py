@@ -182,7 +182,7 @@ def test_it_needs_only_the_standard_library(room: str) -> None:
 def test_golden_models_need_only_numpy() -> None:
     for file in files("sim/golden"):
         top = {name.split(".")[0] for name in imports(file)}
-        assert top <= {"tachometry", "numpy", "typing", "collections", "dataclasses", "bisect"}, file
+        assert top <= {"tachometry", "numpy", "typing", "collections", "dataclasses", "bisect", "functools"}, file
 
 
 def test_naive_models_of_tests_import_nothing_that_is_tested() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import singledispatch
 from pathlib import Path
 
 import click
@@ -151,19 +152,23 @@ def generate(
 
 
 def _bench(spec: AnySpec, name: str, bus: str, record: Callable[[TachometerSpec], Encoding] | None) -> dict[str, str]:
-    if isinstance(spec, AxesSpec):
+    if spec.axes is not None:
         raise ValueError("--testbench must not be given together with --axes: it is of one axis")
-    if isinstance(spec, LoopSpec) and bus != "none":
+    if spec is not spec.tachometer and bus != "none":
         raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
 
-    alone = spec.tachometer if isinstance(spec, LoopSpec) else spec
-    return cocotb_bench(spec, name, None if record is None else record(alone).recording)
+    return cocotb_bench(spec, name, None if record is None else record(spec.tachometer).recording)
 
 
+@singledispatch
 def _print(spec: AnySpec, bus: str) -> None:
-    if isinstance(spec, AxesSpec):
-        print_axes_core(spec)
-    elif isinstance(spec, LoopSpec):
-        print_loop_core(spec, bus)
-    else:
-        print_core(spec, plan_at(spec), bus)
+    alone = spec.tachometer
+    print_core(alone, plan_at(alone), bus)
+
+
+@_print.register
+def _(spec: AxesSpec, bus: str) -> None:
+    print_axes_core(spec)
+
+
+_print.register(LoopSpec, print_loop_core)

@@ -19,7 +19,7 @@ from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.simulation import Window
 from tachometry.sim.studies.simulation import simulate as simulation_of
-from tachometry.spec import AxesSpec, CoreSpec
+from tachometry.spec import CoreSpec
 
 
 @click.command(
@@ -58,11 +58,8 @@ def replay(
     equal files. Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=[capture])
-    if isinstance(spec, AxesSpec):
-        refuse_plot(targets)
-        recordings = [read(capture, spec, axis) for axis in range(spec.axes)]
-    else:
-        recordings = [read(capture, spec)]
+    refuse_plot(spec, targets)
+    recordings = [read(capture, spec, axis) for axis in range(spec.axes or 1)]
     with outputs:
         simulation = simulation_of(
             spec,

@@ -19,7 +19,7 @@ from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.studies.simulation import Window
 from tachometry.sim.studies.simulation import simulate as simulation_of
-from tachometry.spec import AxesSpec, CoreSpec
+from tachometry.spec import CoreSpec
 
 
 @click.command(
@@ -61,11 +61,8 @@ def simulate(
     Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=tables)
-    if isinstance(spec, AxesSpec):
-        refuse_plot(targets)
-        truths = [record(spec.tachometer, axis, spec.axes) for axis in range(spec.axes)]
-    else:
-        truths = [record(spec)]
+    refuse_plot(spec, targets)
+    truths = [record(spec.tachometer, axis, spec.axes) for axis in range(spec.axes or 1)]
     recordings = [truth.recording for truth in truths]
     with outputs:
         simulation = simulation_of(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tachometry.cli.options.option import Group, option, refuse_without
-from tachometry.spec import AxesSpec, CoreSpec
+from tachometry.spec import CoreSpec
 from tachometry.spec.language.units import parse_frequency
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
@@ -80,7 +80,7 @@ def _read(
         from tachometry.sim.captures.other_sensors import converted
         from tachometry.sim.captures.read import read_capture, with_last_tick
 
-        alone, axes = spec.tachometer, spec.axes if isinstance(spec, AxesSpec) else None
+        alone, axes = spec.tachometer, spec.axes
         if sensor == "pulses" and b is not None:
             raise OptionError("b", "must not be given together with --sensor pulses")
         line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))

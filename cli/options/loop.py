@@ -3,7 +3,7 @@
 from typing import Any
 
 from tachometry.cli.options.option import Group, declared, option, take_texts
-from tachometry.spec import AxesSpec, CoreSpec, ParameterError
+from tachometry.spec import CoreSpec, ParameterError
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.language.option import options_of, read_options
 
@@ -45,6 +45,6 @@ def of_loop(spec: CoreSpec, texts: dict[str, str]) -> AnySpec:
     ParameterError
         If there cannot be such a core.
     """
-    if isinstance(spec, AxesSpec):
+    if spec.axes is not None:
         raise ParameterError("axes", "must not be given together with --loop: it is of one axis")
-    return LoopSpec(tachometer=spec, **read_options(LoopSpec, texts, vars(spec.timing)))
+    return LoopSpec(tachometer=spec.tachometer, **read_options(LoopSpec, texts, vars(spec.timing)))

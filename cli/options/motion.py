@@ -66,12 +66,12 @@ def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
     others = _read_encoder(**given)
     encoder = others.pop("encoder")
 
-    def record(spec: TachometerSpec, axis: int | None = None, axes: int = 1) -> Encoding:
+    def record(spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
         from tachometry.sim.encoder.motion import parse_motion
 
         assert motion is not None
         own: VirtualEncoder = encoder(spec)
-        if axis is None:
+        if axes is None:
             return own.record(parse_motion(motion))
         each = motion.split(",")
         if len(each) > axes:

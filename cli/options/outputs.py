@@ -8,7 +8,7 @@ from tachometry.cli.options.option import Group, output
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.signals.tables import write_counts, write_events, write_trace
 from tachometry.sim.studies.simulation import Simulation
-from tachometry.spec import AxesSpec
+from tachometry.spec import CoreSpec
 
 _OPTIONS = [
     output(
@@ -63,9 +63,9 @@ OUTPUT_OPTIONS = Group(_OPTIONS, _read)
 """Handed over as `targets`, a dictionary of option to path; a `.gtkw` comes with `--vcd`."""
 
 
-def refuse_plot(targets: Mapping[str, Path]) -> None:
+def refuse_plot(spec: CoreSpec, targets: Mapping[str, Path]) -> None:
     """Check that no figure is wanted of many axes."""
-    if "--plot" in targets:
+    if spec.axes is not None and "--plot" in targets:
         raise ValueError("--plot must not be given together with --axes: a figure is of one axis")
 
 
@@ -90,6 +90,6 @@ def write_outputs(simulation: Simulation, place: Callable[[str], Path | None]) -
     if path := place("--plot"):
         from tachometry.sim.plots.run import save_plot  # Matplotlib is slow to import
 
-        assert not isinstance(spec, AxesSpec), "a figure is of one axis"
+        assert spec.axes is None, "a figure is of one axis"
         truth = simulation.axes[0].truth
-        save_plot(path, spec, run, None if truth is None else truth.true_speed)
+        save_plot(path, spec.tachometer, run, None if truth is None else truth.true_speed)

@@ -8,7 +8,7 @@ from tachometry.spec.language.units import plural
 
 def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:
     """Print the configuration of tachometer and loop, and the registers on a bus."""
-    form, period, late = spec.form, spec.units.seconds, spec.tick_to_current
+    form, period, late = spec.form, spec.units.seconds, spec.tick_to_result
     filtered = "none" if spec.filter is None else f"{float(spec.filter):.6g} rad/s"
     when = "at updates of the velocity" if spec.synchronised else "at every control tick"
     widths = ", ".join(

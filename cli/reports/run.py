@@ -1,6 +1,8 @@
 """`simulate` and `replay` print these lines of a run."""
 
 import sys
+from collections.abc import Sequence
+from functools import singledispatch
 
 import numpy as np
 from rich.text import Text
@@ -9,8 +11,10 @@ from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
-from tachometry.spec import AxesSpec
+from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.language.units import format_time, plural
+
+_Row = tuple[str, str]  # a name and its value
 
 
 def print_simulation(simulation: Simulation) -> int:
@@ -19,15 +23,8 @@ def print_simulation(simulation: Simulation) -> int:
     run = lockstep.actual
     time, n_ticks = format_time(spec.times.seconds(run.n_clocks)), len(run.ticks) // len(axes)
     simulated = ("simulated", f"{run.n_clocks} clocks ({time}), {n_ticks} ticks")
-    mismatches = ("mismatches", str(lockstep.n_mismatches))
-    if isinstance(spec, AxesSpec):
-        rows = [simulated, mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))]
-        warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
-    else:
-        (axis,) = axes
-        rows = [simulated, _updates(run), mismatches, *_rows(axis)]
-        warnings = _warnings(axis)
-    print_rows([("engine", simulation.engine), *rows])
+    rows, warnings = _summary(spec, axes, ("mismatches", str(lockstep.n_mismatches)))
+    print_rows([("engine", simulation.engine), simulated, *rows])
     console = stdout_console()
     for mismatch in lockstep.first:
         console.print(Text(f"first mismatch in {mismatch}"))
@@ -39,6 +36,19 @@ def print_simulation(simulation: Simulation) -> int:
         return 0
     print(f"tachometry: interrupted after {run.n_clocks} of {simulation.wanted} clocks", file=sys.stderr)
     return INTERRUPTED
+
+
+@singledispatch
+def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
+    """Return rows of the table of a core, and warnings."""
+    (axis,) = axes
+    return [_updates(axis.run), mismatches, *_rows(axis)], _warnings(axis)
+
+
+@_summary.register
+def _(spec: AxesSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
+    warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
+    return [mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))], warnings
 
 
 def print_warnings(warnings: list[str]) -> None:

@@ -1,5 +1,7 @@
 """The hardware of a spec."""
 
+from functools import singledispatch
+
 from tachometry.hdl.core.axes_tachometer import AxesTachometer
 from tachometry.hdl.core.loop_core import LoopCore
 from tachometry.hdl.core.tachometer import Tachometer
@@ -9,8 +11,11 @@ from tachometry.spec.control import AnySpec, LoopSpec
 AnyTachometer = Tachometer | AxesTachometer | LoopCore
 
 
+@singledispatch
 def core_of(spec: AnySpec) -> AnyTachometer:
     """Return the whole core, for one axis or for many, or with a control loop."""
-    if isinstance(spec, LoopSpec):
-        return LoopCore(spec)
-    return AxesTachometer(spec) if isinstance(spec, AxesSpec) else Tachometer(spec)
+    return Tachometer(spec.tachometer)
+
+
+core_of.register(AxesSpec, AxesTachometer)
+core_of.register(LoopSpec, LoopCore)

@@ -1,8 +1,10 @@
 """Template, constraints, FuseSoC core file and smoke test lie beside the Verilog, to build it into a design."""
 
+from functools import singledispatch
+
 from tachometry.hdl.export.render import render_files
 from tachometry.spec import AxesSpec, TachometerSpec
-from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.control import AnySpec
 from tachometry.spec.language.port import Port
 from tachometry.spec.registers.buses import Bus, ports_on
 
@@ -30,21 +32,20 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         On which its registers are.
     """
     ports = ports_on(spec, bus)
-    tacho = spec.tachometer if isinstance(spec, LoopSpec) else spec  # the commands of a loop are synchronous
     return render_files(
         KIT,
         name,
         spec=spec,
-        tacho=tacho,
+        tacho=spec.tachometer if spec.axes is None else spec,  # the commands of a loop are synchronous
         bus=bus,
         inputs=[port for port in ports if port.direction == "input"],
         outputs=[port for port in ports if port.direction == "output"],
         help=_help,
         idle=bus.idle if bus else {},
-        paths=_synchronizers(tacho, bus),
-        bits="*" if isinstance(tacho, AxesSpec) else "",
-        tick_cycles=tacho.timing.tick_cycles,
-        **(_bench_of_axes(tacho) if isinstance(tacho, AxesSpec) else _bench(tacho)),
+        paths=_synchronizers(spec, bus),
+        bits="" if spec.axes is None else "*",
+        tick_cycles=spec.timing.tick_cycles,
+        **_bench(spec),
     )
 
 
@@ -52,17 +53,19 @@ def _help(port: Port) -> str:
     return f"{port.help.rstrip('.')}; in {port.unit}." if port.unit else port.help
 
 
-def _synchronizers(tacho: TachometerSpec | AxesSpec, bus: Bus | None) -> dict[str, list[str]]:
+def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     """Return where the synchroniser of each pin is in the core: the boxes from the outermost to itself."""
     box = {"tick_in": ["sampling_clock"]}
-    default: list[str] = [] if isinstance(tacho, AxesSpec) else ["conditioner"]
-    boxes = {pin.name: box.get(pin.name, default) for pin in tacho.ports.pins}
+    default = ["conditioner"] if spec.axes is None else []
+    boxes = {pin.name: box.get(pin.name, default) for pin in spec.tachometer.ports.pins}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}
 
 
-def _bench(tacho: TachometerSpec) -> dict[str, object]:
-    """Return how the smoke test turns one encoder, and the position that must follow."""
+@singledispatch
+def _bench(spec: AnySpec) -> dict[str, object]:
+    """Return how the smoke test turns one encoder, or many, and the position that must follow."""
+    tacho = spec.tachometer
     return {
         "axes": None,
         "hold": max(_hold(tacho), 2 * (tacho.filter_clocks + 8)),
@@ -74,8 +77,9 @@ def _bench(tacho: TachometerSpec) -> dict[str, object]:
     }
 
 
-def _bench_of_axes(tacho: AxesSpec) -> dict[str, object]:
-    """Return how the smoke test turns many encoders: every other one backward, its lines exchanged."""
+@_bench.register
+def _(tacho: AxesSpec) -> dict[str, object]:
+    # Every other one goes backward, its lines exchanged.
     lines = ["quarter[1] ^ quarter[0]", "quarter[1]"]
     a, b = ([lines[(axis + line) % 2] for axis in reversed(range(tacho.axes))] for line in range(2))
     stores = " ".join(f"positions[{axis}] <= position_{axis};" for axis in range(tacho.axes))

@@ -1,5 +1,7 @@
 """A motion that visits what every core must survive."""
 
+from functools import singledispatch
+
 import numpy as np
 
 from tachometry.sim.signals.axes import AxesTrace, Trace
@@ -47,10 +49,14 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     return trace.with_tick_in(np.cumsum(np.maximum(apart, 2)))
 
 
+@singledispatch
 def stress_of(spec: CoreSpec, seed: int, n_edges: int = 300) -> Trace:
     """Return the same for many axes as well, each of which has a motion of its own."""
-    if not isinstance(spec, AxesSpec):
-        return stress(spec, seed, n_edges)
+    return stress(spec.tachometer, seed, n_edges)
+
+
+@stress_of.register
+def _(spec: AxesSpec, seed: int, n_edges: int = 300) -> Trace:
     # Of different lengths, so that not all axes stand when one does.
     each = [stress(spec.tachometer, seed * spec.axes + axis, n_edges + 7 * axis) for axis in range(spec.axes)]
     return AxesTrace.of(each)

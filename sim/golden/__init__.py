@@ -1,5 +1,6 @@
 """Golden models compute exact integers over whole recordings, from the papers and the spec alone."""
 
+from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,16 @@ def model(spec: TachometerSpec) -> Any:
     return MODELS[spec.method](spec)
 
 
+@singledispatch
 def run(spec: CoreSpec, trace: Trace) -> Run:
     """Return what the core of `spec` must show at its ports for these pins."""
-    if isinstance(spec, AxesSpec):
-        assert isinstance(trace, AxesTrace), "many axes need the pins of each"
-        return run_axes(spec, trace, tables)
     assert isinstance(trace, PinTrace), "a core of one axis needs the pins of one"
-    return Run.of_ports(spec, trace.n_clocks, tables(spec, trace))
+    return Run.of_ports(spec, trace.n_clocks, tables(spec.tachometer, trace))
+
+
+@run.register
+def _(spec: AxesSpec, trace: AxesTrace) -> Run:
+    return run_axes(spec, trace, tables)
 
 
 def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:

@@ -153,7 +153,7 @@ def control(
         rows.append((loop.current, loop.saturated, loop.y, loop.w))
     columns = np.array(rows, dtype=np.int64).reshape(-1, 4).T
     names = ("current", "current_saturated", "filtered_velocity", "disturbance")
-    return Table(clock + spec.tick_to_current, dict(zip(names, columns, strict=True)))
+    return Table(clock + spec.tick_to_result, dict(zip(names, columns, strict=True)))
 
 
 def run_loop(

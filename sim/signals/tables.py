@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import singledispatch
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -78,15 +79,22 @@ def write_trace(path: Path, spec: CoreSpec, run: Run) -> None:
     The velocity stands there as the raw number and in the unit of the core (in rad/s, if that is counts per tick); all
     else is raw, by the names of the ports. With many axes, the axis comes first.
     """
-    if not isinstance(spec, AxesSpec):
-        columns = _of_updates(spec, run, spec.latency.tick_to_velocity)
-    else:
-        each = [_of_updates(spec.tachometer, of_axis(spec, run, axis), 0) for axis in range(spec.axes)]
-        axis = np.repeat(np.arange(spec.axes), [len(found["clock"]) for found in each])
-        together = {name: np.concatenate([found[name] for found in each]) for name in each[0]}
-        order = np.argsort(together["clock"], kind="stable")
-        columns = {name: column[order] for name, column in {"axis": axis, **together}.items()}
+    columns = _columns(spec, run)
     write_csv(path, tuple(columns), rows_of(list(columns.values())))
+
+
+@singledispatch
+def _columns(spec: CoreSpec, run: Run) -> dict[str, NDArray[Any]]:
+    return _of_updates(spec.tachometer, run, spec.latency.tick_to_velocity)
+
+
+@_columns.register
+def _(spec: AxesSpec, run: Run) -> dict[str, NDArray[Any]]:
+    each = [_of_updates(spec.tachometer, of_axis(spec, run, axis), 0) for axis in range(spec.axes)]
+    axis = np.repeat(np.arange(spec.axes), [len(found["clock"]) for found in each])
+    together = {name: np.concatenate([found[name] for found in each]) for name in each[0]}
+    order = np.argsort(together["clock"], kind="stable")
+    return {name: column[order] for name, column in {"axis": axis, **together}.items()}
 
 
 def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[str, NDArray[Any]]:

@@ -3,13 +3,14 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 from pathlib import Path
 
 import numpy as np
 
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.engines.pick import pick
-from tachometry.sim.signals.axes import AxesTrace, of_axis
+from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.run import Run
@@ -108,7 +109,7 @@ def simulate(
     ValueError
         If the recordings do not last a tick, or have too many.
     """
-    trace = AxesTrace.placed(recordings, spec) if isinstance(spec, AxesSpec) else PinTrace.of(recordings[0], spec)
+    trace = _placed(spec, recordings)
     fewest = spec.times.longest_tick + spec.latency.tick  # after which there is something to report
     if trace.n_clocks < fewest:
         raise ValueError(
@@ -121,14 +122,24 @@ def simulate(
     missing = " (there is no C++ compiler)" if (engine, chosen.name) == ("auto", "pysim") else ""
     known = [None] * len(recordings) if truths is None else truths
     each = enumerate(zip(recordings, known, strict=True))
-    if isinstance(spec, AxesSpec):
-        axes = [_one_of_many(spec, found.actual, axis, *of) for axis, of in each]
-    else:
-        axes = [_alone(spec, found.actual, *of) for _, of in each]
-    return Simulation(spec, chosen.name + missing, trace.n_clocks, found, tuple(axes))
+    axes = tuple(_axis(spec, found.actual, number, *of) for number, of in each)
+    return Simulation(spec, chosen.name + missing, trace.n_clocks, found, axes)
 
 
-def _alone(spec: TachometerSpec, run: Run, recording: Recording, truth: Encoding | None) -> Axis:
+@singledispatch
+def _placed(spec: CoreSpec, recordings: Sequence[Recording]) -> Trace:
+    return PinTrace.of(recordings[0], spec.tachometer)
+
+
+@_placed.register
+def _(spec: AxesSpec, recordings: Sequence[Recording]) -> Trace:
+    return AxesTrace.placed(recordings, spec)
+
+
+@singledispatch
+def _axis(core: CoreSpec, run: Run, number: int, recording: Recording, truth: Encoding | None) -> Axis:
+    """Return what came of an axis."""
+    spec = core.tachometer
     counts_in = error = None
     if truth is not None:
         # Up to the pin sample that the last tick can hold.
@@ -152,7 +163,8 @@ def _sampled(clock: int, clock_hz: int) -> float:
     return instant
 
 
-def _one_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
+@_axis.register
+def _(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
     own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
     if truth is not None and (n_ticks := len(own.ticks)):
         # From the first look at the axis to the last one of the last tick.

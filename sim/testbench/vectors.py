@@ -1,6 +1,7 @@
 """A testbench stands on its own: its data say what to put on the pins, and what the outputs must show."""
 
 import json
+from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recordin
     ValueError
         If it does not last for a tick, or for too many.
     """
-    spec = core.tachometer if isinstance(core, LoopSpec) else core
+    spec = core.tachometer
     recording = usual_motion(spec) if recording is None else recording
     check_ticks(recording.duration, spec, _MOST_BENCH_TICKS)
     trace = recording.place(spec.timing.clock_hz)
@@ -58,13 +59,7 @@ def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recordin
 
 def _vectors(core: TachometerSpec | LoopSpec, trace: PinTrace) -> dict[str, Any]:
     """Return the content of `NAME_vectors.json`; test_NAME.py says what stands where."""
-    pins = [*trace.lines]
-    changes: list[NDArray[Any]] = [trace.clock, *trace.lines.values()]
-    if isinstance(core, LoopSpec):
-        inputs, run = loop_inputs(core, trace)
-        pins, changes = [*pins, *inputs], [*loop_changes(core, trace, inputs)]
-    else:
-        run = golden.run(core, trace)
+    pins, changes, run = _put(core, trace)
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {trace.n_clocks} clocks")
     return {
@@ -75,6 +70,18 @@ def _vectors(core: TachometerSpec | LoopSpec, trace: PinTrace) -> dict[str, Any]
         "changes": _rows(*changes),
         "strobes": strobe_rows(run),
     }
+
+
+@singledispatch
+def _put(core: TachometerSpec | LoopSpec, trace: PinTrace) -> tuple[list[str], list[NDArray[Any]], Run]:
+    """Return names of the inputs, the clocks of changes with their values, and what the core must show."""
+    return [*trace.lines], [trace.clock, *trace.lines.values()], golden.run(core.tachometer, trace)
+
+
+@_put.register
+def _(core: LoopSpec, trace: PinTrace) -> tuple[list[str], list[NDArray[Any]], Run]:
+    inputs, run = loop_inputs(core, trace)
+    return [*trace.lines, *inputs], [*loop_changes(core, trace, inputs)], run
 
 
 def usual_motion(spec: TachometerSpec) -> Recording:

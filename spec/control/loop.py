@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 from tachometry.spec.control.coefficients import control_form, ratios_of
 from tachometry.spec.control.form import ControlForm, Term, factor_bits
@@ -75,6 +75,9 @@ class LoopSpec(Law):
         choices=FIXED_OR_INPUTS,
         group=_GROUP,
     )
+
+    # Outputs are of one axis.
+    axes: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -165,11 +168,11 @@ class LoopSpec(Law):
         return _STEPS + (factor_bits if self.multiplier == "serial" else _PARALLEL)
 
     @property
-    def tick_to_current(self) -> int:
+    def tick_to_result(self) -> int:
         """Clocks from `control_tick` to `current_valid`."""
-        return self._tick_to_current(self.form.factor_bits)
+        return self._tick_to_result(self.form.factor_bits)
 
-    def _tick_to_current(self, factor_bits: int) -> int:
+    def _tick_to_result(self, factor_bits: int) -> int:
         unfiltered = _UNFILTERED if self.filter is None else 0
         return (len(Term) - (self.filter is None)) * self._product_clocks(factor_bits) + unfiltered + _LIMIT
 
@@ -180,7 +183,7 @@ class LoopSpec(Law):
 
     def _least_period(self, factor_bits: int) -> int:
         generated = generator_clocks(self.multiplier) if self.command == "generator" else 0
-        return max(self._tick_to_current(factor_bits) + 1, generated)
+        return max(self._tick_to_result(factor_bits) + 1, generated)
 
     @cached_property
     def generator(self) -> GeneratorForm:
@@ -223,4 +226,6 @@ class LoopSpec(Law):
         return {**self.tachometer.parameters, "loop": own}
 
 
+# A core of any kind: all have ports, options, parameters, entries of a manifest, `axes`, `tick_to_result`, and a
+# `tachometer`, the core of one axis that they are, or that is in them.
 AnySpec = CoreSpec | LoopSpec

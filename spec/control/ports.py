@@ -163,7 +163,7 @@ def loop_entries(spec: LoopSpec) -> dict[str, Any]:
     return {
         "period_cycles": spec.period,
         "first_tick": spec.first_tick,
-        "tick_to_current": spec.tick_to_current,
+        "tick_to_current": spec.tick_to_result,
         "longest_interval": form.longest,
         "current": {
             "width": spec.current_width,

@@ -177,6 +177,8 @@ class TachometerSpec:
     # Name of the method, and what sets it apart.
     method: ClassVar[str]
     facts: ClassVar[Facts]
+    # How many axes its outputs are of, if they say which.
+    axes: ClassVar[None] = None
     # What follows.
     times = cached_property(Times["TachometerSpec"])
     widths = cached_property(Widths["TachometerSpec"])
@@ -196,6 +198,11 @@ class TachometerSpec:
     def tachometer(self) -> "TachometerSpec":
         """The core of one axis that it is."""
         return self
+
+    @property
+    def tick_to_result(self) -> int:
+        """Clocks from its tick to what the core is for: here to the velocity."""
+        return self.latency.tick_to_velocity
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

@@ -362,6 +362,11 @@ class AxesSpec:
         }
 
     @property
+    def tick_to_result(self) -> int:
+        """Clocks from `tick` to the velocity."""
+        return self.latency.tick_to_velocity
+
+    @property
     def options(self) -> dict[str, str]:
         """Texts of all options that are asked for, by their names."""
         return {**self.tachometer.options, "axes": str(self.axes), "parallel": ("no", "yes")[self.parallel]}

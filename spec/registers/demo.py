@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, singledispatch
 from typing import Any
 
 from tachometry.spec.control import LoopSpec
@@ -98,6 +98,7 @@ class DemoLoopMap(LoopMap, DemoMap):
         yield from DemoMap._added(self)
 
 
+@singledispatch
 def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
     """Return all registers of the demo of a core.
 
@@ -106,7 +107,12 @@ def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
     ParameterError
         If the gains of a loop are fixed.
     """
-    return DemoLoopMap(spec.tachometer, spec) if isinstance(spec, LoopSpec) else DemoMap(spec)
+    return DemoMap(spec.tachometer)
+
+
+@demo_map.register
+def _(spec: LoopSpec) -> DemoMap:
+    return DemoLoopMap(spec.tachometer, spec)
 
 
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:

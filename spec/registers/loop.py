@@ -2,14 +2,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, singledispatch
 
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.control.form import GAINS
 from tachometry.spec.control.ports import CONTROL, CURRENT, GAIN_PORTS, loop_entries
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
-from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
 
 _MODE, _POSITION = "generator_mode", "command_position"
@@ -134,6 +133,7 @@ def _ranged(field: Field) -> Field:
     return replace(field, least=-most - 1 if field.signed else 0, most=most)
 
 
+@singledispatch
 def registers_of(spec: AnySpec) -> RegisterMap:
     """Return all registers of a core.
 
@@ -142,6 +142,11 @@ def registers_of(spec: AnySpec) -> RegisterMap:
     ParameterError
         If it can have none.
     """
-    if isinstance(spec, AxesSpec):
+    if spec.axes is not None:
         raise ParameterError("bus", "must not be given together with axes: registers and targets are for one axis")
-    return LoopMap(spec.tachometer, spec) if isinstance(spec, LoopSpec) else RegisterMap(spec)
+    return RegisterMap(spec.tachometer)
+
+
+@registers_of.register
+def _(spec: LoopSpec) -> RegisterMap:
+    return LoopMap(spec.tachometer, spec)

@@ -367,6 +367,6 @@ def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
     bare = size.Measurement({"LC": 1}, "a → b")
     monkeypatch.setattr(synthesis, "measure_verilog", lambda *_: bare)
     loop = LoopSpec(tachometer=SPEC)
-    for spec, latency in ((SPEC, SPEC.latency.tick_to_velocity), (loop, loop.tick_to_current)):
+    for spec, latency in ((SPEC, SPEC.latency.tick_to_velocity), (loop, loop.tick_to_result)):
         found = synthesis.measure_core(spec, size.TARGETS["HX8K"], "", {})
         assert found.figures == {"LC": 1, "latency": latency}

@@ -99,7 +99,7 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
     form, period = spec.form, spec.period
     spacing = np.where(rng.random(n_ticks) < 0.7, spec.least_period, period)
     clock = 5 + np.cumsum(spacing)
-    n_clocks = int(clock[-1]) + spec.tick_to_current + 2
+    n_clocks = int(clock[-1]) + spec.tick_to_result + 2
     # Often none for longer than the longest measurement, often many between two control ticks.
     rate = np.repeat([0.02, 0.0, 0.5, 0.002], -(-n_clocks // 4))[:n_clocks]
     rate[:5] = 0.9  # before the first control tick

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from tachometry.hdl.export.targets.litex import litex
 from tachometry.hdl.export.targets.rio import rio
 from tachometry.spec import TachometerSpec
-from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError
 
 
@@ -53,11 +53,11 @@ def bus_for(target: str, bus: str | None) -> str:
 
 def check_core(target: str, spec: AnySpec) -> None:
     """Refuse a core that is not for this target, with a ParameterError."""
-    if target in TARGETS and not isinstance(spec, TachometerSpec):
-        other, whom = ("loop", "a tachometer alone") if isinstance(spec, LoopSpec) else ("axes", "one axis")
+    if target in TARGETS and spec is not spec.tachometer:
+        other, whom = ("loop", "a tachometer alone") if spec.axes is None else ("axes", "one axis")
         raise ParameterError("target", f"must not be given together with {other}: targets are for {whom}")
 
 
 def target_files(target: str, spec: AnySpec, name: str, verilog: str) -> dict[str, str]:
     """Return texts by file name, of the name and the Verilog of the core; none without a target."""
-    return TARGETS[target].files(spec, name, verilog) if isinstance(spec, TachometerSpec) and target in TARGETS else {}
+    return TARGETS[target].files(spec.tachometer, name, verilog) if target in TARGETS else {}

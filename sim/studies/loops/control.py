@@ -223,7 +223,15 @@ def mean(outcomes: Sequence[Outcome]) -> Outcome:
 @functools.lru_cache(maxsize=32)
 def simulation_of(spec: TachometerSpec | LoopSpec) -> Any:
     """Return the compiled simulation of a core: a `GateLoop` if it has its loop in gates, else a `LoopSimulation`."""
-    return GateLoop(spec) if isinstance(spec, LoopSpec) else LoopSimulation(spec)
+    return _simulation_of(spec)
+
+
+@functools.singledispatch
+def _simulation_of(spec: TachometerSpec | LoopSpec) -> Any:
+    return LoopSimulation(spec.tachometer)
+
+
+_simulation_of.register(LoopSpec, GateLoop)
 
 
 def in_gates(setting: Setting) -> Setting:

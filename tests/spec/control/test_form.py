@@ -312,8 +312,8 @@ def test_times() -> None:
         ("parallel", Fraction(0), lambda p: 6 * 6 + 3 + 2),
     ):
         spec = LoopSpec(tachometer=CORE, multiplier=multiplier, velocity_filter=filter)
-        assert spec.tick_to_current == clocks(spec.form.factor_bits)
-        assert spec.least_period == spec.tick_to_current + 1
+        assert spec.tick_to_result == clocks(spec.form.factor_bits)
+        assert spec.least_period == spec.tick_to_result + 1
         # A control tick comes a clock behind the first update, which is late from the last clock of the tick on.
         assert spec.first_tick == 959 + CORE.latency.tick + CORE.latency.tick_to_velocity + 1
 
