@@ -91,17 +91,26 @@ def of_options(options: Mapping[str, str]) -> AnySpec:
         If they are not those of a core.
     """
     texts = dict(options)
-    axes, parallel, loop = (texts.pop(name, "") for name in ("axes", "parallel", "loop"))
+    axes, parallel, loop = (texts.pop(name, "no") for name in ("axes", "parallel", "loop"))
     of_loop = {about.name: texts.pop(about.name) for about in options_of(LoopSpec) if about.name in texts}
-    spec = of_texts(texts.pop("method", ""), texts)
-    if axes:
-        if not isinstance(spec, STachometer):
-            raise ParameterError("method", f"must be s together with axes, not {spec.method}")
-        number = parse_whole("axes", axes)
-        return AxesSpec(tachometer=spec, axes=number, parallel=parse_flag("parallel", parallel or "no"))
-    if loop:
-        return LoopSpec(tachometer=spec, **read_options(LoopSpec, of_loop, vars(spec.timing)))
-    return spec
+    spec: CoreSpec = of_texts(texts.pop("method", ""), texts)
+    if axes != "no":
+        spec = with_axes(spec.tachometer, parse_whole("axes", axes), parallel=parse_flag("parallel", parallel))
+    return with_loop(spec, of_loop) if parse_flag("loop", loop) else spec
+
+
+def with_axes(spec: TachometerSpec, axes: int, *, parallel: bool) -> AxesSpec:
+    """Return a core of so many axes, each of which is as `spec`; ParameterError if there cannot be one."""
+    if not isinstance(spec, STachometer):
+        raise ParameterError("method", f"must be s together with --axes, not {spec.method}")
+    return AxesSpec(tachometer=spec, axes=axes, parallel=parallel)
+
+
+def with_loop(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:
+    """Return a core with a control loop, from texts of its options; ParameterError if there cannot be one."""
+    if spec.axes is not None:
+        raise ParameterError("axes", "must not be given together with --loop: it is of one axis")
+    return LoopSpec(tachometer=spec.tachometer, **read_options(LoopSpec, texts, vars(spec.timing)))
 
 
 def of_manifest(path: Path) -> AnySpec:
@@ -147,4 +156,6 @@ __all__ = [
     "of_texts",
     "own_options",
     "spec_class",
+    "with_axes",
+    "with_loop",
 ]

@@ -3,7 +3,7 @@
 from typing import Any
 
 from tachometry.cli.options.option import Group, option
-from tachometry.spec import AxesSpec, ParameterError, STachometer, TachometerSpec
+from tachometry.spec import ParameterError, TachometerSpec, with_axes
 from tachometry.spec.methods.axes import MAX_AXES
 
 _AXES = "Axes"
@@ -24,21 +24,8 @@ _OPTIONS = [
 def _read(*, spec: TachometerSpec, axes: int | None, parallel: bool, **others: Any) -> dict[str, Any]:
     if axes is None and parallel:
         raise ParameterError("parallel", "must be given together with --axes")
-    return dict(spec=spec if axes is None else of_axes(spec, axes, parallel), **others)
+    return dict(spec=spec if axes is None else with_axes(spec, axes, parallel=parallel), **others)
 
 
 AXES_OPTIONS = Group(_OPTIONS, _read)
 """Below the options of the core: `spec` is that of many axes, if there are to be many."""
-
-
-def of_axes(spec: TachometerSpec, axes: int, parallel: bool) -> AxesSpec:
-    """Return a core of so many axes, each of which is as `spec`.
-
-    Raises
-    ------
-    ParameterError
-        If there cannot be such a core.
-    """
-    if not isinstance(spec, STachometer):
-        raise ParameterError("method", f"must be s together with --axes, not {spec.method}")
-    return AxesSpec(tachometer=spec, axes=axes, parallel=parallel)

@@ -3,9 +3,8 @@
 from typing import Any
 
 from tachometry.cli.options.option import Group, declared, option, take_texts
-from tachometry.spec import CoreSpec, ParameterError
-from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.language.option import options_of, read_options
+from tachometry.spec import CoreSpec, LoopSpec, ParameterError, with_loop
+from tachometry.spec.language.option import options_of
 
 _LOOP = "Loop"
 
@@ -24,7 +23,7 @@ _OPTIONS = [
 
 def _read(*, spec: CoreSpec, loop: bool, **others: Any) -> dict[str, Any]:
     texts = take_texts(LoopSpec, others)
-    return dict(spec=of_loop(spec, texts) if loop else _alone(spec, texts), **others)
+    return dict(spec=with_loop(spec, texts) if loop else _alone(spec, texts), **others)
 
 
 LOOP_OPTIONS = Group(_OPTIONS, _read)
@@ -35,16 +34,3 @@ def _alone(spec: CoreSpec, texts: dict[str, str]) -> CoreSpec:
     for name in texts:
         raise ParameterError(name.replace("-", "_"), "must be given together with --loop")
     return spec
-
-
-def of_loop(spec: CoreSpec, texts: dict[str, str]) -> AnySpec:
-    """Return a core with a control loop, from texts of its options by their names.
-
-    Raises
-    ------
-    ParameterError
-        If there cannot be such a core.
-    """
-    if spec.axes is not None:
-        raise ParameterError("axes", "must not be given together with --loop: it is of one axis")
-    return LoopSpec(tachometer=spec.tachometer, **read_options(LoopSpec, texts, vars(spec.timing)))
