@@ -1,37 +1,71 @@
 """Captures of other sensors become the quadrature that counts the same."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import OptionError
+from tachometry.sim.captures.file import CaptureError, OptionError
 from tachometry.sim.signals.recording import Recording, quadrature
 from tachometry.spec import TachometerSpec
 
 
-def of_pulses(recording: Recording) -> Recording:
+def of_pulses(recording: Recording, decoding: int) -> Recording:
     """Return a single line, here A, as of a tooth wheel: always forward.
 
-    B changes halfway between two edges of A, so what counts edges of A alone counts each at its time.
+    What counts edges of A alone counts each at its time: B changes halfway between two of them. What counts rises alone
+    needs these only, and the falls may come at any time, also at that of a rise: three quarters of a period are spread
+    up to the next rise.
     """
-    edges = recording.time[1:][np.diff(recording.a) != 0]
-    halfway = (edges[1:] + edges[:-1]) / 2
+    recording = _with_first_pulse(recording)
+    steps = np.diff(recording.a.astype(np.int8))
+    parts = 2 if decoding == 2 else 4
+    counted = recording.time[1:][steps != 0 if decoding == 2 else steps == 1]
+    if decoding == 2 and (together := np.flatnonzero(np.diff(counted) == 0)).size:
+        at = f"{len(together)} in this capture, the first at {counted[together[0]]:.9g} s"
+        raise OptionError("decoding", f"must be 1, which counts rises alone, for pulses of no width ({at}), not 2")
+    between = [counted[:-1] + np.diff(counted) * part / parts for part in range(1, parts)]
     # Forward, A is the next line to change where the quarter is even, and low in quarter 0.
-    first = 2 * int(recording.a[0])
-    return _moved(recording, np.sort(np.concatenate([edges, halfway])), first, 1)
+    first = 2 * int(recording.a[0]) if decoding == 2 else 0
+    return _moved(recording, counted, np.sort(np.concatenate([counted, *between])), first, 1)
 
 
-def of_steps(recording: Recording) -> Recording:
-    """Step and direction: each rise of A is a count, forward where B is high after it."""
-    rises = np.flatnonzero(np.diff(recording.a.astype(np.int8)) == 1) + 1
-    return _moved(recording, recording.time[rises], 0, np.where(recording.b[rises] == 1, 1, -1))
-
-
-def _moved(recording: Recording, times: NDArray[np.float64], first: int, steps: NDArray[np.int64] | int) -> Recording:
-    """Return the recording with lines A and B that begin in a quarter period, and change by these steps at these
-    times.
+def _with_first_pulse(recording: Recording) -> Recording:
+    """Return a recording that begins with a pulse of no width so that the line is low before it: earlier, by the time
+    to the next row.
     """
+    later = recording.time[recording.time > 0]
+    if not (later.size and recording.time[:2].tolist() == [0, 0] and recording.a[0] == 1):
+        return recording
+    lines = {name: np.append(line[:1], line) for name, line in recording.lines.items()}
+    lines["a"][0] = 0
+    time = np.append(0, recording.time + later[0])
+    return replace(recording, time=time, duration=recording.duration + float(later[0]), **lines)
+
+
+def of_steps(recording: Recording, decoding: int) -> Recording:
+    """Return the quadrature of step and direction: each rise of A is a count, forward where B is high after it."""
+    rises = np.flatnonzero(np.diff(recording.a.astype(np.int8)) == 1) + 1
+    times = recording.time[rises]
+    return _moved(recording, times, times, 0, np.where(recording.b[rises] == 1, 1, -1))
+
+
+def _moved(
+    recording: Recording,
+    counted: NDArray[np.float64],
+    times: NDArray[np.float64],
+    first: int,
+    steps: NDArray[np.int64] | int,
+) -> Recording:
+    """Return the recording with lines A and B that begin in a quarter period, and change by these steps at these
+    times; those of what is counted are among them, and differ.
+    """
+    if (together := np.flatnonzero(np.diff(counted) == 0)).size:
+        raise CaptureError(
+            f"two pulses of a capture must not come at one time, as {len(together)} do here, the first at "
+            f"{counted[together[0]]:.9g} s"
+        )
     time = np.unique(np.concatenate([recording.time, times]))
     travelled = np.append(0, np.cumsum(np.broadcast_to(steps, times.shape)))
     level = quadrature(first + travelled[np.searchsorted(times, time, side="right")])
@@ -41,7 +75,7 @@ def _moved(recording: Recording, times: NDArray[np.float64], first: int, steps: 
 
 
 # What makes a quadrature of the lines of a sensor, and the decodings that count what the sensor counts.
-SENSORS: dict[str, tuple[Callable[[Recording], Recording], tuple[int, ...]]] = {
+SENSORS: dict[str, tuple[Callable[[Recording, int], Recording], tuple[int, ...]]] = {
     "pulses": (of_pulses, (1, 2)),
     "step-dir": (of_steps, (4,)),
 }
@@ -54,6 +88,8 @@ def converted(recording: Recording, sensor: str, spec: TachometerSpec) -> Record
     ------
     OptionError
         If the core's decoding would count something else.
+    CaptureError
+        If two pulses come at one time.
     """
     if sensor == "quadrature":
         return recording
@@ -61,4 +97,4 @@ def converted(recording: Recording, sensor: str, spec: TachometerSpec) -> Record
     if spec.encoder.decoding not in decodings:
         allowed = " or ".join(map(str, decodings))
         raise OptionError("decoding", f"must be {allowed} for {sensor}, not {spec.encoder.decoding}")
-    return convert(recording)
+    return convert(recording, spec.encoder.decoding)

@@ -67,7 +67,7 @@ def test_every_step_is_a_count_in_its_direction() -> None:
 def test_other_lines_stay_where_they_are() -> None:
     time = np.array([0, 0.001, 0.002, 0.003, 0.004])
     a, z = np.array([[0, 1, 1, 0, 1], [0, 0, 1, 1, 0]], dtype=np.uint8)
-    found = other_sensors.of_pulses(Recording(time, a, a, 0.005, z=z))
+    found = other_sensors.of_pulses(Recording(time, a, a, 0.005, z=z), 2)
     assert found.z is not None
     changes = np.flatnonzero(np.diff(found.z)) + 1
     assert found.time[changes].tolist() == [0.002, 0.004]
@@ -79,6 +79,42 @@ def test_a_text_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     core = "--ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses".split()
     assert run("replay", tmp_path / "wheel.csv", *core, "--decoding", "2") == 0
     assert "counts out 100" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_teeth_that_are_two_rows_at_one_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As loggers of engines write them: 240 teeth, in slots of which two are empty twice."""
+    slots = [slot for slot in range(244) if slot not in (100, 101, 200, 201)]
+    rows = [f"{level},{100 + 0.97 * slot:.3f}\n" for slot in slots for level in (1, 0)]
+    (tmp_path / "teeth.csv").write_text("PriLevel,Time [ms]\n" + "".join(rows))
+    core = "--ppr 44 --clock 1MHz --tick 100us --max-time 20ms --sensor pulses --a PriLevel".split()
+    assert run("replay", tmp_path / "teeth.csv", *core, "--decoding", "1") == 0
+    out = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert {"counts out 240", "errors flagged 0"} <= {*out}
+    assert run("replay", tmp_path / "teeth.csv", *core, "--decoding", "2") == 2
+    assert "--decoding must be 1, which counts rises alone, for pulses of no width (" in capsys.readouterr().err
+
+
+def test_short_pulses_raise_no_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [f"{k + width},{level}\n" for k in range(100) for width, level in ((0, 0), (0.4, 1), (0.4002, 0))]
+    (tmp_path / "c.csv").write_text("Time [ms],A\n" + "".join(rows))
+    core = "--ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses --decoding 1".split()
+    assert run("replay", tmp_path / "c.csv", *core) == 0
+    out = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert {"counts out 100", "errors flagged 0"} <= {*out}
+
+
+@pytest.mark.parametrize(
+    ("rows", "options"),
+    [
+        ("0,0,0\n1,1,0\n1,0,0\n1,1,0\n2,0,0\n", "--sensor pulses --decoding 1"),
+        ("0,0,1\n1,1,1\n1,0,1\n1,1,1\n2,0,1\n", "--sensor step-dir"),
+    ],
+)
+def test_two_pulses_at_one_time(rows: str, options: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "c.csv").write_text("time,A,B\n" + rows)
+    assert run("replay", tmp_path / "c.csv", "--ppr", "18", *options.split()) == 2
+    message = "two pulses of a capture must not come at one time, as 1 do here, the first at 1 s"
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
