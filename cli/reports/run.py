@@ -7,6 +7,7 @@ from functools import singledispatch
 import numpy as np
 from rich.text import Text
 
+from tachometry.cli.reports.capture import capture_rows, capture_warnings, channels, index_distance
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
@@ -29,7 +30,7 @@ def print_simulation(simulation: Simulation) -> int:
     for mismatch in lockstep.first:
         console.print(Text(f"first mismatch in {mismatch}"))
     print_warnings(warnings)
-    console.print(_verdict(run, lockstep.n_mismatches, warned=bool(warnings)))
+    console.print(_verdict(simulation, warned=bool(warnings)))
     if lockstep.n_mismatches:
         return 1
     if run.n_clocks == simulation.wanted:
@@ -42,12 +43,13 @@ def print_simulation(simulation: Simulation) -> int:
 def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
     """Return rows of the table of a core, and warnings."""
     (axis,) = axes
-    return [_updates(axis.run), mismatches, *_rows(axis)], _warnings(axis)
+    return [*capture_rows(axis), _updates(axis.run), mismatches, *_rows(axis)], _warnings(axis)
 
 
 @_summary.register
 def _(spec: AxesSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
     warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
+    warnings += [f"axis {number}: {warning}" for number, axis in enumerate(axes) for warning in _of_capture(axis)]
     return [mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))], warnings
 
 
@@ -70,14 +72,14 @@ def merged_edges(n_merged: int) -> list[str]:
 def _warnings(axis: Axis) -> list[str]:
     """Tell why the core cannot have counted what the shaft did."""
     warnings = merged_edges(axis.n_merged)
-    if axis.truth is None and (together := axis.recording.n_together):
-        warnings.append(
-            f"at {plural(together, 'instant')} of the capture both lines change: it was sampled more slowly than the "
-            "edges came, or the encoder is at fault; counts and velocity are wrong there"
-        )
+    warnings += _of_capture(axis)
     if axis.difference:
         warnings.append(f"counts out differ from counts in by {axis.difference:+d}")
     return warnings
+
+
+def _of_capture(axis: Axis) -> list[str]:
+    return [] if axis.truth else capture_warnings(axis)
 
 
 def _merged_looks(spec: AxesSpec, number: int, n_merged: int) -> str:
@@ -106,7 +108,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
     if spec.index:
         last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
-        rows.append(("index", f"{len(run.index.clock)} times{last}"))
+        rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}"))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
     if n_overflows := int(np.count_nonzero(run.ticks.overflow)):
@@ -142,23 +144,29 @@ def _line(axis: Axis) -> str:
     """Return the line of one of many axes."""
     run, unit = axis.run, axis.spec.scale.shown_unit
     parts = [f"{plural(len(run.updates), 'update')} ({np.count_nonzero(run.updates.forced)} forced)"]
+    if source := axis.recording.source:
+        parts.insert(0, channels(source))
     if axis.counts_in is not None:
         parts.append(f"counts in {axis.counts_in}")
     parts += [f"counts out {axis.counts_out}", f"{plural(len(run.errors), 'error')} flagged"]
     if axis.spec.index:
-        parts.append(f"index {len(run.index)} times")
+        parts.append(f"index {len(run.index)} times{index_distance(axis)}")
     if (error := axis.error) is not None:
         parts.append(f"velocity error RMS {unit.of(error.rms):.4g}, max {unit.of(error.max):.4g} {unit.name}")
     return ", ".join(parts)
 
 
-def _verdict(run: Run, n_mismatches: int, warned: bool) -> Text:
-    """Return the last line: whether hardware and golden model agree."""
+def _verdict(simulation: Simulation, warned: bool) -> Text:
+    """Return the last line: whether hardware and golden model agree, and what that says nothing of."""
+    run, n_mismatches = simulation.lockstep.actual, simulation.lockstep.n_mismatches
     if n_mismatches:
         return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
+    captured = any(axis.truth is None for axis in simulation.axes)
+    n_values = sum(len(table) * (1 + len(table.columns)) for table in run.tables.values())
+    of = f" ({plural(n_values, 'value')}), which says nothing of wiring and --ppr" if captured else ""
     only = "; neither was compared with the shaft: see the warning" if warned else ""
     return Text(
         f"PASS: hardware and golden model agree in every bit of {len(run.updates.clock)} updates "
-        f"and {len(run.ticks.clock)} ticks{only}",
+        f"and {len(run.ticks.clock)} ticks{of}{only}",
         style="bold green",
     )

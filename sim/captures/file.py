@@ -4,10 +4,12 @@ import itertools
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from tachometry.sim.signals.files import replacing
-from tachometry.sim.signals.recording import MAX_EDGES
+from tachometry.sim.signals.recording import MAX_EDGES, Recording
+from tachometry.sim.signals.source import Source
 from tachometry.spec.language.option import ParameterError
 
 Channel = str | int
@@ -110,3 +112,16 @@ def choose_channels(
                 f"channels {one} and {other} of {path} must be two of {listed}, not both {channels[number]}"
             )
     return tuple(numbers.values())
+
+
+def named(recording: Recording, channels: Mapping[int, str], numbers: Sequence[int]) -> Recording:
+    """Return a recording that says which channels its lines are, in their order, and which of them never change."""
+    still = tuple(name for name, line in recording.lines.items() if (line == line[0]).all())
+    source = Source(
+        lines={name: channels[number] for name, number in zip(recording.lines, numbers, strict=True)},
+        duration=recording.duration,
+        n_changes=len(recording.time) - 1,
+        still=still,
+        unused={number: name for number, name in channels.items() if number not in numbers},
+    )
+    return replace(recording, source=source)

@@ -41,7 +41,8 @@ def _with_first_pulse(recording: Recording) -> Recording:
     lines = {name: np.append(line[:1], line) for name, line in recording.lines.items()}
     lines["a"][0] = 0
     time = np.append(0, recording.time + later[0])
-    return replace(recording, time=time, duration=recording.duration + float(later[0]), **lines)
+    duration = recording.duration + float(later[0])
+    return replace(recording, time=time, duration=duration, source=recording.source, **lines)
 
 
 def of_steps(recording: Recording, decoding: int) -> Recording:
@@ -97,4 +98,10 @@ def converted(recording: Recording, sensor: str, spec: TachometerSpec) -> Record
     if spec.encoder.decoding not in decodings:
         allowed = " or ".join(map(str, decodings))
         raise OptionError("decoding", f"must be {allowed} for {sensor}, not {spec.encoder.decoding}")
-    return convert(recording, spec.encoder.decoding)
+    # The second line is invented, or is a direction that may stay.
+    source = recording.source and replace(
+        recording.source,
+        lines={line: name for line, name in recording.source.lines.items() if (sensor, line) != ("pulses", "b")},
+        still=tuple(line for line in recording.source.still if line != "b"),
+    )
+    return replace(convert(recording, spec.encoder.decoding), source=source)

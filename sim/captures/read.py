@@ -2,12 +2,12 @@
 
 import functools
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from tachometry.sim.captures.file import CaptureError, Channel, OptionError
+from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError
 from tachometry.sim.captures.sigrok import read_sr
 from tachometry.sim.captures.text import read_csv
 from tachometry.sim.captures.vcd import read_vcd
@@ -30,6 +30,7 @@ class Reader(Protocol):
 
 
 READERS: dict[str, Reader] = {".sr": read_sr, ".csv": read_csv, ".csv.gz": read_csv, ".vcd": read_vcd}
+_LOOKED_AT = 16  # channels; each takes as long as the capture
 
 
 def read_capture(
@@ -72,7 +73,24 @@ def read_capture(
             raise OptionError("time", f"must not be given for {path}: it has its times")
         reader = functools.partial(read_csv, time=time)
     others = {name: channel for name, channel in (("z", z), ("tick_in", tick_in)) if channel is not None}
-    return reader(path, a, b, samplerate_hz, others)
+    recording = reader(path, a, b, samplerate_hz, others)
+    return _with_moving(recording, lambda number: reader(path, number, SAME, samplerate_hz, NONE))
+
+
+def _with_moving(recording: Recording, read: Callable[[int], Recording]) -> Recording:
+    """Return a recording that says which channels change that it has not taken, if one that it has taken does not."""
+    source = recording.source
+    if source is None or not source.still:
+        return recording
+
+    def moves(number: int) -> bool:
+        try:
+            return len(read(number).time) > 1
+        except CaptureError:  # it is no line of levels
+            return False
+
+    moving = tuple(name for number, name in list(source.unused.items())[:_LOOKED_AT] if moves(number))
+    return replace(recording, source=replace(source, moving=moving))
 
 
 def with_last_tick(recording: Recording, spec: CoreSpec) -> Recording:

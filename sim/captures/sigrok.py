@@ -21,7 +21,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading, writing
+from tachometry.sim.captures.file import (
+    NONE,
+    CaptureError,
+    Channel,
+    check_edges,
+    choose_channels,
+    named,
+    reading,
+    writing,
+)
 from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import Recording
 
@@ -80,7 +89,8 @@ def read_sr(
     if n_samples == 0:
         raise CaptureError(f"{path} must have at least one sample, not 0")
     duration = float(divide(np.array([n_samples]), rate, up=True)[0])
-    return Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *others))
+    recording = Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *others))
+    return named(recording, session.channels, bits)
 
 
 def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chunk: int = CHUNK) -> None:

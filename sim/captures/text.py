@@ -11,7 +11,16 @@ from typing import BinaryIO, NoReturn, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, check_edges, choose_channels, reading, writing
+from tachometry.sim.captures.file import (
+    NONE,
+    CaptureError,
+    Channel,
+    check_edges,
+    choose_channels,
+    named,
+    reading,
+    writing,
+)
 from tachometry.sim.captures.header import COMMENTS, Header, read_header
 from tachometry.sim.signals import files
 from tachometry.sim.signals.recording import Recording
@@ -72,7 +81,8 @@ def read_csv(
     last_level, n_rows = 255, 0
     with reading(path), _opened(path) as file:
         header = read_header(path, file, time, samplerate_hz)
-        columns = tuple(header.column(number) for number in choose_channels(path, header.channels, a, b, others))
+        numbers = choose_channels(path, header.channels, a, b, others)
+        columns = tuple(header.column(number) for number in numbers)
         for line, block in _blocks(file, header.lines + 1, _block):
             block_time, block_lines = _parse(path, line, block, header, columns, n_rows)
             n_rows += len(block_time)
@@ -94,9 +104,8 @@ def read_csv(
     if not level:
         raise CaptureError(f"{path} must have at least one row after its header, not 0")
     duration = header.duration(last_time - start)
-    return Recording.of_level(
-        header.seconds(np.concatenate(times)), np.concatenate(level), duration, ("a", "b", *others)
-    )
+    seconds, lines = header.seconds(np.concatenate(times)), ("a", "b", *others)
+    return named(Recording.of_level(seconds, np.concatenate(level), duration, lines), header.channels, numbers)
 
 
 def _opened(path: Path) -> BinaryIO:

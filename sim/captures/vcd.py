@@ -8,7 +8,16 @@ from typing import BinaryIO
 import numpy as np
 from vcd.reader import ScopeDecl, Token, TokenKind, VarDecl, VCDParseError, tokenize
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_edges, choose_channels, reading
+from tachometry.sim.captures.file import (
+    NONE,
+    CaptureError,
+    Channel,
+    OptionError,
+    check_edges,
+    choose_channels,
+    named,
+    reading,
+)
 from tachometry.sim.signals.recording import Recording
 
 _LONGEST_NAME = 4096
@@ -51,7 +60,8 @@ def read_vcd(
         tokens = _tokens(path, file)
         names, codes, scale = _declarations(path, tokens)
         numbers = choose_channels(path, names, *_default(names, a, b), others)
-        return _changes(path, tokens, dict(zip(("a", "b", *others), (codes[k] for k in numbers), strict=True)), scale)
+        lines = dict(zip(("a", "b", *others), (codes[k] for k in numbers), strict=True))
+        return named(_changes(path, tokens, lines, scale), names, numbers)
 
 
 def _check_end(path: Path, file: BinaryIO) -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.language.units import format_time
@@ -87,6 +88,8 @@ class Recording(_Lines):
         Length of the recording; not before the last change.
     z, tick_in : uint8 arrays, shape (n,), 0 or 1, or None
         Levels of the index line and of the external tick; None if it is absent.
+    source : Source or None
+        Of a capture, what it says of itself.
     """
 
     time: NDArray[np.float64]
@@ -95,6 +98,7 @@ class Recording(_Lines):
     duration: float
     z: NDArray[np.uint8] | None = None
     tick_in: NDArray[np.uint8] | None = None
+    source: Source | None = None
 
     def __post_init__(self) -> None:
         if not (len(self.time) and _same_length(self.time, *self.lines.values())):
@@ -109,7 +113,7 @@ class Recording(_Lines):
         time: NDArray[np.float64], level: NDArray[np.uint8], duration: float, lines: Sequence[str] = ("a", "b")
     ) -> "Recording":
         """Return the recording with these lines whose `level` is given."""
-        return Recording(time, duration=duration, **_split(level, lines))
+        return Recording(time, duration=duration, source=None, **_split(level, lines))
 
     def place(self, clock_hz: int) -> "PinTrace":
         """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one.

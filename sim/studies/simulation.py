@@ -10,11 +10,12 @@ import numpy as np
 
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.engines.pick import pick
+from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.run import Run
-from tachometry.sim.signals.tables import VelocityError, held_from, held_velocity, velocity_error
+from tachometry.sim.signals.tables import HeldVelocity, VelocityError, held_from, held_velocity, velocity_error
 from tachometry.sim.studies.lockstep import Lockstep, lockstep
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.language.units import format_time
@@ -39,8 +40,9 @@ class Axis:
         Edges that came too soon after another to be told apart.
     counts_in, counts_out : int
         Of the shaft, up to the last tick, and of the core.
+    held : HeldVelocity
     error : VelocityError or None
-        Of the held velocity; None also if there was no update.
+        Of it; None also if there was no update.
     """
 
     spec: TachometerSpec
@@ -50,6 +52,7 @@ class Axis:
     n_merged: int
     counts_in: int | None
     counts_out: int
+    held: HeldVelocity
     error: VelocityError | None
 
     @property
@@ -57,6 +60,13 @@ class Axis:
         """Counts out less counts in; the position may have wrapped."""
         half = 1 << (self.spec.position_width - 1)
         return 0 if self.counts_in is None else (self.counts_out - self.counts_in + half) % (2 * half) - half
+
+    @property
+    def index_distances(self) -> Ints:
+        """Counts from each index to the next; the position may have wrapped, or each index resets it."""
+        position, half = self.run.index.index_position, 1 << (self.spec.position_width - 1)
+        distance = position[1:] if self.spec.index_reset else np.diff(position)
+        return (distance + half) % (2 * half) - half
 
 
 @dataclass(frozen=True)
@@ -141,16 +151,17 @@ def _axis(core: CoreSpec, run: Run, number: int, recording: Recording, truth: En
     """Return what came of an axis."""
     spec = core.tachometer
     counts_in = error = None
+    held = held_velocity(spec, run)
     if truth is not None:
         # Up to the pin sample that the last tick can hold.
         clock = int(run.ticks.clock[-1]) - spec.latency.tick - spec.latency.pin_to_count
         sampled = _sampled(max(clock, 0), spec.timing.clock_hz)
         counts_in = int(truth.true_position(sampled, spec.encoder.decoding))
-        error = velocity_error(held_velocity(spec, run), truth.true_speed)
+        error = velocity_error(held, truth.true_speed)
     # An index that resets the position does not undo what has been counted.
     counts_out = int(run.ticks.pulse_count.sum() if spec.index_reset else run.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz, run.n_clocks)
-    return Axis(spec, run, recording, truth, n_merged, counts_in, counts_out, error)
+    return Axis(spec, run, recording, truth, n_merged, counts_in, counts_out, held, error)
 
 
 def _sampled(clock: int, clock_hz: int) -> float:
@@ -166,13 +177,14 @@ def _sampled(clock: int, clock_hz: int) -> float:
 @_axis.register
 def _(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
     own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
+    held = held_from(own.ticks.clock, own.updates, alone)
     if truth is not None and (n_ticks := len(own.ticks)):
         # From the first look at the axis to the last one of the last tick.
         latency = spec.axis.latency.pin_to_count
         clocks = np.array([spec.look(axis, latency), spec.look(axis, n_ticks * spec.rounds - 1)]) - latency
         first, last = truth.true_position(clocks / spec.timing.clock_hz, spec.axis.encoder.decoding)
         counts_in = int(last - first)
-        error = velocity_error(held_from(own.ticks.clock, own.updates, alone), truth.true_speed)
+        error = velocity_error(held, truth.true_speed)
     counts_out = int(own.ticks.position[-1]) if len(own.ticks) else 0
     n_merged = recording.n_merged(spec.timing.clock_hz // spec.slots, run.n_clocks // spec.slots)
-    return Axis(alone, own, recording, truth, n_merged, counts_in, counts_out, error)
+    return Axis(alone, own, recording, truth, n_merged, counts_in, counts_out, held, error)

@@ -24,7 +24,8 @@ def random_trace(n_edges: int, n_clocks: int, seed: int = 1) -> PinTrace:
 def assert_same(got: PinTrace | Recording, wanted: PinTrace | Recording) -> None:
     assert type(got) is type(wanted)
     for name, value in vars(wanted).items():
-        np.testing.assert_array_equal(getattr(got, name), value, err_msg=name)
+        if name != "source":  # what is written does not say where it was read from
+            np.testing.assert_array_equal(getattr(got, name), value, err_msg=name)
 
 
 def make_sr(

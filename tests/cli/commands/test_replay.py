@@ -50,6 +50,34 @@ def test_what_is_unknown_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "velocity error unknown: a capture does not tell the true speed" in rows
 
 
+@pytest.mark.parametrize(
+    ("rows", "options", "said"),
+    [
+        ("abz", "--ppr 25", "indices are 100 counts apart; --ppr 25"),
+        ("abz", "--ppr 100", "indices are 100 counts apart; --ppr 100 with x4 says 400, and --ppr 25 if it comes once"),
+        ("zxab", "--ppr 25 --a z --b x", "x never changes; a and b do: see --b"),
+        ("xyab", "--ppr 25 --a x --b y", "x and y never change; a and b do: see --a and --b"),
+    ],
+)
+def test_what_contradicts_itself_is_warned_of(
+    rows: str, options: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    level = {"a": "0110", "b": "0011"}
+    lines = [f"time,{','.join(rows)}"]
+    for k in range(361):
+        of = {name: cycle[k % 4] for name, cycle in level.items()} | {"x": "0", "y": "1", "z": str(+(k % 100 == 99))}
+        lines.append(",".join([f"{k / 2000:.6f}", *(of[name] for name in rows)]))
+    (tmp_path / "c.csv").write_text("\n".join(lines) + "\n")
+    index = ["--index"] if rows == "abz" else []
+    assert run("replay", tmp_path / "c.csv", *CORE[2:], *options.split(), *index) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert (f"WARNING: {said}" in told) == (options != "--ppr 25")
+    if index:
+        assert "lines a from a, b from b, z from z captured 0.18 s, 360 changes of the lines speed min " in told
+        assert "index 3 times, the last at position 299, 100 counts apart" in told
+        assert re.search(r"PASS: .*[0-9]+ values\), which says nothing of wiring and --ppr", told)
+
+
 def test_channels_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     capture = tmp_path / "c.csv"
     write_csv(capture, recorded())

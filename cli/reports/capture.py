@@ -1,0 +1,79 @@
+"""`replay` prints these lines of a capture: what it took, how fast the shaft was, and what cannot be right."""
+
+import numpy as np
+
+from tachometry.sim.signals.source import Source
+from tachometry.sim.studies.simulation import Axis
+from tachometry.spec.language.units import plural
+
+_Row = tuple[str, str]
+
+
+def capture_rows(axis: Axis) -> list[_Row]:
+    """Return rows of the table: the channels that were taken, how long they last, and the speed that the core shows."""
+    if (source := axis.recording.source) is None:
+        return []
+    rows = [
+        ("lines", channels(source)),
+        ("captured", f"{source.duration:.6g} s, {plural(source.n_changes, 'change')} of the lines"),
+    ]
+    velocity, unit = axis.spec.scale.shown_unit.of(axis.held.velocity_rad_s), axis.spec.scale.shown_unit.name
+    if len(velocity):
+        least, mean, most = velocity.min(), velocity.mean(), velocity.max()
+        rows.append(("speed", f"min {least:.6g}, mean {mean:.6g}, max {most:.6g} {unit}, as held at every tick"))
+    return rows + [("note", note) for note in source.notes]
+
+
+def channels(source: Source) -> str:
+    """Return which channel each line was taken from."""
+    return ", ".join(f"{line} from {name}" for line, name in source.lines.items())
+
+
+def index_distance(axis: Axis) -> str:
+    """Return how far apart the index pulses are, or nothing if there are fewer than two."""
+    distances = np.abs(axis.index_distances)
+    if not len(distances):
+        return ""
+    least, most = int(distances.min()), int(distances.max())
+    return f", {least if least == most else f'{least} to {most}'} counts apart"
+
+
+def capture_warnings(axis: Axis) -> list[str]:
+    """Tell what of a capture contradicts itself or the options."""
+    warnings = _still(axis.recording.source) + _index(axis)
+    if together := axis.recording.n_together:
+        warnings.append(
+            f"at {plural(together, 'instant')} of the capture both lines change: it was sampled more slowly than the "
+            "edges came, or the encoder is at fault; counts and velocity are wrong there"
+        )
+    return warnings
+
+
+def _still(source: Source | None) -> list[str]:
+    """Tell which lines never change, and which channels do instead."""
+    if source is None or not source.still:
+        return []
+    names = [source.lines[line] for line in source.still]
+    options = " and ".join(f"--{line.replace('_', '-')}" for line in source.still)
+    do = f"; {' and '.join(source.moving)} {_do(source.moving)}: see {options}" if source.moving else ""
+    return [f"{' and '.join(names)} never {'changes' if len(names) == 1 else 'change'}{do}"]
+
+
+def _do(names: tuple[str, ...]) -> str:
+    return "does" if len(names) == 1 else "do"
+
+
+def _index(axis: Axis) -> list[str]:
+    """Tell if the index comes at another distance than once a turn; to and fro over one index is no distance."""
+    encoder, distances = axis.spec.encoder, np.abs(axis.index_distances)
+    turn, lines = encoder.counts_per_rev, encoder.pulses_per_rev
+    distances = distances[distances > min(encoder.decoding, turn / 2)]
+    if not len(distances) or abs((apart := float(np.median(distances))) - turn) <= max(1, turn / 100):
+        return []
+    fits = (
+        f", and --ppr {apart / encoder.decoding:.0f} if it comes once a turn" if apart % encoder.decoding == 0 else ""
+    )
+    return [
+        f"indices are {apart:.15g} counts apart; --ppr {lines} with x{encoder.decoding} says {turn}{fits}: "
+        "if it is wrong, speeds are wrong by as much"
+    ]
