@@ -56,6 +56,21 @@ _OPTIONS = [
     ),
     option(
         _CAPTURE,
+        "--count",
+        metavar="COLUMN",
+        help="Column of the counts in a .csv file that logs time and count: its name, or its number from 0. Between "
+        "two rows the shaft turns evenly; a count is one of --ppr and --decoding. With --axes as --a.",
+    ),
+    option(
+        _CAPTURE,
+        "--wrap",
+        type=click.IntRange(min=0),
+        metavar="N",
+        help="The counter of --count goes from N-1 to 0; 0: it does not wrap. [default: 65536 or 4294967296 where it "
+        "jumps by more than half of that, else 0]",
+    ),
+    option(
+        _CAPTURE,
         "--samplerate",
         metavar="FREQUENCY",
         help="Samplerate of a .sr or .csv file that contains neither it nor times, in Hz (plain number), kHz, MHz or "
@@ -73,14 +88,25 @@ def _read(
     time: str | None,
     samplerate: str | None,
     sensor: str,
+    count: str | None,
+    wrap: int | None,
     **others: Any,
 ) -> dict[str, Any]:
+    lines = dict(a=a, b=b, z=z, tick_in=tick_in, samplerate=samplerate)
+
     def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
+        from tachometry.sim.captures.count_log import read_count_log
         from tachometry.sim.captures.file import SAME, OptionError
         from tachometry.sim.captures.other_sensors import converted
         from tachometry.sim.captures.read import read_capture, with_last_tick
 
         alone, axes = spec.tachometer, spec.axes
+        if count is not None:
+            _refuse_lines({**lines, "sensor": None if sensor == "quadrature" else sensor, "index": alone.index or None})
+            log = read_count_log(capture, _of_axis("count", count, axis, axes) or "", time, wrap)
+            return with_last_tick(log.recording(alone.encoder.decoding), spec)
+        if wrap is not None:
+            raise OptionError("wrap", "must not be given without --count")
         if sensor == "pulses" and b is not None:
             raise OptionError("b", "must not be given together with --sensor pulses")
         line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
@@ -98,6 +124,15 @@ def _read(
 
 CAPTURE_OPTIONS = Group(_OPTIONS, _read)
 """Handed over as `read`, which reads a capture for a spec, or for an axis of so many."""
+
+
+def _refuse_lines(given: dict[str, Any]) -> None:
+    """Refuse what is of lines where there is a count."""
+    from tachometry.sim.captures.file import OptionError
+
+    for name, value in given.items():
+        if value is not None:
+            raise OptionError(name, "must not be given together with --count: a log of counts has no lines")
 
 
 def _of_axis(line: str, text: str | None, axis: int, axes: int | None) -> str | None:

@@ -1,0 +1,133 @@
+"""Logs of time and count become the lines of an encoder that turns evenly between two rows."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.command import run
+
+from tachometry.sim.captures.count_log import CountLog, read_count_log
+from tachometry.sim.captures.file import CaptureError
+
+ROOT = Path(__file__).parents[3]
+
+
+def log(folder: Path, counts: list[int], wrap: int | None = None, head: str = "time [ms],n") -> CountLog:
+    rows = [f"{5 * k},{count}" for k, count in enumerate(counts)]
+    (folder / "log.csv").write_text("\n".join([head, *rows, ""]))
+    return read_count_log(folder / "log.csv", "n", None, wrap)
+
+
+@pytest.mark.parametrize("decoding", [1, 2, 4])
+def test_edges_are_even_between_rows(decoding: int, tmp_path: Path) -> None:
+    recording = log(tmp_path, [8, 12, 12, 10]).recording(decoding)
+    quarters = 4 // decoding
+    steps = np.diff(np.unwrap([(0, 1, 3, 2)[n] for n in recording.level], period=4))
+    assert steps.tolist() == [1] * 4 * quarters + [-1] * 2 * quarters
+    n = 4 * quarters
+    expected = [*(5e-3 * np.arange(1, n + 1) / n), *(10e-3 + 5e-3 * np.arange(1, n // 2 + 1) / (n // 2))]
+    np.testing.assert_allclose(recording.time[1:], expected, rtol=1e-12)
+    assert recording.duration == 15e-3
+
+
+@pytest.mark.parametrize(
+    ("counts", "wrap", "total"),
+    [
+        ([65530, 4, 10], None, [0, 10, 16]),
+        ([4, 65530], None, [0, -10]),
+        ([32760, -32766], None, [0, 10]),
+        ([4294967290, 4], None, [0, 10]),
+        ([0, 40000, 70000], None, [0, 40000, 70000]),
+        ([4090, 4], 4096, [0, 10]),
+        ([65530, 4], 0, [0, -65526]),
+        ([7, 7, 7], None, [0, 0, 0]),
+    ],
+)
+def test_a_counter_wraps(counts: list[int], wrap: int | None, total: list[int], tmp_path: Path) -> None:
+    read = log(tmp_path, counts, wrap)
+    assert read.count.tolist() == total
+    told = " ".join(read.notes)
+    assert ("wraps" in told) == (np.diff(counts).tolist() != np.diff(total).tolist())
+    assert "the shaft is taken to turn evenly" in told
+
+
+def test_of_rows_with_one_time_the_last_holds(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("; by hand\nn;time [ms]\n1;0,0\n2;0,0\n\n5;2,5\n6;2,5\n")
+    read = read_count_log(tmp_path / "log.csv", "0")
+    assert (read.time.tolist(), read.count.tolist()) == ([0, 2.5e-3], [0, 4])
+    assert "2 rows have the time of the next one, which holds" in read.notes
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,0", "must have at least two rows after its header, not 1"),
+        ("0,0\n0,1", "must not all be equal"),
+        ("0,0\n1,x", "line 3: time and count must be numbers, not '1,x'"),
+        ("0,0\n1", "line 3: time and count must be numbers, not '1'"),
+        ("0,0\n1,1.5", "line 3: count must be a whole number up to 2^53, not 1.5"),
+        ("0,0\n1,inf", "line 3: count must be a whole number"),
+        ("0,0\nnan,1", "line 3: time must be"),
+        ("2,0\n1,1", "line 3: time must be at least 2 s as before, not 1"),
+        ("0,0\n1,99999999", "at most 10000000 edges to and fro, not 99999999"),
+    ],
+)
+def test_what_cannot_be_is_told(rows: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(f"time,n\n{rows}\n")
+    with pytest.raises(CaptureError, match=re.escape(message)):
+        read_count_log(tmp_path / "log.csv", "n").recording(4)
+
+
+def test_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    page = (ROOT / "docs/guides/encoder.md").read_text(encoding="utf-8").partition("## Logs of time and count")[2]
+    (tmp_path / "build").mkdir()
+    rows = page.partition("```csv\n")[2].partition("```")[0]
+    (tmp_path / "build" / "counts.csv").write_text(rows)
+    monkeypatch.chdir(tmp_path)
+    command = page.partition("```sh\ntachometry ")[2].partition("\n")[0].replace('"left wheel"', "left\xa0wheel")
+    assert run(*(word.replace("\xa0", " ") for word in command.split(" "))) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "lines count from left wheel captured 0.015 s, 30 changes of the lines" in told
+    assert "counts out 30" in told
+    assert "note between two of the 4 rows the shaft is taken to turn evenly" in told
+    assert "note the counter wraps at 65536, 1 times here" in told
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--count n --a n", "--a must not be given together with --count"),
+        ("--count n --index", "--index must not be given together with --count"),
+        ("--count n --sensor pulses", "--sensor must not be given together with --count"),
+        ("--count m", "--count of log.csv must be one of the columns time (0), n (1), not 'm'"),
+        ("--count n --wrap 5", "--wrap must be more than the counts of log.csv differ, 9, not 5"),
+        ("--wrap 5", "--wrap must not be given without --count"),
+    ],
+)
+def test_options_of_counts(
+    options: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "log.csv").write_text("time,n\n0,0\n1,9\n")
+    monkeypatch.chdir(tmp_path)
+    assert (
+        run(
+            "replay",
+            "log.csv",
+            "--ppr",
+            "9",
+            "--clock",
+            "1kHz",
+            "--tick",
+            "100ms",
+            "--max-time",
+            "1s",
+            *options.split(),
+        )
+        == 2
+    )
+    assert message in capsys.readouterr().err
