@@ -100,8 +100,8 @@ from the same map as the gates.
 ## Captures
 
 A capture takes in one clock all that the core shows: the position and whatever else belongs to a tick are of the latest
-tick, the velocity and whatever else belongs to an update are of the latest update, and `age` says how many ticks lie
-between them. There are two ways to capture:
+tick, the velocity and whatever else belongs to an update are of the latest update, and `age` says how many ticks came
+after what caused that. Only `swallowed_edges` is of the clock of the capture. There are two ways to capture:
 
 - Reading VELOCITY, or VELOCITY_LOW where there are two words, captures, and answers with what has just been captured.
   This is enough for one program that polls.
@@ -228,8 +228,9 @@ def ports() -> str:
         [
             "# Ports\n",
             "`make docs` writes this page from `spec.ports`. A *strobe* is high for one clock; an output *with* a "
-            "strobe is new in its clocks, and held until the next. Widths depend on the options: the manifest "
-            "NAME.json has those of your core. Those of many axes are in [axes](../concepts/axes.md#ports).\n",
+            "strobe is new in its clocks, and held until the next, unless its row says more. Widths depend on the "
+            "options: the manifest NAME.json has those of your core. Those of many axes are in "
+            "[axes](../concepts/axes.md#ports).\n",
             markdown(_HEADER, rows, left=range(4)),
             "\nThe manifest states the latencies: a level sampled at clock c is counted in the window of c + "
             "`pin_to_count`, `tick` is high `tick_latency` clocks after the window's last clock, and `velocity_valid` "

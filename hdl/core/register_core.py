@@ -13,8 +13,6 @@ from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 
-_OTHERWISE = ("position", "age")  # ports that the bank shows as they were at the latest tick, or are with it
-
 
 class RegisterCore(wiring.Component):
     """A tachometer, maybe with a control loop, with its registers.
@@ -57,7 +55,7 @@ class RegisterCore(wiring.Component):
         restarts = ResetInserter(bank.restart) if hasattr(bank, "restart") else lambda box: box
         m.submodules.tachometer, m.submodules.tick_position = restarts(whole), restarts(position)
         m.submodules.bank = bank
-        names = {port.name for port in self._map.ports} - {*_OTHERWISE}
+        names = {port.name for port in self._map.ports} - {"position"}  # that of the latest tick is captured
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
         written = {field.port for field in self._map.settings}
         for pin in self._map.core.ports.pins:
@@ -76,8 +74,6 @@ class RegisterCore(wiring.Component):
         ]
         if self.loop is not None:
             self._keep(m, self.loop)
-        if core.update_age is not None:
-            m.d.comb += bank.age.eq(core.update_age.after)
         if open_sum is not None:
             m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
         return m

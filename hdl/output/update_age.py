@@ -1,6 +1,6 @@
 """How old the velocity is."""
 
-from amaranth import Module, Mux, Value
+from amaranth import Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 class UpdateAge(wiring.Component):
     """Counts the ticks since the cause of the update, or from reset, on, up to `max_age`.
 
-    Latency: none; in the clock of an update the age is `fresh`, and a tick counts from the clock after it.
+    Latency: none; in the clock of an update the age is `fresh`, and a tick in this clock counts already.
 
     Parameters
     ----------
@@ -24,9 +24,7 @@ class UpdateAge(wiring.Component):
         Ticks between the cause of an update and the update, valid with it; only if it has bits.
     age : Out(range(max_age + 1))
     before : Out(range(max_age + 1))
-        The age without an update in this clock.
-    after : Out(range(max_age + 1))
-        The age with a tick in this clock.
+        The age of the clock before.
     """
 
     def __init__(self, max_age: int, fresh_width: int = 0) -> None:
@@ -39,7 +37,6 @@ class UpdateAge(wiring.Component):
                 **({"fresh": In(fresh_width)} if fresh_width else {}),
                 "age": Out(range(max_age + 1)),
                 "before": Out(range(max_age + 1)),
-                "after": Out(range(max_age + 1)),
             }
         )
 
@@ -49,7 +46,8 @@ class UpdateAge(wiring.Component):
         if self._fresh_width:
             most = self._max_age
             fresh = self.fresh if most >> self._fresh_width else Mux(self.fresh > most, most, self.fresh)
-        m.d.comb += self.age.eq(Mux(self.update, fresh, self.before))
-        m.d.comb += self.after.eq(self.age + (self.tick & (self.age != self._max_age)))
-        m.d.sync += self.before.eq(self.after)
+        age = Signal.like(self.age)  # without a tick in this clock
+        m.d.comb += age.eq(Mux(self.update, fresh, self.before))
+        m.d.comb += self.age.eq(age + (self.tick & (age != self._max_age)))
+        m.d.sync += self.before.eq(self.age)
         return m

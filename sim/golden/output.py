@@ -31,11 +31,11 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
 
 
 def with_age(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
-    """Return ticks with the age of the velocity: how many there were since the cause of its update, or from reset,
-    on.
+    """Return ticks with the age of the velocity: how many came after the cause of its update, or from reset on, this
+    one included.
     """
     if not spec.age:
         return ticks
     cause = np.append(-1, updates.cause)[np.searchsorted(updates.clock, ticks.clock, side="right")]
-    age = np.arange(len(ticks.clock)) - np.searchsorted(ticks.clock, cause, side="right")
+    age = np.arange(1, len(ticks.clock) + 1) - np.searchsorted(ticks.clock, cause, side="right")
     return ticks.having(age=np.minimum(age, spec.timing.max_ticks))

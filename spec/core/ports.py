@@ -53,7 +53,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             *(TICK, "position", spec.position_width),
             signed=True,
             unit="counts",
-            help="Sum of all counts up to this period; it wraps in two's complement.",
+            help="Sum of all counts up to this period; it wraps in two's complement. Between the ticks it counts on.",
         ),
         strobe(
             "decode_error",
@@ -64,7 +64,8 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             TICK,
             "stalled",
             help="The shaft rests: pulse_count was 0 in this period and in those before it for longer than the maximum "
-            "time, see stalled_after_ticks of the manifest. It falls with the next count.",
+            "time, that is for stalled_after_ticks of the manifest; the time before the first period is one of them. "
+            "It falls with the next count.",
         ),
         *_if(
             spec.scale.output,
@@ -75,8 +76,9 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             held(
                 *(TICK, "age", spec.timing.max_ticks.bit_length()),
                 unit="ticks",
-                help="Ticks between the count or the tick that caused the update and this tick; it stays at the "
-                "maximum time.",
+                help="Ticks after the count or the tick that caused the update, the one of this clock included: 1 with "
+                "the first tick after the cause. It stays at the maximum time, and begins anew with an update, also "
+                "between the ticks.",
             ),
         ),
         *own,
@@ -103,7 +105,8 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             held(
                 *(TICK, "swallowed_edges", 16),
                 unit="edges",
-                help="Edges that the glitch filter has kept out, two for each glitch; it stays at 65534.",
+                help="Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the "
+                "ticks it counts on, and a capture takes what it is then.",
             ),
         ),
     )

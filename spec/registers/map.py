@@ -4,7 +4,8 @@ The registers follow from the ports of the core. A port of several bits has a re
 by its sign or by zeros, or two of them if it is wider; ports of one bit are flags of STATUS. Offsets are in bytes.
 
 A capture takes all of these in one clock: the position and whatever else belongs to a tick is of the latest tick, the
-velocity and whatever belongs to an update is of the latest update, and the age says how many ticks lie between them.
+velocity and whatever belongs to an update is of the latest update, and the age says how many ticks came after what
+caused it. Only `swallowed_edges` is of the clock of the capture.
 Reading the first captured register, VELOCITY, captures, and the others keep what was captured until the next capture.
 Before the first update the velocity is 0, and what else has a unit and belongs to an update is not defined.
 """

@@ -91,11 +91,11 @@ def check_updates(
 
 
 def check_age(settings: Settings, manifest: Manifest, updates: Sequence[Update], rows: Sequence[Row]) -> None:
-    """`age` is how many ticks there were after the cause of the newest update and before this one, or the maximum."""
+    """`age` is how many ticks there were after the cause of the newest update, this one included, or the maximum."""
     latency = manifest["latency_cycles"]
     ticks = [row["clock"] for row in rows if row["tick"]]
     causes = [update.cause + latency["tick_latency"] for update in updates]
     for nth, row in enumerate(row for row in rows if row["tick"]):
         known = bisect_right(causes, row["clock"] - latency["tick_to_velocity"])
         after = bisect_right(ticks, causes[known - 1]) if known else 0
-        assert row["age"] == min(nth - after, settings.max_ticks), row
+        assert row["age"] == min(nth + 1 - after, settings.max_ticks), row

@@ -20,9 +20,8 @@ def check(fresh_width: int = 0) -> None:
     seen = [row["age"] for row in clock_by_clock(update_age.UpdateAge(5, fresh_width), rows, ["age"])]
     wanted, ticks = [], 0
     for row in rows:
-        ticks = row.get("fresh", 0) if row["update"] else ticks
+        ticks = (row.get("fresh", 0) if row["update"] else ticks) + row["tick"]
         wanted.append(min(ticks, 5))
-        ticks += row["tick"]
     assert seen == wanted
     assert set(wanted) == set(range(6))
 
@@ -41,7 +40,7 @@ def check_age(method: str, **texts: str) -> None:
     # Of an update without a filter the cause is always as long ago.
     cause = np.append(-1, run.updates.clock - spec.latency.tick_to_velocity)
     last = cause[np.searchsorted(run.updates.clock, ticks, side="right")]
-    since = [np.count_nonzero((ticks > then) & (ticks < now)) for then, now in zip(last, ticks, strict=True)]
+    since = [np.count_nonzero((ticks > then) & (ticks <= now)) for then, now in zip(last, ticks, strict=True)]
     assert run.ticks["age"].tolist() == np.minimum(since, spec.timing.max_ticks).tolist()
     inside = [((ticks > now - spec.latency.tick_to_velocity) & (ticks < now)).any() for now in run.updates.clock]
     assert any(inside)

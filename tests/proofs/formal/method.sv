@@ -192,7 +192,7 @@ module method #(
         recent = 0;
         for (k = 0; k < TICK_TO_VELOCITY - 1; k = k + 1) recent = recent + line[k];
       end
-      wire [7:0] all = recent + (velocity_valid ? 0 : since_update + tick_);
+      wire [7:0] all = recent + tick + (velocity_valid ? 0 : since_update + tick_);
       always @* p8_age: assert (core_age == (all < MAX_TICKS ? all : MAX_TICKS));
     end
     if (CARRIED) begin : carried

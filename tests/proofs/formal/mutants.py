@@ -119,7 +119,7 @@ MUTANTS = [
         "~opening.any() & was_silent",
         "was_silent",
     ),
-    Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (self.age != self._max_age))", "~self.tick"),
+    Mutant("age, 1 clock", "p8_age", UpdateAge, "(self.tick & (age != self._max_age))", "~self.tick"),
     Mutant("age", "p8_age", UpdateAge, "Mux(self.update, fresh, self.before)", "Mux(self.update, 0, self.before)"),
     Mutant("M of 4", "pm_update", MMethod, "valid.eq(self.tick)", "valid.eq(self.tick & total.any())"),
     Mutant("M of 4", "pm_velocity", MovingSum, "wrap = place >= last - 1", "wrap = place >= last - 2"),
