@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 from tachometry.spec.control import AnySpec, LoopSpec
@@ -26,11 +27,13 @@ METHODS: dict[str, type[TachometerSpec]] = {
 }
 
 
+@cache
 def common_options() -> tuple[Option, ...]:
     """Return options that every method has."""
     return (*options_of(Encoder), *options_of(Timing), *options_of(TachometerSpec))
 
 
+@cache
 def own_options(method: str) -> tuple[Option, ...]:
     """Return options of a method beyond those that every method has, and those of these that it has in another way."""
     common = common_options()
