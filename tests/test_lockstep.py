@@ -26,19 +26,18 @@ SEEDS = {
     "rairan": [0, 9, 20, 22, 24, 30, 31, 42, 43, 44, 51, 61],
     "track": [2, 3, 5, 8, 10, 19, 58, 76],
 }
-QUICK = {"s": [57, 142], "m": [77, 81], "t": [25, 31], "mt": [25, 31], "rairan": [22, 44], "track": [19]}
+QUICK = {"s": 57, "m": 77, "t": 25, "mt": 25, "rairan": 22, "track": 19}
 # A tick of track is hundreds of clocks, which are too many for pysim.
 ENGINES: dict[str, Engine] = {"track": Cxxrtl()}
 TABLES = Path(__file__).parent.parent / "build"
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_few_random_motions(method: str) -> None:
-    """Those that take the least time; for every event all of them are needed."""
-    for seed in QUICK[method]:
-        assert seed in SEEDS[method]
-        problems, _ = lockstep(seed, method, ENGINES.get(method, PySim()))
-        assert not problems, "\n".join(problems[:20])
+def test_a_random_motion(method: str) -> None:
+    """One that takes little time; for every event all of them are needed."""
+    assert QUICK[method] in SEEDS[method]
+    problems, _ = lockstep(QUICK[method], method, ENGINES.get(method, PySim()))
+    assert not problems, "\n".join(problems[:20])
 
 
 @nightly

@@ -25,6 +25,7 @@ def test_mutants_change_one_expression_each() -> None:
     assert len(found) == len(mutants_of(ROOT, FILE)) > 20
 
 
+@nightly  # it draws four times from all files, for `make mutate` only
 def test_the_same_thousand_is_drawn_from_every_room() -> None:
     chosen = sample(ROOT, 1000, seed=1)
     assert len(chosen) == len(set(chosen)) == 1000
@@ -34,6 +35,7 @@ def test_the_same_thousand_is_drawn_from_every_room() -> None:
     assert set(sample(ROOT, 1000, seed=2)) != set(chosen)
 
 
+@nightly  # for the same reason
 def test_a_change_elsewhere_does_not_change_what_is_drawn(tmp_path: Path) -> None:
     """A line above, and a file that has lost all of its mutants."""
     for file in files(ROOT):

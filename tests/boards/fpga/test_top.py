@@ -227,7 +227,8 @@ def test_clocks_are_those_of_the_oscillators(name: str) -> None:
 def test_projects_are_whole_and_always_the_same(name: str, files: set[str], lines: list[str]) -> None:
     board = BOARDS[name]
     said: list[str] = []
-    first, second = (build(core(board, "uart"), board, said.append) for _ in range(2))
+    # A small design is enough: a whole core is in the test of the pins.
+    first, second = (build(Loop(), board, said.append) for _ in range(2))
     assert first.content == second.content
     assert (first.suffix, first.cells, first.fmax, first.seed) == (".zip", {}, None, None)
     assert first.tools.keys() == {"amaranth", "amaranth-boards"}

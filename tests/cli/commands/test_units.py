@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from support.command import run
+from support.nightly import only
 
 CORE = "--ppr 100 --clock 100kHz --tick 1ms --max-time 20ms".split()
 MOTION = ["--motion", "ramp:0:40rad/s:60ms"]
@@ -19,7 +20,8 @@ def columns(path: Path, name: str) -> list[float]:
         return [float(row[name]) for row in csv.DictReader(file) if row[name]]
 
 
-@pytest.mark.parametrize("unit", RAD_PER_S)
+# The unit is a factor; tests/spec/language/test_units.py has all of them.
+@pytest.mark.parametrize("unit", only(["rpm"], RAD_PER_S))
 def test_traces_summaries_and_comparisons(unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     suffix, told = unit.replace("/", "_"), {}
     # With a fine LSB the velocities differ by what is rounded only; errors are compared at slightly other instants.

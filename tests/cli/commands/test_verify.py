@@ -61,7 +61,7 @@ def test_a_difference_is_saved_with_the_command_that_replays_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cores = {words: spec_of(words) for words in configurations("m")}
-    averaging = [words for words, spec in cores.items() if isinstance(spec, MTachometer) and spec.average > 2][:3]
+    averaging = [words for words, spec in cores.items() if isinstance(spec, MTachometer) and spec.average > 2][:2]
     monkeypatch.setattr(study, "configurations", lambda method: averaging)
     options = ["--methods", "m", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out"]
     with monkeypatch.context() as patch:
@@ -73,8 +73,7 @@ def test_a_difference_is_saved_with_the_command_that_replays_it(
     captures = sorted(map(str, (tmp_path / "out").iterdir()))
     assert sorted(shlex.split(line)[1] for line in replay) == captures
     assert len(captures) > 1
-    for line in replay[:2]:
-        assert run(*shlex.split(line)) == 0
+    assert run(*shlex.split(replay[0])) == 0
 
 
 def test_motions_last_as_long_as_is_wanted_and_differ() -> None:

@@ -64,8 +64,8 @@ def check_description(spec: RairanTachometer, step: np.ndarray) -> list[Update]:
     return found
 
 
-# The shorter dt is, the more updates there are: with 1 clock there is nothing within it that could be wrong.
-@pytest.mark.parametrize("dt", only([2, 7], [1, 2, 3, 7, 40]))
+# In 7 clocks counts are first, last and amid; the shorter dt is, the more updates there are, and the less is within it.
+@pytest.mark.parametrize("dt", only([7], [1, 2, 3, 7, 40]))
 @pytest.mark.parametrize("bound_decay", [True, False])
 def test_it_does_what_is_described_clock_by_clock(dt: int, bound_decay: bool) -> None:
     for seed, kind in enumerate(("n1", "n2", "n3")):
