@@ -5,6 +5,8 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +63,23 @@ def play(folder: Path, simulator: str = "icarus", *more: str) -> str:
     return "" if found is None else found[1]
 
 
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return what gives the folder of a case, with the bench that was made once for all tests."""
+
+    @cache
+    def made(case: str) -> Path:
+        folder = tmp_path_factory.mktemp("bench")
+        assert generate(folder, *SMALL.split(), *CASES[case].split()) == 0
+        return folder
+
+    return made
+
+
 # Every option of a bench is in one of these.
 @pytest.mark.parametrize("case", only(["s", "mt"], CASES))
-def test_passes_in_icarus(case: str, tmp_path: Path) -> None:
-    assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
-    assert play(tmp_path) == ""
+def test_passes_in_icarus(case: str, bench: Callable[[str], Path]) -> None:
+    assert play(bench(case)) == ""
 
 
 @nightly  # that of a wrong sign runs as far, and tests/hdl/core/test_loop_core.py has the exported loop
@@ -76,9 +90,8 @@ def test_a_loop_passes_in_icarus(tmp_path: Path) -> None:
     assert play(tmp_path) == ""
 
 
-def test_unknown_simulator_is_told_in_a_line(tmp_path: Path) -> None:
-    assert generate(tmp_path, *SMALL.split()) == 0
-    done = run(tmp_path, "modelsim")
+def test_unknown_simulator_is_told_in_a_line(bench: Callable[[str], Path]) -> None:
+    done = run(bench("s"), "modelsim")
     assert done.returncode == 1
     assert re.fullmatch(r"test_spindle\.py: Simulator 'modelsim' is not [^\n]*icarus[^\n]*\n", done.stderr)
 
@@ -111,10 +124,9 @@ def ports_width(ports: list[dict[str, Any]], name: str) -> int:
 
 
 @pytest.mark.parametrize("case", only(["s", "mt", "rairan"], CASES))  # all ports that there are
-def test_every_output_and_situation_is_in_the_vectors(case: str, tmp_path: Path) -> None:
-    assert generate(tmp_path, *SMALL.split(), *CASES[case].split()) == 0
-    ports = json.loads((tmp_path / "spindle.json").read_text())["ports"]
-    vectors = json.loads((tmp_path / "spindle_vectors.json").read_text())
+def test_every_output_and_situation_is_in_the_vectors(case: str, bench: Callable[[str], Path]) -> None:
+    ports = json.loads((bench(case) / "spindle.json").read_text())["ports"]
+    vectors = json.loads((bench(case) / "spindle_vectors.json").read_text())
     strobes = vectors["strobes"]
     assert all(strobe["rows"] for strobe in strobes.values())
     outputs = {port["name"] for port in ports if port["direction"] == "output"}
@@ -128,14 +140,13 @@ def test_every_output_and_situation_is_in_the_vectors(case: str, tmp_path: Path)
         assert shown["forced"] == {0, 1}
 
 
-def test_stands_on_its_own_and_is_the_same_again(tmp_path: Path) -> None:
-    for folder in ("1", "2"):
-        assert generate(tmp_path / folder, *SMALL.split(), *CASES["s"].split()) == 0
+def test_stands_on_its_own_and_is_the_same_again(bench: Callable[[str], Path], tmp_path: Path) -> None:
+    assert generate(tmp_path, *SMALL.split(), *CASES["s"].split()) == 0
     for name in ("test_spindle.py", "spindle_vectors.json"):
-        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
-    bench = (tmp_path / "1" / "test_spindle.py").read_text()
-    assert bench.startswith(notice("#"))
-    assert "tachometry" not in bench.removeprefix(notice("#"))
+        assert (bench("s") / name).read_bytes() == (tmp_path / name).read_bytes()
+    text = (tmp_path / "test_spindle.py").read_text()
+    assert text.startswith(notice("#"))
+    assert "tachometry" not in text.removeprefix(notice("#"))
 
 
 def test_usual_motion_stays_short_for_every_timing() -> None:
