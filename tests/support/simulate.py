@@ -6,9 +6,23 @@ from itertools import islice
 from operator import attrgetter
 from typing import Any, overload
 
-from amaranth import Module, Shape, Signal, Value
+from amaranth import Elaboratable, Module, ResetInserter, Shape, Signal, Value
 from amaranth.lib import data, wiring
 from amaranth.sim import Simulator
+
+
+class Resettable(Elaboratable):
+    """A box with a reset of its own, `rst`."""
+
+    def __init__(self, core: Any) -> None:
+        self.core = core
+        self.rst = Signal()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.core, name)
+
+    def elaborate(self, platform: object) -> Any:
+        return ResetInserter(self.rst)(self.core)
 
 
 def member(component: wiring.Component, name: str) -> Any:

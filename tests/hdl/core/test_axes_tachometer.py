@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from amaranth import Module, ResetInserter, Signal
 from support.axes import TICK_CYCLES, check, motions, small
-from support.simulate import clock_by_clock
+from support.simulate import Resettable, clock_by_clock
 
 from tachometry.hdl.core.axes_tachometer import AxesTachometer
 from tachometry.sim import golden
@@ -71,19 +70,6 @@ def test_a_run_that_ends_earlier_has_the_same_rows_until_then() -> None:
                 assert found[name].tolist() == before[name].tolist(), (strobe, name)
 
 
-class Restarted(AxesTachometer):
-    """A core with a reset of its own."""
-
-    def __init__(self, spec: AxesSpec) -> None:
-        super().__init__(spec)
-        self.restart = Signal()
-
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
-        m.submodules += ResetInserter(self.restart)(super().elaborate(platform))
-        return m
-
-
 def test_a_reset_clears_what_is_in_memory() -> None:
     """The content of the memories at a reset does not matter."""
     spec = small(2, index=True)
@@ -91,11 +77,11 @@ def test_a_reset_clears_what_is_in_memory() -> None:
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
     for clock, *levels in zip(trace.clock.tolist(), *(line.tolist() for line in trace.lines.values()), strict=True):
         rows[clock] = dict(zip(trace.lines, levels, strict=True))
-    rows[0]["restart"] = 0
+    rows[0]["rst"] = 0
     # As long before the reset as after it, on other levels.
     before = [{**row, **({"a": row["b"], "b": row["a"]} if "a" in row else {})} for row in rows[:701]]
-    seen = clock_by_clock(Restarted(spec), [*before, {"restart": 1}, *rows], names)
-    fresh = clock_by_clock(Restarted(spec), rows, names)
+    seen = clock_by_clock(Resettable(AxesTachometer(spec)), [*before, {"rst": 1}, *rows], names)
+    fresh = clock_by_clock(Resettable(AxesTachometer(spec)), rows, names)
     strobes = {port.name: port.held_by for port in spec.ports.outputs}
     for clock, (after, wanted) in enumerate(zip(seen[702:], fresh, strict=True)):
         for name, strobe in strobes.items():

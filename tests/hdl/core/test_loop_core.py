@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amaranth import Module, ResetInserter, Signal
 from support.control import GENERATED, SERIAL, SMALL, check_core, core_case
 from support.nightly import nightly
-from support.simulate import clock_by_clock
+from support.simulate import Resettable, clock_by_clock
 from support.verilog import play_in_icarus
 
 from tachometry.hdl.control.sigma_delta import SigmaDelta
@@ -20,7 +19,6 @@ from tachometry.sim import golden
 from tachometry.sim.golden.control import run_loop
 from tachometry.sim.signals.run import compare
 from tachometry.spec import Encoder, ParameterError, Timing, TTachometer
-from tachometry.spec.control import LoopSpec
 
 CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)))
 
@@ -56,19 +54,6 @@ def test_the_first_control_tick_has_the_first_update() -> None:
     assert set(apart[np.abs(apart) < 25].tolist()) == {-1}
 
 
-class Restarted(LoopCore):
-    """A core with a reset of its own."""
-
-    def __init__(self, spec: LoopSpec) -> None:
-        super().__init__(spec)
-        self.restart = Signal()
-
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
-        m.submodules += ResetInserter(self.restart)(super().elaborate(platform))
-        return m
-
-
 def test_a_reset_amid_a_program() -> None:
     """From a reset on the core shows what it shows after the first one, wherever the program was."""
     *_, changes = core_case(CORE, 5, 1)
@@ -76,13 +61,13 @@ def test_a_reset_amid_a_program() -> None:
     rows: list[dict[str, int]] = [{} for _ in range(700)]
     for clock, *values in changes[changes[:, 0] < len(rows)].tolist():
         rows[clock] = dict(zip(names, values, strict=True))
-    rows[0]["restart"] = 0
+    rows[0]["rst"] = 0
     outputs = ("control_tick", "current_valid", "current", "filtered_velocity", "disturbance", "drive")
-    whole = clock_by_clock(Restarted(CORE), rows, outputs)
+    whole = clock_by_clock(Resettable(LoopCore(CORE)), rows, outputs)
     ticks = [clock for clock, row in enumerate(whole) if row["control_tick"]]
     for amid in (9, CORE.tick_to_result - 1):
         until = ticks[3] + amid
-        seen = clock_by_clock(Restarted(CORE), [*rows[:until], {"restart": 1}, *rows], outputs)[until + 1 :]
+        seen = clock_by_clock(Resettable(LoopCore(CORE)), [*rows[:until], {"rst": 1}, *rows], outputs)[until + 1 :]
         assert [row["control_tick"] for row in seen] == [row["control_tick"] for row in whole]
         assert [row for row in seen if row["current_valid"]] == [row for row in whole if row["current_valid"]]
 

@@ -4,15 +4,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import zip_longest
-from typing import Any
 
 import numpy as np
 import pytest
-from amaranth import Elaboratable, ResetInserter, Signal
 from numpy.typing import NDArray
 from support import compiled
 from support.nightly import only
-from support.simulate import Player, clock_by_clock
+from support.simulate import Player, Resettable, clock_by_clock
 from support.tracking import hostile
 
 from tachometry.hdl.methods import track
@@ -35,20 +33,6 @@ EXTERNAL = replace(SPEC, timing=Timing(1_000_000, 1400, 10), external_tick=True,
 NAMES = ["velocity", "acceleration", "position_fine", "interval", "forced"]
 COMPILED = compiled.clock_by_clock  # mutants, which end soon, are not worth a compilation
 Update = tuple[int, ...]  # clock, and what the update says
-
-
-class Resettable(Elaboratable):
-    """A datapath with a reset."""
-
-    def __init__(self, core: track.TrackMethod) -> None:
-        self.core = core
-        self.rst = Signal()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.core, name)
-
-    def elaborate(self, platform: object) -> Any:
-        return ResetInserter(self.rst)(self.core)
 
 
 def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[dict[str, int]]:
