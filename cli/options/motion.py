@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tachometry.cli.options.option import Group, declared, option, refuse_without, take_values
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import TachometerSpec
-from tachometry.spec.language.option import options_of
+from tachometry.spec.language.option import ParameterError, options_of
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -25,6 +25,8 @@ Motions, joined by + into one:
   trapezoid:SPEED:ACCEL_TIME:HOLD_TIME
   stop:TIME
   csv:FILE    alone: a table with the header time,angle_rad in s and rad
+  counts:FILE:TIME:COUNT  alone, in no loop or sweep: the log of a counter,
+              by the names of its columns; see replay --count
 Units: rad/s (default), rev/s, rpm; s (default), ms, us, ns;
   Hz (default), kHz, MHz, GHz."""
 
@@ -48,7 +50,29 @@ _OF_LOOPS = ("jitter", "nonuniformity", "phase-error", "duty-error", "seed")
 def tables_of(motion: str) -> list[Path]:
     """Return files that a motion reads, or the motions of several axes."""
     parts = [part.strip().partition(":") for part in {motion, *motion.split(",")}]
-    return [Path(table) for kind, _, table in parts if kind == "csv"]
+    return [
+        Path(table.rsplit(":", 2)[0] if kind == "counts" else table)
+        for kind, _, table in parts
+        if kind in ("csv", "counts")
+    ]
+
+
+def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encoding:
+    """Return what an encoder records of a motion, which may be a log of what its counter showed."""
+    from tachometry.sim.captures.count_log import read_count_log
+    from tachometry.sim.encoder.motion import Motion, parse_motion
+
+    kind, _, rest = motion.strip().partition(":")
+    if kind != "counts":
+        return encoder.record(parse_motion(motion))
+    if len(parts := rest.rsplit(":", 2)) != 3:
+        raise ParameterError("motion", f"must be counts:FILE:TIME:COUNT, not {motion!r}")
+    log = read_count_log(Path(parts[0]), parts[2], parts[1])
+    # In the middle of a quarter period, for rounding not to make or lose an edge.
+    angle = (log.count * (4.0 / spec.encoder.decoding) + 0.5) * encoder.disc.pitch_rad
+    encoding = encoder.record(Motion.of_table(log.time, angle.astype("float64")))
+    source = log.recording(spec.encoder.decoding).source
+    return replace(encoding, recording=replace(encoding.recording, source=source))
 
 
 def _read_encoder(**given: Any) -> dict[str, Any]:
@@ -67,16 +91,14 @@ def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
     encoder = others.pop("encoder")
 
     def record(spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
-        from tachometry.sim.encoder.motion import parse_motion
-
         assert motion is not None
         own: VirtualEncoder = encoder(spec)
         if axes is None:
-            return own.record(parse_motion(motion))
+            return _record(own, motion, spec)
         each = motion.split(",")
         if len(each) > axes:
             raise ValueError(f"--motion must have at most one motion for each of the --axes {axes}, not {len(each)}")
-        return replace(own, seed=own.seed + axis).record(parse_motion(each[min(axis, len(each) - 1)]))
+        return _record(replace(own, seed=own.seed + axis), each[min(axis, len(each) - 1)], spec)
 
     if motion is None:
         refuse_without("--motion", _OPTIONS)

@@ -125,6 +125,14 @@ class Motion:
             breakpoints = np.array(list(accumulate(duration, initial=0.0)))
         return Motion(breakpoints, start_angle, speed, acceleration, sine_speed, frequency)
 
+    @staticmethod
+    def of_table(time: FloatArray, angle_rad: FloatArray) -> "Motion":
+        """Return the motion that is at these angles at these times, from 0, and turns evenly in between."""
+        zero = np.zeros(len(time) - 1)
+        with np.errstate(all="ignore"):  # Motion refuses what is not finite
+            slope = np.diff(angle_rad) / np.diff(time)
+        return Motion(time, angle_rad[:-1], slope, zero, zero, zero)
+
     @property
     def duration(self) -> float:
         """Length of the motion, seconds."""
@@ -307,8 +315,5 @@ def _read_csv(file: str) -> Motion:
     if len(rows) < 2:
         raise ValueError(f"{file}:{len(lines)}: file must have at least 2 rows, not {len(rows)}")
     table = np.array(rows)
-    zero = np.zeros(len(rows) - 1)
     with np.errstate(all="ignore"):  # Motion refuses what is not finite
-        breakpoints, angle_rad = table[:, 0] - table[0, 0], table[:, 1]
-        slope = np.diff(angle_rad) / np.diff(breakpoints)
-    return Motion(breakpoints, angle_rad[:-1], slope, zero, zero, zero)
+        return Motion.of_table(table[:, 0] - table[0, 0], table[:, 1])

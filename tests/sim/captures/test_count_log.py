@@ -1,6 +1,7 @@
 """Logs of time and count become the lines of an encoder that turns evenly between two rows."""
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -81,17 +82,38 @@ def test_what_cannot_be_is_told(rows: str, message: str, tmp_path: Path) -> None
 
 def test_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     page = (ROOT / "docs/guides/encoder.md").read_text(encoding="utf-8").partition("## Logs of time and count")[2]
+    page = page.partition("\n## ")[0]
     (tmp_path / "build").mkdir()
     rows = page.partition("```csv\n")[2].partition("```")[0]
     (tmp_path / "build" / "counts.csv").write_text(rows)
     monkeypatch.chdir(tmp_path)
-    command = page.partition("```sh\ntachometry ")[2].partition("\n")[0].replace('"left wheel"', "left\xa0wheel")
-    assert run(*(word.replace("\xa0", " ") for word in command.split(" "))) == 0
+    replay, simulate = re.findall(r"^tachometry (.*)", page, re.MULTILINE)
+    assert run(*shlex.split(replay)) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "lines count from left wheel captured 0.015 s, 30 changes of the lines" in told
     assert "counts out 30" in told
     assert "note between two of the 4 rows the shaft is taken to turn evenly" in told
     assert "note the counter wraps at 65536, 1 times here" in told
+    assert run(*shlex.split(simulate)) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "lines count from left wheel captured 0.015 s, 30 changes of the lines" in told
+    assert re.search(r"note between two of the 4 rows .* counts in (2[0-9]|30) counts out \1 errors flagged 0", told)
+
+
+@pytest.mark.parametrize("decoding", ["1", "2", "4"])
+def test_a_motion_counts_what_the_log_says(
+    decoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    log(tmp_path, [3, 13, 13, 9, 9, 9])
+    core = f"--ppr 9 --clock 100kHz --tick 1ms --decoding {decoding}".split()
+    assert run("simulate", "--motion", "counts:log.csv:time:n", *core) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "counts in 6 counts out 6 errors flagged 0" in told
+    assert run("simulate", "--motion", "counts:log.csv", *core) == 2
+    assert "--motion must be counts:FILE:TIME:COUNT, not 'counts:log.csv'" in capsys.readouterr().err
+    assert run("simulate", "--motion", "counts:log.csv:time:n", *core, "--trace", "log.csv") == 2
+    assert "must be another file than the input" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
