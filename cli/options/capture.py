@@ -52,7 +52,21 @@ _OPTIONS = [
         _CAPTURE,
         "--time",
         metavar="COLUMN",
-        help="Column of the times in a .csv file: its name, or its number from 0. [default: the column named time]",
+        help="Column of the times in a text: its name, or its number from 0. [default: the column named time]",
+    ),
+    option(
+        _CAPTURE,
+        "--time-unit",
+        metavar="UNIT",
+        help="Unit of the times in a text: s, ms, us, ns, or the rate of what counts them, such as 16MHz. [default: as "
+        "the name of the column ends, such as time_ms or Time [us], else s]",
+    ),
+    option(
+        _CAPTURE,
+        "--threshold",
+        metavar="V[:V]",
+        help="Voltage from which on a line is high, for the columns of an oscilloscope, and by how much it must fall "
+        "below where it rose, as in 1.65V:200mV. [default: levels are 0 or 1]",
     ),
     option(
         _CAPTURE,
@@ -73,7 +87,7 @@ _OPTIONS = [
         _CAPTURE,
         "--samplerate",
         metavar="FREQUENCY",
-        help="Samplerate of a .sr or .csv file that contains neither it nor times, in Hz (plain number), kHz, MHz or "
+        help="Samplerate of a .sr file or a text that contains neither it nor times, in Hz (plain number), kHz, MHz or "
         "GHz.",
     ),
 ]
@@ -86,24 +100,35 @@ def _read(
     z: str | None,
     tick_in: str | None,
     time: str | None,
+    time_unit: str | None,
+    threshold: str | None,
     samplerate: str | None,
     sensor: str,
     count: str | None,
     wrap: int | None,
     **others: Any,
 ) -> dict[str, Any]:
-    lines = dict(a=a, b=b, z=z, tick_in=tick_in, samplerate=samplerate)
+    lines = dict(a=a, b=b, z=z, tick_in=tick_in, threshold=threshold, samplerate=samplerate)
 
     def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
+        from tachometry.sim.captures.cells import parse_threshold
         from tachometry.sim.captures.count_log import read_count_log
         from tachometry.sim.captures.file import SAME, OptionError
+        from tachometry.sim.captures.header import TextOptions
         from tachometry.sim.captures.other_sensors import converted
         from tachometry.sim.captures.read import read_capture, with_last_tick
+        from tachometry.sim.captures.time_unit import parse_time_unit
 
         alone, axes = spec.tachometer, spec.axes
+        text = TextOptions(
+            time,
+            None if time_unit is None else parse_time_unit("time_unit", time_unit),
+            None if threshold is None else parse_threshold("threshold", threshold),
+            slowest_s=float(alone.times.seconds(alone.times.longest)),
+        )
         if count is not None:
             _refuse_lines({**lines, "sensor": None if sensor == "quadrature" else sensor, "index": alone.index or None})
-            log = read_count_log(capture, _of_axis("count", count, axis, axes) or "", time, wrap)
+            log = read_count_log(capture, _of_axis("count", count, axis, axes) or "", text, wrap)
             return with_last_tick(log.recording(alone.encoder.decoding), spec)
         if wrap is not None:
             raise OptionError("wrap", "must not be given without --count")
@@ -114,7 +139,7 @@ def _read(
         tick = "tick_in" if tick_in is None and alone.external_tick else tick_in
         rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
         second = SAME if sensor == "pulses" else line_b
-        recording = read_capture(capture, line_a, second, rate, index, tick, time)
+        recording = read_capture(capture, line_a, second, rate, index, tick, text)
         return with_last_tick(converted(recording, sensor, alone), spec)
 
     if others.get("capture") is None:

@@ -60,6 +60,8 @@ def tables_of(motion: str) -> list[Path]:
 def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encoding:
     """Return what an encoder records of a motion, which may be a log of what its counter showed."""
     from tachometry.sim.captures.count_log import read_count_log
+    from tachometry.sim.captures.file import OptionError
+    from tachometry.sim.captures.header import TextOptions
     from tachometry.sim.encoder.motion import Motion, parse_motion
 
     kind, _, rest = motion.strip().partition(":")
@@ -67,7 +69,16 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
         return encoder.record(parse_motion(motion))
     if len(parts := rest.rsplit(":", 2)) != 3:
         raise ParameterError("motion", f"must be counts:FILE:TIME:COUNT, not {motion!r}")
-    log = read_count_log(Path(parts[0]), parts[2], parts[1])
+    text = TextOptions(parts[1], slowest_s=float(spec.times.seconds(spec.times.longest)))
+    try:
+        log = read_count_log(Path(parts[0]), parts[2], text)
+    except OptionError as error:
+        if error.parameter != "time_unit":
+            raise
+        name = f"column {parts[1]} of {parts[0]}"
+        raise ParameterError(
+            "motion", f"has times without a unit: {name} must have it in its name, as time_ms"
+        ) from None
     # In the middle of a quarter period, for rounding not to make or lose an edge.
     angle = (log.count * (4.0 / spec.encoder.decoding) + 0.5) * encoder.disc.pitch_rad
     encoding = encoder.record(Motion.of_table(log.time, angle.astype("float64")))

@@ -1,24 +1,22 @@
 """A log of time and count, as a microcontroller's own counter gives it, is read as what turned the counter."""
 
-import csv
-import gzip
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.captures.cells import numbers
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError, check_edges, reading
-from tachometry.sim.captures.header import COMMENTS, LONGEST, Header, read_header
+from tachometry.sim.captures.header import PLAIN, Header, TextOptions, check_seconds, read_header
+from tachometry.sim.captures.rows import Lines, Times, blocks, opened, refuse
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
 from tachometry.sim.signals.source import Source
 
 _MODULI = (1 << 16, 1 << 32)  # of the counters that wrap
 _MOST = 1 << 53  # counts that a number of a spreadsheet holds
-_LATEST = 1e30  # of any unit
 NO_WRAP = 0
 
 
@@ -58,7 +56,7 @@ class CountLog:
         return Recording(np.append(0.0, time), level & np.uint8(1), level >> np.uint8(1), duration, source=source)
 
 
-def read_count_log(path: Path, count: Channel, time: Channel | None = None, wrap: int | None = None) -> CountLog:
+def read_count_log(path: Path, count: Channel, text: TextOptions = PLAIN, wrap: int | None = None) -> CountLog:
     """Read a text with a column of times and one of counts, whose head is that of `read_csv`.
 
     Rows of one time are one, the last of them.
@@ -66,8 +64,10 @@ def read_count_log(path: Path, count: Channel, time: Channel | None = None, wrap
     Parameters
     ----------
     path : Path
-    count, time : str or int
-        Name of the column, else its number among all columns, from 0; None: that named `time`.
+    count : str or int
+        Name of the column, else its number among all columns, from 0.
+    text : TextOptions
+        What the text does not say; it has no threshold.
     wrap : int or None
         The counter goes from one less than this to 0. `NO_WRAP`: it does not wrap. None: if it has 16 or 32 bits, as
         seen from a jump by more than half of them.
@@ -79,15 +79,21 @@ def read_count_log(path: Path, count: Channel, time: Channel | None = None, wrap
     """
     if path.suffix.lower() in (".sr", ".vcd"):
         raise OptionError("count", f"must not be given for {path}: it has levels, not counts")
-    with reading(path), _opened(path) as file:
-        header = read_header(path, file, time, None)
+    with reading(path), opened(path) as file:
+        source = Lines(path, file)
+        header = read_header(path, source.head, text, None)
         if header.time is None:
             raise OptionError("time", f"must be given for {path}: counts must have times")
-        column = _column(path, header, count)
-        try:
-            rows = np.array(list(_rows(path, file, header, column)), dtype=np.float64)
-        except csv.Error as error:
-            raise CaptureError(f"{path} must be rows of numbers: {error}") from None
+        column, times = _column(path, header, count), Times(path, header)
+        parts = [
+            np.stack([times.of(line, columns), _counts(path, line, header.names[column], columns[column])])
+            for line, columns in blocks(path, source, header)
+        ]
+    if not source.ended:
+        raise CaptureError(
+            f"the last line of {path} must end, else its last number may be cut: put a line end there if it is whole"
+        )
+    rows = np.concatenate([np.zeros((2, 0)), *parts], axis=1).T
     if len(rows) < 2:
         raise CaptureError(f"{path} must have at least two rows after its header, not {len(rows)}")
     seconds, counts = header.seconds(rows[:, 0] - rows[0, 0]), rows[:, 1].astype(np.int64)
@@ -98,14 +104,12 @@ def read_count_log(path: Path, count: Channel, time: Channel | None = None, wrap
     seconds, total = seconds[last], np.cumsum(np.append(0, steps))[last]
     if len(seconds) < 2:
         raise CaptureError(f"times of {path} must not all be equal")
+    check_seconds(path, header, text, np.diff(seconds), "rows", whole=times.whole)
+    notes += times.notes
     notes.insert(0, f"between two of the {len(seconds)} rows the shaft is taken to turn evenly")
     if counts[0]:
         notes.append(f"the log begins at {counts[0]} counts, and counts out are since then")
     return CountLog(seconds, total - total[0], header.names[column], tuple(notes))
-
-
-def _opened(path: Path) -> BinaryIO:
-    return cast(BinaryIO, gzip.open(path)) if path.suffix.lower() == ".gz" else path.open("rb")
 
 
 def _column(path: Path, header: Header, count: Channel) -> int:
@@ -120,27 +124,13 @@ def _column(path: Path, header: Header, count: Channel) -> int:
     raise OptionError("count", f"of {path} must be one of the columns {listed}, not {count!r}")
 
 
-def _rows(path: Path, file: BinaryIO, header: Header, column: int) -> Iterator[tuple[float, float]]:
-    """Give time and count of each row, checked."""
-    assert header.time is not None
-    before = -_LATEST
-    text = (line.decode("utf-8", errors="replace") for line in iter(lambda: file.readline(LONGEST), b""))
-    for number, row in enumerate(csv.reader(text, delimiter=header.separator), header.lines + 1):
-        if not row or row[0].startswith(COMMENTS):
-            continue
-        try:
-            time, count = (float(row[k].replace(",", ".")) for k in (header.time, column))
-        except (ValueError, IndexError):
-            shown = header.separator.join(row)[:60]
-            raise CaptureError(f"{path} line {number}: time and count must be numbers, not {shown!r}") from None
-        if not before <= time <= _LATEST:
-            least = f"at least {before:.15g} {header.unit} as before" if before > -_LATEST else "a finite number"
-            raise CaptureError(f"{path} line {number}: time must be {least}, not {time:.15g}")
-        if not (abs(count) <= _MOST and count == int(count)):
-            raise CaptureError(f"{path} line {number}: count must be a whole number up to 2^53, not {count:.15g}")
-        before = time
-        check_edges(path, number)
-        yield time, count
+def _counts(path: Path, line: Sequence[int], name: str, texts: Sequence[str]) -> NDArray[np.float64]:
+    """Return the counts of a block of rows."""
+    count = numbers(texts)
+    check_edges(path, line[-1])
+    refuse(path, line, ~(np.abs(count) <= _MOST), f"{name} must be a whole number up to 2^53", texts)
+    refuse(path, line, count != np.rint(count), f"{name} must be a whole number up to 2^53", texts)
+    return count
 
 
 def _unwrapped(path: Path, counts: Ints, wrap: int | None) -> tuple[Ints, list[str]]:

@@ -1,11 +1,13 @@
 """Every kind of capture shares this: its error, the choice of channels, and files written whole or not at all."""
 
 import itertools
+import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from tachometry.sim.signals.files import replacing
 from tachometry.sim.signals.recording import MAX_EDGES, Recording
@@ -15,6 +17,22 @@ from tachometry.spec.language.option import ParameterError
 Channel = str | int
 SAME = -(1 << 16)  # as the channel of B: that of A
 NONE: Mapping[str, Channel] = {}
+NO_VECTORS: Mapping[int, str] = {}
+
+
+class Line(NamedTuple):
+    """Names a line of a capture.
+
+    Parameters
+    ----------
+    number : int
+        Of its channel.
+    bit : int or None
+        Of the number that the channel is; None: it is a level.
+    """
+
+    number: int
+    bit: int | None = None
 
 
 class CaptureError(ValueError):
@@ -58,8 +76,9 @@ def choose_channels(
     a: Channel | None = None,
     b: Channel | None = None,
     others: Mapping[str, Channel] = NONE,
-) -> tuple[int, ...]:
-    """Find the numbers of the encoder lines among the channels of a capture: of A, B and what else is wanted.
+    vectors: Mapping[int, str] = NO_VECTORS,
+) -> tuple[Line, ...]:
+    """Find the encoder lines among the channels of a capture: A, B and what else is wanted.
 
     Parameters
     ----------
@@ -73,55 +92,71 @@ def choose_channels(
         two.
     others : mapping of str to str or int
         Likewise, of further lines by their names.
+    vectors : mapping from number to name
+        Channels that are numbers: `name[1]` is bit 1.
 
     Raises
     ------
     CaptureError
         If there are fewer than two channels, if one is unknown, or if two are the same.
     """
-    listed = ", ".join(f"{name} ({number})" for number, name in channels.items())
-    if len(channels) < (1 if b == SAME else 2):
+    bits = {number: f"{name}[bit]" for number, name in vectors.items()}
+    shown = {**bits, **channels}
+    listed = ", ".join(f"{name} ({number})" if number in channels else name for number, name in shown.items())
+    if len(channels) < (1 if b == SAME else 2) and not (vectors and isinstance(a, str) and a.endswith("]")):
         needed = "one logic channel" if b == SAME else "two logic channels"
-        raise CaptureError(f"{path} must have at least {needed}, not {listed or 'none'}")
+        example = next(iter(vectors.values()), None)
+        hint = f"; lines in one number are --a {example}[0] --b {example}[1]" if example and b != SAME else ""
+        raise CaptureError(f"{path} must have at least {needed}, not {listed or 'none'}{hint}")
 
-    def find(wanted: Channel | None) -> int | None:
+    def find(wanted: Channel | None) -> Line | None:
         if not isinstance(wanted, str):
-            return wanted if wanted in channels else None
-        exact = [number for number, name in channels.items() if name == wanted]
-        alike = [number for number, name in channels.items() if name.casefold() == wanted.casefold()]
-        last = [number for number, name in channels.items() if name.rpartition(".")[2].casefold() == wanted.casefold()]
-        if exact or alike or len(last) == 1:
-            return (exact or alike or last)[0]
+            return Line(wanted) if wanted is not None and wanted in channels else None
+        if (number := _named(channels, wanted)) is not None:
+            return Line(number)
+        if match := re.fullmatch(r"(.+)\[([0-9]{1,2})\]", wanted):
+            number = _named(vectors, match[1])
+            return None if number is None else Line(number, int(match[2]))
         return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
 
     one_line = b == SAME
-    defaults: Sequence[int | None] = [find("A"), find("A" if one_line else "B")]
-    if None in defaults:
-        defaults = [*channels, *channels][:2]
+    named = [find("A"), find("A" if one_line else "B")]
+    defaults = [*channels, *channels, None, None][:2] if None in named else [line and line.number for line in named]
     first, second = (default if given is None else given for default, given in zip(defaults, (a, b), strict=True))
     wanted = {"a": first, "b": first if one_line else second, **others}
-    numbers: dict[str, int] = {}
+    lines: dict[str, Line] = {}
     for line, channel in wanted.items():
-        number = find(channel)
-        if number is None:
+        if (place := find(channel)) is None:
             raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {channel!r}")
-        numbers[line] = number
-    for one, other in itertools.combinations(numbers, 2):
-        if (number := numbers[one]) == numbers[other] and not (one_line and other == "b"):
-            raise CaptureError(
-                f"channels {one} and {other} of {path} must be two of {listed}, not both {channels[number]}"
-            )
-    return tuple(numbers.values())
+        lines[line] = place
+    for one, other in itertools.combinations(lines, 2):
+        if (place := lines[one]) == lines[other] and not (one_line and other == "b"):
+            name = shown[place.number].replace("[bit]", f"[{place.bit}]")
+            raise CaptureError(f"channels {one} and {other} of {path} must be two of {listed}, not both {name}")
+    return tuple(lines.values())
 
 
-def named(recording: Recording, channels: Mapping[int, str], numbers: Sequence[int]) -> Recording:
+def _named(channels: Mapping[int, str], wanted: str) -> int | None:
+    """Return the number of a channel: of this spelling, else in any case, else the only one without its scopes."""
+    exact = [number for number, name in channels.items() if name == wanted]
+    alike = [number for number, name in channels.items() if name.casefold() == wanted.casefold()]
+    last = [number for number, name in channels.items() if name.rpartition(".")[2].casefold() == wanted.casefold()]
+    return (exact or alike or last)[0] if exact or alike or len(last) == 1 else None
+
+
+def named(
+    recording: Recording, channels: Mapping[int, str], lines: Sequence[Line], notes: Sequence[str] = ()
+) -> Recording:
     """Return a recording that says which channels its lines are, in their order, and which of them never change."""
     still = tuple(name for name, line in recording.lines.items() if (line == line[0]).all())
+    names = [channels[number] + ("" if bit is None else f"[{bit}]") for number, bit in lines]
+    numbers = {line.number for line in lines}
     source = Source(
-        lines={name: channels[number] for name, number in zip(recording.lines, numbers, strict=True)},
+        lines=dict(zip(recording.lines, names, strict=True)),
         duration=recording.duration,
         n_changes=len(recording.time) - 1,
         still=still,
         unused={number: name for number, name in channels.items() if number not in numbers},
+        notes=tuple(notes),
     )
     return replace(recording, source=source)

@@ -1,23 +1,45 @@
-"""The head of a text capture says which columns it has, what separates them, and how its rows are dated."""
+"""The head of a text says which columns it has, what separates them, and how its rows are dated."""
 
-import csv
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.captures.cells import NUMBER, Threshold, origin_of
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError
 from tachometry.sim.captures.sigrok import agreed_samplerate, divide, parse_samplerate
-from tachometry.spec.language.units import TIME, plain_unit
+from tachometry.sim.captures.sniff import VOLTS, Table, bare, is_comment, names_times, sniff, trimmed
+from tachometry.sim.captures.time_unit import TimeUnit, parted, rank, unit_named
+from tachometry.spec.language.units import TIME
 
-LONGEST = 1 << 16  # bytes, with the comments before it
-COMMENTS = ("#", ";")
-# What sigrok calls the time if channels are not called by their names.
-_SIGROK = {"samples": "s", "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns", "picoseconds": "ps"}
+
+@dataclass(frozen=True)
+class TextOptions:
+    """Says how a text is read, where it does not say it.
+
+    Parameters
+    ----------
+    time : str, int or None
+        Column of the times: its name, else its number among all columns, from 0. None: the one that is named so.
+    unit : TimeUnit or None
+        Of the times. None: as their name says, else seconds.
+    threshold : Threshold or None
+        Of columns that are voltages. None: they are levels, 0 or 1.
+    slowest_s : float or None, seconds
+        Edges that are further apart are taken for a mistake where nothing says the unit of the times.
+    """
+
+    time: Channel | None = None
+    unit: TimeUnit | None = None
+    threshold: Threshold | None = None
+    slowest_s: float | None = None
+
+
+PLAIN = TextOptions()
 
 
 @dataclass(frozen=True)
@@ -26,48 +48,62 @@ class Header:
 
     Parameters
     ----------
-    lines : int
-        Of the file, up to the first row.
-    separator : str
-        `,`, `;` or a tab. With `;` a number may have a decimal comma.
+    table : Table
     names : tuple of str
-        Of all columns.
+        Of all columns; the first may have none.
     time : int or None
         Column of the times; None: every row is a sample.
-    unit : str
+    unit : TimeUnit
         Of the times.
+    assumed : bool
+        Whether nothing says the unit.
     samplerate_hz : float or None
         For rows that are samples.
     period : int or None
         For files of sigrok, whose times are sample numbers times so many of a unit.
     """
 
-    lines: int
-    separator: str
+    table: Table
     names: tuple[str, ...]
     time: int | None
-    unit: str
-    samplerate_hz: float | None
-    period: int | None
+    unit: TimeUnit
+    assumed: bool = False
+    samplerate_hz: float | None = None
+    period: int | None = None
 
     @property
     def unit_name(self) -> str:
         """Of the times, for messages."""
-        return "seconds" if self.unit == "s" else self.unit
+        return "seconds" if self.unit.name == "s" else self.unit.name
+
+    @property
+    def origin(self) -> int | None:
+        """Nanoseconds from 1970 to the first row, if its time has a date."""
+        in_first = self.time is not None and self.time < len(self.table.first)
+        return origin_of(self.table.first[self.time or 0]) if in_first else None
+
+    @property
+    def _columns(self) -> list[int]:
+        return [column for column, name in enumerate(self.names) if name and column != self.time]
 
     @property
     def channels(self) -> dict[int, str]:
         """Names of the channels, by their numbers from 0."""
-        return dict(enumerate(name for column, name in enumerate(self.names) if column != self.time))
+        return {channel: self.names[column] for channel, column in enumerate(self._columns)}
 
     def column(self, channel: int) -> int:
         """Return the column of a channel."""
-        return channel + (self.time is not None and channel >= self.time)
+        return self._columns[channel]
+
+    def volts(self, column: int) -> float:
+        """Return how many volts the unit of a column is."""
+        units = self.table.units
+        return VOLTS.get(bare(parted(self.names[column])[1] or (units[column] if column < len(units) else "")), 1.0)
 
     def seconds(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what the first column, or the number of the row, is in seconds; a sample is dated as in a `.sr`."""
+        """Return what the times, or the numbers of the rows, are in seconds; a sample is dated as in a `.sr`."""
         if self.samplerate_hz is None:
-            return time / float(1 / TIME[self.unit].size)
+            return time / self.unit.per_second
         return divide(self._sample(time), self.samplerate_hz, up=False)
 
     def duration(self, last: float) -> float:
@@ -80,82 +116,90 @@ class Header:
         return np.rint(time / (self.period or 1)).astype(np.int64)
 
 
-def read_header(path: Path, file: BinaryIO, time: Channel | None, samplerate_hz: float | None) -> Header:
-    """Read the comments and the line of names with which a text capture begins.
+def read_header(path: Path, lines: Sequence[str], options: TextOptions, samplerate_hz: float | None) -> Header:
+    """Read what stands above the rows of a text.
 
     Parameters
     ----------
     path : Path
         File that messages name.
-    file : binary file
-        Is read up to the first row.
-    time : str, int or None
-        Column of the times: its name, else its number among all columns, from 0. None: the one that is named so.
+    lines : sequence of str
+        The first of it.
+    options : TextOptions
     samplerate_hz : float or None
         For a file that has no times.
 
     Raises
     ------
     CaptureError
-        If there is no such line, or if rows cannot be dated.
+        If columns have no names, nor numbers that are given, or if rows cannot be dated.
     """
-    text, comments, lines = _first_line(file)
-    if "\r" in text:
-        raise CaptureError(f"lines of {path} must end in LF or CR LF, not CR")
-    separator = max(",;\t", key=text.count)
-    names = [name.strip() for name in next(csv.reader([text], delimiter=separator), [])]
-    column = _time_column(path, names, time)
-    rest = [number for number in range(len(names)) if number != column]
-    if len(set(names)) < len(names):  # sigrok calls each of its lines "logic"
-        for number, name in zip(rest, _of_sigrok(comments, r"Channels \([0-9/]+\): (.*)").split(", "), strict=False):
-            names[number] = name or names[number]
-    shown = text if len(text) <= 60 else text[:60] + "..."
-    if (
-        len(rest) < (2 if column is None else 1)
-        or "" in names
-        or len(set(names)) < len(names)
-        or all(map(_is_number, names))
-    ):
+    table = sniff(lines, options.time)
+    first = next((line.strip() for line in lines if not is_comment(line)), "")
+    shown = first if len(first) <= 60 else first[:60] + "..."
+    if table is None or (table.names is not None and not _are_names(table, options.time)):
         raise CaptureError(
             f"header of {path} must name the columns, as time,a,b does: one channel at least, each name once, "
             f"not {shown!r}"
         )
-    in_file = parse_samplerate(path, _of_sigrok(comments, r"Samplerate: (.*)"))
+    if table.names is None and options.time is None and samplerate_hz is None:
+        raise CaptureError(
+            f"{path} has no line of names: put one such as time,a,b before its rows, or give its columns by number, as "
+            "--time 0 --a 1 --b 2"
+        )
+    names = _names(table)
+    column = _time_column(path, names, table, options.time)
+    in_file = parse_samplerate(path, _of_sigrok(table.comments, r"Samplerate: (.*)")) or _increment(names)
     if column is None:
         if samplerate_hz is None and in_file is None:
             hint = "or --time or --samplerate must be given"
             raise CaptureError(f"header of {path} must have a column named time, {hint}, not {shown!r}")
-        return Header(lines, separator, (*names,), None, "", agreed_samplerate(path, in_file, samplerate_hz), None)
+        if options.unit is not None:
+            raise OptionError("time_unit", f"must not be given for {path}: it has no times")
+        rate = agreed_samplerate(path, in_file, samplerate_hz)
+        return Header(table, names, None, TimeUnit("samples", rate), samplerate_hz=rate)
     if samplerate_hz is not None:
         raise OptionError("samplerate", f"must not be given for {path}: its rows have their times")
-    if in_file and _of_sigrok(comments, "(CSV generated by libsigrok)"):
-        period, unit = _sigrok_period(in_file)
-        return Header(lines, separator, (*names,), column, unit, in_file, period)
-    return Header(lines, separator, (*names,), column, _unit(path, names[column]), None, None)
+    if in_file and _of_sigrok(table.comments, "(CSV generated by libsigrok)"):
+        period, name = _sigrok_period(in_file)
+        return Header(table, names, column, TimeUnit(name, 0), samplerate_hz=in_file, period=period)
+    unit, assumed = _unit(path, table, names, column, options.unit)
+    return Header(table, names, column, unit, assumed)
 
 
-def _first_line(file: BinaryIO) -> tuple[str, list[str], int]:
-    """Return the first line that is no comment, the comments before it, and how many lines that were."""
-    comments: list[str] = []
-    left, lines = LONGEST, 0
-    while line := file.readline(left):
-        left -= len(line)
-        lines += 1
-        text = line.decode("utf-8-sig", errors="replace").strip()
-        if text and not text.startswith(COMMENTS):
-            return text, comments, lines
-        comments.append(text.lstrip("".join(COMMENTS)).strip())
-    return "", comments, lines
+def _are_names(table: Table, time: Channel | None) -> bool:
+    """Tell whether the names are some: one for each column, and no numbers unless the times are named beside them."""
+    names = _names(table)
+    if not names_times(names, time):
+        extra = len(table.first) - len(names)
+        if any(map(NUMBER.fullmatch, names)) or (table.first and extra not in (0, 1)):
+            return False
+    return "" not in names[1:] and len({*names}) == len(names)
 
 
-def _time_column(path: Path, names: list[str], time: Channel | None) -> int | None:
-    plain = [re.split(r"[\[(]", name)[0].strip().casefold() for name in names]
+def _names(table: Table) -> tuple[str, ...]:
+    """Return names of all columns, those of sigrok's comment if it calls each line "logic", else their numbers."""
+    if table.names is None:
+        return tuple(map(str, range(len(trimmed(table.first)))))
+    names = list(table.names)
+    if len({*names}) < len(names):
+        rest = [column for column, name in enumerate(names) if rank(name) is None]
+        listed = _of_sigrok(table.comments, r"Channels \([0-9/]+\): (.*)").split(", ")
+        for column, name in zip(rest, listed, strict=False):
+            names[column] = name or names[column]
+    return tuple(names)
+
+
+def _time_column(path: Path, names: Sequence[str], table: Table, time: Channel | None) -> int | None:
     if time is None:
-        return next((k for k, name in enumerate(plain) if name == "time" or name in _SIGROK), None)
+        ranked = [(likely, column) for column, name in enumerate(names) if (likely := rank(name)) is not None]
+        dated = [column for column, cell in enumerate(table.units) if unit_named(bare(cell))]
+        return min(ranked)[1] if ranked else dated[0] if dated else None
     wanted = str(time).strip()
+    plain = [parted(name)[0].casefold() for name in names]
     for alike in (names, [name.casefold() for name in names], plain):
         for word in (wanted, wanted.casefold()):
-            if not isinstance(time, int) and word in alike:
+            if not isinstance(time, int) and word and word in alike:
                 return alike.index(word)
     if wanted.isascii() and wanted.isdigit() and int(wanted) < len(names):
         return int(wanted)
@@ -163,17 +207,60 @@ def _time_column(path: Path, names: list[str], time: Channel | None) -> int | No
     raise OptionError("time", f"of {path} must be one of the columns {listed}, not {time!r}")
 
 
-def _unit(path: Path, name: str) -> str:
-    """Return the unit in brackets behind a name, else seconds."""
-    match = re.search(r"[\[(]\s*(.*?)\s*[\])]$", name)
-    unit = plain_unit(match[1]) if match else _SIGROK.get(name.casefold(), "s")
-    if unit not in TIME:
-        raise CaptureError(f"unit of column {name} of {path} must be one of {', '.join(TIME)}, not {unit!r}")
-    return unit
+def _unit(path: Path, table: Table, names: Sequence[str], column: int, given: TimeUnit | None) -> tuple[TimeUnit, bool]:
+    """Return the unit of the times, and whether it is a guess."""
+    word = parted(names[column])[1] or (bare(table.units[column]) if column < len(table.units) else "")
+    unit = given or (unit_named(word) if word else TimeUnit("s", 1.0))
+    if column < len(table.first) and origin_of(table.first[column]) is not None:
+        if given is not None:
+            raise OptionError("time_unit", f"must not be given for {path}: its times have dates")
+        return TimeUnit("ns", 1e9), False
+    if unit is None:
+        units = ", ".join(TIME)
+        raise CaptureError(f"unit of column {names[column]} of {path} must be one of {units}, not {word!r}")
+    increments = [
+        table.units[k] for k, name in enumerate(names) if name.casefold() == "increment" and k < len(table.units)
+    ]
+    if not unit.per_second and increments and NUMBER.fullmatch(increments[0]) and float(increments[0]) > 0:
+        unit = TimeUnit(unit.name, 1 / float(increments[0]))
+    if not unit.per_second:
+        raise OptionError("time_unit", f"must be given for {path}: the rate of {names[column]}, such as 16MHz")
+    return unit, given is None and not word
 
 
-def _of_sigrok(comments: list[str], pattern: str) -> str:
+def check_seconds(
+    path: Path, header: Header, options: TextOptions, distances: NDArray[np.float64], what: str, *, whole: bool
+) -> None:
+    """Check that times, of which nothing says the unit, make sense as seconds.
+
+    Parameters
+    ----------
+    distances : float64 array, seconds
+        Between edges, or whatever they date.
+    what : str
+        What they date.
+    whole : bool
+        Whether all times are whole numbers.
+    """
+    if not header.assumed or options.slowest_s is None or not distances.size:
+        return
+    median = float(np.median(distances))
+    if median > options.slowest_s or (whole and median):
+        raise OptionError(
+            "time_unit",
+            f"must be given for {path}: as seconds, its {what} would be {median:.4g} s apart; it is s, ms, us, ns or "
+            "the rate of what counts the time, such as 16MHz",
+        )
+
+
+def _of_sigrok(comments: Sequence[str], pattern: str) -> str:
     return next((match[1].strip() for line in comments if (match := re.match(pattern, line))), "")
+
+
+def _increment(names: Sequence[str]) -> float | None:
+    """Return the samplerate of an oscilloscope that writes `tInc = 1e-06` among the names."""
+    matches = (re.fullmatch(rf"tInc\s*=\s*({NUMBER.pattern})s?", name) for name in names)
+    return next((1 / float(match[1]) for match in matches if match and float(match[1]) > 0), None)
 
 
 def _sigrok_period(rate: float) -> tuple[int, str]:
@@ -182,10 +269,6 @@ def _sigrok_period(rate: float) -> tuple[int, str]:
 
     It is a whole number: 24 MHz has 41 ns, which is off by 1.6 percent. So times divided by it are numbers of samples.
     """
-    units = enumerate(_SIGROK.values())
+    units = enumerate(("s", "ms", "us", "ns", "ps"))
     size, unit = next(((1000**k, unit) for k, unit in units if 1000**k >= rate), (1000**5, "fs"))
     return max(int(size // Fraction(rate)), 1), unit
-
-
-def _is_number(name: str) -> bool:
-    return re.fullmatch(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?", name, re.IGNORECASE) is not None

@@ -38,11 +38,11 @@ def _with_first_pulse(recording: Recording) -> Recording:
     later = recording.time[recording.time > 0]
     if not (later.size and recording.time[:2].tolist() == [0, 0] and recording.a[0] == 1):
         return recording
-    lines = {name: np.append(line[:1], line) for name, line in recording.lines.items()}
-    lines["a"][0] = 0
-    time = np.append(0, recording.time + later[0])
-    duration = recording.duration + float(later[0])
-    return replace(recording, time=time, duration=duration, source=recording.source, **lines)
+    lead = float(later[0])
+    a, b = (np.append(line[:1], line) for line in (recording.a, recording.b))
+    z, tick_in = (None if line is None else np.append(line[:1], line) for line in (recording.z, recording.tick_in))
+    a[0] = 0
+    return Recording(np.append(0, recording.time + lead), a, b, recording.duration + lead, z, tick_in, recording.source)
 
 
 def of_steps(recording: Recording, decoding: int) -> Recording:

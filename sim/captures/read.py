@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError
+from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.sigrok import read_sr
 from tachometry.sim.captures.text import read_csv
 from tachometry.sim.captures.vcd import read_vcd
@@ -29,8 +30,17 @@ class Reader(Protocol):
     ) -> Recording: ...
 
 
-READERS: dict[str, Reader] = {".sr": read_sr, ".csv": read_csv, ".csv.gz": read_csv, ".vcd": read_vcd}
+TEXTS = (".csv", ".txt", ".tsv", ".teeth")  # each may end in .gz, too
+READERS: dict[str, Reader] = {".sr": read_sr, ".vcd": read_vcd, **dict.fromkeys(TEXTS, read_csv)}
 _LOOKED_AT = 16  # channels; each takes as long as the capture
+# What other programs save for themselves, and how they write what others can read.
+_EXPORTS = {
+    ".sal": "in Saleae Logic 2: File, Export Data, CSV",
+    ".logicdata": "in Saleae Logic 1: Options, Export data, CSV",
+    ".bin": "in Saleae Logic 2, or in the oscilloscope: export as CSV instead of binary",
+    ".dsl": "in DSView: File, Export, as .csv or .sr",
+    ".fst": "with `fst2vcd FILE.fst -o FILE.vcd`, which comes with GTKWave",
+}
 
 
 def read_capture(
@@ -40,24 +50,24 @@ def read_capture(
     samplerate_hz: float | None = None,
     z: Channel | None = None,
     tick_in: Channel | None = None,
-    time: Channel | None = None,
+    text: TextOptions = PLAIN,
 ) -> Recording:
     """Read the encoder lines from a capture; the suffix tells its kind.
 
     Parameters
     ----------
     path : path
-        A sigrok session `.sr` (see `read_sr`), a text `.csv` or `.csv.gz` (see `read_csv`) or a waveform `.vcd` (see
-        `read_vcd`).
+        A sigrok session `.sr` (see `read_sr`), a text `.csv`, `.txt`, `.tsv` or `.teeth`, or one of these with `.gz`
+        (see `read_csv`), or a waveform `.vcd` (see `read_vcd`).
     a, b : str, int or None
         Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named A and B
         (in any case) if there are both, else the first two.
     samplerate_hz : float or None, Hz
-        Only for a `.sr` or `.csv` that has neither a samplerate nor times.
+        Only for a `.sr` or a text that has neither a samplerate nor times.
     z, tick_in : str, int or None
         Channels of the index line and of the external tick, likewise; what is not given, the recording has not.
-    time : str, int or None
-        Only for a `.csv`: column of the times, see `read_csv`.
+    text : TextOptions
+        Only for a text, see `read_csv`.
 
     Raises
     ------
@@ -65,13 +75,22 @@ def read_capture(
         If the suffix is another one, or as the reader of that kind says.
     """
     path = Path(path)
-    reader = next((reader for suffix, reader in READERS.items() if path.name.lower().endswith(suffix)), None)
+    packed = path.suffix.lower() == ".gz"
+    kind = path.with_suffix("").suffix.lower() if packed else path.suffix.lower()
+    reader = READERS.get(kind) if not packed or kind in TEXTS else None
     if reader is None:
-        raise CaptureError(f"a capture must be a .sr, .csv, .csv.gz or .vcd file, not {path}")
-    if time is not None:
-        if reader is not read_csv:
-            raise OptionError("time", f"must not be given for {path}: it has its times")
-        reader = functools.partial(read_csv, time=time)
+        how = f": export it {_EXPORTS[kind]}" if kind in _EXPORTS else ""
+        raise CaptureError(
+            f"a capture must be a .sr, .vcd, .csv, .txt, .tsv or .teeth file, or .csv.gz, not {path}{how}"
+        )
+    if reader is read_csv:
+        reader = functools.partial(read_csv, options=text)
+    else:
+        for option in ("time", "unit", "threshold"):
+            if getattr(text, option) is not None:
+                name = "time_unit" if option == "unit" else option
+                why = "it has levels" if option == "threshold" else "it has its times"
+                raise OptionError(name, f"must not be given for {path}: {why}")
     others = {name: channel for name, channel in (("z", z), ("tick_in", tick_in)) if channel is not None}
     recording = reader(path, a, b, samplerate_hz, others)
     return _with_moving(recording, lambda number: reader(path, number, SAME, samplerate_hz, NONE))

@@ -84,13 +84,14 @@ def read_sr(
     with reading(path), _damage_named(path), _Bounded(path) as file, zipfile.ZipFile(file) as archive:
         session = _read_session(path, archive)
         rate = agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
-        bits = choose_channels(path, session.channels, a, b, others)
+        lines = choose_channels(path, session.channels, a, b, others)
+        bits = tuple(line.number for line in lines)
         sample, level, n_samples = _changes(session, bits, _pieces(path, archive, session, _piece))
     if n_samples == 0:
         raise CaptureError(f"{path} must have at least one sample, not 0")
     duration = float(divide(np.array([n_samples]), rate, up=True)[0])
     recording = Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *others))
-    return named(recording, session.channels, bits)
+    return named(recording, session.channels, lines)
 
 
 def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chunk: int = CHUNK) -> None:

@@ -60,7 +60,7 @@ def read_vcd(
         tokens = _tokens(path, file)
         names, codes, scale = _declarations(path, tokens)
         numbers = choose_channels(path, names, *_default(names, a, b), others)
-        lines = dict(zip(("a", "b", *others), (codes[k] for k in numbers), strict=True))
+        lines = dict(zip(("a", "b", *others), (codes[line.number] for line in numbers), strict=True))
         return named(_changes(path, tokens, lines, scale), names, numbers)
 
 

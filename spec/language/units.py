@@ -63,6 +63,7 @@ DEGREES = {"deg": Unit()}
 BANDWIDTH = {"rad/s": Unit(), **{name: Unit(unit.size, Fraction(2)) for name, unit in FREQUENCY.items()}}
 FRACTION = {"": Unit(), "%": Unit(Fraction(1, 100))}
 PLAIN = {"": Unit()}
+VOLTAGE = _decimal(V=0, mV=-3)
 CURRENT = _decimal(A=0, mA=-3)
 TORQUE_CONSTANT = {"Nm/A": Unit(), "mNm/A": Unit(Fraction(1, 1000))}
 TORQUE = _decimal(Nm=0, mNm=-3)

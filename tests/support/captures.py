@@ -1,12 +1,14 @@
 """Captures that are made for tests."""
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.signals.recording import PinTrace, Recording
 
@@ -59,8 +61,10 @@ def make_csv(path: Path, text: str | bytes) -> Path:
 # Round trips
 
 
-def assert_error(path: Path, message: str, **options: str | int | float | None) -> None:
+def assert_error(
+    path: Path, message: str, *, time: str | None = None, text: TextOptions = PLAIN, **options: str | int | float | None
+) -> None:
     with pytest.raises(CaptureError) as caught:
-        read_capture(path, **options)  # type: ignore[arg-type]
+        read_capture(path, text=replace(text, time=time), **options)  # type: ignore[arg-type]
     assert str(caught.value) == message.replace("PATH", str(path))
     assert "\n" not in str(caught.value)

@@ -26,6 +26,8 @@ _TEXTS = {
     "control.csv": _MOTION + "0,0\n1,\x1b]0;title\x07\x9b31m\n",
     "one-row.csv": _MOTION + "0,0\n",
     "good.csv": _CAPTURE + "0,0,0\n0.0001,1,0\n0.0002,1,1\n0.0005,1,1\n",
+    "slow.csv": _CAPTURE + "0,0,0\n0.5,1,0\n1.0,1,1\n1.5,0,1\n",
+    "whole.csv": _CAPTURE + "0,0,0\n1,1,0\n2,1,1\n3,0,1\n",
     "overflow.csv": _CAPTURE + "-1e308,0,0\n1e308,1,0\n",
     "late.csv": _CAPTURE + "0,0,0\n1e29,1,0\n",
     "nan-time.csv": _CAPTURE + "0,0,0\nnan,1,0\n",

@@ -100,7 +100,7 @@ def test_csv_of_others(header: str, row: str, options: str, tmp_path: Path, caps
     lines = [row.format(*one, one[0] * 1e6) for one in [*rows, (recording.duration, recording.a[-1], recording.b[-1])]]
     if ";" in row:
         lines = [line.replace(".", ",") for line in lines]
-    (tmp_path / "c.csv").write_text("\n".join([header, *lines]), encoding="utf-8")
+    (tmp_path / "c.csv").write_text("\n".join([header, *lines, ""]), encoding="utf-8")
     assert run("replay", tmp_path / "c.csv", *CORE, *options.split()) == 0
     assert "counts out 62" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
 
@@ -115,7 +115,7 @@ def test_samplerate(tmp_path: Path) -> None:
     ("name", "options", "message"),
     [
         ("none.sr", "", "none.sr does not exist"),
-        ("c.txt", "", "a capture must be a .sr, .csv, .csv.gz or .vcd file, not"),
+        ("c.bin", "", "a capture must be a .sr, .vcd, .csv, .txt, .tsv or .teeth file, or .csv.gz, not"),
         ("empty.csv", "", "header of"),
         ("text.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
         ("cut.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
@@ -146,7 +146,7 @@ def test_what_cannot_be_is_told_in_one_line(
     (tmp_path / "cut.csv").write_text("time,a,b\n0.0,0,0\n0.1,1")
     (tmp_path / "short.csv").write_text("time,a,b\n0.0,0,0\n0.00001,1,0\n0.00005,1,0\n")
     (tmp_path / "text.sr").write_text("text")
-    for empty in ("c.txt", "empty.csv"):
+    for empty in ("c.bin", "empty.csv"):
         (tmp_path / empty).write_text("")
     (tmp_path / "folder.sr").mkdir()
     before = sorted(tmp_path.iterdir())

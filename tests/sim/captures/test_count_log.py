@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[3]
 def log(folder: Path, counts: list[int], wrap: int | None = None, head: str = "time [ms],n") -> CountLog:
     rows = [f"{5 * k},{count}" for k, count in enumerate(counts)]
     (folder / "log.csv").write_text("\n".join([head, *rows, ""]))
-    return read_count_log(folder / "log.csv", "n", None, wrap)
+    return read_count_log(folder / "log.csv", "n", wrap=wrap)
 
 
 @pytest.mark.parametrize("decoding", [1, 2, 4])
@@ -65,12 +65,12 @@ def test_of_rows_with_one_time_the_last_holds(tmp_path: Path) -> None:
     [
         ("0,0", "must have at least two rows after its header, not 1"),
         ("0,0\n0,1", "must not all be equal"),
-        ("0,0\n1,x", "line 3: time and count must be numbers, not '1,x'"),
-        ("0,0\n1", "line 3: time and count must be numbers, not '1'"),
-        ("0,0\n1,1.5", "line 3: count must be a whole number up to 2^53, not 1.5"),
-        ("0,0\n1,inf", "line 3: count must be a whole number"),
+        ("0,0\n1,x", "line 3: n must be a whole number up to 2^53, not 'x'"),
+        ("0,0\n1", "line 3: a row must have 2 fields (time,n), not 1"),
+        ("0,0\n1,1.5", "line 3: n must be a whole number up to 2^53, not '1.5'"),
+        ("0,0\n1,inf", "line 3: n must be a whole number up to 2^53, not 'inf'"),
         ("0,0\nnan,1", "line 3: time must be"),
-        ("2,0\n1,1", "line 3: time must be at least 2 s as before, not 1"),
+        ("2,0\n1,1", "line 3: time must be at least 2.0 s as before, not 1.0 s"),
         ("0,0\n1,99999999", "at most 10000000 edges to and fro, not 99999999"),
     ],
 )

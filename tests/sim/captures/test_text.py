@@ -14,6 +14,7 @@ from support import docs
 from support.captures import MEGAHERTZ, assert_same, make_csv, make_sr, random_trace
 
 from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.header import TextOptions
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.captures.sigrok import divide, read_sr, write_sr
 from tachometry.sim.captures.text import read_csv, write_csv
@@ -304,16 +305,16 @@ def test_column_of_the_times(tmp_path: Path, time: str | int) -> None:
     make_csv(tmp_path / "x.csv", "time,when [ms],left,right\n0,0,0,1\n1,1000,1,1\n1,2000,1,1\n")
     wanted = Recording(np.array([0.0, 1.0]), np.array([0, 1], np.uint8), np.array([1, 1], np.uint8), 2.0)
     for a, b in (("left", "right"), (1, 2), ("1", "right")):
-        assert_same(read_capture(tmp_path / "x.csv", a, b, time=time), wanted)
+        assert_same(read_capture(tmp_path / "x.csv", a, b, text=TextOptions(time)), wanted)
 
 
 def test_examples_of_the_documentation(tmp_path: Path) -> None:
-    page = docs.page("guides/encoder.md")
+    page = docs.page("guides/encoder.md").partition("## Logs of time and count")[0]
     examples = re.findall(r"```csv\n(.*?)```", page, re.DOTALL)
     assert len(examples) == 3
     for text in examples:
         time = "when" if "when" in text else None
-        recording = read_capture(make_csv(tmp_path / "x.csv", text), time=time)
+        recording = read_capture(make_csv(tmp_path / "x.csv", text), text=TextOptions(time))
         np.testing.assert_allclose(recording.time, [0, 0.25e-3, 0.5e-3, 0.75e-3])
         assert (recording.a.tolist(), recording.b.tolist()) == ([0, 1, 1, 0], [0, 0, 1, 1])
 

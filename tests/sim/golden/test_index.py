@@ -91,7 +91,7 @@ def test_captures_keep_the_index(name: str, tmp_path: Path) -> None:
 
 def test_levels_of_the_index_are_checked(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("time,a,b,z\n0,0,0,2\n")
-    with pytest.raises(CaptureError, match=r"line 2: level of z must be 0 or 1, not 2$"):
+    with pytest.raises(CaptureError, match=r"line 2: level of z must be 0 or 1, not '2' "):
         read_capture(tmp_path / "x.csv", z="z")
 
 
