@@ -97,8 +97,10 @@ for bit, and float models of what other projects use and of estimators in the li
   timer, two block RAMs and ticks of about 800 clocks. With a bad disc, tell it so (`--edge-error 0.6`): with the
   default it takes the disc's errors for changes of the speed.
 - *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 18 µs, down to a clock; it is the
-  smallest but for M, it has no divider, and it is good around multiples of the unit velocity. Ticks should be long: its
-  error at more than a count per tick is a part of the unit velocity.
+  smallest but for M, it has no divider, and its steady error is least around multiples of the unit velocity. After
+  a step to just such a speed it shows the speed before for the maximum time, though
+  ([S](../concepts/s-method.md#what-it-measures)). Ticks should be long: its error at more than a count per tick is a
+  part of the unit velocity.
 - *M/T*: use it if a fast timer and a divider are available, and bounds of the speed are wanted or half of the area of
   tracking. A longer `--min-time` gives less noise and more delay, as averaging does. On a lattice (`--timer tick`) it
   equals M at high speeds.

@@ -39,6 +39,11 @@ class SForm(Follows["STachometer"]):
         return self.spec.timing.max_ticks // 2
 
     @property
+    def rest_divisor(self) -> int:
+        """After a long rest, the first update at one count per tick has at most the speed divided by this."""
+        return (self.kept_ticks + 1) * (2 if self.spec.cancel else 1)
+
+    @property
     def max_numerator(self) -> int:
         """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
         return 2 * self.spec.widths.max_count * self.numerator_per_count + self.spec.bounds * self.margin
@@ -158,8 +163,15 @@ class SWords(Words["STachometer"]):
     def remark(self) -> str:
         return (
             "At a multiple of the unit velocity m_s would be infinite. At one, and nearer to it than "
-            f"1/{self.spec.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error."
+            f"1/{self.spec.timing.max_ticks} of the unit,\nupdates are forced, and Q_V is the bound of their error.\n"
+            f"After a step to a multiple the velocity stays that before it for the maximum time, but for {self._step}: "
+            f"from rest\nto exactly one count per tick at most 1/{self.spec.form.rest_divisor} of the speed is shown "
+            "till then."
         )
+
+    @property
+    def _step(self) -> str:
+        return "1/(2*m_s) of the step" if self.spec.cancel else "1/m_s of the step"
 
     @property
     def memory(self) -> tuple[str, int, int] | None:

@@ -115,3 +115,17 @@ def test_bounds_are_a_count_and_the_edge_error_over_the_window(name: str, cancel
     assert found["velocity_lower"].tolist() == [floor((x - d) * 2**7) for x, d in zip(exact, off, strict=True)]
     assert found["velocity_upper"].tolist() == [ceil((x + d) * 2**7) for x, d in zip(exact, off, strict=True)]
     assert found["bounds_valid"].tolist() == [k > 0 for k in range(len(updates))]
+
+
+@pytest.mark.parametrize("cancel", [True, False])
+def test_a_step_to_a_whole_number_of_counts_is_shown_after_the_maximum_time(cancel: bool) -> None:
+    """1/(2·m_s) of the step, or 1/m_s of it, is shown till then; 14.4 of 1500 rpm after 51 ticks of rest."""
+    most, parts = 500, 2 if cancel else 1
+    for rest, counts in [(51, 1), (51, 7), *((500 + more, 1) for more in range(0, 500, 83))]:
+        found = [row for row in results([0] * rest + [counts] * 1000, most, cancel=cancel) if row[0] >= rest]
+        (tick, m_s, forced, _, raw), (after, _, late, _, right) = found[:2]
+        assert (tick, forced, after, late) == (rest, False, rest + most, True)
+        assert raw == rounded(Fraction(counts, parts * m_s), 16)
+        assert right == counts << 16
+        assert rest < most or m_s * parts >= model(most, cancel=cancel)._spec.form.rest_divisor
+    assert round(1500 / (2 * 52), 1) == 14.4
