@@ -1,6 +1,7 @@
 """Outputs appear whole and all together, or not at all; caches have a folder that can be written."""
 
 import errno
+import itertools
 import os
 import shutil
 import sys
@@ -90,6 +91,14 @@ class Outputs:
         self._check()
         for target in self._targets.values():
             self._stage(target)
+
+    def keep(self, what: str, part: Path) -> Path:
+        """Put a part of the output `what` beside its target, which stays as it was; its path, at which nothing was."""
+        target = self._targets.pop(what)
+        names = (f"{target.stem}.part{number or ''}{part.suffix}" for number in itertools.count())
+        kept = next(path for path in map(target.with_name, names) if not path.exists())
+        part.replace(kept)
+        return kept
 
     def _check(self) -> None:
         taken: dict[str, str] = {}

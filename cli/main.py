@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
-from tachometry.cli.reports.streams import INTERNAL, INTERRUPTED, UNREAD, prepare_streams, printable, silence
+from tachometry.cli.reports.streams import INTERNAL, INTERRUPTED, STOPS, UNREAD, prepare_streams, printable, silence
 
 _LONGEST = 2000  # characters of a message, which may quote what is in a file
 
@@ -35,13 +35,13 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
 
 
 class _Interrupts:
-    """Ctrl-C and SIGTERM: while commands are imported they end the process, then they raise KeyboardInterrupt."""
+    """Let signals that stop a command end the process while commands are imported, then raise KeyboardInterrupt."""
 
     def __init__(self) -> None:
         self.heard = False
         self._ready = False
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in STOPS:
                 if signal.getsignal(number) is not signal.SIG_IGN:
                     signal.signal(number, self._hear)
 

@@ -27,12 +27,11 @@ from tachometry.cli.options.core import OPTIONAL_CORE_OPTIONS, CoreTexts
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.options.target import SIMULATED, Target, target_of
 from tachometry.cli.reports.monitor import SelftestReport, display
-from tachometry.spec.language.units import parse_time
+from tachometry.cli.reports.streams import STOPS
+from tachometry.spec.language.units import parse_time, plural
 from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
 
 _GROUP = "Monitor"
-# A terminal that is closed, too, where there is this signal.
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _ORDERLY = 3.0  # seconds that an end may take before it can be interrupted
 
 
@@ -151,23 +150,36 @@ def monitor(
     state = State(target.title, target.registers.spec, shown, recorded="" if record is None else str(record))
     screen = display(plain)
     failure: Exception | None = None
-    with _interrupts() as stop, outputs, ExitStack() as stack:
-        where, recorder = outputs.get("--record"), None
-        if where is not None and record is not None:
-            recorder = stack.enter_context(Recorder(where, record.suffix.lower(), list(shown.values())))
+    with _interrupts() as stop, outputs:
+        where = outputs.get("--record")
+        recorder = None if where is None else Recorder(where, where.suffix.lower(), list(shown.values()))
         try:
-            name = stack.enter_context(target.presence())
-            label, described = target.label(name), target.manifest
-            session = Session(label, lambda: target.open(name), described, period, settings, screen.notice)
-            with screen:
-                watch(session, state, screen, recorder, seconds, stop)
+            with ExitStack() as stack:
+                if recorder is not None:
+                    stack.enter_context(recorder)
+                name = stack.enter_context(target.presence())
+                label, described = target.label(name), target.manifest
+                session = Session(label, lambda: target.open(name), described, period, settings, screen.notice)
+                with screen:
+                    watch(session, state, screen, recorder, seconds, stop)
         except Exception as error:
-            if recorder is None or not recorder.rows:
+            if recorder is None or record is None or not recorder.rows:
                 raise
+            if not recorder.whole:
+                raise _kept(outputs, recorder, record, error) from error
             failure = error  # what was recorded before is kept
     if failure is not None:
         raise failure
     return 0
+
+
+def _kept(outputs: Outputs, recorder: Recorder, record: Path, error: Exception) -> Exception:
+    """Keep the rows of a recording that could not be written to its end, and return an error that says where."""
+    part, rows = recorder.saved()
+    if not rows or not isinstance(error, OSError):
+        return error
+    kept = outputs.keep("--record", part)
+    return OSError(f"cannot write {record}: {error.strerror or error}; {plural(rows, 'row')} kept in {kept}")
 
 
 def _selftest(target: Target) -> int:
@@ -215,7 +227,7 @@ def _interrupts() -> Iterator[threading.Event]:
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = {number: signal.signal(number, hear) for number in _SIGNALS}
+    before = {number: signal.signal(number, hear) for number in STOPS}
     try:
         yield stop
     finally:

@@ -154,8 +154,11 @@ def _check(
 
 
 def _heed_only_the_pool() -> None:
-    """In a process of the pool: ignore Ctrl-C, which the main process handles by ending the others; end after it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """In a process of the pool: ignore Ctrl-C and a closed terminal, at which the main process ends the others; end
+    after it.
+    """
+    for name in {"SIGINT", "SIGHUP"} & set(dir(signal)):
+        signal.signal(getattr(signal, name), signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
 

@@ -48,6 +48,18 @@ main(sys.argv[2:])
 """
 
 
+# A function of a command is stopped when it begins.
+STOPPED = """
+import importlib, os, signal, sys
+from tachometry.cli.main import main
+module, _, name = "{where}".rpartition(".")
+def stopped(*_, **__):
+    os.kill(os.getpid(), signal.{stop})
+setattr(importlib.import_module(module), name, stopped)
+main(sys.argv[1:])
+"""
+
+
 @pytest.mark.parametrize(
     "module",
     [
@@ -60,6 +72,21 @@ def test_ctrl_c_during_an_import(module: str, tmp_path: Path) -> None:
     words = [sys.executable, "-c", INTERRUPTED, module, *SIMULATE, "--trace", "new/t.csv"]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "tachometry: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("stop", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize(
+    ("words", "where"),
+    [
+        (["generate", "--ppr", "9", "-o", "out"], "tachometry.cli.commands.generate.export"),
+        ([*SIMULATE, "--trace", "out/t.csv"], "tachometry.cli.options.outputs.write_trace"),
+    ],
+)
+def test_whatever_stops_a_command_leaves_nothing(stop: str, words: list[str], where: str, tmp_path: Path) -> None:
+    code = STOPPED.format(stop=stop, where=where)
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (130, "tachometry: interrupted\n")
     assert list(tmp_path.iterdir()) == []
 
 

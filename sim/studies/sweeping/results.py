@@ -113,7 +113,7 @@ class Results:
         self._new.append(row)
         self._saved = False
         if self._journal is not None:
-            with self._writing(Path(self._journal.name)):
+            with self._writing():
                 self._journal.write(f"{json.dumps(row)}\n")
                 self._journal.flush()
             self._n_kept += 1
@@ -145,7 +145,7 @@ class Results:
         place = {point: k for k, point in enumerate(self._points)}
         order = [place.get(point, len(place)) for point in self._table["point"].to_pylist()]
         table = self._table.take(pc.array_sort_indices(pa.array(order, pa.int64())))
-        with self._writing(self._path), replacing(self._path) as beside, beside.open("wb") as file:
+        with self._writing(), replacing(self._path) as beside, beside.open("wb") as file:
             pq.write_table(table, file)
         self._n_kept = len(table)
 
@@ -153,9 +153,8 @@ class Results:
         """Begin an empty journal; the old one's rows are in the file."""
         assert self._path is not None
         self._close_journal()
-        path = self._path.with_name(f".{self._path.name}.new")
-        with self._writing(path):
-            self._journal = path.open("w", encoding="ascii")
+        with self._writing():
+            self._journal = self._path.with_name(f".{self._path.name}.new").open("w", encoding="ascii")
             self._journal.write(f"{_made_by()}\n")
             self._journal.flush()
 
@@ -165,14 +164,14 @@ class Results:
                 self._journal.close()
 
     @contextmanager
-    def _writing(self, path: Path) -> Iterator[None]:
-        """Report which file could not be written, and what was saved nevertheless."""
+    def _writing(self) -> Iterator[None]:
+        """Report that the results could not be written, and what was saved nevertheless."""
         try:
             yield
         except OSError as error:
             rows = "row is" if self._n_kept == 1 else "rows are"
             kept = f"; {self._n_kept} {rows} kept, and the same command goes on from there" if self._n_kept else ""
-            raise OSError(f"cannot write {path}: {error.strerror or error}{kept}") from error
+            raise OSError(f"cannot write {self._path}: {error.strerror or error}{kept}") from error
 
     def _release(self) -> None:
         try:

@@ -89,6 +89,12 @@ def test_parquet_says_the_same(tmp_path: Path) -> None:
     assert [[text(value) for value in row.values()] for row in table.to_pylist()] == rows[1:]
 
 
+def test_parquet_without_a_row(tmp_path: Path) -> None:
+    written(tmp_path / "a.parquet", demo_map(), [])
+    assert pyarrow.parquet.read_table(tmp_path / "a.parquet").num_rows == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["a.parquet"]
+
+
 def test_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(OSError, match=r"^recordings in Parquet need pyarrow: pip install 'tachometry\[host\]'$"):

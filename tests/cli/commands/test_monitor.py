@@ -132,6 +132,36 @@ def test_interrupted_recordings_are_complete(stops: signal.Signals, tmp_path: Pa
     assert sorted(file.name for file in tmp_path.iterdir()) == ["demo.json", "run.csv"]
 
 
+FULL = """
+import resource, sys
+from tachometry.cli.main import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_full_disk_leaves_the_old_recording_and_keeps_the_rows(suffix: str, tmp_path: Path, manifest: Path) -> None:
+    path = tmp_path / f"run{suffix}"
+    path.write_text("the old one")
+    (tmp_path / "run.part.csv").write_text("of the last full disk")
+    with SimulatedBoard(ToldBoard(demo_map()), CLOCK_HZ) as board:
+        words = ["monitor", board.path, "--manifest", str(manifest), "--every", "1ms", "--record", str(path)]
+        done = subprocess.run([sys.executable, "-c", FULL, *words], capture_output=True, text=True)
+    kept = tmp_path / "run.part1.csv"
+    head, *rows = kept.read_text().splitlines()
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == (
+        f"tachometry: error: cannot write {path}: File too large; {len(rows)} rows kept in {kept}"
+    )
+    assert len(rows) > 100
+    assert {row.count(",") for row in rows} == {head.count(",")}
+    assert kept.read_bytes().endswith(b"\n")
+    assert path.read_text() == "the old one"
+    names = {path.name, kept.name, "run.part.csv", manifest.name}
+    assert {file.name for file in tmp_path.iterdir()} == names
+
+
 def test_a_board_that_is_served(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Another process runs it; the manifest that it wrote is what the monitor needs."""
     path = tmp_path / "sim.json"

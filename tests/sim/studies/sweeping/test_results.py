@@ -137,7 +137,7 @@ def test_a_disk_that_is_full_in_the_middle(tmp_path: Path) -> None:
     for name in "ab":
         results.add(row(name))
     with files_up_to((tmp_path / ".r.parquet.new").stat().st_size + 99):
-        with pytest.raises(OSError, match=r"^cannot write .*/\.r\.parquet\.new: .*; 2 rows are kept, "):
+        with pytest.raises(OSError, match=r"^cannot write .*/r\.parquet: .*; 2 rows are kept, "):
             results.add(row("c"))
         with pytest.raises(OSError, match=message):
             results.__exit__()
@@ -149,7 +149,7 @@ def test_a_disk_that_is_full_in_the_middle(tmp_path: Path) -> None:
 
 def test_a_disk_that_is_full_at_the_start(tmp_path: Path) -> None:
     path = tmp_path / "r.parquet"
-    with files_up_to(9), pytest.raises(OSError, match=r"^cannot write .*/\.r\.parquet\.new: [^;]*$"):
+    with files_up_to(9), pytest.raises(OSError, match=r"^cannot write .*/r\.parquet: [^;]*$"):
         Results(path, ["a"]).__enter__()
     assert list(tmp_path.iterdir()) == []
 
