@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from tachometry.cli.options.motion import tables_of
+from tachometry.sim.signals.files import read_text
 from tachometry.spec.language.option import ParameterError, parse_flag
 from tachometry.spec.language.units import QUANTITY, ratio
 
@@ -18,6 +19,7 @@ Text = str | None  # None: without the option
 
 _RANGE = re.compile(rf"{QUANTITY}\s*\.\.\s*{QUANTITY}\s*:\s*(\d{{1,30}})\s*(log)?")
 _MOST = 100_000  # values of an axis
+_MOST_TOML = 1 << 20  # bytes
 _DIGITS = 4  # of values between the ends of a logarithmic range
 _LISTS = ("methods", "axes")
 
@@ -82,7 +84,7 @@ def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
         If it cannot be read.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(read_text(path, _MOST_TOML))
     except RecursionError:
         raise ValueError(f"{path} must be TOML of few levels: it is nested too deeply") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

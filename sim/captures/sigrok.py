@@ -5,7 +5,6 @@ The format is described at https://sigrok.org/wiki/File_format:Sigrok/v2. Both w
 with the edges and with one chunk, never with the length of the capture.
 """
 
-import configparser
 import io
 import os
 import re
@@ -81,6 +80,8 @@ def read_sr(
     path = Path(path)
     if samplerate_hz is not None and not 0 < samplerate_hz < float("inf"):
         raise CaptureError(f"samplerate must be above 0 Hz and finite, not {samplerate_hz} Hz")
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise CaptureError(f"{path} must be a regular file")
     with reading(path), _damage_named(path), _Bounded(path) as file, zipfile.ZipFile(file) as archive:
         session = _read_session(path, archive)
         rate = agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
@@ -210,12 +211,8 @@ def _read_session(path: Path, archive: zipfile.ZipFile) -> _Session:
     version = _small(path, archive, "version").strip()
     if version not in (b"1", b"2"):
         raise CaptureError(f"version of sigrok session {path} must be 1 or 2, not {version.decode('latin-1')!r}")
-    ini = configparser.ConfigParser(interpolation=None, delimiters=("=",), comment_prefixes=("#",))
-    try:
-        ini.read_string("\n".join(_small(path, archive, "metadata").decode().splitlines()))
-    except (configparser.Error, UnicodeDecodeError) as error:
-        raise CaptureError(f"metadata of {path} must be an INI text: {' '.join(str(error).split())}") from error
-    devices = [ini[name] for name in ini.sections() if name.startswith("device ") and "capturefile" in ini[name]]
+    ini = _metadata_of(path, archive)
+    devices = [ini[name] for name in ini if name.startswith("device ") and "capturefile" in ini[name]]
     if not devices:
         raise CaptureError(f"{path} must have logic samples, but its metadata names no capturefile")
     device = devices[0]
@@ -229,6 +226,26 @@ def _read_session(path: Path, archive: zipfile.ZipFile) -> _Session:
     channels = {number - 1: name.strip() or f"D{number - 1}" for number, name in probes}
     members = _members(path, archive, device["capturefile"].strip())
     return _Session(path, channels, int(unitsize), parse_samplerate(path, device.get("samplerate")), members)
+
+
+def _metadata_of(path: Path, archive: zipfile.ZipFile) -> dict[str, dict[str, str]]:
+    """Return the sections of the metadata; a parser of the library takes a time that is quadratic in blanks."""
+    sections: dict[str, dict[str, str]] = {}
+    section: dict[str, str] | None = None
+    try:
+        lines = _small(path, archive, "metadata").decode().splitlines()
+    except UnicodeDecodeError as error:
+        raise CaptureError(f"metadata of {path} must be an INI text: {error}") from error
+    for number, line in enumerate(map(str.strip, lines), 1):
+        key, equals, value = line.partition("=")
+        key = key.strip().lower()
+        if line.startswith("[") and line.endswith("]") and line[1:-1] not in sections:
+            section = sections.setdefault(line[1:-1], {})
+        elif section is not None and equals and key and key not in section:
+            section[key] = value.strip()
+        elif line and not line.startswith("#"):
+            raise CaptureError(f"metadata of {path} must be an INI text: line {number} must not be {line[:60]!r}")
+    return sections
 
 
 def _members(path: Path, archive: zipfile.ZipFile, capturefile: str) -> list[zipfile.ZipInfo]:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tachometry.sim.signals.files import read_text
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.units import ANGLE, FREQUENCY, SPEED, TIME, Units, read_nearest
 
@@ -30,6 +31,7 @@ _FIELDS: dict[str, dict[str, Units]] = {
 }
 _FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items())
 _CSV_HEADER = ["time", "angle_rad"]
+_MOST_CSV = 1 << 26  # bytes
 _BELOW = 1e30  # times, angles, speeds and accelerations: what is computed of them is finite
 
 # (-1)^n (2 pi)^(2n+1) / (2n+1)!, highest power first
@@ -293,12 +295,12 @@ def _parse_segment(text: str) -> list[_Segment]:
 
 def _read_csv(file: str) -> Motion:
     try:
-        lines = Path(file).read_text(encoding="utf-8-sig").splitlines()
+        lines = read_text(Path(file), _MOST_CSV).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise ValueError(f"motion file {file!r} cannot be read: {reason}") from error
     if not lines or [cell.strip() for cell in lines[0].split(",")] != _CSV_HEADER:
-        raise ValueError(f"{file}:1: header must be 'time,angle_rad', not {lines[0] if lines else ''!r}")
+        raise ValueError(f"{file}:1: header must be 'time,angle_rad', not {lines[0][:60] if lines else ''!r}")
     rows: list[tuple[float, float]] = []
     for number, line in enumerate(lines[1:], start=2):
         if not line.strip():
@@ -306,7 +308,7 @@ def _read_csv(file: str) -> Motion:
         try:
             time, angle = map(float, line.split(","))
         except ValueError:
-            raise ValueError(f"{file}:{number}: row must be two numbers TIME,ANGLE, not {line!r}") from None
+            raise ValueError(f"{file}:{number}: row must be two numbers TIME,ANGLE, not {line[:60]!r}") from None
         if not (math.isfinite(time) and math.isfinite(angle)):
             raise ValueError(f"{file}:{number}: time and angle must be finite, not {line!r}")
         if rows and time <= rows[-1][0]:

@@ -85,8 +85,12 @@ class Term(IntEnum):
 GAINS = tuple(term for term in Term if not term.tabled)
 
 
+_LONGEST = Fraction(177)  # e^−177 > 2^−256
+
+
 def decay(exponent: Fraction) -> Fraction:
-    """Return e^−exponent to 60 digits."""
+    """Return e^−exponent to 60 digits, and never less than 2^−256, far below what a coefficient shows."""
+    exponent = min(exponent, _LONGEST)
     with localcontext() as context:
         context.prec = 70
         return Fraction((-Decimal(exponent.numerator) / Decimal(exponent.denominator)).exp())

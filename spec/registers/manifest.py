@@ -31,10 +31,21 @@ _KEYWORDS = frozenset(
     with within
     """.split()
 )
+# Also those of VHDL, which a module may be an entity of, its first library, and the devices of Windows; in any case.
+_OF_OTHERS = frozenset(
+    """
+    abs access after all architecture array attribute block body buffer bus component configuration context default
+    disconnect downto elsif entity exit file generic group guarded impure in is label library linkage literal loop map
+    mod new next nor of on open others out parameter port postponed procedure process pure range record register reject
+    rem report return rol ror select severity shared signal sla sll sra srl subtype then to transport type unaffected
+    units until use variable vmode vprop vunit wait when work xnor xor
+    std con prn aux nul
+    """.split()
+) | {f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10)}
 
 
 def check_module_name(name: str) -> str:
-    """Return `name`, if it can be the name of a Verilog module.
+    """Return `name`, if it can be the name of a Verilog module, of an entity of VHDL, and of files.
 
     Raises
     ------
@@ -43,6 +54,8 @@ def check_module_name(name: str) -> str:
     """
     if name in _KEYWORDS:
         raise ParameterError("name", f"must not be a Verilog keyword, which {name!r} is")
+    if name.casefold() in _OF_OTHERS:
+        raise ParameterError("name", f"must not be a word of VHDL or a device of Windows, which {name!r} is")
     if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,63}", name) is None:
         raise ParameterError("name", f"must be a letter or _ and up to 63 letters, digits or _, not {name!r}")
     return name

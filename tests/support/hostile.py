@@ -76,6 +76,10 @@ def make_files(folder: Path) -> None:
         (folder / name).touch()
     for name in ("noise", "noise.csv", "noise.sr", "noise.vcd", "noise.parquet", "binary.toml"):
         (folder / name).write_bytes(_NOISE)
+    for name in ("zero.csv", "zero.toml", "zero.sr"):
+        (folder / name).symlink_to("/dev/zero")
+    (folder / "endless.csv").write_text("time,a,b\n" + "0" * (9 << 20), encoding="ascii")
+    make_sr(folder / "blanks.sr", [bytes(4)], comment="x" + " " * 900_000 + "y", probe9="X")
     (folder / "utf16.csv").write_text(_MOTION + "0,0\n1,1\n", encoding="utf-16")
 
     levels = bytes([0, 1, 3, 2] * 100)

@@ -105,8 +105,7 @@ def test_any_damage_is_a_capture_error(tmp_path: Path) -> None:
         ({"samplerate": "-1 Hz"}, "samplerate of PATH must be a number and Hz, kHz, MHz or GHz, not '-1 Hz'"),
         (
             {"samplerate": "1 MHz\nsamplerate=1 MHz"},
-            "metadata of PATH must be an INI text: While reading from '<string>' [line 8]: "
-            "option 'samplerate' in section 'device 1' already exists",
+            "metadata of PATH must be an INI text: line 8 must not be 'samplerate=1 MHz'",
         ),
     ],
 )
