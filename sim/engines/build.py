@@ -1,5 +1,6 @@
 """Runs the C++ compiler, and keeps what it made in a cache."""
 
+import ctypes
 import functools
 import hashlib
 import importlib.util
@@ -20,7 +21,7 @@ import platformdirs
 _FLAGS = ("-std=c++17", "-O2", "-w", "-fPIC", "-fvisibility=hidden", "-pthread")
 
 _UTF8: Any = {"encoding": "utf-8", "errors": "replace"}  # whatever the locale is
-_KEPT = 1000  # files
+_KEPT, _KEPT_BYTES = 1000, 256 << 20  # files, and their bytes
 _ABANDONED = 24 * 3600.0  # seconds after which a folder is no build that is under way
 
 
@@ -131,8 +132,10 @@ def compile_library(source: str, folder: Path, *more: str | Path) -> Path:
     (folder / "model.cc").write_text(source, encoding="utf-8")
     command = [*compiler(), *flags(), "-shared", "-o", "model.so", "model.cc", *more]
     run(command, f"{' '.join(compiler())} cannot compile the core", folder)
-    if not (folder / "model.so").exists():
-        raise OSError(f"{' '.join(compiler())} made no library of the core")
+    try:
+        ctypes.CDLL(str(folder / "model.so"))
+    except OSError:  # it is not there, or something else
+        raise OSError(f"{' '.join(compiler())} made no library of the core") from None
     return folder / "model.so"
 
 
@@ -189,7 +192,6 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     folder = cache_folder()
     if (found := _intact(folder, key)) is not None:
         return found
-    _prune(folder)
     try:
         with tempfile.TemporaryDirectory(prefix=".building-", dir=folder, ignore_cleanup_errors=True) as name:
             made = make(Path(name))
@@ -198,6 +200,7 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
             index = Path(name) / "index"
             index.write_text(target.name, encoding="ascii")
             index.replace(folder / key)
+            _prune(folder)
     except OSError as error:
         if error.errno is None or error.filename is not None:
             raise
@@ -206,7 +209,7 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
 
 
 def _intact(folder: Path, key: str) -> Path | None:
-    """Return the file of a key, if it is there and whole."""
+    """Return the file of a key, if it is there and whole; a library must load."""
     try:
         name = (folder / key).read_text(errors="replace")
         if not re.fullmatch(r"[0-9a-f]{64}\.\w+", name):
@@ -214,6 +217,8 @@ def _intact(folder: Path, key: str) -> Path | None:
         target = folder / name
         whole = hashlib.sha256(target.read_bytes()).hexdigest() == target.stem
         if whole:
+            if target.suffix == ".so":
+                ctypes.CDLL(str(target))
             os.utime(target)
             os.utime(folder / key)
     except OSError:
@@ -226,12 +231,16 @@ def _prune(folder: Path) -> None:
     aged = []
     for path in folder.iterdir():
         try:
-            age = time.time() - path.stat().st_mtime
+            status = path.stat()
+            age = time.time() - status.st_mtime
         except OSError:  # another run has removed it
             continue
         if not path.name.startswith(".building-"):
-            aged.append((age, path))
+            aged.append((age, path, status.st_size))
         elif age > _ABANDONED:
             shutil.rmtree(path, ignore_errors=True)
-    for _, path in sorted(aged)[_KEPT:]:
-        path.unlink(missing_ok=True)
+    n_bytes = 0
+    for number, (_, path, size) in enumerate(sorted(aged)):
+        n_bytes += size
+        if number >= _KEPT or n_bytes > _KEPT_BYTES:
+            path.unlink(missing_ok=True)

@@ -200,5 +200,27 @@ def test_what_was_not_used_for_longest_goes_first(folder: Path, monkeypatch: pyt
     assert make["c"].calls == 2
 
 
+def test_the_cache_is_bounded_by_bytes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build, "_KEPT_BYTES", 5000)
+    for name in "abcdef":
+        kept = cached(name, ".bin", Maker(name.encode() * 2000))
+    assert kept.exists()
+    assert sum(path.stat().st_size for path in folder.iterdir()) <= 5000
+
+
+def test_a_library_that_does_not_load_is_made_anew() -> None:
+    make = Maker(b"no library")
+    assert cached("one", ".so", make) == cached("one", ".so", make)
+    assert make.calls == 2
+
+
+def test_a_compiler_that_writes_garbage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cc").write_text("#!/bin/sh\n[ $1 = --version ] || echo garbage > model.so\n")
+    (tmp_path / "cc").chmod(0o755)
+    monkeypatch.setenv("CXX", str(tmp_path / "cc"))
+    with pytest.raises(OSError, match=r"/cc made no library of the core$"):
+        compile_library("int x;", tmp_path)
+
+
 def test_any_difference_gives_another_name() -> None:
     assert len({digest("a", "bc"), digest("ab", "c"), digest("abc"), digest(("a", "bc"))}) == 4
