@@ -33,7 +33,7 @@ SPECS = [SPEC, replace(SPEC, tachometer=IN_RAD_PER_S, multiplier="parallel", con
 
 def described(spec: LoopSpec) -> dict[str, Any]:
     """Return entries of the manifest, as whoever reads the file has them."""
-    found: dict[str, Any] = json.loads(json.dumps(manifest(spec, "loop")))["loop"]
+    found: dict[str, Any] = json.loads(json.dumps(manifest(spec, "wheel")))["loop"]
     return found
 
 
@@ -76,7 +76,7 @@ def test_velocity_and_disturbance(spec: LoopSpec) -> None:
     loop.tick(0, Command())
     loop.update(1234)
     loop.tick(0, Command())
-    per_lsb = float(manifest(spec, "loop")["velocity"]["rad_per_s_per_lsb"])
+    per_lsb = float(manifest(spec, "wheel")["velocity"]["rad_per_s_per_lsb"])
     assert loop.y * entries["filtered_velocity"]["rad_per_s_per_lsb"] == pytest.approx(1234 * per_lsb)
     loop = Control(spec.form)
     held = Command(acceleration=int(5 * CONSTANT_OF_TORQUE / INERTIA * 2**spec.units.acceleration_frac_bits))
