@@ -326,7 +326,8 @@ def test_ctrl_c_in_the_simulation(
     ("engine", "end"),
     # One engine and one signal show what is kept; how each engine ends is in tests/sim/engines.
     only_rows(
-        [("cxxrtl", signal.SIGTERM)], [(e, s) for e in ("pysim", "cxxrtl") for s in (signal.SIGINT, signal.SIGTERM)]
+        [("cxxrtl", signal.SIGHUP)],
+        [(e, s) for e in ("pysim", "cxxrtl") for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)],
     ),
 )
 def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signal.Signals, tmp_path: Path) -> None:

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import dask
 import pyarrow.parquet as pq
+import pytest
 from distributed import Client, LocalCluster
-from support.nightly import nightly
+from support.nightly import nightly, only
 
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "sweep"]
 SWEEP = [
@@ -124,6 +125,21 @@ def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
     again = {point for point, times in executed.items() if times > 1}
     assert again <= set(trace.of(victim))
     assert len(again) <= 5
+
+
+# What a terminal sends waits, what a service is sent is noted down: one of each is enough every day.
+@pytest.mark.parametrize("end", only([signal.SIGTERM, signal.SIGHUP], [signal.SIGTERM, signal.SIGHUP, signal.SIGINT]))
+def test_the_sweep_is_interrupted_while_its_processes_start(end: signal.Signals, tmp_path: Path) -> None:
+    """It heeds the signal when they are there, and ends them; nothing is said but this, and nothing is left."""
+    with begun(tmp_path / "r.parquet") as sweep:
+        children = Path(f"/proc/{sweep.pid}/task")
+        while not any(file.read_text() for file in children.glob("*/children")):
+            assert sweep.poll() is None
+            time.sleep(0.001)
+        os.killpg(sweep.pid, end)
+        out, err = sweep.communicate()
+    assert (sweep.returncode, out, err) == (130, "", f"tachometry: interrupted after 0 of {POINTS} points\n")
+    assert not list(tmp_path.iterdir())
 
 
 @nightly

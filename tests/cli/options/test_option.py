@@ -17,7 +17,7 @@ def test_a_capture_keeps_index_and_tick(tmp_path: Path, capsys: pytest.CaptureFi
     assert run("simulate", *CORE, *LINES, *unit, *motion, *files) == 0
     told = " ".join(capsys.readouterr().out.split())
     # Upwards at 96 counts, which is then 0, and there again on the way back.
-    assert " index 2 times, the last at position 0 " in told
+    assert " index 2 times, the last at position 0, 0 counts apart " in told
     assert " counts in 96 counts out 96 " in told
     assert " tick errors 0 (external tick too early or missing) " in told
     assert " velocity overflow " in told  # 600 rpm are 4800 LSB, and twelve bits hold 2047
