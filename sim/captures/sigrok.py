@@ -253,7 +253,12 @@ def _members(path: Path, archive: zipfile.ZipFile, capturefile: str) -> list[zip
         members = [archive.getinfo(capturefile)]
     else:
         pattern = re.compile(re.escape(capturefile) + "-([0-9]+)")
-        chunks = {int(m[1]): info for info in archive.infolist() if (m := pattern.fullmatch(info.filename))}
+        named = [(int(m[1]), info) for info in archive.infolist() if (m := pattern.fullmatch(info.filename))]
+        chunks = dict(named)
+        if len(chunks) < len(named):
+            raise CaptureError(
+                f"chunks of {path} must be members with a number each, but two of {capturefile} share one"
+            )
         if not chunks:
             raise CaptureError(f"{path} must have logic samples, but has no member {capturefile} or {capturefile}-1")
         for number in range(1, len(chunks) + 1):

@@ -136,6 +136,13 @@ def test_missing_chunk(tmp_path: Path) -> None:
     assert_error(tmp_path / "x.sr", "2 chunks of PATH must be logic-1-1 to logic-1-2, but logic-1-2 is missing")
 
 
+def test_two_members_of_one_chunk(tmp_path: Path) -> None:
+    make_sr(tmp_path / "x.sr", [bytes(4)])
+    with zipfile.ZipFile(tmp_path / "x.sr", "a") as archive:
+        archive.writestr("logic-1-01", bytes(4))
+    assert_error(tmp_path / "x.sr", "chunks of PATH must be members with a number each, but two of logic-1 share one")
+
+
 def test_other_compression(tmp_path: Path) -> None:
     make_sr(tmp_path / "x.sr", [])
     with zipfile.ZipFile(tmp_path / "x.sr", "a", zipfile.ZIP_BZIP2) as archive:
