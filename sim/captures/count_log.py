@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from tachometry.sim.captures.cells import numbers
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError, check_edges, reading
 from tachometry.sim.captures.header import PLAIN, Header, TextOptions, check_seconds, read_header
-from tachometry.sim.captures.rows import Lines, Times, blocks, opened, refuse
+from tachometry.sim.captures.rows import COUNTERS, Lines, Times, blocks, opened, refuse
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
 from tachometry.sim.signals.source import Source
 
-_MODULI = (1 << 16, 1 << 32)  # of the counters that wrap
+_MODULI = tuple(1 << bits for bits in COUNTERS)  # of the counters that wrap
 _MOST = 1 << 53  # counts that a number of a spreadsheet holds
 NO_WRAP = 0
 
@@ -128,8 +128,8 @@ def _counts(path: Path, line: Sequence[int], name: str, texts: Sequence[str]) ->
     """Return the counts of a block of rows."""
     count = numbers(texts)
     check_edges(path, line[-1])
-    refuse(path, line, ~(np.abs(count) <= _MOST), f"{name} must be a whole number up to 2^53", texts)
-    refuse(path, line, count != np.rint(count), f"{name} must be a whole number up to 2^53", texts)
+    wrong = ~(np.abs(count) <= _MOST) | (count != np.rint(count))
+    refuse(path, line, wrong, f"{name} must be a whole number up to 2^53", texts)
     return count
 
 

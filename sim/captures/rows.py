@@ -22,7 +22,7 @@ LONGEST = 1 << 16  # characters of a line, and of all that is above the rows
 BLOCK = 1 << 16  # rows parsed at once
 # Beyond it a time or the number of a sample is a mistake.
 _LATEST, _LAST_SAMPLE = 1e30, 1e15
-_COUNTERS = (16, 32)  # bits of counters whose times wrap
+COUNTERS = (16, 32)  # bits of counters whose times wrap
 
 
 @contextmanager
@@ -122,7 +122,7 @@ class Times:
     def __init__(self, path: Path, header: Header) -> None:
         self._path, self._header = path, header
         self._rows, self._last, self._gap, self._offset = 0, float("nan"), 0.0, 0
-        self._wraps = dict.fromkeys(_COUNTERS, 0)
+        self._wraps = dict.fromkeys(COUNTERS, 0)
         self.whole = True
 
     def of(self, line: Sequence[int], columns: Sequence[Sequence[str]]) -> NDArray[np.float64]:
@@ -147,7 +147,7 @@ class Times:
         for row in np.flatnonzero(steps < 0).tolist():
             gap = max([self._gap, *steps[max(row - 1000, 0) : row]])
             before = time[row] - steps[row]
-            bits = next((bits for bits in _COUNTERS if before < 1 << bits), 0) if self.whole else 0
+            bits = next((bits for bits in COUNTERS if before < 1 << bits), 0) if self.whole else 0
             if not bits or not 0 <= steps[row] + (1 << bits) <= 4 * gap:
                 unit = self._header.unit.name
                 raise CaptureError(

@@ -93,8 +93,8 @@ def _nearest(spec: STachometer, axes: int) -> list[int]:
     return [one for one in found if one is not None]
 
 
-class AxesLatency:
-    """Counts the clocks from a pin of an axis to what is shown of it.
+class _OfAxes:
+    """Answers one question about a core of many axes, as `Follows` does of one axis.
 
     Parameters
     ----------
@@ -103,6 +103,10 @@ class AxesLatency:
 
     def __init__(self, spec: AxesSpec) -> None:
         self.spec = spec
+
+
+class AxesLatency(_OfAxes):
+    """Counts the clocks from a pin of an axis to what is shown of it."""
 
     @property
     def pin_to_count(self) -> int:
@@ -134,16 +138,8 @@ class AxesLatency:
         return COUNT_LATENCY + 1 + self.spec.parallel
 
 
-class AxesRecovery:
-    """Says how long a core of many axes takes until all is right again after an upset; see `Recovery`.
-
-    Parameters
-    ----------
-    spec : AxesSpec
-    """
-
-    def __init__(self, spec: AxesSpec) -> None:
-        self.spec = spec
+class AxesRecovery(_OfAxes):
+    """Says how long a core of many axes takes until all is right again after an upset; see `Recovery`."""
 
     @property
     def clocks(self) -> int:
@@ -158,16 +154,8 @@ class AxesRecovery:
         return own * slots + (1 << (slots - 1).bit_length()) + 2 * self.spec.times.longest_tick
 
 
-class AxesWords:
-    """Says of a core of many axes what commands show.
-
-    Parameters
-    ----------
-    spec : AxesSpec
-    """
-
-    def __init__(self, spec: AxesSpec) -> None:
-        self.spec = spec
+class AxesWords(_OfAxes):
+    """Says of a core of many axes what commands show."""
 
     @property
     def notes(self) -> tuple[str, ...]:
