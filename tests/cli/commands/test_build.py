@@ -16,6 +16,7 @@ from tachometry.boards.fpga.boards import BOARDS
 from tachometry.hdl.core.bus_tachometer import BusTachometer
 from tachometry.hdl.export.verilog import verilog_of
 from tachometry.spec import of_texts
+from tachometry.spec.language.provenance import entries
 from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_manifest
 from tachometry.spec.registers.map import RegisterMap
@@ -102,7 +103,7 @@ def test_a_bitstream(
     ]
     wanted = demo_manifest(DemoMap(spec), bus, "rig")
     del wanted["ports"]
-    assert written == {"generator": written["generator"], "license": "BSD-2-Clause", **json.loads(json.dumps(wanted))}
+    assert written == {**entries(), **json.loads(json.dumps(wanted))}
     assert described == {
         "name": name,
         "bitstream": f"rig{suffix}",

@@ -13,6 +13,9 @@ from support.native import HEADER, NAME, check_golden, library, logged, snapshot
 from support.script import load
 
 from tachometry.hdl.export.registers.files import register_files, tables
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines import build
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
@@ -166,6 +169,56 @@ def test_what_the_driver_says_is_what_the_golden_bank_says(tmp_path: Path) -> No
     assert min(one["position"] for one in shown) < 0
     for name in ("interval", "age", "velocity_lower", "velocity_upper", "updated"):
         assert any(one[name] for one in shown), name
+
+
+# A word of a driver's unit in rad/s, from school.
+UNITS = {"rad/s": 1.0, "rev/s": 2 * math.pi, "rpm": 2 * math.pi / 60, "count/tick": 2 * math.pi / 2000 / 100e-6}
+_CONVERSIONS = """
+static uint32_t words_UNIT[] = {WORDS};
+static void show_UNIT(void) {
+  const struct UNIT_bus bus = {of_words, 0, words_UNIT};
+  struct UNIT_snapshot now;
+  UNIT_read(&bus, &now);
+  printf("%.17g %.17g ", UNIT_rad_per_s(now.velocity), UNIT_in_unit(now.velocity));
+  printf("%.17g %.17g ", UNIT_rad_per_s2(now.acceleration), (double)now.acceleration * UNIT_ACCELERATION_PER_LSB);
+  printf("%.17g %.17g\\n", UNIT_rad(now.position), UNIT_fine_rad(now.position_fine));
+}
+"""
+
+
+def test_the_driver_converts_to_what_the_shaft_did(tmp_path: Path) -> None:
+    """Speed, acceleration and angle of a braking shaft, from registers of golden models, in every unit of the speed."""
+    motion = parse_motion("ramp:-100rad/s:-20rad/s:100ms")
+    recording = VirtualEncoder(500, seed=1).record(motion).recording
+    parts, calls = [], []
+    for number, unit in enumerate(UNITS):
+        spec = of_texts("track", {"ppr": "500", "clock": "20MHz", "tick": "100us", "unit": unit})
+        registers = RegisterMap(spec)
+        run = golden.run(spec, recording.place(spec.timing.clock_hz))
+        shown = {port: int(run.updates.get(port)[-1]) for port in ("velocity", "acceleration", "position_fine")}
+        shown["position"] = int(run.ticks.position[-1])
+        words = [
+            sum(shown.get(field.port, 0) >> field.shift << field.low & field.mask for field in register.fields)
+            for register in registers
+        ]
+        name = f"core{number}"
+        for file, text in register_files(registers, name).items():
+            (tmp_path / file).write_text(text, encoding="utf-8")
+        parts.append(_CONVERSIONS.replace("WORDS", ", ".join(f"UINT32_C({word})" for word in words)))
+        parts[-1] = parts[-1].replace("UNIT_ACC", f"{name.upper()}_ACC").replace("UNIT", name)
+        calls.append(f"  show_{name}();\n")
+    lines = ["#include <stdio.h>", *(f'#include "core{number}_driver.h"' for number in range(len(UNITS)))]
+    lines.append("static uint32_t of_words(void *words, uint32_t offset) { return ((uint32_t *)words)[offset / 4]; }")
+    program = "\n".join([*lines, *parts, f"int main(void) {{\n{''.join(calls)}  return 0;\n}}\n"])
+    (tmp_path / "main.c").write_text(program)
+    build.run([*build.compiler(), *STRICT, "main.c", "-o", "main"], "compiler", tmp_path)
+    said = [[float(word) for word in line.split()] for line in build.run([tmp_path / "main"], "main").splitlines()]
+    speed, acceleration, angle = float(motion.speed(0.1)), float(motion.acceleration(0.05)), float(motion.angle(0.1))
+    assert (speed, acceleration, angle) == pytest.approx((-20, 800, -6))
+    for (unit, rad_per_s), found in zip(UNITS.items(), said, strict=True):
+        per_time = 100e-6 if unit == "count/tick" else 1.0  # count/tick², or the unit per second
+        expected = (speed, speed / rad_per_s, acceleration, acceleration / rad_per_s * per_time, angle, angle)
+        assert found == pytest.approx(expected, rel=0.02), unit
 
 
 def test_drivers_of_all_methods_are_strict_c(tmp_path: Path) -> None:

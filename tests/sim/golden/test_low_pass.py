@@ -1,6 +1,7 @@
 """The low-pass filter against the exact recursion of eq. (22)."""
 
 import math
+from dataclasses import replace
 from decimal import Decimal, localcontext
 from fractions import Fraction
 
@@ -119,14 +120,19 @@ def test_what_comes_when_one_is_taken_waits_for_the_next_turn() -> None:
     assert got.clock.tolist() == [taken + latency - 1 for taken in (51, then, then + latency - 2)]
 
 
-def test_time_is_what_has_passed_and_not_what_was_measured() -> None:
-    """Windows that overlap: an update in every tick, of some ticks each, is filtered as one of a tick."""
+@pytest.mark.parametrize("longest", [None, 960, 4800])
+def test_time_is_what_has_passed_and_not_what_was_measured(longest: int | None) -> None:
+    """Windows that overlap: an update in every tick, of some ticks each, is filtered as one of a tick.
+
+    An external tick counts as 20 µs, the nominal, however long it may be.
+    """
     spec = spec_of(Fraction(50))
+    if longest is not None:
+        spec = replace(spec, external_tick=True, max_tick_cycles=longest)
     n = 1500
     ticks, updates = far_apart(spec, np.full(n, 1000 << 6), np.ones(n, dtype=np.int64), False)
     got = filtered(spec, ticks, updates.having(interval=np.full(n, 77))).velocity
-    seconds = n * float(spec.timing.tick_seconds)
-    assert got[-1] == pytest.approx((1000 << 6) * (1 - math.exp(-50 * seconds)), abs=1)
+    assert got[-1] == pytest.approx((1000 << 6) * (1 - math.exp(-50 * n * 20e-6)), abs=1)
 
 
 def test_a_method_without_updates_at_rest_ends_at_0() -> None:

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import Encoder, Speed, STachometer, Timing, of_texts
 from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.language.units import parse_frequency
 from tachometry.spec.registers.manifest import manifest
@@ -114,6 +114,26 @@ def test_errors_say_what_is_wrong_and_what_is_allowed(make: object, message: str
 def test_max_speed_in_counts_per_tick(text: str, counts: int) -> None:
     spec = STachometer(encoder=Encoder(500), timing=TIMING, max_speed=Speed.parse(text))
     assert spec.widths.max_count == counts
+
+
+@pytest.mark.parametrize(
+    ("speed", "longest", "counts"),
+    [
+        # As above, in an external tick that may last longer than 20 µs: until 40 µs, where nothing else is asked for.
+        ("25rev/s", None, 2),
+        ("25.0001rev/s", None, 3),
+        ("25rev/s", "20us", 1),
+        ("25rev/s", "50us", 3),
+        ("1500rpm", "1ms", 50),
+        ("1e9rpm", None, 1920),
+        (None, None, 1920),
+        (None, "1ms", 48_000),
+    ],
+)
+def test_max_count_is_that_of_the_longest_external_tick(speed: str | None, longest: str | None, counts: int) -> None:
+    texts = {"ppr": "500", "tick": "20us", "external-tick": "yes", "max-speed": speed, "max-tick-period": longest}
+    for method in ("m", "s", "mt"):
+        assert of_texts(method, texts).widths.max_count == counts, method
 
 
 @pytest.mark.parametrize("text", ["12.5rad/s", "1.98943678864869rev/s", "119.366207318922rpm"])
