@@ -3,21 +3,16 @@
 import errno
 import itertools
 import os
-import shutil
-import sys
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-if sys.platform != "win32":
-    import fcntl
+from tachometry.sim.signals.scratch import Claim, held_back, scratch, stale
 
 # What the system says of a disk that takes no more.
 DISK = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO))
-_PREFIX = ".tachometry-"
 _NEW, _OLD = "new", "old"
 
 
@@ -47,8 +42,7 @@ class Outputs:
     def __init__(self, targets: Mapping[str, Path], inputs: Iterable[Path] = ()) -> None:
         self._targets = {what: _real(path) for what, path in targets.items()}
         self._made: list[Path] = []
-        self._staging: dict[Path, Path] = {}
-        self._locks: list[int] = []
+        self._staging: dict[Path, Claim] = {}
         self._current: Path | None = None
         self._inputs = {_real(path) for path in inputs}
         self._check()
@@ -56,7 +50,7 @@ class Outputs:
     def __getitem__(self, what: str) -> Path:
         """Where to write the output `what` for now."""
         self._current = target = self._targets[what]
-        return self._staging[target.parent] / _NEW / target.name
+        return self._staging[target.parent].folder / _NEW / target.name
 
     def get(self, what: str) -> Path | None:
         """Tell where to write the output `what` for now, or None if it is not wanted."""
@@ -64,8 +58,7 @@ class Outputs:
 
     def __enter__(self) -> Self:
         try:
-            for target in self._targets.values():
-                self._stage(target)
+            self._stage()
         except BaseException:
             self._discard()
             raise
@@ -78,19 +71,19 @@ class Outputs:
             self._discard()
             self._name_the_target(error)
             return
-        try:
-            self._commit()
-        except BaseException:
-            self._discard()
-            raise
-        self._remove_staging()
+        with held_back():
+            try:
+                self._commit()
+            except BaseException:
+                self._discard()
+                raise
+            self._remove_staging()
 
     def add(self, targets: Mapping[str, Path]) -> None:
         """Take more targets, whose names follow only from what is written; errors are those of the others."""
         self._targets |= {what: _real(path) for what, path in targets.items()}
         self._check()
-        for target in self._targets.values():
-            self._stage(target)
+        self._stage()
 
     def keep(self, what: str, part: Path) -> Path:
         """Put a part of the output `what` beside its target, which stays as it was; its path, at which nothing was."""
@@ -111,30 +104,30 @@ class Outputs:
             if target.exists() and not target.is_file():
                 raise ValueError(f"{what} must be a file, which {target} is not")
 
-    def _stage(self, target: Path) -> None:
-        parent = target.parent
-        if parent in self._staging:
-            return
-        try:
-            missing = [directory for directory in (parent, *parent.parents) if not directory.exists()]
-            for directory in reversed(missing):
-                self._made.append(directory)
-                directory.mkdir()
-            _clear_stale(parent)
-            staging, lock = _new_staging(parent)
-            self._staging[parent] = staging
-            self._locks += [] if lock is None else [lock]
-            (staging / _NEW).mkdir()
-            (staging / _OLD).mkdir()
-        except OSError as error:
-            raise _unwritable(target, error) from error
+    def _stage(self) -> None:
+        for target in self._targets.values():
+            parent = target.parent
+            if parent in self._staging:
+                continue
+            try:
+                with held_back():
+                    missing = [directory for directory in (parent, *parent.parents) if not directory.exists()]
+                    for directory in reversed(missing):
+                        self._made.append(directory)
+                        directory.mkdir()
+                    _clear_stale(parent)
+                    self._staging[parent] = Claim(parent)
+                for name in (_NEW, _OLD):
+                    (self._staging[parent].folder / name).mkdir()
+            except OSError as error:
+                raise _unwritable(target, error) from error
 
     def _commit(self) -> None:
         """Rename every file onto its target, or none."""
         begun: list[tuple[Path, Path | None]] = []
         try:
             for what, target in self._targets.items():
-                old = self._staging[target.parent] / _OLD / target.name if target.exists() else None
+                old = self._staging[target.parent].folder / _OLD / target.name if target.exists() else None
                 begun.append((target, old))
                 try:
                     if old is not None:
@@ -151,16 +144,15 @@ class Outputs:
             raise
 
     def _discard(self) -> None:
-        self._remove_staging()
-        for directory in reversed(self._made):
-            if directory.is_dir() and not any(directory.iterdir()):
-                directory.rmdir()
+        with held_back():
+            self._remove_staging()
+            for directory in reversed(self._made):
+                if directory.is_dir() and not any(directory.iterdir()):
+                    directory.rmdir()
 
     def _remove_staging(self) -> None:
-        for directory in self._staging.values():
-            shutil.rmtree(directory, ignore_errors=True)
-        while self._locks:
-            os.close(self._locks.pop())
+        for claim in self._staging.values():
+            claim.remove()
 
     def _name_the_target(self, error: BaseException) -> None:
         """Raise what the system says of a file here with the name of its target."""
@@ -168,54 +160,20 @@ class Outputs:
         if not isinstance(of_system, OSError):
             return
         staged = Path(os.fsdecode(of_system.filename or ""))
-        for parent, staging in self._staging.items():
-            if staged.is_relative_to(staging):
+        for parent, claim in self._staging.items():
+            if staged.is_relative_to(claim.folder):
                 raise _unwritable(parent / staged.name, of_system) from error
         # A write knows no name: it is of the output that was asked for last.
         if of_system.filename is None and of_system.errno in DISK and self._current is not None:
             raise _unwritable(self._current, of_system) from error
 
 
-def _new_staging(parent: Path) -> tuple[Path, int | None]:
-    """Return a new temporary directory, and what locks it for as long as this process lives; None where there are no
-    locks.
-    """
-    while True:
-        folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
-        lock = _lock(folder, wait=True)
-        if folder.exists():
-            return folder, lock
-        if lock is not None:  # another process has just cleared it away
-            os.close(lock)
-
-
 def _clear_stale(parent: Path) -> None:
     """Remove what killed processes have left in a directory; files that they had put aside go back to their places."""
-    for folder in parent.glob(f"{_PREFIX}*"):
-        try:
-            lock = _lock(folder, wait=False)
-        except OSError:
-            continue
-        if lock is None:
-            continue
+    for folder in stale(parent):
         for old in (folder / _OLD).glob("*"):
             if not (parent / old.name).exists():
                 old.replace(parent / old.name)
-        shutil.rmtree(folder, ignore_errors=True)
-        os.close(lock)
-
-
-def _lock(folder: Path, *, wait: bool) -> int | None:
-    """Return a descriptor that locks a directory; None if it is locked, or cannot be."""
-    if sys.platform == "win32":
-        return None
-    descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError:
-        os.close(descriptor)
-        return None
-    return descriptor
 
 
 def _real(path: Path) -> Path:
@@ -246,8 +204,8 @@ def writable_caches() -> Iterator[None]:
         return
     names = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "MPLCONFIGDIR")
     before = {name: os.environ.get(name) for name in names}
-    with tempfile.TemporaryDirectory(prefix="tachometry-", ignore_cleanup_errors=True) as folder:
-        os.environ.update(dict.fromkeys(names, folder))
+    with scratch() as folder:
+        os.environ.update(dict.fromkeys(names, str(folder)))
         try:
             yield
         finally:

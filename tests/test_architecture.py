@@ -59,7 +59,7 @@ ALLOWED = {
         "spec",
     },
     "boards": set[str](),
-    "boards/fpga": {"hdl", "spec"},
+    "boards/fpga": {"hdl", "sim/signals", "spec"},
     "boards/host": {"spec"},
     "boards/monitor": {"boards/host", "sim/golden", "spec"},
     "boards/simulated": set[str](),

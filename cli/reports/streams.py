@@ -2,14 +2,11 @@
 
 import io
 import os
-import signal
 import sys
 from typing import TextIO
 
 INTERNAL = 70  # exit status: a fault of the program, as sysexits.h has it
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
-# A terminal that is closed says so by SIGHUP, where there is this signal.
-STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 UNREAD = 141  # 128 + SIGPIPE, likewise
 
 _STREAMS = ("stdin", "stdout", "stderr")

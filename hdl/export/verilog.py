@@ -2,11 +2,13 @@
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
 from amaranth.back import verilog
+from amaranth.back.verilog import YosysError
 from amaranth.lib import wiring
 
 from tachometry.hdl.export.render import render
@@ -15,10 +17,26 @@ from tachometry.hdl.export.render import render
 _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
 
 
+@contextmanager
+def bundled_yosys() -> Iterator[None]:
+    """Have Amaranth take the Yosys that is a package, whatever else is installed.
+
+    Raises
+    ------
+    OSError
+        If it fails, with the line that says why.
+    """
+    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+        try:
+            yield
+        except YosysError as error:
+            raise OSError(f"Yosys: {(str(error).splitlines() or ['it fails'])[-1]}") from error
+
+
 def verilog_of(top: wiring.Component, described: Mapping[str, Any]) -> str:
     """Return the text of a module; its manifest says its name, and what is said above it."""
     name = described["module"]
-    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+    with bundled_yosys():
         text = verilog.convert(top, name=name, emit_src=False)
     text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", text)
     return render("NAME.v", **described, name=name, verilog=text.removesuffix("\n"))

@@ -1,5 +1,6 @@
 """Runs the C++ compiler, and keeps what it made in a cache."""
 
+import atexit
 import ctypes
 import functools
 import hashlib
@@ -8,21 +9,19 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import platformdirs
 
+from tachometry.sim.signals.scratch import run_tool, scratch
+
 _FLAGS = ("-std=c++17", "-O2", "-w", "-fPIC", "-fvisibility=hidden", "-pthread")
 
-_UTF8: Any = {"encoding": "utf-8", "errors": "replace"}  # whatever the locale is
 _KEPT, _KEPT_BYTES = 1000, 256 << 20  # files, and their bytes
-_ABANDONED = 24 * 3600.0  # seconds after which a folder is no build that is under way
 
 
 class NoCompiler(OSError):
@@ -70,7 +69,7 @@ def compiler() -> tuple[str, ...]:
 @functools.cache
 def version(command: tuple[str, ...]) -> str:
     """Return what a compiler says that it is."""
-    return subprocess.run([*command, "--version"], capture_output=True, **_UTF8).stdout
+    return run_tool([*command, "--version"]).stdout
 
 
 def flags() -> tuple[str, ...]:
@@ -85,7 +84,7 @@ def _is_gcc() -> bool:
     return "Free Software Foundation" in version(compiler())
 
 
-def run(command: Sequence[str | Path], what: str, folder: Path | None = None, text: str | None = None) -> str:
+def run(command: Sequence[str | Path], what: str, folder: Path | None = None, text: str = "") -> str:
     """Run a tool on an input; its output.
 
     Raises
@@ -93,7 +92,7 @@ def run(command: Sequence[str | Path], what: str, folder: Path | None = None, te
     OSError
         If it fails, with the line that says why.
     """
-    done = subprocess.run(list(map(str, command)), cwd=folder, input=text, capture_output=True, **_UTF8)
+    done = run_tool(list(map(str, command)), folder, text)
     if done.returncode:
         said = (done.stderr + done.stdout).splitlines() or [f"exit status {done.returncode}"]
         raise OSError(f"{what}: {next((line for line in said if 'error' in line.lower()), said[-1])}")
@@ -140,8 +139,10 @@ def compile_library(source: str, folder: Path, *more: str | Path) -> Path:
 
 
 @functools.cache
-def _own_folder() -> "tempfile.TemporaryDirectory[str]":
-    return tempfile.TemporaryDirectory(prefix="tachometry-")
+def _own_folder() -> Path:
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(scratch())
 
 
 def cache_folder() -> Path:
@@ -173,7 +174,7 @@ def cache_folder() -> Path:
         return folder
     if given:
         raise OSError(f"TACHOMETRY_CACHE must be a folder that can be written, not {given!r}")
-    return Path(_own_folder().name)
+    return _own_folder()
 
 
 def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
@@ -193,11 +194,11 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     if (found := _intact(folder, key)) is not None:
         return found
     try:
-        with tempfile.TemporaryDirectory(prefix=".building-", dir=folder, ignore_cleanup_errors=True) as name:
-            made = make(Path(name))
+        with scratch(folder) as building:
+            made = make(building)
             target = folder / f"{hashlib.sha256(made.read_bytes()).hexdigest()}{suffix}"
             made.replace(target)
-            index = Path(name) / "index"
+            index = building / "index"
             index.write_text(target.name, encoding="ascii")
             index.replace(folder / key)
             _prune(folder)
@@ -227,7 +228,7 @@ def _intact(folder: Path, key: str) -> Path | None:
 
 
 def _prune(folder: Path) -> None:
-    """Remove what has not been used for longest, and builds that were killed."""
+    """Remove what has not been used for longest."""
     aged = []
     for path in folder.iterdir():
         try:
@@ -235,10 +236,8 @@ def _prune(folder: Path) -> None:
             age = time.time() - status.st_mtime
         except OSError:  # another run has removed it
             continue
-        if not path.name.startswith(".building-"):
+        if path.is_file():
             aged.append((age, path, status.st_size))
-        elif age > _ABANDONED:
-            shutil.rmtree(path, ignore_errors=True)
     n_bytes = 0
     for number, (_, path, size) in enumerate(sorted(aged)):
         n_bytes += size

@@ -9,6 +9,7 @@ from unittest.mock import patch
 from amaranth.back import verilog
 
 from tachometry.hdl.export import export
+from tachometry.hdl.export.verilog import bundled_yosys
 from tachometry.sim.engines import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
@@ -75,7 +76,7 @@ class Verilator(CompiledEngine):
         """Return the Verilog: what is exported, or, if signals are to be shown, a core with these as outputs."""
         if not design.n_words:
             return export(design.spec)["tachometer.v"]
-        with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+        with bundled_yosys():
             return str(verilog.convert(design.component, name="tachometer", emit_src=False))
 
     def library(self, design: Design) -> Path:

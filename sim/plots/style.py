@@ -1,6 +1,7 @@
 """All figures look alike, and equal figures give equal files."""
 
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,9 @@ def save_figure(path: Path, draw: Callable[[], Figure]) -> None:
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_STYLE)
-        draw().savefig(path, format=suffix[1:], dpi=160, metadata=_METADATA[suffix])
+        drawn = BytesIO()  # on a full disk Matplotlib would say something else
+        draw().savefig(drawn, format=suffix[1:], dpi=160, metadata=_METADATA[suffix])
+    path.write_bytes(drawn.getvalue())
 
 
 def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = COLUMNS) -> NDArray[np.int64]:

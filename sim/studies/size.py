@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tachometry.sim.engines.build import cached, digest
+from tachometry.sim.signals.scratch import run_tool
 from tachometry.spec import Port
 from tachometry.spec.control import AnySpec
 
@@ -181,9 +182,7 @@ def call(folder: Path, command: Sequence[str]) -> None:
     program = Path(sys.executable).with_name(command[0])
     longest = LONGEST_ROUTE if "--seed" in command else None
     try:
-        done = subprocess.run(
-            [program, *command[1:]], cwd=folder, capture_output=True, text=True, check=False, timeout=longest
-        )
+        done = run_tool([str(program), *command[1:]], folder, seconds=longest)
     except subprocess.TimeoutExpired:
         (folder / command[command.index("--report") + 1]).write_text("{}", encoding="utf-8")
         return

@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from amaranth.back.verilog import YosysError
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.files import CORE_FILES
+from tachometry.hdl.export.verilog import bundled_yosys
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
 VERSION = importlib.metadata.version("tachometry")
@@ -131,3 +133,12 @@ def test_equal_specs_give_equal_files_whatever_the_environment() -> None:
 def test_bad_names(name: str, message: str) -> None:
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         export(make_spec(), name)
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [("Traceback:\n  File\nwasmtime._error.WasmtimeError: out of memory", ".*Error: out of memory"), ("", "it fails")],
+)
+def test_a_yosys_that_fails_is_told_in_a_line(said: str, told: str) -> None:
+    with pytest.raises(OSError, match=rf"^Yosys: {told}$"), bundled_yosys():
+        raise YosysError(said)

@@ -172,7 +172,7 @@ assert compare(golden.run(spec, trace), pick("cxxrtl").run(spec, trace)) == (0, 
 """
     runs = [subprocess.Popen([sys.executable, "-c", program]) for _ in range(2)]
     assert [run.wait() for run in runs] == [0, 0]
-    assert not list(folder.glob(".building-*"))
+    assert not list(folder.glob(".tachometry-*"))
     # A run of which only half a library was left makes it anew.
     for library in folder.glob("*.so"):
         library.write_bytes(library.read_bytes()[:1000])
@@ -187,8 +187,7 @@ def test_what_was_not_used_for_longest_goes_first(folder: Path, monkeypatch: pyt
         then = time.time() - 1000 + 100 * age
         for path in (target, folder / name):
             os.utime(path, (then, then))
-    (abandoned := folder / ".building-x").mkdir()
-    os.utime(abandoned, (0, 0))
+    (abandoned := folder / ".tachometry-x.tmp").mkdir()
     cached("d", ".bin", make["d"])  # used again
     monkeypatch.setattr(build, "_KEPT", 4)
     cached("a", ".bin", make["a"])

@@ -1,9 +1,13 @@
 """A figure leaves out only what cannot be seen."""
 
+import resource
+from pathlib import Path
+
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from tachometry.sim.plots.style import columns, in_words
+from tachometry.sim.plots.style import columns, in_words, save_figure
 
 
 @pytest.mark.parametrize("n", [0, 1, 400])
@@ -44,3 +48,24 @@ def test_one_spike_in_a_million_is_kept() -> None:
 )
 def test_legends_speak_in_words(name: str, words: str) -> None:
     assert in_words(name) == words
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_a_disk_that_is_full_within_a_figure_is_told(suffix: str, tmp_path: Path) -> None:
+    """Matplotlib forgets it in a PDF, as it cannot end what it has begun."""
+    path = tmp_path / f"figure.{suffix}"
+
+    def draw() -> Figure:
+        figure = Figure()
+        figure.text(0, 0, "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
+        return figure
+
+    save_figure(path, draw)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for least in range(0, path.stat().st_size, 1000):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (least, before[1]))
+        try:
+            with pytest.raises(OSError, match="File too large"):
+                save_figure(path, draw)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -1,0 +1,167 @@
+"""Temporary folders and tools end with the process that has them, whatever ends it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
+
+# What ends a command in order. A terminal that is closed says so by SIGHUP, where there is this signal.
+STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_PREFIX, _SUFFIX = ".tachometry-", ".tmp"
+_ABANDONED = 24 * 3600.0  # seconds after which a folder is nobody's, where there are no locks
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Do what must not be interrupted: signals that stop a command are heard at its end."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {}
+    try:
+        for number in STOPS:
+            if callable(handler := signal.getsignal(number)):
+                before[number] = handler
+                signal.signal(number, lambda number, frame: came.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in came[:1]:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def scratch(parent: Path | None = None) -> Iterator[Path]:
+    """Give a folder that is removed at the end, in `parent` or among the temporary files of the system.
+
+    What killed processes have left there is removed, too.
+    """
+    parent = Path(tempfile.gettempdir()) if parent is None else parent
+    claimed: list[Claim] = []
+    try:
+        with held_back():
+            for _ in stale(parent):
+                pass
+            claimed.append(Claim(parent))
+        yield claimed[0].folder
+    finally:
+        with held_back():
+            for claim in claimed:
+                claim.remove()
+
+
+class Claim:
+    """A new temporary folder in `parent`, which others leave alone for as long as this process lives."""
+
+    def __init__(self, parent: Path) -> None:
+        while True:
+            self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=parent))
+            self._lock = _lock(self.folder, wait=True)
+            if self.folder.exists():
+                return
+            if self._lock is not None:  # another process has just taken it for one that was left
+                os.close(self._lock)
+
+    def remove(self) -> None:
+        """Remove the folder with all that is in it."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+
+def stale(parent: Path) -> Iterator[Path]:
+    """Yield temporary folders that killed processes of this user have left, and remove each afterwards."""
+    for folder in parent.glob(f"{_PREFIX}*{_SUFFIX}"):
+        try:
+            status = folder.lstat()
+            if sys.platform != "win32" and status.st_uid != os.getuid():
+                continue
+            lock = _lock(folder, wait=False)
+        except OSError:
+            continue
+        if lock is None and (sys.platform != "win32" or time.time() - status.st_mtime < _ABANDONED):
+            continue
+        yield folder
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _lock(folder: Path, *, wait: bool) -> int | None:
+    """Return a descriptor that locks a directory; None if it is locked, or cannot be."""
+    if sys.platform == "win32":
+        return None
+    descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
+
+
+def run_tool(
+    command: Sequence[str], folder: Path | None = None, text: str = "", seconds: float | None = None
+) -> "subprocess.CompletedProcess[str]":
+    """Run a tool with a text as its input; it ends with all of its processes, whatever ends the wait for it.
+
+    Its temporary files are in `folder`, in which it runs, if that is given. A signal from the terminal does not reach
+    it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be run.
+    subprocess.TimeoutExpired
+        If it takes longer than so many seconds.
+    """
+    ours = {} if folder is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))
+    started: list[subprocess.Popen[str]] = []
+    try:
+        with held_back():
+            started.append(
+                subprocess.Popen(
+                    command,
+                    cwd=folder,
+                    env={**os.environ, **ours},
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    encoding="utf-8",  # whatever the locale is
+                    errors="replace",
+                    process_group=0,
+                )
+            )
+        out, err = started[0].communicate(text, seconds)
+    except BaseException:
+        with held_back():
+            for process in started:
+                _end(process)
+        raise
+    return subprocess.CompletedProcess(command, started[0].returncode, out, err)
+
+
+def _end(process: "subprocess.Popen[str]") -> None:
+    """Kill a tool with all that it has started."""
+    if sys.platform == "win32":
+        process.kill()
+    elif process.returncode is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    for stream in (process.stdin, process.stdout, process.stderr):
+        if stream is not None:
+            stream.close()
+    process.wait()

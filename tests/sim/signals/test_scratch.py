@@ -1,0 +1,95 @@
+"""Temporary folders and tools end with the process that has them, whatever ends it."""
+
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tachometry.sim.signals.scratch import STOPS, held_back, run_tool, scratch
+
+
+class Stopped(Exception):
+    """A signal has come."""
+
+
+@pytest.fixture(autouse=True, params=STOPS)
+def stop(request: pytest.FixtureRequest) -> Iterator[signal.Signals]:
+    """Give each signal that stops a command, which raises `Stopped` here."""
+
+    def hear(number: int, frame: object) -> None:
+        raise Stopped
+
+    before = signal.signal(request.param, hear)
+    yield request.param
+    signal.signal(request.param, before)
+
+
+def test_what_is_held_back_is_heard_at_the_end(stop: signal.Signals) -> None:
+    done = []
+
+    def work() -> None:
+        with held_back():
+            signal.raise_signal(stop)
+            signal.raise_signal(stop)
+            done.append(1)
+        done.append(2)
+
+    with pytest.raises(Stopped):
+        work()
+    assert done == [1]
+    with pytest.raises(Stopped):
+        signal.raise_signal(stop)
+
+
+def test_a_folder_ends_with_its_block(stop: signal.Signals, tmp_path: Path) -> None:
+    def work() -> None:
+        with scratch(tmp_path) as folder:
+            (folder / "file").write_text("")
+            signal.raise_signal(stop)
+
+    with pytest.raises(Stopped):
+        work()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_killed_processes_have_left_is_removed(tmp_path: Path) -> None:
+    """Those of living ones stay, and so does what has another name."""
+    (tmp_path / ".tachometry-cache").mkdir()
+    (tmp_path / ".tachometry-killed.tmp").mkdir()
+    (tmp_path / ".tachometry-killed.tmp" / "file").write_text("")
+    with scratch(tmp_path) as living, scratch(tmp_path) as other:
+        assert set(tmp_path.iterdir()) == {living, other, tmp_path / ".tachometry-cache"}
+    assert list(tmp_path.iterdir()) == [tmp_path / ".tachometry-cache"]
+
+
+TOOL = """
+mktemp
+sleep 100 > alive &
+kill -{stop} {ours}
+wait
+"""
+
+
+def test_a_tool_ends_with_all_that_it_has_started(stop: signal.Signals, tmp_path: Path) -> None:
+    """A compiler is a driver and what it calls, with temporary files between them."""
+    os.mkfifo(tmp_path / "alive")
+    alive = os.open(tmp_path / "alive", os.O_RDONLY | os.O_NONBLOCK)
+    with pytest.raises(Stopped):
+        run_tool(["sh", "-c", TOOL.format(stop=stop.name.removeprefix("SIG"), ours=os.getpid())], tmp_path)
+    os.set_blocking(alive, True)
+    assert os.read(alive, 1) == b""  # until the last of those who have its other end is gone
+    os.close(alive)
+    assert len(list(tmp_path.iterdir())) == 2  # with a temporary file, which lies in the tool's folder
+
+
+def test_a_tool_that_takes_too_long_is_ended() -> None:
+    with pytest.raises(subprocess.TimeoutExpired):
+        run_tool(["sleep", "1000"], seconds=0.01)
+
+
+def test_a_tool_is_given_a_text_and_says_something() -> None:
+    done = run_tool(["sh", "-c", "cat; echo µ >&2; exit 3"], text="ü")
+    assert (done.stdout, done.stderr, done.returncode) == ("ü", "µ\n", 3)
