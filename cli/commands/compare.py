@@ -69,7 +69,7 @@ Examples:
     "capture",
     metavar="CAPTURE",
     type=FilePath(),
-    help="Captured lines instead of a --motion: .sr, .csv, .csv.gz or .vcd, as `tachometry replay` takes them.",
+    help="Captured lines instead of a --motion: a session, text or waveform, as `tachometry replay` takes it.",
 )
 @CAPTURE_OPTIONS
 @option(

@@ -49,9 +49,9 @@ def replay(
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
-    CAPTURE is a sigrok session (.sr), a text (.csv, or .csv.gz) with a line of names such as time,a,b and levels 0 or
-    1, as Saleae Logic and sigrok-cli export it, or a waveform (.vcd), whose one-bit variables are named with their
-    scopes: --a top.a --b top.b.
+    CAPTURE is a sigrok session (.sr), a text (.csv, .txt, .tsv or .teeth, also with .gz) of an analyser, oscilloscope,
+    logger or spreadsheet, with a line of names such as time,a,b, or a waveform (.vcd, .vcd.gz or .fst), whose variables
+    are named with their scopes: --a top.a, or --a top.enc[0] for a bit of a vector.
     Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
 
     Ctrl-C ends the simulation, and what was simulated so far is reported and written. Equal options and captures give

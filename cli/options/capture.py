@@ -72,7 +72,7 @@ _OPTIONS = [
         _CAPTURE,
         "--count",
         metavar="COLUMN",
-        help="Column of the counts in a .csv file that logs time and count: its name, or its number from 0. Between "
+        help="Column of the counts in a text that logs time and count: its name, or its number from 0. Between "
         "two rows the shaft turns evenly; a count is one of --ppr and --decoding. With --axes as --a.",
     ),
     option(

@@ -1,5 +1,7 @@
 """Every kind of capture shares this: its error, the choice of channels, and files written whole or not at all."""
 
+import difflib
+import gzip
 import itertools
 import re
 import zlib
@@ -7,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple, cast
 
 from tachometry.sim.signals.files import replacing
 from tachometry.sim.signals.recording import MAX_EDGES, Recording
@@ -17,6 +19,7 @@ from tachometry.spec.language.option import ParameterError
 Channel = str | int
 SAME = -(1 << 16)  # as the channel of B: that of A
 NONE: Mapping[str, Channel] = {}
+_LISTED = 40  # channels in a message
 NO_VECTORS: Mapping[int, str] = {}
 
 
@@ -52,6 +55,11 @@ def reading(path: Path) -> Iterator[None]:
         raise CaptureError(f"{path} does not exist") from None
     except (OSError, EOFError, zlib.error) as error:
         raise CaptureError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def opened_bytes(path: Path) -> BinaryIO:
+    """Open a file; what ends in `.gz` is unpacked."""
+    return cast(BinaryIO, gzip.open(path)) if path.suffix.lower() == ".gz" else path.open("rb")
 
 
 def check_edges(path: Path, n: int) -> None:
@@ -100,9 +108,9 @@ def choose_channels(
     CaptureError
         If there are fewer than two channels, if one is unknown, or if two are the same.
     """
-    bits = {number: f"{name}[bit]" for number, name in vectors.items()}
-    shown = {**bits, **channels}
-    listed = ", ".join(f"{name} ({number})" if number in channels else name for number, name in shown.items())
+    texts = [f"{name} ({number})" for number, name in channels.items()]
+    texts += [f"{name}[bit]" for number, name in vectors.items() if number not in channels]
+    listed = ", ".join(texts[:_LISTED]) + (f" and {len(texts) - _LISTED} more" if len(texts) > _LISTED else "")
     if len(channels) < (1 if b == SAME else 2) and not (vectors and isinstance(a, str) and a.endswith("]")):
         needed = "one logic channel" if b == SAME else "two logic channels"
         example = next(iter(vectors.values()), None)
@@ -114,7 +122,7 @@ def choose_channels(
             return Line(wanted) if wanted is not None and wanted in channels else None
         if (number := _named(channels, wanted)) is not None:
             return Line(number)
-        if match := re.fullmatch(r"(.+)\[([0-9]{1,2})\]", wanted):
+        if match := re.fullmatch(r"(.+)\[([0-9]{1,7})\]", wanted):
             number = _named(vectors, match[1])
             return None if number is None else Line(number, int(match[2]))
         return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
@@ -127,11 +135,13 @@ def choose_channels(
     lines: dict[str, Line] = {}
     for line, channel in wanted.items():
         if (place := find(channel)) is None:
-            raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {channel!r}")
+            near = difflib.get_close_matches(str(channel), texts, 3, 0.5) if len(texts) > _LISTED else []
+            close = f"; near it are {', '.join(near)}" if near else ""
+            raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {channel!r}{close}")
         lines[line] = place
     for one, other in itertools.combinations(lines, 2):
         if (place := lines[one]) == lines[other] and not (one_line and other == "b"):
-            name = shown[place.number].replace("[bit]", f"[{place.bit}]")
+            name = channels[place.number] if place.bit is None else f"{vectors[place.number]}[{place.bit}]"
             raise CaptureError(f"channels {one} and {other} of {path} must be two of {listed}, not both {name}")
     return tuple(lines.values())
 

@@ -1,4 +1,4 @@
-"""Captures of any kind: sigrok sessions (`.sr`), text (`.csv`, `.csv.gz`), waveforms (`.vcd`)."""
+"""Captures of any kind: sigrok sessions (`.sr`), text (`.csv`, `.csv.gz`), waveforms (`.vcd`, `.fst`)."""
 
 import functools
 import os
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError
+from tachometry.sim.captures.fst import read_fst
 from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.sigrok import read_sr
 from tachometry.sim.captures.text import read_csv
@@ -30,8 +31,9 @@ class Reader(Protocol):
     ) -> Recording: ...
 
 
-TEXTS = (".csv", ".txt", ".tsv", ".teeth")  # each may end in .gz, too
-READERS: dict[str, Reader] = {".sr": read_sr, ".vcd": read_vcd, **dict.fromkeys(TEXTS, read_csv)}
+TEXTS = (".csv", ".txt", ".tsv", ".teeth")
+PACKED = (*TEXTS, ".vcd")  # may end in .gz, too
+READERS: dict[str, Reader] = {".sr": read_sr, ".vcd": read_vcd, ".fst": read_fst, **dict.fromkeys(TEXTS, read_csv)}
 _LOOKED_AT = 16  # channels; each takes as long as the capture
 # What other programs save for themselves, and how they write what others can read.
 _EXPORTS = {
@@ -39,7 +41,6 @@ _EXPORTS = {
     ".logicdata": "in Saleae Logic 1: Options, Export data, CSV",
     ".bin": "in Saleae Logic 2, or in the oscilloscope: export as CSV instead of binary",
     ".dsl": "in DSView: File, Export, as .csv or .sr",
-    ".fst": "with `fst2vcd FILE.fst -o FILE.vcd`, which comes with GTKWave",
 }
 
 
@@ -58,7 +59,7 @@ def read_capture(
     ----------
     path : path
         A sigrok session `.sr` (see `read_sr`), a text `.csv`, `.txt`, `.tsv` or `.teeth`, or one of these with `.gz`
-        (see `read_csv`), or a waveform `.vcd` (see `read_vcd`).
+        (see `read_csv`), or a waveform `.vcd`, `.vcd.gz` or `.fst` (see `read_vcd` and `read_fst`).
     a, b : str, int or None
         Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named A and B
         (in any case) if there are both, else the first two.
@@ -77,11 +78,11 @@ def read_capture(
     path = Path(path)
     packed = path.suffix.lower() == ".gz"
     kind = path.with_suffix("").suffix.lower() if packed else path.suffix.lower()
-    reader = READERS.get(kind) if not packed or kind in TEXTS else None
+    reader = READERS.get(kind) if not packed or kind in PACKED else None
     if reader is None:
         how = f": export it {_EXPORTS[kind]}" if kind in _EXPORTS else ""
         raise CaptureError(
-            f"a capture must be a .sr, .vcd, .csv, .txt, .tsv or .teeth file, or .csv.gz, not {path}{how}"
+            f"a capture must be a .sr, .vcd, .fst, .csv, .txt, .tsv or .teeth file, or .csv.gz, not {path}{how}"
         )
     if reader is read_csv:
         reader = functools.partial(read_csv, options=text)

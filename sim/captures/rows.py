@@ -1,19 +1,18 @@
 """The rows of a text are read in blocks, whatever program wrote it, and their times do not decrease."""
 
 import csv
-import gzip
 import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
-from typing import BinaryIO, TextIO, cast
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.captures import cells
-from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.file import CaptureError, opened_bytes
 from tachometry.sim.captures.header import Header
 from tachometry.sim.captures.sniff import is_comment
 from tachometry.spec.language.units import plural
@@ -28,8 +27,7 @@ COUNTERS = (16, 32)  # bits of counters whose times wrap
 @contextmanager
 def opened(path: Path) -> Iterator[TextIO]:
     """Open a text: UTF-16 if its first bytes say so, else UTF-8; anything else is the reader's to refuse."""
-    packed = path.suffix.lower() == ".gz"
-    with cast(BinaryIO, gzip.open(path)) if packed else path.open("rb") as file:
+    with opened_bytes(path) as file:
         encoding = "utf-16" if file.read(2) in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
         file.seek(0)
         yield io.TextIOWrapper(file, encoding, errors="replace", newline="\n")

@@ -1,27 +1,25 @@
-"""Waveforms (`.vcd`) are read as captures: one-bit variables of a simulation or of a logic analyser's export."""
+"""Waveforms (`.vcd`) are read as captures: variables of a simulation or of a logic analyser's export."""
 
 import os
+import re
 from collections.abc import Iterator, Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
-from vcd.reader import ScopeDecl, Token, TokenKind, VarDecl, VCDParseError, tokenize
-
-from tachometry.sim.captures.file import (
-    NONE,
-    CaptureError,
-    Channel,
-    OptionError,
-    check_edges,
-    choose_channels,
-    named,
-    reading,
-)
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, opened_bytes, reading
+from tachometry.sim.captures.waveform import Changes, Variable
 from tachometry.sim.signals.recording import Recording
 
+_PIECE = 1 << 20  # bytes read at once
+_LONGEST = 1 << 16  # bytes of a word
 _LONGEST_NAME = 4096
+_LATEST = 20  # digits of a time
+_MOST_WORDS = 1000  # that are kept of a declaration
 _UNITS = {"s": 0, "ms": 3, "us": 6, "ns": 9, "ps": 12, "fs": 15}
+_NO_BITS = (b"real", b"realtime", b"shortreal", b"string", b"event")  # types of variables
+_SCALARS, _WITH_BLANK = b"01xXzZuUwWlLhH-", b"bBrRsS"  # how changes begin, of one bit and of what has a blank in it
+_SECTIONS = (b"$dumpvars", b"$dumpall", b"$dumpon", b"$dumpoff", b"$end")
 
 
 def read_vcd(
@@ -31,16 +29,19 @@ def read_vcd(
     samplerate_hz: float | None = None,
     others: Mapping[str, Channel] = NONE,
 ) -> Recording:
-    """Read two to four one-bit variables of a Value Change Dump.
+    """Read two to four lines of a Value Change Dump: variables of one bit, or bits of vectors.
 
-    The recording begins when all of them have first been 0 or 1, and ends with the last time in the file.
+    The recording begins when all of them have first been 0 or 1, and ends with the last time in the file. Where a line
+    is x or z after that, its level before holds.
 
     Parameters
     ----------
     path : path
+        What ends in `.gz` is compressed by gzip.
     a, b : str, int or None
-        Name of the variable with its scopes, as `top.core.a`, else its number, from 0, among those of one bit. When not
-        given: the variables whose names without scopes are a and b, if there is one of each, else the first two.
+        Name of the variable with its scopes, as `top.core.a`, or `top.enc[0]` for a bit of a vector, as it is declared;
+        else its number, from 0, among those of one bit. When not given: the variables whose names without scopes are a
+        and b, if there is one of each, else the first two.
     samplerate_hz : None
         Not allowed: a waveform has its times.
     others : mapping of str to str or int
@@ -49,113 +50,145 @@ def read_vcd(
     Raises
     ------
     CaptureError
-        If the file is missing, no VCD, or cut short; for an unknown variable; for a level other than 0 or 1 after the
-        first of all.
+        If the file is missing, no VCD, or cut short; for an unknown variable; if a line never is 0 or 1.
     """
     path = Path(path)
     if samplerate_hz is not None:
         raise OptionError("samplerate", f"must not be given for {path}: a waveform has its times")
-    with reading(path), path.open("rb") as file:
-        _check_end(path, file)
-        tokens = _tokens(path, file)
-        names, codes, scale = _declarations(path, tokens)
-        numbers = choose_channels(path, names, *_default(names, a, b), others)
-        lines = dict(zip(("a", "b", *others), (codes[line.number] for line in numbers), strict=True))
-        return named(_changes(path, tokens, lines, scale), names, numbers)
+    with reading(path), opened_bytes(path) as file:
+        words = _Words(path, file)
+        variables, codes, unit = _declarations(path, words)
+        changes = Changes(path, variables, a, b, others)
+        last = _read_changes(path, words, codes, changes)
+        return changes.recording(unit, words.end_notes(last, codes))
 
 
-def _check_end(path: Path, file: BinaryIO) -> None:
-    """Check that the last line is whole: of one that is cut, a part may read as another time or variable."""
-    if file.seek(0, os.SEEK_END):
-        file.seek(-1, os.SEEK_END)
-        if not file.read(1).isspace():
-            raise CaptureError(f"{path} must be a complete VCD file: its last line does not end")
-    file.seek(0)
+class _Words:
+    """Gives the words of a file, and knows how it ends."""
+
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        self._path, self._file = path, file
+        self._ended = True
+        self.rest = self._all()
+
+    def _all(self) -> Iterator[bytes]:
+        tail = self._file.read(3).removeprefix(b"\xef\xbb\xbf")
+        while piece := self._file.read(_PIECE):
+            text = tail + piece
+            self._ended = text.endswith(b"\n")
+            words = text.split()
+            # The last word may go on in the next piece.
+            tail = b"" if text[-1:].isspace() or not words else words.pop()
+            if len(tail) > _LONGEST:
+                raise CaptureError(f"words of {self._path} must have at most {_LONGEST} bytes")
+            yield from words
+        yield from tail.split()
+
+    def until_end(self, what: str) -> list[bytes]:
+        """Return the words before `$end`; of many, the first ones."""
+        found: list[bytes] = []
+        for word in self.rest:
+            if word == b"$end":
+                return found
+            if len(found) < _MOST_WORDS:
+                found.append(word)
+        raise _incomplete(self._path, f"{what} does not end")
+
+    def end_notes(self, last: bytes, codes: set[bytes]) -> list[str]:
+        """Return what there is to say of the last line; CaptureError if the code in it may be a part of another."""
+        if self._ended:
+            return []
+        if last and any(code != last and code.startswith(last) for code in codes):
+            raise CaptureError(
+                f"the last line of {self._path} must end, else its last change may be cut: put a line end there if it "
+                "is whole"
+            )
+        return ["the last line does not end: if the file was cut, what followed is missing"]
 
 
-def _tokens(path: Path, file: BinaryIO) -> Iterator[Token]:
-    try:
-        yield from tokenize(file)
-    except CaptureError:
-        raise
-    except (VCDParseError, ValueError) as error:
-        raise CaptureError(f"{path} must be a complete VCD file: {str(error).splitlines()[0]}") from error
+def _incomplete(path: Path, why: str) -> CaptureError:
+    return CaptureError(f"{path} must be a complete VCD file: {why}")
 
 
-def _declarations(path: Path, tokens: Iterator[Token]) -> tuple[dict[int, str], list[str], tuple[int, int]]:
-    """Return names and codes of all one-bit variables, and the time unit as a numerator and denominator in seconds."""
+def _shown(word: bytes) -> str:
+    text = word.decode("utf-8", "replace")
+    return repr(text if len(text) <= 40 else text[:40] + "...")
+
+
+def _declarations(path: Path, words: _Words) -> tuple[list[Variable], set[bytes], Fraction]:
+    """Return all variables that have bits, the codes of all, and the unit of the times in seconds."""
     scopes: list[str] = []
-    names: dict[int, str] = {}
-    codes: list[str] = []
-    scale = None
-    for token in tokens:
-        data = token.data
-        if token.kind is TokenKind.TIMESCALE:
-            scale = (int(data.magnitude.value), 10 ** _UNITS[data.unit.value])
-        elif isinstance(data, ScopeDecl):
-            scopes.append(data.ident)
-        elif token.kind is TokenKind.UPSCOPE and scopes:
+    variables: list[Variable] = []
+    codes: set[bytes] = set()
+    unit: Fraction | None = None
+    for word in words.rest:
+        if word[:1] != b"$" or word == b"$end":
+            raise _incomplete(path, f"{_shown(word)} must be a declaration, such as $var")
+        said = words.until_end(word.decode("utf-8", "replace"))
+        if word == b"$timescale":
+            unit = _unit(path, said)
+        elif word == b"$scope":
+            scopes.append(said[-1].decode("utf-8", "replace") if len(said) == 2 else "")
+        elif word == b"$upscope" and scopes:
             scopes.pop()
-        elif isinstance(data, VarDecl) and data.size == 1:
-            names[len(codes)] = ".".join([*scopes, data.ref_str])
-            if len(names[len(codes)]) > _LONGEST_NAME:
-                raise CaptureError(f"names of {path} with their scopes must have at most {_LONGEST_NAME} characters")
-            codes.append(data.id_code)
-        elif token.kind is TokenKind.ENDDEFINITIONS:
-            if scale is None:
-                raise CaptureError(f"{path} must have a $timescale")
-            return names, codes, scale
-    raise CaptureError(f"{path} must be a complete VCD file: its declarations do not end")
+        elif word == b"$var":
+            variable = _variable(path, said, scopes)
+            codes.add(said[2])
+            variables += [] if said[0] in _NO_BITS else [variable]
+        elif word == b"$enddefinitions":
+            if unit is None:
+                raise CaptureError(f"{path} must have a $timescale, such as $timescale 1 ns $end")
+            return variables, codes, unit
+    raise _incomplete(path, "its declarations do not end")
 
 
-def _default(names: dict[int, str], a: Channel | None, b: Channel | None) -> tuple[Channel | None, Channel | None]:
-    """Return what is not given, by the last part of the name, where that is unique."""
-
-    def only(line: str) -> int | None:
-        alike = [number for number, name in names.items() if name.rpartition(".")[2].casefold() == line]
-        return alike[0] if len(alike) == 1 else None
-
-    if only("a") is None or only("b") is None:
-        return a, b
-    return only("a") if a is None else a, only("b") if b is None else b
+def _unit(path: Path, said: list[bytes]) -> Fraction:
+    match = re.fullmatch(rb"(1|10|100)([munpf]?s)", b"".join(said))
+    if match is None:
+        raise CaptureError(
+            f"$timescale of {path} must be 1, 10 or 100 s, ms, us, ns, ps or fs, not {_shown(b' '.join(said))}"
+        )
+    return Fraction(int(match[1]), 10 ** _UNITS[match[2].decode()])
 
 
-def _changes(path: Path, tokens: Iterator[Token], lines: dict[str, str], scale: tuple[int, int]) -> Recording:
-    level = dict.fromkeys(lines.values(), "x")
-    times: list[int] = []
-    levels: list[tuple[str, ...]] = []
-    distinct: dict[tuple[str, ...], tuple[str, ...]] = {}
-    now = 0
+def _variable(path: Path, said: list[bytes], scopes: list[str]) -> Variable:
+    """Return the variable of a declaration: type, size, code, name, and bits that may be part of the name."""
+    if len(said) < 4 or not re.fullmatch(rb"[0-9]{1,7}", said[1]):
+        raise _incomplete(path, f"$var must have a type, a size, a code and a name, not {_shown(b' '.join(said))}")
+    size, own = int(said[1]), b"".join(said[3:]).decode("utf-8", "replace")
+    name, high, low = own, size - 1, 0
+    if size > 1 and (match := re.fullmatch(r"(.+)\[([0-9]{1,7}):([0-9]{1,7})\]", own)):
+        name, high, low = match[1], int(match[2]), int(match[3])
+        if abs(high - low) + 1 != size:
+            raise CaptureError(f"{own} of {path} must have as many bits as its declaration says, {size}")
+    name = ".".join([*scopes, name])
+    if len(name) > _LONGEST_NAME:
+        raise CaptureError(f"names of {path} with their scopes must have at most {_LONGEST_NAME} characters")
+    return Variable(name, size, said[2], high, low)
 
-    def note() -> None:
-        row = tuple(level[code] for code in lines.values())
-        if not times and not {*row} <= {"0", "1"}:
-            return
-        if not levels or row != levels[-1]:
-            if not {*row} <= {"0", "1"}:
-                raise CaptureError(f"levels of {path} must be 0 or 1, not {''.join(row)} at time {now}")
-            times.append(now)
-            levels.append(distinct.setdefault(row, row))
-            check_edges(path, len(times))
 
-    for token in tokens:
-        if token.kind is TokenKind.CHANGE_TIME:
-            note()
-            if int(token.data) < now:
-                raise CaptureError(
-                    f"{path} line {token.span.start.line}: time must be at least {now}, not {token.data}"
-                )
-            now = int(token.data)
-        elif token.kind is TokenKind.CHANGE_SCALAR:
-            change = token.scalar_change
-            if change.id_code in level:
-                level[change.id_code] = change.value.lower()
-        elif token.kind in (TokenKind.CHANGE_VECTOR, TokenKind.CHANGE_REAL) and token.data.id_code in level:
-            level[token.data.id_code] = str(token.data.value).lower()
-    note()
-    if not times:
-        raise CaptureError(f"{path} must contain the levels of all lines, 0 or 1, at least once")
-    numerator, denominator = scale
-    seconds = np.array([(time - times[0]) * numerator / denominator for time in times])
-    columns = dict(zip(lines, np.array(levels, dtype=np.uint8).T, strict=True))
-    return Recording(seconds, duration=(now - times[0]) * numerator / denominator, **columns)
+def _read_changes(path: Path, words: _Words, codes: set[bytes], changes: Changes) -> bytes:
+    """Read all changes; return the code in the last one, or nothing if a time or a section came later."""
+    wanted, now, code = changes.codes, b"0", b""
+    for word in words.rest:
+        head, code, value = word[:1], word[1:], word[:1]
+        if head == b"#":
+            now, code = code, b""
+            if not now.isdigit() or len(now) > _LATEST:
+                raise _incomplete(path, f"{_shown(word)} must be # and a time")
+            changes.at(int(now))
+            continue
+        if head == b"$":
+            code = b""
+            if word not in _SECTIONS:
+                words.until_end(_shown(word))
+            continue
+        if head in _WITH_BLANK:
+            value, code = code, next(words.rest, b"")
+        if code not in codes or head not in _SCALARS + _WITH_BLANK:
+            raise _incomplete(
+                path, f"{_shown(word)} at time {now.decode()} must be a change of a variable that it declares"
+            )
+        if code in wanted:
+            changes.change(code, value.decode("utf-8", "replace"))
+    return code

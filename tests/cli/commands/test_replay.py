@@ -3,10 +3,14 @@
 import gzip
 import itertools
 import re
+import shlex
 from pathlib import Path
 
 import pytest
+from support import docs
+from support.captures import make_sr
 from support.command import run
+from support.formats import FORMATS, QUARTERS
 
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.captures.text import write_csv
@@ -86,23 +90,45 @@ def test_channels_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "counts out -62" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
 
 
-@pytest.mark.parametrize(
-    ("header", "row", "options"),
-    [
-        ("Time [s],Channel 0,Channel 1", "{0:.9f},{1},{2}", ""),
-        ("left,when (µs),right", "{1},{3},{2}", "--time when --a left --b right"),
-        ("; by hand\nleft;right;t [us]", "{1};{2};{3}", "--time 2 --a 0 --b 1"),
-    ],
-)
-def test_csv_of_others(header: str, row: str, options: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = recorded()
-    rows = zip(*(column.tolist() for column in (recording.time, recording.a, recording.b)), strict=True)
-    lines = [row.format(*one, one[0] * 1e6) for one in [*rows, (recording.duration, recording.a[-1], recording.b[-1])]]
-    if ";" in row:
-        lines = [line.replace(".", ",") for line in lines]
-    (tmp_path / "c.csv").write_text("\n".join([header, *lines, ""]), encoding="utf-8")
-    assert run("replay", tmp_path / "c.csv", *CORE, *options.split()) == 0
-    assert "counts out 62" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+# What the guide calls a capture, and the format that it has.
+IN_GUIDE = {
+    "digital": "Saleae Logic 2",
+    "scope": "Rigol",
+    "timer": "ticks of a timer",
+    "bare": "no line of names",
+    "port": "both lines in a number",
+    "sim": "waveform with a vector",
+}
+
+
+def commands_of_guide() -> list[str]:
+    section = docs.page("guides/encoder.md").partition("## Captures of real encoders")[2].partition("\n## ")[0]
+    return re.findall(r"^tachometry (.*)", section, re.MULTILINE)
+
+
+def test_the_guide_shows_every_kind() -> None:
+    assert {Path(shlex.split(command)[1]).stem for command in commands_of_guide()} == {"run", *IN_GUIDE}
+
+
+@pytest.mark.parametrize("command", commands_of_guide())
+def test_the_guide(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "build").mkdir()
+    monkeypatch.chdir(tmp_path)
+    arguments = shlex.split(command)
+    path = Path(arguments[1])
+    if path.stem == "run":
+        levels = b"".join(bytes([0, 4, 12, 8]) for _ in range(QUARTERS // 4)) + b"\0"
+        make_sr(path, [levels], {3: "D2", 4: "D3"}, samplerate="4 kHz")
+    else:
+        (form,) = (form for form in FORMATS if form.name == IN_GUIDE[path.stem])
+        assert path.suffix == form.suffix
+        path.write_bytes(form.content)
+    assert run(*arguments) == 0
+    said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert f"counts out {QUARTERS}" in said
+    assert "errors flagged 0" in said
 
 
 def test_samplerate(tmp_path: Path) -> None:
@@ -115,7 +141,7 @@ def test_samplerate(tmp_path: Path) -> None:
     ("name", "options", "message"),
     [
         ("none.sr", "", "none.sr does not exist"),
-        ("c.bin", "", "a capture must be a .sr, .vcd, .csv, .txt, .tsv or .teeth file, or .csv.gz, not"),
+        ("c.bin", "", "a capture must be a .sr, .vcd, .fst, .csv, .txt, .tsv or .teeth file, or .csv.gz, not"),
         ("empty.csv", "", "header of"),
         ("text.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
         ("cut.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),

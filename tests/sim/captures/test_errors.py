@@ -18,7 +18,7 @@ from tachometry.sim.captures.text import read_csv
 @pytest.mark.parametrize("name", ["x.doc", "x", "x.sr.gz"])
 def test_suffix(tmp_path: Path, name: str) -> None:
     assert_error(
-        tmp_path / name, "a capture must be a .sr, .vcd, .csv, .txt, .tsv or .teeth file, or .csv.gz, not PATH"
+        tmp_path / name, "a capture must be a .sr, .vcd, .fst, .csv, .txt, .tsv or .teeth file, or .csv.gz, not PATH"
     )
 
 

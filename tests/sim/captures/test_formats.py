@@ -31,3 +31,5 @@ def test_a_format_is_read(form: Format, tmp_path: Path) -> None:
     recording = read(form, tmp_path)
     assert counts(recording) == QUARTERS
     np.testing.assert_allclose(recording.time, np.arange(QUARTERS + 1) * STEP_S, rtol=0, atol=1e-12)
+    assert recording.source is not None
+    assert recording.source.notes == form.notes

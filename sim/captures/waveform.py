@@ -1,0 +1,164 @@
+"""Variables of a waveform, whatever file it is in, become the lines of a recording."""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tachometry.sim.captures.file import CaptureError, Channel, check_edges, choose_channels, named
+from tachometry.sim.signals.recording import Recording
+from tachometry.spec.language.units import plural
+
+Code = bytes | int  # what a file calls a variable
+_LEVELS = {"0": 0, "1": 1, "l": 0, "h": 1}
+_ALLOWED = "".join(_LEVELS) + "xzuw-"  # what VHDL and Verilog have beside levels: the one before holds
+
+
+class Variable(NamedTuple):
+    """Describes a variable of a waveform.
+
+    Parameters
+    ----------
+    name : str
+        With its scopes, as `tb.core.a`.
+    size : int
+        Number of its bits.
+    code : bytes or int
+        Several may share one.
+    high, low : int
+        Numbers of its first and last bit, as declared: 3 and 0, or 1 and 4.
+    """
+
+    name: str
+    size: int
+    code: Code
+    high: int
+    low: int
+
+    def position(self, path: Path, bit: int | None) -> int:
+        """Return where a bit is, from the last one on; CaptureError if there is none of this number."""
+        if bit is None:
+            return 0
+        if not min(self.high, self.low) <= bit <= max(self.high, self.low):
+            raise CaptureError(f"bits of {self.name} of {path} must be from {self.high} to {self.low}, not {bit}")
+        return abs(bit - self.low)
+
+
+class Changes:
+    """Makes a recording of changes of variables.
+
+    It begins when all lines have first been 0 or 1. What is neither, later on, is as before.
+
+    Parameters
+    ----------
+    path : Path
+        File that messages name.
+    variables : sequence of Variable
+    a, b, others
+        As of `choose_channels`; numbers count the variables of one bit. When not given: the variables whose names
+        without scopes are a and b, if there is one of each, else the first two.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        variables: Sequence[Variable],
+        a: Channel | None,
+        b: Channel | None,
+        others: Mapping[str, Channel],
+    ) -> None:
+        self._path, self._lines = path, ("a", "b", *others)
+        ordered = sorted(variables, key=lambda variable: variable.size > 1)
+        self._names = {number: variable.name for number, variable in enumerate(ordered)}
+        scalars = {number: self._names[number] for number, variable in enumerate(ordered) if variable.size == 1}
+        vectors = {number: name for number, name in self._names.items() if number not in scalars}
+        self._chosen = choose_channels(path, scalars, *_default(scalars, a, b), others, vectors)
+        of = [(ordered[line.number], line.bit) for line in self._chosen]
+        self._sources = [(variable, variable.position(path, bit)) for variable, bit in of]
+        self._value = {variable.code: "x" for variable, _ in of}
+        self._last: list[int | None] = [None] * len(of)
+        self._gap, self._gaps = [False] * len(of), 0
+        self._times, self._rows = list[int](), list[int]()
+        self._begin: int | None = None
+        self._now, self._changed = 0, False
+
+    @property
+    def codes(self) -> frozenset[Code]:
+        """Those of the variables that lines are taken from."""
+        return frozenset(self._value)
+
+    def at(self, time: int) -> None:
+        """Go on to a time; CaptureError if it is before the last one."""
+        self._settle()
+        if self._begin is None:
+            self._begin = time
+        elif time < self._now:
+            raise CaptureError(f"times of {self._path} must not decrease, as from {self._now} to {time}")
+        self._now = time
+
+    def change(self, code: Code, value: str) -> None:
+        """Give a variable another value, its first bit first."""
+        self._value[code] = value.lower()
+        self._changed = True
+
+    def _settle(self) -> None:
+        """End what happens at one time."""
+        if not self._changed:
+            return
+        self._changed = False
+        levels = [self._level(variable, position) for variable, position in self._sources]
+        gap = [level is None for level in levels]
+        self._gaps += sum(
+            now and not was and last is not None for now, was, last in zip(gap, self._gap, self._last, strict=True)
+        )
+        self._gap = gap
+        self._last = [last if level is None else level for level, last in zip(levels, self._last, strict=True)]
+        row = sum(level << line for line, level in enumerate(self._last) if level is not None)
+        if None not in self._last and (not self._rows or row != self._rows[-1]):
+            self._times.append(self._now)
+            self._rows.append(row)
+            check_edges(self._path, len(self._rows))
+
+    def _level(self, variable: Variable, position: int) -> int | None:
+        """Return the level of a line; None if there is none."""
+        text = self._value[variable.code]
+        value = text.lstrip("0") or text[-1:]
+        if len(value) > variable.size or not value or value.strip(_ALLOWED):
+            shown = text if len(text) <= 40 else text[:40] + "..."
+            raise CaptureError(
+                f"{variable.name} of {self._path} must be {plural(variable.size, 'bit')} of 0, 1, x or z, not "
+                f"{shown!r} at time {self._now}"
+            )
+        # What is shorter goes on with its first bit if that is no level, else with 0.
+        first = "0" if value[0] in _LEVELS else value[0]
+        return _LEVELS.get(value[-1 - position] if position < len(value) else first)
+
+    def recording(self, unit: Fraction, notes: Sequence[str] = ()) -> Recording:
+        """Return the recording up to the last time, in a unit of so many seconds."""
+        self._settle()
+        if not self._times:
+            raise CaptureError(f"{self._path} must contain the levels of all lines, 0 or 1, at least once")
+        first, told = self._times[0], list(notes)
+        if first > (self._begin or 0):
+            at = (first * unit.numerator) / unit.denominator
+            told.append(f"begins at {at:.9g} s of the waveform, where all lines have been 0 or 1")
+        if self._gaps:
+            told.append(f"{plural(self._gaps, 'change')} to x or z: the level before holds there")
+        seconds = np.array([(time - first) * unit.numerator / unit.denominator for time in self._times])
+        duration = (self._now - first) * unit.numerator / unit.denominator
+        recording = Recording.of_level(seconds, np.array(self._rows, dtype=np.uint8), duration, self._lines)
+        return named(recording, self._names, self._chosen, told)
+
+
+def _default(names: Mapping[int, str], a: Channel | None, b: Channel | None) -> tuple[Channel | None, Channel | None]:
+    """Return what is not given, by the last part of the name, where that is unique."""
+
+    def only(line: str) -> int | None:
+        alike = [number for number, name in names.items() if name.rpartition(".")[2].casefold() == line]
+        return alike[0] if len(alike) == 1 else None
+
+    if only("a") is None or only("b") is None:
+        return a, b
+    return only("a") if a is None else a, only("b") if b is None else b

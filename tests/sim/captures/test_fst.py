@@ -1,0 +1,92 @@
+"""Compressed waveforms tell what the plain ones of the same simulation do."""
+
+import importlib.util
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from support.captures import assert_same
+
+from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.read import read_capture
+
+BENCH = """\
+`timescale 1 ns / 1 ps
+module tb;
+  reg a, b;
+  reg [1:0] enc;
+  real speed = 0.5;
+  event never;
+  integer k;
+  initial begin
+    if ($test$plusargs("plain")) $dumpfile("w.vcd"); else $dumpfile("w.fst");
+    $dumpvars(0, tb);
+    #5 a = 0; b = 0; enc = 0;
+    for (k = 0; k < 40; k = k + 1) begin
+      #250 if (k % 2) b = !b; else a = !a;
+      enc = {b, a};
+    end
+    #100 a = 1'bx;
+    #100 a = 0;
+    enc = 2'bzz;
+    #1000 $finish;
+  end
+endmodule
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("fst")
+    (folder / "tb.v").write_text(BENCH)
+    for command in ("iverilog -o tb tb.v", "vvp tb -fst", "vvp tb +plain"):
+        subprocess.run(command.split(), cwd=folder, check=True, capture_output=True)
+    return folder
+
+
+@pytest.mark.parametrize(("a", "b"), [(None, None), ("tb.enc[0]", "enc[1]"), ("b", "0")])
+def test_it_is_read_as_the_plain_one(a: str | None, b: str | None, folder: Path) -> None:
+    plain, compressed = (read_capture(folder / f"w.{suffix}", a, b) for suffix in ("vcd", "fst"))
+    assert len(plain.time) == 41
+    assert plain.duration == pytest.approx(11.2e-6)
+    assert_same(compressed, plain)
+    assert plain.source is not None
+    assert compressed.source is not None
+    assert compressed.source.lines == plain.source.lines
+    assert set(compressed.source.notes) - set(plain.source.notes) == (
+        {"bit 0 of tb.enc is its last one"} if a == "tb.enc[0]" else set()
+    )
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "instead"),
+    [
+        pytest.param(0, 1, b"$", id="another type"),
+        pytest.param(8, 9, b"\0", id="another length"),
+        pytest.param(400, 420, b"", id="a piece is missing"),
+        pytest.param(-40, None, b"", id="the end is missing"),
+        pytest.param(10, None, b"", id="all is missing"),
+    ],
+)
+def test_damage_is_refused(
+    start: int, end: int | None, instead: bytes, folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    data, path = (folder / "w.fst").read_bytes(), folder / "damaged.fst"
+    path.write_bytes(data[:start] + instead + (b"" if end is None else data[end:]))
+    with pytest.raises(CaptureError, match=rf"^{re.escape(str(path))} must be a whole FST file, but is cut or damaged"):
+        read_capture(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_the_extra_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(CaptureError, match=r"the extra `fst` must be installed: pip install 'tachometry\[fst\]'; or "):
+        read_capture(folder / "w.fst")
+    with pytest.raises(CaptureError, match=r"^samplerate must not be given for .*w\.fst: a waveform has its times$"):
+        read_capture(folder / "w.fst", samplerate_hz=1e6)
+
+
+def test_a_missing_file_is_named(folder: Path) -> None:
+    with pytest.raises(CaptureError, match=r"none\.fst does not exist$"):
+        read_capture(folder / "none.fst")
