@@ -78,7 +78,7 @@ _OPTIONS = [
     option(
         _CAPTURE,
         "--wrap",
-        type=click.IntRange(min=0),
+        type=click.IntRange(0, 1 << 53),
         metavar="N",
         help="The counter of --count goes from N-1 to 0; 0: it does not wrap. [default: 65536 or 4294967296 where it "
         "jumps by more than half of that, else 0]",

@@ -67,8 +67,8 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
     kind, _, rest = motion.strip().partition(":")
     if kind != "counts":
         return encoder.record(parse_motion(motion))
-    if len(parts := rest.rsplit(":", 2)) != 3:
-        raise ParameterError("motion", f"must be counts:FILE:TIME:COUNT, not {motion!r}")
+    if len(parts := rest.rsplit(":", 2)) != 3 or not all(parts) or ("+" in rest and not Path(parts[0]).exists()):
+        raise ParameterError("motion", f"must be counts:FILE:TIME:COUNT alone, not {motion!r}")
     text = TextOptions(parts[1], slowest_s=float(spec.times.seconds(spec.times.longest)))
     try:
         log = read_count_log(Path(parts[0]), parts[2], text)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.source import Source
 from tachometry.sim.studies.simulation import Axis
 from tachometry.spec.language.units import plural
@@ -13,15 +14,22 @@ def capture_rows(axis: Axis) -> list[_Row]:
     """Return rows of the table: the channels that were taken, how long they last, and the speed that the core shows."""
     if (source := axis.recording.source) is None:
         return []
-    rows = [
-        ("lines", channels(source)),
-        ("captured", f"{source.duration:.6g} s, {plural(source.n_changes, 'change')} of the lines"),
-    ]
+    lines, captured, *notes = source_rows(source)
+    rows = [lines, captured]
     velocity, unit = axis.spec.scale.shown_unit.of(axis.held.velocity_rad_s), axis.spec.scale.shown_unit.name
     if len(velocity):
         least, mean, most = velocity.min(), velocity.mean(), velocity.max()
         rows.append(("speed", f"min {least:.6g}, mean {mean:.6g}, max {most:.6g} {unit}, as held at every tick"))
-    return rows + [("note", note) for note in source.notes]
+    return rows + notes
+
+
+def source_rows(source: Source) -> list[_Row]:
+    """Return rows of the table: the channels that were taken, how long they last, and how they were read."""
+    return [
+        ("lines", channels(source)),
+        ("captured", f"{source.duration:.6g} s, {plural(source.n_changes, 'change')} of the lines"),
+        *(("note", note) for note in source.notes),
+    ]
 
 
 def channels(source: Source) -> str:
@@ -38,10 +46,15 @@ def index_distance(axis: Axis) -> str:
     return f", {least if least == most else f'{least} to {most}'} counts apart"
 
 
-def capture_warnings(axis: Axis) -> list[str]:
-    """Tell what of a capture contradicts itself or the options."""
-    warnings = _still(axis.recording.source) + _index(axis)
-    if together := axis.recording.n_together:
+def axis_warnings(axis: Axis) -> list[str]:
+    """Tell what of the capture of an axis contradicts itself or the options."""
+    return capture_warnings(axis.recording) + _index(axis) + _index_place(axis)
+
+
+def capture_warnings(recording: Recording) -> list[str]:
+    """Tell what of a capture contradicts itself."""
+    warnings = _still(recording.source)
+    if together := recording.n_together:
         warnings.append(
             f"at {plural(together, 'instant')} of the capture both lines change: it was sampled more slowly than the "
             "edges came, or the encoder is at fault; counts and velocity are wrong there"
@@ -77,3 +90,19 @@ def _index(axis: Axis) -> list[str]:
         f"indices are {apart:.15g} counts apart; --ppr {lines} with x{encoder.decoding} says {turn}{fits}: "
         "if it is wrong, speeds are wrong by as much"
     ]
+
+
+def _index_place(axis: Axis) -> list[str]:
+    """Tell if the index is at other counts forward than backward, as where it is wide or low."""
+    near = np.abs(axis.index_distances)
+    near = near[(near > 0) & (near <= 2 * axis.spec.encoder.decoding) & (near < axis.spec.encoder.counts_per_rev / 2)]
+    recording = axis.recording
+    if not len(near) or recording.z is None:
+        return []
+    high = float(np.diff(recording.time, append=recording.duration) @ recording.z) / recording.duration
+    why = (
+        f"z is high {100 * high:.3g} % of the time, so it may be low at the index, and must be inverted"
+        if high > 0.5
+        else "z may be high for longer than a quarter of a period of A, or not be in step with A and B"
+    )
+    return [f"to and fro, the index is found {int(near.max())} counts apart, as it is taken where z rises: {why}"]

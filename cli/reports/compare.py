@@ -5,8 +5,9 @@ from fractions import Fraction
 
 from rich.text import Text
 
+from tachometry.cli.reports.capture import capture_warnings, source_rows
 from tachometry.cli.reports.run import merged_edges, print_warnings
-from tachometry.cli.reports.terminal import print_table, stdout_console
+from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
 from tachometry.sim.studies.comparing.compare import Score
 from tachometry.sim.studies.comparing.comparison import Comparison
 from tachometry.sim.studies.size import Measurement
@@ -33,6 +34,8 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
         Methods that are not compared, and why.
     """
     scores, unit = comparison.scores, comparison.spec.scale.shown_unit
+    if source := comparison.recording.source:
+        print_rows(source_rows(source))
 
     def time(seconds: float | None) -> str:
         return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
@@ -65,7 +68,10 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
             console.print(Text(f"{name}: {note}"))
     for name, reason in left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
-    print_warnings(merged_edges(comparison.n_merged))
+    warnings = merged_edges(comparison.n_merged)
+    if comparison.true_speed is None:
+        warnings += capture_warnings(comparison.recording)
+    print_warnings(warnings)
 
 
 def _size_cells(size: Measurement | None) -> list[str]:

@@ -7,7 +7,7 @@ from functools import singledispatch
 import numpy as np
 from rich.text import Text
 
-from tachometry.cli.reports.capture import capture_rows, capture_warnings, channels, index_distance
+from tachometry.cli.reports.capture import axis_warnings, capture_rows, channels, index_distance
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
@@ -50,7 +50,9 @@ def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[li
 def _(spec: AxesSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
     warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
     warnings += [f"axis {number}: {warning}" for number, axis in enumerate(axes) for warning in _of_capture(axis)]
-    return [mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))], warnings
+    rows = [mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))]
+    sources = [(number, source) for number, axis in enumerate(axes) if (source := axis.recording.source)]
+    return rows + [("note", f"axis {number}: {note}") for number, source in sources for note in source.notes], warnings
 
 
 def print_warnings(warnings: list[str]) -> None:
@@ -79,7 +81,7 @@ def _warnings(axis: Axis) -> list[str]:
 
 
 def _of_capture(axis: Axis) -> list[str]:
-    return [] if axis.truth else capture_warnings(axis)
+    return [] if axis.truth else axis_warnings(axis)
 
 
 def _merged_looks(spec: AxesSpec, number: int, n_merged: int) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.captures.cells import numbers
-from tachometry.sim.captures.file import CaptureError, Channel, OptionError, check_edges, reading
+from tachometry.sim.captures.file import CaptureError, Channel, OptionError, check_edges, kind_of, reading
 from tachometry.sim.captures.header import PLAIN, Header, TextOptions, check_seconds, read_header
 from tachometry.sim.captures.rows import COUNTERS, Lines, Times, blocks, opened, refuse
 from tachometry.sim.signals.arrays import Ints
@@ -77,7 +77,7 @@ def read_count_log(path: Path, count: Channel, text: TextOptions = PLAIN, wrap: 
     CaptureError
         If the file cannot be read, or a row is not of this kind.
     """
-    if path.suffix.lower() in (".sr", ".vcd"):
+    if kind_of(path) in (".sr", ".vcd", ".fst"):
         raise OptionError("count", f"must not be given for {path}: it has levels, not counts")
     with reading(path), opened(path) as file:
         source = Lines(path, file)

@@ -57,6 +57,11 @@ def reading(path: Path) -> Iterator[None]:
         raise CaptureError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
 
 
+def kind_of(path: Path) -> str:
+    """Return the suffix that tells the kind of a file, in lower case; that before `.gz`."""
+    return (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
+
+
 def opened_bytes(path: Path) -> BinaryIO:
     """Open a file; what ends in `.gz` is unpacked."""
     return cast(BinaryIO, gzip.open(path)) if path.suffix.lower() == ".gz" else path.open("rb")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError
+from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError, kind_of
 from tachometry.sim.captures.fst import read_fst
 from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.sigrok import read_sr
@@ -77,7 +77,7 @@ def read_capture(
     """
     path = Path(path)
     packed = path.suffix.lower() == ".gz"
-    kind = path.with_suffix("").suffix.lower() if packed else path.suffix.lower()
+    kind = kind_of(path)
     reader = READERS.get(kind) if not packed or kind in PACKED else None
     if reader is None:
         how = f": export it {_EXPORTS[kind]}" if kind in _EXPORTS else ""

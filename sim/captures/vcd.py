@@ -175,7 +175,7 @@ def _read_changes(path: Path, words: _Words, codes: set[bytes], changes: Changes
         if head == b"#":
             now, code = code, b""
             if not now.isdigit() or len(now) > _LATEST:
-                raise _incomplete(path, f"{_shown(word)} must be # and a time")
+                raise _incomplete(path, f"{_shown(word)} must be # and a time of at most {_LATEST} digits")
             changes.at(int(now))
             continue
         if head == b"$":

@@ -10,7 +10,7 @@ from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.units import PI, rounded, signed_width
+from tachometry.spec.language.units import PI, format_time, rounded, signed_width
 
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
@@ -33,7 +33,12 @@ def check(spec: TachometerSpec) -> None:
     if not 8 <= spec.position_width <= 48:
         raise ParameterError("position_width", f"must be from 8 to 48, not {spec.position_width}")
     if not 0 <= spec.filter_clocks <= 255:
-        raise ParameterError("filter_clocks", f"must be from 0 to 255, not {spec.filter_clocks}")
+        longest = format_time(Fraction(255, spec.timing.clock_hz))
+        raise ParameterError(
+            "filter_clocks",
+            f"must be from 0 to 255 clocks, {longest}, not {spec.filter_clocks}: what bounces longer must be filtered "
+            "before the core, or needs a slower clock",
+        )
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with an index")
     if spec.facts.bounds:

@@ -9,6 +9,7 @@ from support.captures import make_sr
 _NOISE = random.Random(1).randbytes(5000)
 _MOTION = "time,angle_rad\n"
 _CAPTURE = "time,a,b\n"
+_LOG = "time [ms],n\n0,0\n5,9\n"
 _VARIABLES = '$var wire 1 ! a $end\n$var wire 1 "! b $end\n$var wire 1 " c $end\n'
 _HEAD = f"$timescale 1 us $end\n{_VARIABLES}$enddefinitions $end\n"
 _BEGIN = '#0\n0!\n0"!\n0"\n#1000\n1!\n'
@@ -44,11 +45,16 @@ _TEXTS = {
     "cut-value.vcd": _HEAD + _BEGIN + "#2000\n1",
     "cut-variable.vcd": _HEAD + _BEGIN + '#2000\n1"',
     "vector.vcd": _HEAD + _BEGIN + "#2000\nb10 !\n",
-    "undefined.vcd": _HEAD + _BEGIN + "#2000\nx!\n",
+    "undefined.vcd": _HEAD + "#2000\nx!\n",
     "no-scale.vcd": f"{_VARIABLES}$enddefinitions $end\n{_BEGIN}",
-    "huge-time.vcd": _HEAD + _BEGIN + f"#1{'0' * 40}\n0!\n",
+    "late.vcd": _HEAD + _BEGIN + f"#1{'0' * 19}\n0!\n",
     "long-time.vcd": _HEAD + _BEGIN + f"#{'9' * 5000}\n0!\n",
     "scopes.vcd": "$scope module m $end\n" * 5000 + _HEAD,
+    "log.csv": _LOG + "10,20\n",
+    "cut-log.csv": _LOG + "10,2",
+    "nan-log.csv": _LOG.replace("9", "nan"),
+    "far-log.csv": _LOG + f"10,{1 << 53}\n15,-{1 << 53}\n",
+    "late-log.csv": _LOG + "1e29,10\n",
     "deep.toml": "ppr = " + "[" * 100_000,
     "deep-table.toml": "ppr = " + "{a = " * 5_000,
     "broken.toml": "ppr = \n",
@@ -72,9 +78,9 @@ def make_files(folder: Path) -> None:
     (folder / "folder").mkdir()
     for name, text in _TEXTS.items():
         (folder / name).write_text(text, encoding="utf-8")
-    for name in ("empty", "empty.csv", "empty.sr", "empty.vcd"):
+    for name in ("empty", "empty.csv", "empty.sr", "empty.vcd", "empty.fst"):
         (folder / name).touch()
-    for name in ("noise", "noise.csv", "noise.sr", "noise.vcd", "noise.parquet", "binary.toml"):
+    for name in ("noise", "noise.csv", "noise.sr", "noise.vcd", "noise.fst", "noise.parquet", "binary.toml"):
         (folder / name).write_bytes(_NOISE)
     for name in ("zero.csv", "zero.toml", "zero.sr"):
         (folder / name).symlink_to("/dev/zero")

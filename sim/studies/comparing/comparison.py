@@ -55,8 +55,8 @@ class Comparison:
     instants : float64 array, shape (n,), seconds
         At which they are compared.
     true_speed : TrueSpeed or None
-    n_merged : int
-        Edges that no core can tell apart.
+    recording : Recording
+        The edges.
     n_tried : dict of str to int
         Number of settings of which one is the best, by the name of this one.
     costs : dict of str to list of Cost
@@ -71,10 +71,16 @@ class Comparison:
     scores: list[Score]
     instants: FloatArray
     true_speed: TrueSpeed | None
-    n_merged: int
+    recording: Recording
     n_tried: dict[str, int] = field(default_factory=dict)
     costs: dict[str, list[Cost]] = field(default_factory=dict)
     rms_speed: float = 0.0
+
+    @property
+    def n_merged(self) -> int:
+        """Edges that no core can tell apart."""
+        clock_hz = self.spec.timing.clock_hz
+        return self.recording.n_merged(clock_hz, int(self.recording.duration * clock_hz))
 
     @property
     def front(self) -> list[Cost]:
@@ -139,7 +145,6 @@ def comparison(
         beyond = "" if earliest is None else ", and beyond --from"
         what = source.name if end == duration else "--until"
         raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {_time(end)}")
-    clock_hz = spec.timing.clock_hz
     return Comparison(
         spec=spec,
         specs=specs,
@@ -147,7 +152,7 @@ def comparison(
         scores=[score(curve, duration, instants, source.true_speed) for curve in curves],
         instants=instants,
         true_speed=source.true_speed,
-        n_merged=recording.n_merged(clock_hz, int(duration * clock_hz)),
+        recording=recording,
         n_tried=n_tried,
         costs=costs,
         rms_speed=speed,

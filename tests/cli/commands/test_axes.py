@@ -53,6 +53,15 @@ def test_simulate_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert f"counts out {counts['1'][1]}," in other["0"]
 
 
+def test_what_the_reader_says_of_an_axis_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [f"{k / 1000},{k % 2},0,{'X' if k == 7 else 0},{k % 2}" for k in range(20)]
+    (tmp_path / "c.csv").write_text("\n".join(["time,a0,b0,a1,b1", *lines, ""]))
+    assert run("replay", tmp_path / "c.csv", *CORE, "--axes", "2") == 0
+    assert [line for line in rows(capsys) if line.startswith("note axis")] == [
+        "note axis 1: 1 cell with an X: the level before holds there"
+    ]
+
+
 def test_edges_that_are_too_close_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     core = "--ppr 25 --clock 2kHz --tick 20ms --max-time 80ms --engine pysim --axes 3".split()
     assert run("simulate", *core, "--motion", "constant:60:100ms,stop:100ms") == 0

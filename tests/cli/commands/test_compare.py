@@ -93,6 +93,19 @@ def test_a_capture_in_place_of_a_motion(tmp_path: Path, capsys: pytest.CaptureFi
     assert (tmp_path / "c.png").stat().st_size > 1000
 
 
+def test_what_the_reader_says_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [f"{k / 1000},{'0110'[k % 4] if k != 7 else 'X'},0,{k % 2}" for k in range(200)]
+    (tmp_path / "c.csv").write_text("\n".join(["time,a,b,c", *rows, ""]))
+    assert run("compare", *CORE, "--replay", tmp_path / "c.csv", "--methods", "s") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert (
+        "lines a from a, b from b captured 0.199 s, 100 changes of the lines note 1 cell with an X: the level" in told
+    )
+    assert "WARNING: b never changes; c does: see --b" in told
+    assert run("compare", *CORE, "--motion", "stop:100ms", "--methods", "s") == 0
+    assert "captured" not in capsys.readouterr().out
+
+
 def test_a_capture_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "c.csv").write_text("time,a,b\n0,0,0\n0.1,1,0\n")
     assert run("compare", *CORE, "--replay", tmp_path / "c.csv", "--csv", tmp_path / "c.csv") == 2

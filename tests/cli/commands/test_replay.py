@@ -82,6 +82,32 @@ def test_what_contradicts_itself_is_warned_of(
         assert re.search(r"PASS: .*[0-9]+ values\), which says nothing of wiring and --ppr", told)
 
 
+@pytest.mark.parametrize(
+    ("high", "said"),
+    [
+        ({40}, None),
+        (
+            {40, 41, 42, 43},
+            "3 counts apart, as it is taken where z rises: z may be high for longer than a quarter of a",
+        ),
+        (
+            {*range(100)} - {40},
+            "2 counts apart, as it is taken where z rises: z is high 97.9 % of the time, so it may be",
+        ),
+    ],
+)
+def test_an_index_at_two_places_is_warned_of(
+    high: set[int], said: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shaft = [*range(61), *range(60, 19, -1), *range(20, 61)]
+    rows = [f"{k / 2000:.6f},{'0110'[n % 4]},{'0011'[n % 4]},{int(n in high)}" for k, n in enumerate(shaft)]
+    (tmp_path / "c.csv").write_text("\n".join(["time,a,b,z", *rows, ""]))
+    assert run("replay", tmp_path / "c.csv", *CORE, "--index") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert ("WARNING" in told) == (said is not None)
+    assert f"WARNING: to and fro, the index is found {said}" in told or said is None
+
+
 def test_channels_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     capture = tmp_path / "c.csv"
     write_csv(capture, recorded())

@@ -111,7 +111,7 @@ def test_a_motion_counts_what_the_log_says(
     told = " ".join(capsys.readouterr().out.split())
     assert "counts in 6 counts out 6 errors flagged 0" in told
     assert run("simulate", "--motion", "counts:log.csv", *core) == 2
-    assert "--motion must be counts:FILE:TIME:COUNT, not 'counts:log.csv'" in capsys.readouterr().err
+    assert "--motion must be counts:FILE:TIME:COUNT alone, not 'counts:log.csv'" in capsys.readouterr().err
     assert run("simulate", "--motion", "counts:log.csv:time:n", *core, "--trace", "log.csv") == 2
     assert "must be another file than the input" in capsys.readouterr().err
 

@@ -86,7 +86,8 @@ ERRORS = [
     ),
     (
         lambda: STachometer(encoder=Encoder(500), timing=TIMING, filter_clocks=256),
-        "filter_clocks must be from 0 to 255, not 256",
+        "filter_clocks must be from 0 to 255 clocks, 5.3125us, not 256: what bounces longer must be filtered before "
+        "the core, or needs a slower clock",
     ),
     (lambda: parse_frequency("clock", -5), "clock must be a positive whole number of Hz, not -5"),
 ]
