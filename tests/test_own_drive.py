@@ -8,6 +8,8 @@ import pytest
 from support import docs
 from support.command import run
 
+from tachometry.sim.engines.verilator import verilate
+
 PAGE = docs.page("guides/integration.md")
 # 3,050 rpm forward, then 1,000 rpm backward: counts of 10,000 a revolution, and clocks of 10 ns, in a quarter period.
 FORWARD, BACKWARD = 100e6 * 60 / (10_000 * 3050), 100e6 * 60 / (10_000 * 1000)
@@ -55,6 +57,7 @@ def test_a_core_for_a_drive_of_ones_own(
     assert "rtl/speed.v" in capsys.readouterr().out
     Path("drive.v").write_text(top[1])
     Path("bench.v").write_text(BENCH)
+    verilate(["--lint-only", "-Wall", "--top-module", "drive", "drive.v", "rtl/speed.v"], tmp_path)
     files = ["drive.v", "rtl/speed.v", "bench.v"]
     subprocess.run(["iverilog", "-s", "bench", "-o", "bench.vvp", *files], check=True)
     done = subprocess.run(["vvp", "-n", "bench.vvp"], check=True, capture_output=True, text=True)

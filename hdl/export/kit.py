@@ -72,6 +72,7 @@ def _bench(spec: AnySpec) -> dict[str, object]:
         "a": "quarter[1] ^ quarter[0]",
         "b": "quarter[1]",
         "velocity": "velocity",
+        "lsb": 2.0**-tacho.widths.frac_bits,
         "compared": "generate --testbench cocotb",
         "expected": _MOVED * tacho.encoder.decoding // 4,
     }

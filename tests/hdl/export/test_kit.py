@@ -2,6 +2,7 @@
 
 import fnmatch
 import json
+import math
 import os
 import re
 import subprocess
@@ -30,6 +31,15 @@ CASES = {
     "mt": {"external-tick": "yes", "bounds": "yes"},
     "rairan": {"filter": "100", "bounds": "yes"},
     "track": {"external-tick": "yes", "unit": "rad/s"},
+}
+# The unit of the velocity, and the speed at which the smoke test turns.
+FASTEST = {
+    "s": ("rpm", 60 * 1e6 / 24 / 32, 1e-5),  # a count of 32 in 24 clocks
+    "m": ("count/tick", 1 - math.exp(-2 * math.pi * 20 * 10 * 80e-6), 1e-3),  # a count a tick, filtered for ten ticks
+    "t": ("count/tick", 2, 1e-5),
+    "mt": ("count/tick", 4, 1e-5),
+    "rairan": ("count/tick", 80 / 216, 0.1),  # in ticks of 80 clocks it sees 80/216 as 2/5
+    "track": ("rad/s", 2 * math.pi * 1e6 / 20 / 32, 1),  # it has not settled
 }
 
 
@@ -71,9 +81,12 @@ def test_the_smoke_test_includes_the_template_and_passes(method: str, bus: str, 
     said = run(tmp_path, "iverilog", "-g2012", "-Wall", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
     assert said == ""
     counts = 24 * int(CASES[method].get("decoding", "4")) // 4
-    assert re.match(
-        rf"PASS: position {counts}, [1-9]\d* updates, velocity -?\d+\n", run(tmp_path, "vvp", "-n", "x.vvp")
-    )
+    text = run(tmp_path, "vvp", "-n", "x.vvp")
+    passed = re.match(rf"PASS: position {counts}, [1-9]\d* updates, velocity from (\S+) to (\S+) (\S+)\n", text)
+    assert passed is not None, text
+    unit, fastest, within = FASTEST[method]
+    assert float(passed[1]) <= 0 < float(passed[2]) == pytest.approx(fastest, rel=within)
+    assert passed[3] == unit
     described = json.loads(files["spindle.json"])["ports"]
     ports = [port["name"] for direction in ("input", "output") for port in described if port["direction"] == direction]
     assert re.findall(r"^  \.(\w+)\(\1\)", files["spindle_inst.v"], re.MULTILINE) == ports
@@ -87,7 +100,8 @@ def test_the_smoke_test_fails_on_a_wrong_core(tmp_path: Path) -> None:
     run(tmp_path, "iverilog", "-g2012", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
     done = subprocess.run(["vvp", "-n", "x.vvp"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1
-    assert "FAIL: position -6 instead of 6, 0 errors" in done.stdout + done.stderr
+    # Updates before the shaft turns back show a negative velocity.
+    assert "FAIL: position -6 instead of 6, 8 errors" in done.stdout + done.stderr
 
 
 def flip_flops(verilog: str) -> dict[str, str]:
@@ -164,12 +178,17 @@ def test_fusesoc_runs_every_target(bus: str, tmp_path: Path) -> None:
     files = made("s", bus)
     for file, text in files.items():
         (tmp_path / file).write_text(text)
-    path = f"{home() / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    # An environment as `make venv` leaves it, with the packages of this one.
+    venv = tmp_path / "venv"
+    (venv / "bin").mkdir(parents=True)
+    (venv / "lib").symlink_to(home().parents[2])
+    run(docs.DOCS.parent, "make", f"VENV={venv}", "-o", venv / ".test", "venv", MAKEFLAGS="")
+    path = f"{venv / 'bin'}{os.pathsep}{os.environ['PATH']}"
     targets = re.findall(r"^  (\w+):\n    filesets:", files["spindle.core"], re.MULTILINE)
     assert targets == ["default", "lint", "sim"]
     for target in targets:
         command = (BIN / "fusesoc", "--cores-root", ".", "run", "--target", target, "spindle")
-        home_ = {"VERILATOR_ROOT": str(home()), "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
+        home_ = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
         said = run(tmp_path, *command, PATH=path, **home_)
         assert "Warning" not in said, said
         assert ("PASS: position 24" in said) == (target == "sim")
