@@ -78,7 +78,7 @@ def levels(cells: Sequence[str]) -> NDArray[np.int8]:
 
     def level(cell: str) -> int:
         known = _LEVELS.get(cell.lower(), BAD)
-        number = float(cell) if NUMBER.fullmatch(cell) else known
+        number = float(cell) if NUMBER.fullmatch(cell) and not re.match("0[0-9]", cell) else known  # no two in one cell
         return int(number) if number in (0, 1) else known
 
     return _each(cells, {cell: level(cell) for cell in set(cells)})
@@ -88,7 +88,9 @@ def bits(cells: Sequence[str], bit: int) -> NDArray[np.int8]:
     """Return a bit of whole numbers; HELD and BAD as of `levels`."""
 
     def level(cell: str) -> int:
-        return int(cell) >> bit & 1 if re.fullmatch("[0-9]{1,9}", cell) else min(_LEVELS.get(cell.lower(), BAD), HELD)
+        if re.fullmatch("[0-9]{1,9}", cell):
+            return int(cell) >> bit & 1
+        return HELD if cell.lower() == "x" else BAD
 
     return _each(cells, {cell: level(cell) for cell in set(cells)})
 

@@ -92,7 +92,7 @@ def _table(
 ) -> Table | None:
     """Return the table whose names are in line `at`, or that has none."""
     below = [number for number in cells if number > at]
-    before = [number for number in cells if number < at and names and _as_many(cells[number], names)]
+    before = [number for number in cells if number < at and names and _as_many(names, cells[number])]
     units: list[str] = []
     if names and at in cells and before and _are_units(names):
         units, names = names, cells[before[-1]]  # it is the line of units that looks as names of times do
@@ -111,8 +111,10 @@ def trimmed(cells: list[str]) -> list[str]:
     return cells[:-1] if cells and not cells[-1] else cells
 
 
-def _as_many(cells: list[str], others: list[str]) -> bool:
-    return len(cells) == len(others) or len(trimmed(cells)) == len(trimmed(others))
+def _as_many(units: list[str], names: list[str]) -> bool:
+    """Tell whether a line has a cell for each name, and nothing where there is no name."""
+    as_many = len(units) == len(names) or len(trimmed(units)) == len(trimmed(names))
+    return as_many and not any(units[len(trimmed(names)) :])
 
 
 def _is_row(cells: Sequence[str], separator: str) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.captures import assert_error, make_csv, make_sr, random_trace
+from support.damage import damaged
 
 from tachometry.sim.captures.file import CaptureError
 from tachometry.sim.captures.read import read_capture
@@ -73,10 +74,11 @@ def test_any_damage_is_a_capture_error(tmp_path: Path) -> None:
     data = np.frombuffer(good.read_bytes(), np.uint8)
     rng = np.random.default_rng(8)
     messages = []
-    for position in range(len(data)):
-        bad = data.copy()
+    flipped = [data.copy() for _ in data]
+    for position, bad in enumerate(flipped):
         bad[position] ^= rng.integers(1, 256)
-        (tmp_path / "y.sr").write_bytes(bad.tobytes())
+    for content in (*(bad.tobytes() for bad in flipped), *damaged(data.tobytes(), "sr", 100)):
+        (tmp_path / "y.sr").write_bytes(content)
         try:
             read_capture(tmp_path / "y.sr")
         except CaptureError as error:
@@ -296,6 +298,11 @@ def test_csv_without_rows(tmp_path: Path, rows: str) -> None:
         (
             "2,0,0.5",
             "PATH line 4: level of b must be 0 or 1, not '0.5' VOLTAGE",
+        ),
+        (
+            "2,0,01",
+            "PATH line 4: level of b must be 0 or 1, not '01' "
+            "(of both lines in one number, --a b[0] is the lowest bit)",
         ),
         ("2,nan,0", "PATH line 4: level of a must be 0 or 1, not 'nan'"),
         ("0.1,0,0", "PATH line 4: time must be at least 0.5 s as before, not 0.1 s"),
