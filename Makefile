@@ -1,5 +1,7 @@
-# Everything needs only Python 3.11 or newer; the environment is made on first use.
+# Everything needs only Python 3.11 or newer; the environment is made on first use, with PINNED=1 of the packages of
+# constraints.txt.
 PYTHON ?= python3
+PINNED ?=
 VENV   := .venv
 BIN    := $(VENV)/bin
 LAYERS := spec hdl sim boards cli
@@ -9,10 +11,14 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test test-all pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api lint clean
+.PHONY: help venv demo figures compare icarus test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
+
+# What has a test of the packages beside those of the demo.
+SMOKE := tests/test_package.py tests/hdl/export tests/hdl/bus/test_buses.py tests/sim/studies/sweeping tests/boards/monitor \
+  tests/cli/commands/test_testbench.py tests/cli/commands/test_verify.py
 
 # An editable install links each file, so other files need another one.
 LINKED := build/.linked-$(firstword $(shell find $(LAYERS) package -type f ! -name '*.pyc' | LC_ALL=C sort | cksum))
@@ -20,6 +26,7 @@ LINKED := build/.linked-$(firstword $(shell find $(LAYERS) package -type f ! -na
 $(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, not " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
+	$(if $(PINNED),$(PIP) --no-deps --require-hashes -r constraints.txt)
 	@touch $@
 
 $(LINKED): pyproject.toml $(VENV)/.made
@@ -57,8 +64,16 @@ test: $(VENV)/.test icarus ## lint, types and all tests but the nightly ones
 pytest: $(VENV)/.test icarus
 	$(BIN)/pytest -q -n auto --dist worksteal -m "not nightly"
 
-test-all: lint icarus ## lint, types and all tests: every pair of options, and every mutant that a test must catch
+test-all: lint icarus lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
+
+# Packages that came later may warn of what the lowest versions do.
+lowest: $(VENV)/.test icarus ## a smoke run with the lowest versions that pyproject.toml allows of what it names
+	$(PIP) uv
+	$(BIN)/uv venv -q --clear -p $(BIN)/python build/lowest
+	$(BIN)/uv pip install -q -p build/lowest/bin/python --resolution lowest-direct '.[test]'
+	BIN=build/lowest/bin OUT=build/lowest/demo TIME=500ms sh docs/demo.sh
+	build/lowest/bin/pytest -q -n auto -m "not nightly" -W default::DeprecationWarning -W default::PendingDeprecationWarning $(SMOKE)
 
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, written to docs/measured/formal.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.formal -o docs/measured/formal.md
@@ -99,8 +114,9 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 	$(BIN)/python bench/boards.py
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
-docs: $(LINKED) ## the pages of options, ports and registers, written to docs/reference
+docs: demo ## the pages of options, ports and registers, written to docs/reference, and docs/demo.png
 	$(BIN)/python bench/reference_pages.py
+	cp build/demo/ramp.png docs/demo.png
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	$(BIN)/pdoc --docformat numpy -o build/api $(addprefix tachometry.,$(LAYERS)) \

