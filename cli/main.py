@@ -19,8 +19,11 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     prepare_streams()
     interrupts = _Interrupts()
     try:
-        code = _run(sys.argv[1:] if args is None else args, interrupts)
-        sys.stdout.flush()
+        try:
+            code = _run(sys.argv[1:] if args is None else args, interrupts)
+            sys.stdout.flush()
+        finally:
+            interrupts.over = True
     except KeyboardInterrupt as interrupt:
         code = _interrupted(str(interrupt))
     except BrokenPipeError:
@@ -39,7 +42,7 @@ class _Interrupts:
     """Let signals that stop a command end the process while commands are imported, then raise KeyboardInterrupt."""
 
     def __init__(self) -> None:
-        self.heard = False
+        self.heard = self.over = False
         self._ready = False
         if threading.current_thread() is threading.main_thread():
             for number in STOPS:
@@ -51,6 +54,8 @@ class _Interrupts:
         self._ready = True
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
+        if self.over:  # what is left to do is to say how it has ended
+            return
         self.heard = True
         if not self._ready:
             os._exit(_interrupted())

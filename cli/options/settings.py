@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from tachometry.cli.options.motion import tables_of
-from tachometry.sim.signals.files import read_text
+from tachometry.spec.language.files import read_text
 from tachometry.spec.language.option import ParameterError, parse_flag
 from tachometry.spec.language.units import QUANTITY, ratio
 

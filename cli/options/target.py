@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.cli.options.core import CoreTexts
 from tachometry.spec import of_options
+from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.registers.buses import Bus, bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_manifest
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 SIMULATED = "sim:"
 _BUS = "uart"
-_LARGEST = 1 << 22  # bytes of a manifest
 
 
 @dataclass(frozen=True)
@@ -111,10 +111,8 @@ def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:
         raise ValueError("--manifest must be given with a serial port: the file NAME.json that tachometry build writes")
     if core.given:
         raise ValueError("options of the core must not be given with a serial port: --manifest has them")
-    with path.open("rb") as file:
-        content = file.read(_LARGEST)
     try:
-        described = json.loads(content)
+        described = json.loads(read_text(path, MOST_JSON))
         options, registers = dict(described["options"]), described["registers"]
         bus, baud, module = described["bus"], described.get("baud"), described["module"]
         configuration = registers["configuration"]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tachometry.sim.signals.files import read_text
+from tachometry.spec.language.files import read_text
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.units import ANGLE, FREQUENCY, SPEED, TIME, Units, read_nearest
 

@@ -12,23 +12,6 @@ from numpy.typing import NDArray
 _ROWS = 1 << 16  # rows that are Python objects at once
 
 
-def read_text(path: Path, most: int) -> str:
-    """Return the text of a file of at most so many bytes: one without an end would fill the memory.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it has more, or is not UTF-8 text (then a `UnicodeDecodeError`).
-    """
-    with path.open("rb") as file:
-        content = file.read(most + 1)
-    if len(content) > most:
-        raise ValueError(f"{path} must have at most {most} bytes")
-    return content.decode("utf-8-sig")
-
-
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a path to write to, which takes the place of `path` at the end; nothing is left of it after an error."""

@@ -1,5 +1,6 @@
 """Files that are wrong, cut, or small on disk and large in memory; the table tests/cli/hostile.txt names them."""
 
+import gzip
 import random
 import zipfile
 from pathlib import Path
@@ -49,6 +50,7 @@ _TEXTS = {
     "no-scale.vcd": f"{_VARIABLES}$enddefinitions $end\n{_BEGIN}",
     "late.vcd": _HEAD + _BEGIN + f"#1{'0' * 19}\n0!\n",
     "long-time.vcd": _HEAD + _BEGIN + f"#{'9' * 5000}\n0!\n",
+    "endless.vcd": f"$comment {'x' * (9 << 20)}\n",
     "scopes.vcd": "$scope module m $end\n" * 5000 + _HEAD,
     "log.csv": _LOG + "10,20\n",
     "cut-log.csv": _LOG + "10,2",
@@ -82,9 +84,13 @@ def make_files(folder: Path) -> None:
         (folder / name).touch()
     for name in ("noise", "noise.csv", "noise.sr", "noise.vcd", "noise.fst", "noise.parquet", "binary.toml"):
         (folder / name).write_bytes(_NOISE)
-    for name in ("zero.csv", "zero.toml", "zero.sr"):
+    (folder / "board").mkdir()
+    (folder / "board" / "x.bin").touch()
+    zeros = ("csv", "toml", "sr", "vcd", "txt", "csv.gz", "json", "parquet")
+    for name in (*(f"zero.{suffix}" for suffix in zeros), "board/x.json"):
         (folder / name).symlink_to("/dev/zero")
     (folder / "endless.csv").write_text("time,a,b\n" + "0" * (9 << 20), encoding="ascii")
+    (folder / "endless.csv.gz").write_bytes(gzip.compress((folder / "endless.csv").read_bytes()))
     make_sr(folder / "blanks.sr", [bytes(4)], comment="x" + " " * 900_000 + "y", probe9="X")
     (folder / "utf16.csv").write_text(_MOTION + "0,0\n1,1\n", encoding="utf-16")
 

@@ -268,13 +268,14 @@ def tracking_loop(
     readings = read(steps, period_s)
     least = 0.5 * period_s * ki if whole_counts else 0.0
     position = speed = 0.0  # counts, counts/s
+    to_position, to_speed, floor = period_s * kp, period_s * ki, math.floor
     speeds = []
     for count in readings.counts.tolist():
         position += period_s * speed
-        error = count - (math.floor(position) if whole_counts else position)
-        position += period_s * kp * error
-        speed += period_s * ki * error
-        if abs(speed) < least:
+        error = count - (floor(position) if whole_counts else position)
+        position += to_position * error
+        speed += to_speed * error
+        if -least < speed < least:
             speed = 0.0
         speeds.append(speed)
     return Estimate(readings.time, np.array(speeds) * steps.count_rad)

@@ -20,6 +20,7 @@ _MOST_ORDER = 5  # beyond that, digits are lost
 _LEAST_INDEX, _GREATEST_INDEX = 1e-15, 1e6
 _MOST_SILENT = 2  # counts that the shaft may go without one: the slots of a bad disc are that uneven
 _AT_ONCE = 1 << 20  # edges of polynomials, for which memory is needed at once
+_READINGS = 1 << 14  # whose windows grow at once: they stay in the cache of a processor
 _RIDGE = 1e-12  # of the normal equations: edges with one timestamp do not make them singular
 
 
@@ -157,26 +158,36 @@ def adaptive_window(
     readings = read(steps, period_s)
     count = np.append(0, readings.counts).astype(np.float64)
     slope = np.zeros(len(count))
-    grows: IntArray = np.arange(1, len(count))  # readings whose window still grows
+    every: IntArray = np.arange(1, len(count))
+    for part in np.array_split(every, 1 + len(every) // _READINGS):
+        _grow(slope, count, part, noise_bound, longest, best_fit)
+    return Estimate(readings.time, slope[1:] / period_s * steps.count_rad)
+
+
+def _grow(
+    slope: FloatArray, count: FloatArray, grows: IntArray, noise_bound: float, longest: int, best_fit: bool
+) -> None:
+    """Put the slopes of some readings, whose windows still grow, into their places."""
     # Of each: the least and the greatest slope that all readings so far allow, and two sums for the least squares.
     state: FloatArray = np.zeros((4, len(grows)))
     state[0], state[1] = -np.inf, np.inf
     for length in range(1, longest + 1):
-        inside = grows >= length  # no window begins before time 0
-        grows, state = grows[inside], state[:, inside]
+        if len(grows) and grows[0] < length:  # no window begins before time 0
+            grows, state = grows[1:], state[:, 1:]
+        if not len(grows):
+            break
         moved = count[grows] - count[grows - length]
         state[0] = np.maximum(state[0], (moved - noise_bound) / length)
         state[1] = np.minimum(state[1], (moved + noise_bound) / length)
-        state[2:] += moved, length * moved
+        state[2] += moved
+        state[3] += length * moved
         found = moved / length
         if best_fit:
             found = 6 * (2 * state[3] - length * state[2]) / (length * (length + 1) * (length + 2))
         holds = (state[0] <= found) & (found <= state[1])
         slope[grows[holds]] = found[holds]
-        grows, state = grows[holds], state[:, holds]
-        if not len(grows):
-            break
-    return Estimate(readings.time, slope[1:] / period_s * steps.count_rad)
+        if not holds.all():
+            grows, state = grows[holds], state[:, holds]
 
 
 def kalman_gains(index: float, order: int) -> tuple[float, float, float]:

@@ -198,6 +198,9 @@ def test_a_manifest_says_which_core_it_is(bus: str, tmp_path: Path, monkeypatch:
 
 
 def test_what_is_no_manifest_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "endless.json").symlink_to("/dev/zero")
+    with pytest.raises(ValueError, match=r"endless.json must be a manifest that tachometry writes"):
+        of_manifest(tmp_path / "endless.json")
     path = tmp_path / "core.json"
     for text in ("", "[]", "{}", '{"options": 1}', "[" * 100_000):
         path.write_text(text)
