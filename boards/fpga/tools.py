@@ -8,9 +8,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from tachometry.sim.signals.scratch import run_tool
+from tachometry.spec.language.tools import complaint
 
 EXTRA = "pip install 'tachometry[boards]'"
-_LONGEST = 300  # characters of a line that a program said
 
 
 class ToolError(OSError):
@@ -47,14 +47,7 @@ def run(command: Sequence[str], folder: Path) -> None:
     """
     done = run_tool([find(command[0]), *command[1:]], folder)
     if done.returncode:
-        raise ToolError(f"{command[0]}: {told(done.stdout + done.stderr) or f'exit status {done.returncode}'}")
-
-
-def told(output: str) -> str:
-    """Return the line of an output that says what is wrong."""
-    lines = [line.strip() for line in output.splitlines() if line.strip()]
-    of_error = [line for line in lines if "error" in line.lower()]
-    return (of_error or lines[-1:] or [""])[0][:_LONGEST]
+        raise ToolError(f"{command[0]}: {complaint(done.stdout + done.stderr) or f'exit status {done.returncode}'}")
 
 
 def versions(packages: Iterable[str]) -> dict[str, str]:

@@ -12,6 +12,7 @@ from amaranth.back.verilog import YosysError
 from amaranth.lib import wiring
 
 from tachometry.hdl.export.render import render
+from tachometry.spec.language.tools import complaint
 
 # Yosys wakes `always @*` by giving a register its value; SystemVerilog does that too early where it is declared.
 _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
@@ -30,7 +31,7 @@ def bundled_yosys() -> Iterator[None]:
         try:
             yield
         except YosysError as error:
-            raise OSError(f"Yosys: {(str(error).splitlines() or ['it fails'])[-1]}") from error
+            raise OSError(f"Yosys: {complaint(str(error)) or 'it fails'}") from error
 
 
 def verilog_of(top: wiring.Component, described: Mapping[str, Any]) -> str:

@@ -18,6 +18,7 @@ from pathlib import Path
 import platformdirs
 
 from tachometry.sim.signals.scratch import run_tool, scratch
+from tachometry.spec.language.tools import complaint
 
 _FLAGS = ("-std=c++17", "-O2", "-w", "-fPIC", "-fvisibility=hidden", "-pthread")
 
@@ -94,8 +95,7 @@ def run(command: Sequence[str | Path], what: str, folder: Path | None = None, te
     """
     done = run_tool(list(map(str, command)), folder, text)
     if done.returncode:
-        said = (done.stderr + done.stdout).splitlines() or [f"exit status {done.returncode}"]
-        raise OSError(f"{what}: {next((line for line in said if 'error' in line.lower()), said[-1])}")
+        raise OSError(f"{what}: {complaint(done.stderr + done.stdout) or f'exit status {done.returncode}'}")
     return done.stdout
 
 

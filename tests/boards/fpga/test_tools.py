@@ -1,4 +1,4 @@
-"""Programs: where they are found, and what is told of those that fail."""
+"""Programs are found beside this Python, then on the path."""
 
 import importlib.metadata
 from pathlib import Path
@@ -17,19 +17,6 @@ def test_programs_of_this_python_come_before_those_on_the_path(tmp_path: Path, m
     assert tools.find("there") == str(tmp_path / "path" / "there")
     with pytest.raises(tools.ToolError, match=r"^nowhere is needed for boards and not installed: pip install 'tach"):
         tools.find("nowhere")
-
-
-@pytest.mark.parametrize(
-    ("output", "line"),
-    [
-        ("", ""),
-        ("\n one\n\n last \n\n", "last"),
-        ("Info: no\nERROR: it is too big\nERROR: and too slow\n2 errors\n", "ERROR: it is too big"),
-        ("x" * 1000, "x" * 300),
-    ],
-)
-def test_one_line_is_told(output: str, line: str) -> None:
-    assert tools.told(output) == line
 
 
 def test_versions_are_those_that_are_installed() -> None:

@@ -1,0 +1,13 @@
+"""The tools that this project calls fail with many lines, of which one says why."""
+
+_LONGEST = 300  # characters
+_NO_MEMORY = "Cannot allocate memory"
+
+
+def complaint(said: str) -> str:
+    """Return the line that says why a tool has failed, of all that it has said; empty if it has said nothing."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()] or [""]
+    of_error = [line for line in lines if "error" in line.lower()]
+    traced = any(line.startswith("Traceback ") for line in lines)  # which quotes its sources, too
+    line = (lines[-1:] if traced else of_error or lines[-1:])[0][:_LONGEST]
+    return f"{line}; it needs some 5 GB of addresses, see ulimit -v" if _NO_MEMORY in line else line
