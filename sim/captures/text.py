@@ -1,6 +1,7 @@
 """Text (`.csv` and its like) is read as a `Recording`, and written."""
 
 import os
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -116,6 +117,8 @@ class _Pins:
         def hint(cell: str) -> str:
             if bit is not None or self._threshold is not None or not cells.NUMBER.fullmatch(cell):
                 return ""
+            if cell.isdigit() and int(cell) > 3:
+                return f" (of a counter, --count {shlex.quote(name)} takes its counts)"
             if cell.isdigit():
                 return f" (of both lines in one number, --a {name}[0] is the lowest bit)"
             return " (of a voltage, --threshold 1.65V says from where on it is high)"

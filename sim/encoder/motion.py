@@ -300,7 +300,9 @@ def _read_csv(file: str) -> Motion:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise ValueError(f"motion file {file!r} cannot be read: {reason}") from error
     if not lines or [cell.strip() for cell in lines[0].split(",")] != _CSV_HEADER:
-        raise ValueError(f"{file}:1: header must be 'time,angle_rad', not {lines[0][:60] if lines else ''!r}")
+        shown = lines[0][:60] if lines else ""
+        hint = f"; a log of counts is counts:{file}:TIME:COUNT" if "," in shown else ""
+        raise ValueError(f"{file}:1: header must be 'time,angle_rad', not {shown!r}{hint}")
     rows: list[tuple[float, float]] = []
     for number, line in enumerate(lines[1:], start=2):
         if not line.strip():

@@ -79,7 +79,7 @@ def _scalars(k: int, a: int, b: int) -> str:
 
 
 def _with_x(k: int, a: int, b: int) -> str:
-    return _scalars(k, a, b) + f'\n#{250 * k + 100}\nx!\nz"'
+    return _scalars(k, a, b) + f'\n#{250 * k + 100}\nx!\nz"\n#{250 * k + 200}\nz!'
 
 
 FORMATS = [
@@ -138,7 +138,7 @@ FORMATS = [
     Format(
         "X for a gap",
         ".csv",
-        _text("time,a,b\n", lambda k, a, b: f"{_s(k, a, b)}\n{k * STEP_S + 1e-4:.6f},X,{b}"),
+        _text("time,a,b\n", lambda k, a, b: f"{_s(k, a, b)}\n{k * STEP_S + 1e-4:.6f},{'Xx'[k % 2]},{b}"),
         notes=("41 cells with an X: the level before holds there",),
     ),
     Format("blanks", ".txt", _text("time a b\n", lambda k, a, b: f"  {k * STEP_S:.6f}   {a}  {b}")),

@@ -1,10 +1,13 @@
 """`tachometry compare`."""
 
 import csv
+import re
 from pathlib import Path
 
 import pytest
+from support import docs
 from support.command import run
+from support.nightly import nightly
 
 from tachometry.cli.commands import compare as command
 from tachometry.sim.studies import size as synthesis
@@ -91,6 +94,20 @@ def test_a_capture_in_place_of_a_motion(tmp_path: Path, capsys: pytest.CaptureFi
     with (tmp_path / "c.csv").open() as file:
         assert [row["rms_rad_s"] for row in csv.DictReader(file)] == ["", "", ""]
     assert (tmp_path / "c.png").stat().st_size > 1000
+
+
+@nightly
+def test_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The other tests of this file run the same command on shorter captures."""
+    (command,) = re.findall(r"^tachometry (compare --replay .*)", docs.page("guides/encoder.md"), re.MULTILINE)
+    (tmp_path / "tests").symlink_to(docs.DOCS.parent / "tests")
+    monkeypatch.chdir(tmp_path)
+    assert run(*command.split()) == 0
+    told = capsys.readouterr().out
+    assert [
+        line.split()[0] for line in told.partition("method ")[2].splitlines()[1:7]
+    ] == "s m t mt rairan track".split()
+    assert (tmp_path / "build" / "wheel_methods.png").stat().st_size > 1000
 
 
 def test_what_the_reader_says_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

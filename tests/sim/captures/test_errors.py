@@ -228,6 +228,11 @@ def test_csv_without_names(tmp_path: Path, first: str) -> None:
             "time_unit must be given for PATH: the rate of Time [samples], such as 16MHz",
         ),
         ("Time [us],a,b\n2,0,1\n1,0,1\n", {}, "PATH line 3: time must be at least 2.0 us as before, not 1.0 us"),
+        (
+            "us,a,b\n29750,0,1\n30000,0,1\n0,0,1\n",
+            {},
+            "PATH line 4: time must be at least 30000.0 us as before, not 0.0 us",
+        ),
         ("Time [us],a,b\ninf,0,1\n", {}, "PATH line 2: Time [us] must be a number, not 'inf'"),
         ("#\n;\ntime,a,b\n#,\n0,0,1\n;x\n\n1,0\n", {}, "PATH line 8: a row must have 3 fields (time,a,b), not 2"),
         (
@@ -304,6 +309,7 @@ def test_csv_without_rows(tmp_path: Path, rows: str) -> None:
             "PATH line 4: level of b must be 0 or 1, not '01' "
             "(of both lines in one number, --a b[0] is the lowest bit)",
         ),
+        ("2,0,8", "PATH line 4: level of b must be 0 or 1, not '8' (of a counter, --count b takes its counts)"),
         ("2,nan,0", "PATH line 4: level of a must be 0 or 1, not 'nan'"),
         ("0.1,0,0", "PATH line 4: time must be at least 0.5 s as before, not 0.1 s"),
         ("2", "PATH line 4: a row must have 3 fields (time,a,b), not 1"),

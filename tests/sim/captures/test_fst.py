@@ -87,6 +87,12 @@ def test_the_extra_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         read_capture(folder / "w.fst", samplerate_hz=1e6)
 
 
+def test_a_plain_waveform_of_this_name_is_refused(folder: Path) -> None:
+    (folder / "plain.fst").write_bytes((folder / "w.vcd").read_bytes())
+    with pytest.raises(CaptureError, match=r"plain\.fst must be a whole FST file, but is cut or damaged$"):
+        read_capture(folder / "plain.fst")
+
+
 def test_a_missing_file_is_named(folder: Path) -> None:
     with pytest.raises(CaptureError, match=r"none\.fst does not exist$"):
         read_capture(folder / "none.fst")

@@ -132,11 +132,11 @@ def test_no_samplerate(tmp_path: Path) -> None:
     ],
 )
 def test_a_bit_of_a_vector_is_that_of_its_declaration(declared: str, channel: str, bit: int, tmp_path: Path) -> None:
-    values = ["0", "1", "101", "1000", "0110", "x", "1", "1x1", "zz10", "1111"]
+    values = ["0", "1", "101", "1000", "0110", "x", "1", "1x1", "zz10", "00001111", "0"]
     text = VECTOR.replace("wire 2 ! enc [1:0]", f'wire 1 " tick $end\n$var wire 4 ! enc {declared}')
     text += "".join(f'#{k}\nb{value} !\n{k % 2}"\n' for k, value in enumerate(values))
     recording = read_capture(write(tmp_path / "w.vcd", text), channel, "tb.tick")
-    extended = [value.rjust(4, value[0] if value[0] in "xz" else "0") for value in values]
+    extended = [value[-4:].rjust(4, value[0] if value[0] in "xz" else "0") for value in values]
     levels: list[int] = []
     for value in extended:
         levels.append(int(value[3 - bit]) if value[3 - bit] in "01" else levels[-1])
@@ -156,6 +156,8 @@ def test_simulators_declare_more_than_the_standard(tmp_path: Path) -> None:
     )
     recording = read_capture(write(tmp_path / "w.vcd", text + body), "top.a", "top.b")
     assert (recording.a.tolist(), recording.b.tolist()) == ([0, 1, 1], [0, 0, 1])
+    assert recording.source is not None
+    assert [*recording.source.unused.values()] == ["top.deep.a", "top.bus"]
 
 
 def test_pieces_of_any_length_make_the_same_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -199,7 +199,10 @@ def test_csv_as_a_spreadsheet_writes_it(tmp_path: Path) -> None:
     ("content", "message"),
     [
         ("", "{}:1: header must be 'time,angle_rad', not ''"),
-        ("t,angle\n0,0\n1,1\n", "{}:1: header must be 'time,angle_rad', not 't,angle'"),
+        (
+            "t,angle\n0,0\n1,1\n",
+            "{0}:1: header must be 'time,angle_rad', not 't,angle'; a log of counts is counts:{0}:TIME:COUNT",
+        ),
         ("time,angle_rad\n0,0\n1,x\n", "{}:3: row must be two numbers TIME,ANGLE, not '1,x'"),
         ("time,angle_rad\n0,0\n1\n", "{}:3: row must be two numbers TIME,ANGLE, not '1'"),
         ("time,angle_rad\n0,0,0\n", "{}:2: row must be two numbers TIME,ANGLE, not '0,0,0'"),
