@@ -44,6 +44,8 @@ def find_compiler() -> tuple[str, ...] | None:
             words = [given]
         if not shutil.which(words[0]):
             raise NoCompiler(f"CXX must name a C++ compiler that exists, not {given!r}")
+        if os.path.dirname(words[0]):  # it runs in other folders
+            words[0] = os.path.abspath(words[0])
         return tuple(words)
     for name in ("c++", "g++", "clang++"):
         if shutil.which(name):
@@ -117,7 +119,10 @@ def precompiled(folder: Path, name: str, *more: str) -> list[str]:
 
     def make(building: Path) -> Path:
         made = building / "header.gch"
-        run([*command, *flags(), *more, "-x", "c++-header", f"-I{folder}", "-o", made, header], "compiler")
+        run(
+            [*command, *flags(), *more, "-x", "c++-header", f"-I{folder}", "-o", made, header],
+            f"{' '.join(command)} cannot compile {name}",
+        )
         return made
 
     made = cached(digest(header.read_text(), version(command), command, flags(), more), ".gch", make)
@@ -196,6 +201,8 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     try:
         with scratch(folder) as building:
             made = make(building)
+            if not made.is_file():
+                raise OSError(f"there is no {made.name}, although what makes it reports no error")
             target = folder / f"{hashlib.sha256(made.read_bytes()).hexdigest()}{suffix}"
             made.replace(target)
             index = building / "index"

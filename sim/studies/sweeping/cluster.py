@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
+from tachometry.sim.signals.scratch import scratch
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.units import plural
 
@@ -71,8 +72,9 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
             if not client.scheduler_info()["workers"]:
                 print(f"tachometry: {scheduler} has no workers yet: waiting for them", file=sys.stderr)
         else:
+            here = {"temporary-directory": str(stack.enter_context(scratch()))}
             try:
-                with _deaf_to_interrupts(), dask.config.set(_LOCAL):
+                with _deaf_to_interrupts(), dask.config.set(_LOCAL | here):
                     local = LocalCluster(
                         n_workers=jobs,
                         threads_per_worker=1,

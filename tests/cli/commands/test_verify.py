@@ -15,6 +15,7 @@ from support.nightly import nightly
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.methods import m as golden_m
 from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.signals.scratch import run_tool
 from tachometry.sim.studies import verify as study
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.sim.studies.verify import motions
@@ -129,6 +130,21 @@ def test_workers_end_with_a_command_that_is_killed() -> None:
     assert os.read(alive[0], 1) == b""  # until the last of those who have its other end is gone
     os.close(begun[0])
     os.close(alive[0])
+
+
+def compile_for_ever(folder: Path, core: object) -> None:
+    run_tool(["sh", "-c", "sleep 100 > alive & echo > begun; wait"], folder)
+
+
+def test_a_compiler_ends_with_its_worker(tmp_path: Path) -> None:
+    for name in ("alive", "begun"):
+        os.mkfifo(tmp_path / name)
+    alive = os.open(tmp_path / "alive", os.O_RDONLY | os.O_NONBLOCK)
+    with study._each(partial(compile_for_ever, tmp_path), [None], 2):
+        (tmp_path / "begun").read_text()
+    os.set_blocking(alive, True)
+    assert os.read(alive, 1) == b""  # until the last of those who have its other end is gone
+    os.close(alive)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tachometry.sim.engines import build
-from tachometry.sim.engines.build import cached, compile_library, digest
+from tachometry.sim.engines.build import cached, compile_library, digest, find_compiler
 
 
 @pytest.fixture(autouse=True)
@@ -219,6 +219,15 @@ def test_a_compiler_that_writes_garbage(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("CXX", str(tmp_path / "cc"))
     with pytest.raises(OSError, match=r"/cc made no library of the core$"):
         compile_library("int x;", tmp_path)
+    monkeypatch.chdir(tmp_path)  # a path from here, although it runs elsewhere
+    monkeypatch.setenv("CXX", "./cc")
+    assert find_compiler() == (str(tmp_path / "cc"),)
+
+
+def test_a_tool_that_makes_nothing(folder: Path) -> None:
+    with pytest.raises(OSError, match=r"^there is no header.gch, although what makes it reports no error$"):
+        cached("one", ".gch", lambda inside: inside / "header.gch")
+    assert not list(folder.iterdir())
 
 
 def test_any_difference_gives_another_name() -> None:
