@@ -5,7 +5,6 @@ import json
 import os
 import re
 import struct
-import subprocess
 import sys
 from collections.abc import Mapping
 from fractions import Fraction
@@ -15,6 +14,7 @@ from typing import Any
 from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_edges, reading
 from tachometry.sim.captures.waveform import Changes, Variable
 from tachometry.sim.signals.recording import MAX_EDGES, Recording
+from tachometry.sim.signals.scratch import run_tool
 
 _HEADER = struct.Struct(">BQQQ")  # type of the first block, its length, time of the beginning and of the end
 _PLAIN, _PACKED = 0, 254  # types of it
@@ -77,7 +77,7 @@ def read_fst(
 def _contents(path: Path, *codes: int) -> dict[str, Any]:
     """Return what another process finds in the file."""
     child = [sys.executable, "-P", "-m", "tachometry.sim.captures.fst_child"]
-    done = subprocess.run([*child, str(path), str(MAX_EDGES + 1), *map(str, codes)], capture_output=True, text=True)
+    done = run_tool([*child, str(path), str(MAX_EDGES + 1), *map(str, codes)])
     if done.returncode:
         reasons = re.findall(r"^\w+Error: (.*\w)", done.stderr, re.MULTILINE)  # a panic speaks of the reader's inside
         raise _damaged(path, *reasons[-1:])
