@@ -34,6 +34,23 @@ def in_ticks(times: np.ndarray, steps: np.ndarray, ends: np.ndarray) -> np.ndarr
     return np.diff([steps[seen <= end].sum() for end in ends], prepend=0)
 
 
+@pytest.mark.parametrize("late", [1, 4, 19])
+@pytest.mark.parametrize("decoding", [1, 2])
+def test_a_line_and_itself_some_clocks_later_count_the_same(decoding: int, late: int) -> None:
+    times = edges(np.random.default_rng(3), 400)
+    every = np.concatenate([[0.0], np.sort(np.concatenate([times, times + late / CLOCK_HZ]))])
+    a, b = (
+        np.searchsorted(of, every + 0.1 / CLOCK_HZ).astype(np.uint8) & np.uint8(1)
+        for of in (times, times + late / CLOCK_HZ)
+    )
+    recording = Recording(every, a, b, float(every[-1]) + 0.1)
+    found, ends = counts(recording, "quadrature", decoding)
+    counted = times if decoding == 2 else times[::2]
+    assert found.tolist() == in_ticks(counted, np.ones(len(counted), int), ends).tolist()
+    tied, _ = counts(Recording(every, a, 0 * b, recording.duration), "quadrature", decoding)
+    assert set(np.cumsum(tied).tolist()) == {0, 1}
+
+
 @pytest.mark.parametrize("start", [0, 1])
 @pytest.mark.parametrize("decoding", [1, 2])
 def test_every_pulse_is_a_count_forward(decoding: int, start: int) -> None:
