@@ -6,7 +6,8 @@ from tachometry.hdl.export.registers.values import captured_values, in_unit
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers import frames
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.buses import bus_of
+from tachometry.spec.registers.demo import DemoMap, demo_map, demo_ports
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import Field, RegisterMap
 
@@ -143,6 +144,17 @@ def test_bits_of_a_demo() -> None:
     assert bits(demo, "ERRORS") == [("phase_error", 0, 8), ("duty_a", 8, 8), ("duty_b", 16, 8)]
     assert bits(demo, "NOISE") == [("jitter", 0, 6), ("bounce", 8, 8), ("drop", 16, 8)]
     assert bits(demo, "TELEMETRY") == [("telemetry_period", 0, 16)]
+
+
+def test_a_demo_shows_of_its_core_the_drive_of_the_loop_alone() -> None:
+    """All that is captured is read through the bus, and is no pin of a board."""
+    core, loop = demo_map(of_texts("s", BASE)), demo_map(loop_of("ports"))
+    bus = bus_of("uart")
+    assert bus is not None
+    ports = [[port for port in demo_ports(demo, bus) if port.direction == "output"] for demo in (core, loop)]
+    alone, driven = ([port.name for port in each] for each in ports)
+    assert alone == [port for port in driven if port != "drive"]
+    assert driven == ["uart_tx", "emulated_a", "emulated_b", "drive", "leds"]
 
 
 def test_numbers_of_the_serial_lines() -> None:
