@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
 from tachometry.sim.signals.files import replacing
+from tachometry.sim.signals.scratch import held_back
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Row, code_digest
 from tachometry.spec.language.option import ParameterError
 
@@ -64,14 +65,12 @@ class Results:
             return self
         self._path.parent.mkdir(parents=True, exist_ok=True)
         beside = self._path.with_name(f".{self._path.name}.lock")
-        beside.touch()  # which says it if it cannot be
-        lock = FileLock(beside, timeout=0)
         try:
-            lock.acquire()
-        except Timeout:
-            raise ParameterError("results", f"must be of one sweep at a time: {self._path} is in use") from None
-        self._lock = lock
-        try:
+            with held_back():
+                beside.touch()  # which says it if it cannot be
+                lock = FileLock(beside, timeout=0)
+                lock.acquire()
+                self._lock = lock
             for torn in self._path.parent.glob(f".{escape(self._path.name)}.*.part"):  # by one that was killed
                 torn.unlink()
             if self._path.exists():
@@ -85,6 +84,8 @@ class Results:
                 self._n_kept = len(self._table)
                 self._write()
             self._begin_journal()
+        except Timeout:
+            raise ParameterError("results", f"must be of one sweep at a time: {self._path} is in use") from None
         except BaseException:
             self._release()
             raise
@@ -153,7 +154,7 @@ class Results:
         """Begin an empty journal; the old one's rows are in the file."""
         assert self._path is not None
         self._close_journal()
-        with self._writing():
+        with self._writing(), held_back():
             self._journal = self._path.with_name(f".{self._path.name}.new").open("w", encoding="ascii")
             self._journal.write(f"{_made_by()}\n")
             self._journal.flush()
@@ -174,14 +175,15 @@ class Results:
             raise OSError(f"cannot write {self._path}: {error.strerror or error}{kept}") from error
 
     def _release(self) -> None:
-        try:
-            self._close_journal()
-            if self._journal is not None and self._saved:
-                Path(self._journal.name).unlink(missing_ok=True)
-        finally:
-            if self._lock is not None:
-                Path(self._lock.lock_file).unlink(missing_ok=True)
-                self._lock.release()
+        with held_back():
+            try:
+                self._close_journal()
+                if self._journal is not None and self._saved:
+                    Path(self._journal.name).unlink(missing_ok=True)
+            finally:
+                if self._lock is not None:
+                    Path(self._lock.lock_file).unlink(missing_ok=True)
+                    self._lock.release()
 
     def columns(self, *names: str) -> dict[str, list[Any]]:
         """Return columns of this sweep's points that have a row, in order."""

@@ -1,6 +1,7 @@
 """Results of a sweep on disk."""
 
 import resource
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from filelock import FileLock
 
 from tachometry.sim.studies.sweeping import results as sweep_results
 from tachometry.sim.studies.sweeping.results import Results
@@ -234,3 +236,26 @@ def test_what_a_killed_sweep_was_writing_is_removed(tmp_path: Path) -> None:
     with Results(path, ["a"]) as results:
         results.add(row("a"))
     assert [file.name for file in tmp_path.iterdir()] == ["r.parquet"]
+
+
+@pytest.mark.parametrize("function", [(FileLock, "acquire"), (Path, "unlink"), (Path, "open")])
+def test_a_signal_while_the_file_is_taken_or_given_back_leaves_nothing(
+    function: tuple[type, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = getattr(*function)
+
+    def stopped(*arguments: Any, **named: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        done = real(*arguments, **named)
+        signal.raise_signal(signal.SIGINT)
+        return done
+
+    def use() -> None:
+        with Results(tmp_path / "r.parquet", ["a"]):
+            pass
+
+    monkeypatch.setattr(*function, stopped)
+    with pytest.raises(KeyboardInterrupt):
+        use()
+    monkeypatch.undo()
+    assert list(tmp_path.iterdir()) == []
