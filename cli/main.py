@@ -23,7 +23,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
             code = _run(sys.argv[1:] if args is None else args, interrupts)
             sys.stdout.flush()
         finally:
-            interrupts.over = True
+            interrupts.over = args is None  # else the process goes on, and hears signals
     except KeyboardInterrupt as interrupt:
         code = _interrupted(str(interrupt))
     except BrokenPipeError:

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import Pool, parent_process
@@ -21,6 +21,7 @@ from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.run import Mismatch, Run
+from tachometry.sim.signals.scratch import held_back
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.pairs import AXES, configurations, core_of
 from tachometry.spec import CoreSpec
@@ -178,7 +179,9 @@ def _each(check: Callable[[Core], Result], cores: list[Core], n_jobs: int) -> It
     if n_jobs == 1:
         yield map(check, cores)
         return
-    with Pool(n_jobs, _heed_only_the_pool) as pool:
+    with ExitStack() as stack:
+        with held_back():  # what is raised in a fork is lost
+            pool = stack.enter_context(Pool(n_jobs, _heed_only_the_pool))
         yield pool.imap_unordered(check, cores)
 
 

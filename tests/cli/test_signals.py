@@ -104,7 +104,8 @@ def _child(line: str, folder: Path, moment: int, stop: int) -> None:
 
     sys.setprofile(count)
     try:
-        main(shlex.split(line))
+        sys.argv[1:] = shlex.split(line)
+        main()
     except SystemExit as end:
         sys.setprofile(None)
         (folder / "calls").write_text(str(calls))

@@ -132,6 +132,23 @@ def test_workers_end_with_a_command_that_is_killed() -> None:
     os.close(alive[0])
 
 
+def test_a_signal_while_workers_start_is_heard_when_they_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a fork it would be lost, as all that is raised there."""
+    started: list[Any] = []
+
+    def start(*arguments: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        started.append(real(*arguments))
+        return started[0]
+
+    real = vars(study)["Pool"]
+    monkeypatch.setattr(study, "Pool", start)
+    with pytest.raises(KeyboardInterrupt), study._each(abs, [1], 2):
+        raise AssertionError
+    with pytest.raises(ValueError, match="Pool not running"):
+        started[0].map(abs, [1])
+
+
 def compile_for_ever(folder: Path, core: object) -> None:
     run_tool(["sh", "-c", "sleep 100 > alive & echo > begun; wait"], folder)
 
