@@ -57,8 +57,9 @@ LinuxCNC's timestamps of 0.5 µs are the best by far.""",
     Situation(
         "Ramp",
         """Times in clocks of 0.1 µs are better than a lattice of 100 µs. The tracking method does not lag behind a
-ramp. It has half of the error of least squares and an eighth of that of M/T (T_c is a tick), which follow, then
-T and LinuxCNC's timestamps. The tracking loops lag by a constant 2 ms. On a lattice of ticks S is the best.""",
+ramp: its error is that of holding a value for a tick. Least squares over 16 edges are nearly as good, and M/T (T_c is a
+tick) has six times its error. T and LinuxCNC's timestamps follow. The tracking loops lag by a constant 2 ms. On a
+lattice of ticks S is the best.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",
     ),
     Situation(
@@ -66,15 +67,16 @@ T and LinuxCNC's timestamps. The tracking loops lag by a constant 2 ms. On a lat
         """T measures one count, so its result contains every error of the disc and all jitter. The same is true of
 M/T while its windows are short. With windows of 1 ms it is as good as LinuxCNC's timestamps. Methods that
 average over more keep their errors and their delays. The memory of the tracking method grows on a ramp
-as it does at constant speed, so it has a twentieth of their error.""",
+as it does at constant speed, and it learns where the edges of the disc are. So its error is as small as with an ideal
+encoder, and less than a fiftieth of theirs.""",
         f"--methods {WITH_LONG_MT} "
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),
     Situation(
         "Reversals",
         """Here delay matters: filters of 5 ms are worse than all others but M. The tracking method has less than
-half of the error of least squares, which is second. LinuxCNC's timestamps and M/T follow with eight and ten times its
-error.""",
+a third of the error of least squares, which is second. LinuxCNC's timestamps and M/T follow with eleven and thirteen
+times its error.""",
         "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
     ),
 )
@@ -93,9 +95,8 @@ for bit, and float models of what other projects use and of estimators in the li
 **When to use what**, according to the tables below:
 
 - *Tracking* (`--method track`): use it where its tick and its area are to be had. It has the least error of the cores
-  in nearly all situations, with one setting, and it says the acceleration and the position between counts. It needs a
-  timer, two block RAMs and ticks of about 800 clocks. With a bad disc, tell it so (`--edge-error 0.6`): with the
-  default it takes the disc's errors for changes of the speed.
+  in all situations, it has no settings, and it says the acceleration and the position between counts. It needs a timer,
+  block RAMs, and ticks of about 870 clocks, or of 410 with a multiplier of the FPGA.
 - *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 18 µs, down to a clock; it is the
   smallest but for M, it has no divider, and its steady error is least around multiples of the unit velocity. After
   a step to just such a speed it shows the speed before for the maximum time, though
@@ -113,9 +114,9 @@ for bit, and float models of what other projects use and of estimators in the li
   1 ms is fast enough and software divides.
 - *Tracking loops* (ODrive, moteus): they are smooth, with a delay that is constant and known, 2 ms with their defaults.
 - *Filtered differences, SimpleFOC*: they are good at constant speed, and have 5 ms of delay everywhere else.
-- *Least squares over edges* (float, with a matrix solved for each value): tuned for each situation it has the least
-  error of all in most rows. With one setting for all it is as good as tracking on sines and reversals, and far
-  worse on a ramp and at speed with a real disc.
+- *Least squares over edges* (float, with a matrix solved for each value): tuned for each situation it is as good as
+  tracking on ramps, slightly better on some slow shafts, and worse on reversals, sines and at speed. With one setting
+  for all it is far worse on a ramp and at speed with a real disc, and better only on an ideal and very slow shaft.
 
 Without `--method`, `generate` makes S all the same: it is the only one that every clock, tick and option suits, so what
 is generated does not depend on whether a tick is long enough.

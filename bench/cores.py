@@ -108,9 +108,8 @@ EVERY_CLOCK_BARS = {
     "HX8K": {"Fmax": 100},
 }
 TRACK_BARS = {
-    "ECP5": {"COMB": 700, "FF": 600, "DP16KD": 2, "MULT": 0, "Fmax": 100},
-    "HX8K": {"LC": 900},
-    "UP5K": {"Fmax": 24},
+    "ECP5": {"COMB": 1700, "FF": 900, "MULT": 0, "Fmax": 48},
+    "UP5K": {"Fmax": 12},
 }
 # The reference core, and 250 COMB and 100 FF for the bank.
 BUS_BARS = {"ECP5": {"COMB": 265 + 250, "FF": 260 + 100}}
@@ -261,29 +260,25 @@ CONFIGURATIONS = (
     ),
     Configuration(
         "track",
-        "tracking, 1000 rad/s, velocity of 16 bits",
-        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16),
+        "tracking, 1000 rad/s, serial multiplier",
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="serial"),
         TRACK_BARS,
         is_option=False,
         without_max_speed="track-wide",
     ),
     Configuration(
-        "track-20-bits",
-        "tracking, 1000 rad/s, velocity of 20 bits, as that of the reference",
-        TrackTachometer(**COMMON, max_speed=MAX_SPEED),
+        "track-block",
+        "tracking, 1000 rad/s, multiplier of the FPGA",
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="block"),
+        {"ECP5": {"COMB": 1900, "FF": 950, "MULT": 4, "Fmax": 48}},
         is_option=False,
     ),
     Configuration(
         "track-external-tick",
         "tracking, external tick",
-        TrackTachometer(**COMMON, max_speed=MAX_SPEED, velocity_width=16, external_tick=True, max_tick_cycles=MAX_TICK),
-        is_option=False,
-        without_max_speed="track-wide-external-tick",
-    ),
-    Configuration(
-        "track-wide-external-tick",
-        "tracking, no max_speed, external tick",
-        TrackTachometer(**COMMON, external_tick=True, max_tick_cycles=MAX_TICK),
+        TrackTachometer(
+            **COMMON, max_speed=MAX_SPEED, multiplier="serial", external_tick=True, max_tick_cycles=MAX_TICK
+        ),
         is_option=False,
     ),
     Configuration("track-wide", "tracking, no max_speed", TrackTachometer(**COMMON), is_option=False),

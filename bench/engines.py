@@ -23,10 +23,9 @@ from golden import BEGIN, MOTION, part_of
 from pages import markdown, write_block
 
 from tachometry.cli.reports.terminal import print_table
-from tachometry.sim import golden
+from tachometry.sim import build, golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.engines import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design, Play
 from tachometry.sim.engines.cxxrtl import headers, model_of, translate
 from tachometry.sim.engines.engine import driven_pins

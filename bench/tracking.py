@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from pages import markdown, write_block
-from situations import Cell
+from situations import CORE, OF_METHOD, Cell
 
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.comparing.compare import core_curve
@@ -15,31 +15,11 @@ from tachometry.sim.studies.comparing.situations import SITUATIONS, Situation
 from tachometry.spec import of_texts
 
 TICKS = ("100us", "20us")
-SHOWN = (
-    "ramp",
-    "ramp, real",
-    "slow, jitter",
-    "slow, real",
-    "fast, jitter",
-    "fast, real",
-    "unit velocity, vibration",
-    "reversals, jitter",
-    "reversals, real",
-    "slow sine, real",
-    "fast sine, real",
-    "trapezoid, real",
-    "stop",
-    "ramp, bad",
-    "reversals, bad",
-    "fast, bad",
-)
 
 
 def error(situation: Situation, seed: int, tick: str) -> float:
     """Return RMS error (rad/s) at the clocks in which updates appear."""
-    edge_error = "0.6" if situation.name.endswith("bad") else "0.4"
-    core = {"ppr": "500", "clock": "48MHz", "tick": tick, "max-time": "10ms", "max-speed": "400rad/s"}
-    spec = of_texts("track", core | {"edge-error": edge_error})
+    spec = of_texts("track", {**CORE, **OF_METHOD["track"], "tick": tick})
     truth = situation.record(seed)
     found = core_curve("track", spec, PinTrace.of(truth.recording, spec)).estimate
     judged = (found.time > situation.start_s) & (found.time <= truth.recording.duration)
@@ -55,7 +35,7 @@ def main() -> None:
     given = parser.parse_args()
     seeds = range(1, given.seeds + 1)
     rows = []
-    for situation in (each for each in SITUATIONS if each.name in SHOWN):
+    for situation in SITUATIONS:
         used = seeds if situation.random else (1,)
         rows.append((situation.name, *(str(Cell.of("", [error(situation, n, tick) for n in used])) for tick in TICKS)))
     table = markdown(("situation", *(f"ticks of {tick[:-2]} µs" for tick in TICKS)), rows)

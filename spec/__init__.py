@@ -70,7 +70,7 @@ def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
         If the method has no such option, or a text is not what it must be.
     """
     spec = spec_class(method)
-    given = {name: text for name, text in texts.items() if text is not None}
+    given = {**spec.usual, **{name: text for name, text in texts.items() if text is not None}}
     known = {about.name: about for about in (*common_options(), *own_options(method))}
     for name in given:
         parameter = name.replace("-", "_")

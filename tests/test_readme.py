@@ -120,7 +120,7 @@ def test_numbers_of_the_table_of_methods_are_those_of_the_pages(method: str) -> 
     assert alike(ideal, cells("measured/compare.md", "Ramp", method)[3])
     assert alike(real, cells("measured/compare.md", "Ramp, real encoder", method)[3])
     assert alike(delay.removesuffix(" ms"), cells("measured/compare.md", "Reversals", method)[5])
-    row = {"s": "reference", "track": "track-20-bits"}.get(method, f"{method}-max-speed")
+    row = {"s": "reference", "track": "track"}.get(method, f"{method}-max-speed")
     assert comb == cells("measured/size.md", "ECP5 (LFE5U-25F, CABGA256)", row)[2]
     texts = {"ppr": "500", "clock": "10MHz", "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
     spec = of_texts(method, texts)

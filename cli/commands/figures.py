@@ -86,7 +86,7 @@ def _chosen(only: str) -> list[Entry]:
     from tachometry.sim.figures import FIGURES
 
     if only.strip() == "all":
-        from tachometry.sim.engines.build import find_compiler
+        from tachometry.sim.build import find_compiler
 
         return [entry for entry in FIGURES.values() if not entry.compiled or find_compiler() is not None]
     names = list(dict.fromkeys(name.strip() for name in only.split(",")))

@@ -16,7 +16,7 @@ from tachometry.cli.options.settings import Settings
 from tachometry.cli.options.sweep import VaryingCommand
 from tachometry.cli.reports.closed_loop import log_table, loop_table, print_loops
 from tachometry.cli.reports.terminal import progress_bar
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.sim.signals.files import write_csv
 from tachometry.sim.studies.sweeping.grid import Loops
 from tachometry.sim.studies.sweeping.run import LoopResult, run_loops

@@ -1,4 +1,4 @@
-"""The counts of a tick: how many, when, and where."""
+"""The counts of a tick: their number, their times, their places."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, signed
 from amaranth.lib import wiring
@@ -8,33 +8,36 @@ from tachometry.spec.formats.tracking import Tracking
 
 
 class TickCounts(wiring.Component):
-    """Adds up the times and the places of the counts of a tick; the outputs are new two clocks after `tick`.
+    """Adds up times and places of the counts of each tick; the outputs are valid two clocks after it, until the next.
 
     Parameters
     ----------
     form : Tracking
     max_ticks : int
-        Longest silence in ticks.
 
     Members
     -------
     tick : In(1)
         The last clock of a tick.
     step : In(signed(2))
-    tracks : In(1)
-        There is a speed. Without, and if the tick before was empty, each count replaces those before it.
     number : Out
-        Counts, at most `max_count`; with more, the last one alone.
+        Counts that an event takes: the first ones.
     times : Out
-        Sum of the clocks from each count to the end of the tick.
+        Sum of the clocks from each of these to the end of the tick.
     places : Out(signed)
-        Sum of their places relative to the end of the tick, in half counts.
+        Sum of twice the places of their edges, in counts from the place at the beginning of the tick.
+    kind : Out(2)
+        Lower one of the two positions around the edge of the last of these, modulo 4.
+    down : Out(1)
+        It went backward.
+    last : Out
+        Clocks from the last count to the end of the tick.
+    moved : Out(signed)
+        Forward counts less backward ones.
+    end : Out(2)
+        Position at the end of the tick, since reset, modulo 4.
     elapsed : Out
         Ticks since the last one with counts before this one, at most `max_ticks`.
-    quiet : Out(1)
-        These are as many.
-    counted : Out(1)
-        There were counts.
     length : Out
         Clocks of the tick.
     """
@@ -46,57 +49,57 @@ class TickCounts(wiring.Component):
             {
                 "tick": In(1),
                 "step": In(signed(2)),
-                "tracks": In(1),
                 "number": Out(form.number_bits),
                 "times": Out(form.times_bits),
                 "places": Out(signed(form.places_bits)),
+                "kind": Out(2),
+                "down": Out(1),
+                "last": Out(range(form.longest_tick)),
+                "moved": Out(signed(form.moved_bits)),
+                "end": Out(2),
                 "elapsed": Out(range(max_ticks + 1), init=max_ticks),
-                "counted": Out(1),
-                "quiet": Out(1),
-                "length": Out(range(form.longest_tick + 1)),
+                "length": Out(range(form.longest_tick + 1), init=form.tick_cycles),
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         form = self._form
-        number = Signal.like(self.number, name="open_number")
-        times = Signal.like(self.times, name="open_times")
-        places = Signal.like(self.places, name="open_places")
-        alone = Signal(init=1)
+        of_tick = ("number", "times", "places", "kind", "down", "last", "moved")
+        number, times, places, kind, down, last, moved = (
+            Signal.like(getattr(self, name), name=f"open_{name}") for name in of_tick
+        )
         fresh = Signal()
+        position = Signal(2)
         counts, backward = self.step.any(), self.step[-1]
-        m.d.sync += fresh.eq(self.tick)
-        # A count that replaces those before it, or the beginning of a tick.
-        anew = Signal()
-        m.d.comb += anew.eq(fresh | (counts & (alone | (number == form.max_count))))
-        m.d.sync += [number.eq(number + counts), times.eq(times + number)]
-        # A count moves the places of those before it away from the end, and its own edge is half a count off.
-        twice = Cat(Const(1, 1), number, Const(0, 1))
-        moved = Signal.like(places)
-        minus = Signal()
-        m.d.comb += [minus.eq(~backward), moved.eq((twice ^ minus.replicate(len(twice))).as_signed())]
-        with m.If(counts):
-            m.d.sync += places.eq((Cat(1, places).as_signed() + Cat(minus, moved).as_signed()) >> 1)
-        with m.If(anew):
-            m.d.sync += [number.eq(counts), times.eq(0), places.eq(Mux(counts, Mux(backward, 1, -1), 0))]
-        with m.If(counts & (number == form.max_count)):
-            m.d.sync += alone.eq(1)
-        more = Signal.like(self.elapsed)
-        quiet = Signal()
-        m.d.comb += [quiet.eq(self.elapsed == self._max_ticks), more.eq(self.elapsed + ~quiet)]
-        with m.If(self.counted):
-            m.d.comb += more.eq(1)
+        before = Mux(fresh, 0, number)
+        way = Mux(fresh, 0, moved)
+        m.d.sync += [
+            fresh.eq(self.tick),
+            position.eq(position + self.step),
+            last.eq(Mux(counts, 0, last + 1)),
+            moved.eq(way + self.step),
+            times.eq(Mux(fresh, 0, times + number)),
+            number.eq(before),
+        ]
         with m.If(fresh):
+            m.d.sync += places.eq(0)
+        with m.If(counts & (before != form.most_number)):
             m.d.sync += [
-                self.number.eq(number),
-                self.times.eq(times),
-                self.places.eq(places),
-                self.counted.eq(number.any()),
-                self.elapsed.eq(more),
-                alone.eq(~number.any() | ~self.tracks),
+                number.eq(before + 1),
+                places.eq(Mux(fresh, 0, places) + (Cat(Const(0, 1), way).as_signed() + self.step)),
+                kind.eq((position - backward)[:2]),
+                down.eq(backward),
             ]
-        m.d.comb += self.quiet.eq(quiet)
+        counted = Signal()
+        m.d.comb += counted.eq(self.number.any())
+        with m.If(fresh):
+            values = (number, times, places, kind, down, last, moved)
+            m.d.sync += [getattr(self, name).eq(value) for name, value in zip(of_tick, values, strict=True)]
+            m.d.sync += [
+                self.end.eq(position),
+                self.elapsed.eq(Mux(counted, 1, self.elapsed + (self.elapsed != self._max_ticks))),
+            ]
         if form.external:
             length = Signal.like(self.length, name="open_length", init=1)
             m.d.sync += length.eq(length + 1)

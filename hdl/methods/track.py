@@ -8,12 +8,14 @@ from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.spec import TrackTachometer
+from tachometry.spec.formats.tracking import PLACE_BITS
 
 
 class TrackMethod(wiring.Component):
-    """Tracking datapath: a filter for fluctuating measurement time (Tsuji 2009, eq. (22)) of third order.
+    """Tracking datapath: least squares over a memory that finds its own length (after Tsuji 2009, eq. (22)).
 
-    Latency: an update comes `spec.latency.datapath` clocks after every `tick`.
+    Latency: an update comes `spec.latency.datapath` clocks after every `tick`, and the filter has taken it before the
+    next may come: no update needs a stamp.
 
     Parameters
     ----------
@@ -22,10 +24,8 @@ class TrackMethod(wiring.Component):
     Members
     -------
     tick : In(1)
-    pulse_count, position : In(signed)
+    position : In(signed)
         Valid with `tick`.
-    overflow : In(1)
-        The tick had more counts than `pulse_count` shows; valid with `tick`, until the next.
     step : In(signed(2))
         As late as `tick`.
     updates : Out(stream)
@@ -35,15 +35,8 @@ class TrackMethod(wiring.Component):
     def __init__(self, spec: TrackTachometer) -> None:
         self._spec = spec
         self.tick_counts = TickCounts(spec.form, spec.timing.max_ticks)
-        self.machine = TrackMachine(spec.program, moved_width=spec.widths.count)
-        super().__init__(
-            {
-                **datapath_members(spec),
-                "step": In(signed(2)),
-                "overflow": In(1),
-                "position": In(signed(spec.position_width)),
-            }
-        )
+        self.machine = TrackMachine(spec.program)
+        super().__init__({**datapath_members(spec), "step": In(signed(2)), "position": In(signed(spec.position_width))})
 
     @property
     def probes(self) -> dict[str, Value]:
@@ -56,37 +49,30 @@ class TrackMethod(wiring.Component):
         m.submodules.tick_counts = counts = self.tick_counts
         m.submodules.machine = machine = self.machine
         position = Signal.like(self.position)
+        # All ways through the program take as long.
+        clocks = spec.latency.datapath - 1
+        left = Signal(range(clocks + 1))
+        ready = Signal()
+        m.d.comb += ready.eq(left == 1)
         with m.If(self.tick):
-            m.d.sync += position.eq(self.position)
-        m.d.comb += [
-            counts.tick.eq(self.tick),
-            counts.step.eq(self.step),
-            counts.tracks.eq(machine.tracks),
-            machine.begin.eq(self.tick),
-            machine.counted.eq(counts.counted),
-            machine.beyond.eq(self.overflow),
-            machine.quiet.eq(counts.quiet),
-            machine.number.eq(counts.number),
-            machine.times.eq(counts.times),
-            machine.places.eq(counts.places),
-            machine.moved.eq(self.pulse_count),
-            machine.length.eq(counts.length),
-        ]
+            m.d.sync += [position.eq(self.position), left.eq(clocks)]
+        with m.Elif(left.any()):
+            m.d.sync += left.eq(left - 1)
+        m.d.comb += [counts.tick.eq(self.tick), counts.step.eq(self.step), machine.begin.eq(self.tick)]
+        names = ("number", "times", "places", "last", "moved", "length", "kind", "end", "down")
+        m.d.comb += [getattr(machine, name).eq(getattr(counts, name)) for name in names]
         new = self.updates.p
-        shift = spec.form.frac_bits - spec.fine_bits
-        m.d.sync += self.updates.valid.eq(machine.out)
-        with m.If(machine.out):
+        shift = PLACE_BITS - spec.fine_bits
+        m.d.sync += self.updates.valid.eq(ready)
+        with m.If(ready):
             m.d.sync += [
                 new.velocity.eq(machine.velocity),
                 new.acceleration.eq(machine.acceleration),
-                new.position_fine.eq((position << spec.fine_bits) + (machine.p >> shift) + machine.p[shift - 1]),
+                new.quality.eq(machine.quality),
+                new.position_fine.eq(
+                    (position << spec.fine_bits) + (machine.position_fine >> shift) + machine.position_fine[shift - 1]
+                ),
                 new.interval.eq(counts.elapsed),
-                new.forced.eq(~counts.counted),
+                new.forced.eq(~counts.number.any()),
             ]
-        if spec.widths.stamp:
-            stamp = Signal.like(self.stamp)
-            with m.If(self.tick):
-                m.d.sync += stamp.eq(self.stamp)
-            with m.If(machine.out):
-                m.d.sync += new.stamp.eq(stamp)
         return m

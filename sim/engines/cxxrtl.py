@@ -14,7 +14,7 @@ from pathlib import Path
 from amaranth.back import rtlil
 
 from tachometry.hdl.arithmetic.idle import IdleDivision
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
 _MODEL = """

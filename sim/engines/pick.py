@@ -1,6 +1,6 @@
 """Engines are known by name, and chosen here."""
 
-from tachometry.sim.engines.build import compiler, find_compiler
+from tachometry.sim.build import compiler, find_compiler
 from tachometry.sim.engines.engine import Engine
 
 ENGINES = ("pysim", "cxxrtl", "verilator")

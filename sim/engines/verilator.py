@@ -10,7 +10,7 @@ from amaranth.back import verilog
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.verilog import bundled_yosys
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
 _OPTIONS = ("-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-assert", "-Wno-fatal")

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tachometry.sim.engines.build import cached, digest
+from tachometry.sim.build import cached, digest
 from tachometry.sim.signals.scratch import run_tool
 from tachometry.spec import Port
 from tachometry.spec.control import AnySpec
@@ -148,7 +148,7 @@ def versions() -> dict[str, str]:
 def made(
     files: Mapping[str, str], commands: Sequence[Sequence[str]], results: Sequence[str], tools: Mapping[str, str]
 ) -> list[Any]:
-    """Return what is in the JSON files that commands make of some files; kept, see `sim.engines.build.cached`.
+    """Return what is in the JSON files that commands make of some files; kept, see `sim.build.cached`.
 
     Raises
     ------

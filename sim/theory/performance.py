@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.theory import rairan, tracking_filter, tsuji
+from tachometry.sim.theory import rairan, tracking, tsuji
 from tachometry.sim.theory.checks import Floats
 from tachometry.spec import (
     MTachometer,
@@ -204,28 +204,17 @@ def _steady_shift(spec: RairanTachometer, ratio: Floats) -> NDArray[np.int64]:
 
 
 def _of_track(spec: TrackTachometer, speed: Floats) -> Performance:
-    """Return the tracking method when its memory has grown: edges are known to half a clock, and errors may all be one
-    way.
-
-    T_m is how long the past counts, 1/λ. Counts that come more seldom than this keep a weight, so it is longer there.
-    """
-    timing, form = spec.timing, spec.form
-    level = len(form.rates) - 1 if spec.growing_memory else 0
+    """Return the tracking method when its memory has grown: an edge is known to half a clock, and T_m is the memory."""
+    timing, counts = spec.timing, spec.encoder.counts_per_rev
+    tick_seconds = float(timing.tick_seconds)
+    memory = float(spec.form.memory_seconds)
     ratio = speed / spec.scale.unit_velocity
     ticks, forced = _limited(np.maximum(1 / ratio, 1), timing.max_ticks)
-    x = np.minimum(form.rate(level) * timing.tick_cycles * ticks, form.most(level))
-    worst = np.array([tracking_filter.worst_gain(each) for each in x.tolist()])
-    place = ratio / (2 * timing.tick_cycles)  # counts in half a clock
-    tick_seconds = float(timing.tick_seconds)
+    half_clock = ratio / (2 * timing.tick_cycles)  # counts
+    resolution = tracking.errors(speed, half_clock, counts, tick_seconds, memory)[1]
     return Performance(
-        _or_forced(
-            worst * place / ticks * spec.scale.unit_velocity,
-            forced,
-            timing.max_ticks,
-            spec.encoder.counts_per_rev,
-            tick_seconds,
-        ),
-        ticks * tick_seconds / x,
+        _or_forced(resolution, forced, timing.max_ticks, counts, tick_seconds),
+        ticks * tick_seconds / tracking.share(ratio, tick_seconds, memory),
         forced,
     )
 

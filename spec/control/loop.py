@@ -60,6 +60,7 @@ class LoopSpec(Law):
     multiplier: str = option(
         "serial",
         "How products are formed: a bit a clock, or at once with multipliers of the FPGA.",
+        name="loop-multiplier",
         choices=MULTIPLIERS,
         group=_GROUP,
     )
@@ -84,7 +85,7 @@ class LoopSpec(Law):
         if not 8 <= self.current_width <= 24:
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:
-            raise ParameterError("multiplier", f"must be serial or parallel, not {self.multiplier!r}")
+            raise ParameterError("loop_multiplier", f"must be serial or parallel, not {self.multiplier!r}")
         if self.command not in COMMANDS:
             raise ParameterError("command", f"must be ports or generator, not {self.command!r}")
         if self.gains not in FIXED_OR_INPUTS:

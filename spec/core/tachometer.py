@@ -1,8 +1,10 @@
 """A tachometer says what is asked for: from encoder pins to velocity, whatever the method."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from tachometry.spec.core.bound import Bound
@@ -177,6 +179,8 @@ class TachometerSpec:
     # Name of the method, and what sets it apart.
     method: ClassVar[str]
     facts: ClassVar[Facts]
+    # Texts of options that have another default with this method than with all others.
+    usual: ClassVar[Mapping[str, str]] = MappingProxyType({})
     # How many axes its outputs are of, if they say which.
     axes: ClassVar[None] = None
     # What follows.

@@ -97,6 +97,7 @@ class Timing:
         "Longest measurement: after it an update is forced, so that standstill is seen. In s, ms, us or ns, 2 to 2^20 "
         "whole ticks; a plain number is clocks.",
         text="10ms",
+        shown="10ms, with method track 100ms",
         name="max-time",
         metavar="TIME",
         unit="ticks",

@@ -7,7 +7,7 @@ from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.formats.velocity_output import per_count as of_a_count
 from tachometry.spec.language.units import ceil_log2, signed_width
 
-MAX_NATIVE_FRAC_BITS = 24
+MAX_NATIVE_FRAC_BITS = 24  # as a rule
 
 
 class Widths(Follows[S]):
@@ -58,11 +58,16 @@ class Widths(Follows[S]):
     def _usual_frac_bits(self) -> int:
         """Fraction bits of the velocity if they are not given."""
         coarsest, finest = self.frac_bits_range(self.spec.unit)
-        most = 16 if self.spec.unit == NATIVE else min(10, finest)
+        most = min(self._wished_frac_bits, finest)
         if self.spec.max_speed is not None and self.spec.velocity_width is not None:
             # With them no velocity saturates.
             most = min(most, self.fitting_frac_bits(self.max_velocity))
         return max(coarsest, most)
+
+    @property
+    def _wished_frac_bits(self) -> int:
+        """Fraction bits that show what the method tells apart."""
+        return 16 if self.spec.unit == NATIVE else 10
 
     def fitting_frac_bits(self, counts: Fraction | int) -> int:
         """Return the most fraction bits with which so many counts per tick fit `velocity`."""
@@ -72,10 +77,15 @@ class Widths(Follows[S]):
     def frac_bits_range(self, unit: str) -> tuple[int, int]:
         """Return fewest and most fraction bits of the velocity in `unit`."""
         if unit == NATIVE:
-            return 4, MAX_NATIVE_FRAC_BITS
+            return 4, self.most_native_frac_bits
         # The greatest speed must be at least one LSB, and one count per tick at most 2^22.
         count = of_a_count(unit, self.spec.encoder.counts_per_rev, self.spec.timing.tick_seconds)
-        return 1 - ceil_log2(count * self.max_velocity), MAX_NATIVE_FRAC_BITS - 2 - ceil_log2(count)
+        return 1 - ceil_log2(count * self.max_velocity), self.most_native_frac_bits - 2 - ceil_log2(count)
+
+    @property
+    def most_native_frac_bits(self) -> int:
+        """Most fraction bits of the velocity in counts per tick."""
+        return MAX_NATIVE_FRAC_BITS
 
     @property
     def needed_velocity(self) -> int:

@@ -1,42 +1,48 @@
-"""Formats of the tracking recursion: how many bits its numbers have, and why these are enough.
+"""Formats of the tracking recursion: how fine its numbers are, and why that is enough.
 
-p is in counts, relative to the position; v is in counts per U, where U is 2^k clocks, about 1/(4·λ_0). Both have F
-fraction bits. a is in counts per U², and has F + S fraction bits. In this unit of time the three are of a similar size,
-so one word fits all. Times are whole clocks. Products are rounded to the nearest.
+A word has 40 bits. Places are in 2^−20 counts, relative to the position at the end of the tick. Times are in clocks
+with `time_bits` fraction bits, so that no time of a tick is longer than a factor of the multiplier. Logarithms are to
+base 2, with 12 fraction bits. The velocity is in 2^−`velocity_bits` counts per clock: 8 times the greatest speed fits.
+The acceleration is in 2^−`acceleration_bits` counts per clock²: 100,000 rad/s² fits.
 
-Error analysis. A count comes every m ticks; d = 1 − θ, and u = U/T_s. The count adds d³·(u/m)²·e to a. The product
-h = d²·(u/m)·e is rounded by at most 2^−F/2, which adds d·(u/m)/2·2^−F to a. The sum a is rounded by 2^−(F + S)/2. If
-both go one way with each count, a keeps still only where a constant deviation e of p from the counts makes up for them:
-
-    |e| ≤ 2^−F/2 · m/(d²·u) · (1 + m/(d·u·2^S))
-
-S makes the second term as small as the first. This e gives the velocity 3·d/m·|e| in counts per tick; the roundings of
-v add at most 2^−F·(1.5/(d·u) + 1). F is the least with which the sum is at most half an LSB of the velocity, and |e| at
-most half one of the fine position. They are greatest for the least λ, and either for m = 1, for the longest silence, or
-where x = λ·m·T_s has just reached its most.
-
-The gain d is less than 1 and has B fraction bits. The gain d·U/m is less than 2^(1 + R) and has B − R; R is 0, except
-where ticks may be much shorter than U. Their relative error is below 2^−(B − R)/d. It only moves the poles. B − R is
-such that a transient of one count per tick is off by at most an eighth of an LSB for it.
+Error analysis. What is added to p, v and a is a power of 2 from a table, off by at most 0.2 % and at most an LSB; the
+relative error moves the gains only, which are flat. A result is rounded up if its 8 bits below the LSB and the number
+of the event, its bits reversed, carry: so in the mean of 256 events nothing is lost, and a step below the LSB is still
+made. What is left is a walk of a by less than an LSB an event, over as many events as the memory has: 2^−63 ·
+(48 MHz)² · √4096 = 0.016 counts/s² at 2000 counts, which is 1/100 of what a real disc leaves. Products by a time are
+exact to the LSB, as the time is.
 """
 
 import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 
-from tachometry.spec.language.units import ceil_log2, signed_width
+from tachometry.spec.language.units import ceil_log2
 
-LEVELS = 16  # of λ, from λ_0 to λ_0/10, with equal ratios
-RATIOS = tuple(10 ** (-level / (LEVELS - 1)) for level in range(LEVELS))
-SHORTEST_MEMORY = 0.2  # of 1 − θ_min: it does not fall further as λ does
-AGILE = 4  # times λ_0
-STEP_BACK = 4  # levels, when the mean error is large
-THRESHOLD_BITS = 16  # of the threshold of the mean error, that count
-MOST_EXTRA_BITS = 9
-LEAST_TICK_BITS = 8  # a tick has more than 2^8 clocks, as the program does
-GROWTH = 10  # λ falls by its e-th part in so many of its time constants
+WIDTH = 40  # bits of a word
+PLACE_BITS = 20  # fraction bits of a place
+LOG_BITS = 12  # fraction bits of a logarithm
+CHANCE_BITS = 8  # bits below the LSB that decide which way a result is rounded
+RESULT_BITS = WIDTH - 4  # a product or a power is held below 2^36, so that sums of some fit the word
+DROPPED = 5  # no product is shifted by less
+LOG_INDEX, EXP_INDEX = 7, 8  # bits of the index of the tables of log2 and of 2^x
+GAIN_STEPS, GAIN_OCTAVES = 16, 8  # entries of a table of gains: an octave has 16
+GAINS = GAIN_STEPS * GAIN_OCTAVES
+POWER_BITS = 17  # fraction bits of a power in its table
+MOST_NUMBER_BITS = 11  # of the counts of a tick that an event takes
+
+MOST_MEMORY = 4  # seconds
+MOST_EVENTS_BITS = 12  # memory does not grow beyond 2^12 events
+# The deviation of a slope at the end of N events in the time T, as D·√(1/N)/T: of a line and of a parabola.
+STRAIGHT, CURVE = 3.0, 12.0
+FORGET = Fraction(1, 10)  # seconds of silence after which the state is forgotten, if the maximum time is no longer
+GREATEST_ACCELERATION = 110_000  # rad/s²
+
+
+def fixed_log(value: float) -> int:
+    """Return a logarithm as a word."""
+    return round(value * (1 << LOG_BITS))
 
 
 @dataclass(frozen=True)
@@ -45,244 +51,158 @@ class Tracking:
 
     Parameters
     ----------
-    clock_hz, tick_cycles, longest_tick, max_ticks, max_count : int
-        Clock, nominal and longest tick in clocks, the longest silence in ticks, most counts of a tick.
+    clock_hz, tick_cycles, longest_tick : int
+        Clock, nominal and longest tick in clocks.
     external : bool
         Whether ticks come from outside, and differ in length.
-    bandwidth : Fraction, rad/s
-        λ_0.
-    least_memory : Fraction
-        θ_min at λ_0.
-    edge_error : Fraction, counts
-        E.
-    agile, growing : bool
-        Whether a large error is corrected with four times the bandwidth.
-        Whether λ falls to λ_0/10 while the errors are small.
-    velocity_bits, fine_bits : int
-        Fraction bits of the velocity in counts per tick, and of the position.
+    max_count : int
+        Most counts of a tick.
+    counts_per_rev : int
+    max_memory : Fraction or None, seconds
+        What memory does not grow beyond; None: 4 s.
+    max_time : int
+        Clocks of silence after which 0 is shown.
+    velocity_out : int
+        Fraction bits of the velocity in counts per tick that is shown.
+    slope : Fraction
+        LSB of the acceleration that is shown in one of the recursion, less than 1.
+    quality : Fraction, quality_bits : int
+        LSB of the deviation that is shown in one count per clock, and its bits.
     """
 
     clock_hz: int
     tick_cycles: int
     longest_tick: int
-    max_ticks: int
-    max_count: int
     external: bool
-    bandwidth: Fraction
-    least_memory: Fraction
-    edge_error: Fraction
-    agile: bool
-    growing: bool
-    velocity_bits: int
-    fine_bits: int
+    max_count: int
+    counts_per_rev: int
+    max_memory: Fraction | None
+    max_time: int
+    velocity_out: int
+    slope: Fraction
+    quality: Fraction
+    quality_bits: int
 
     @cached_property
-    def unit_bits(self) -> int:
-        """k: the unit of time U is 2^k clocks, at most 1/(4·λ_0), but at least half the longest tick."""
-        fitting = -ceil_log2(AGILE * self.bandwidth / self.clock_hz)
-        return max(fitting, self.longest_tick.bit_length() - 1)
+    def factor_bits(self) -> int:
+        """Bits of the second factor of a product: all those of a tick."""
+        return max(16, self.longest_tick.bit_length())
 
     @cached_property
-    def unit_ticks(self) -> Fraction:
-        """u: U in nominal ticks."""
-        return Fraction(1 << self.unit_bits, self.tick_cycles)
-
-    def rate(self, level: int) -> float:
-        """Return λ of a level, per clock."""
-        return float(self.bandwidth) * RATIOS[level] / self.clock_hz
-
-    def most(self, level: int) -> float:
-        """Return the greatest x = λ·m·T_s that counts for the gains of a level: −ln θ_min."""
-        return -math.log(1 - float(1 - self.least_memory) * max(RATIOS[level], SHORTEST_MEMORY))
-
-    def _gains(self) -> list[tuple[int, float]]:
-        """Return m and d where errors are greatest: a count in every tick, as seldom as may be, and where x reaches its
-        most.
-
-        In all of them λ is the least.
-        """
-        level = LEVELS - 1 if self.growing else 0
-        each = self.rate(level) * self.tick_cycles
-        ticks = {1, self.max_ticks, max(1, min(round(self.most(level) / each), self.max_ticks))}
-        return [(m, 1 - math.exp(-min(each * m, self.most(level)))) for m in sorted(ticks)]
-
-    @cached_property
-    def extra_bits(self) -> int:
-        """S, by the error analysis above."""
-        most = max(m / (d * float(self.unit_ticks)) for m, d in self._gains())
-        return min(max(math.ceil(math.log2(most)), 0), MOST_EXTRA_BITS)
-
-    @cached_property
-    def frac_bits(self) -> int:
-        """F, by the error analysis above."""
-        u = float(self.unit_ticks)
-        finest = 0
-        for m, d in self._gains():
-            error = m / (d * d * u) / 2 * (1 + m / (d * u) / 2**self.extra_bits)  # of p, in 2^−F
-            velocity = 3 * d / m * error + 1.5 / (d * u) + 1
-            bits = (self.velocity_bits + math.log2(velocity), self.fine_bits + math.log2(error + 1))
-            finest = max(finest, *(1 + math.ceil(each) for each in bits))
-        return finest
-
-    @cached_property
-    def acceleration_error(self) -> float:
-        """Error of a, in its LSB."""
-        u = float(self.unit_ticks)
-        return max((4.5 * u / m) * 2**self.extra_bits + 1.5 / d for m, d in self._gains())
-
-    @cached_property
-    def ratio_range(self) -> int:
-        """R, of the range of the gain d·U/m."""
-        shortest = 1 << LEAST_TICK_BITS if self.external else self.tick_cycles
-        x = min((AGILE if self.agile else 1) * self.rate(0) * shortest, self.most(0))
-        greatest = (1 - math.exp(-x)) * (1 << self.unit_bits) / shortest
-        return max(math.floor(math.log2(greatest * (1 + 2.0**-10))), 0)
-
-    @cached_property
-    def gain_bits(self) -> int:
-        """B: fraction bits of the multipliers."""
-        d = self._gains()[0][1]
-        least = self.velocity_bits + 3 + math.ceil(-math.log2(min(d, d * float(self.unit_ticks))))
-        return max(20, least) + self.ratio_range
-
-    @cached_property
-    def max_velocity(self) -> int:
-        """Greatest |v|, in 2^−F counts per U: `max_count` counts in a tick as long as nominal."""
-        return (self.max_count << (self.frac_bits + self.unit_bits)) // self.tick_cycles
-
-    @cached_property
-    def max_acceleration(self) -> int:
-        """Greatest |a|, in 2^−(F + S) counts per U²: an eighth of the greatest speed within U."""
-        return (self.max_velocity << self.extra_bits) >> 3
-
-    @cached_property
-    def max_error(self) -> int:
-        """|e| from which the recursion starts anew, in counts: no shaft within the greatest speed has it."""
-        return 2 * self.max_count + 2
-
-    @cached_property
-    def max_gap(self) -> int:
-        """Most clocks from a tick with counts to the end of the next one, and what the first count was early."""
-        return (self.max_ticks + 1) * self.longest_tick
-
-    @cached_property
-    def gap_bits(self) -> int:
-        """Bits of a number of clocks between counts."""
-        return self.max_gap.bit_length()
-
-    @cached_property
-    def times_bits(self) -> int:
-        """Bits of the sum of the times from the counts of a tick to its end, in clocks."""
-        return max((self.max_count * (self.longest_tick - 1)).bit_length(), 1)
+    def time_bits(self) -> int:
+        """Fraction bits of a time."""
+        return min(2, self.factor_bits - self.longest_tick.bit_length())
 
     @cached_property
     def number_bits(self) -> int:
-        """Bits of the number of counts of a tick."""
-        return self.max_count.bit_length()
+        """Bits of the number of counts of an event: further counts of a tick move the position alone."""
+        return min(self.max_count.bit_length(), MOST_NUMBER_BITS)
 
-    @cached_property
+    @property
+    def most_number(self) -> int:
+        """Most counts of an event."""
+        return (1 << self.number_bits) - 1
+
+    @property
+    def times_bits(self) -> int:
+        """Bits of the sum of the clocks from each of these to the end of the tick."""
+        return max((self.most_number * (self.longest_tick - 1)).bit_length(), 1)
+
+    @property
     def places_bits(self) -> int:
-        """Bits of the sum of twice the places of a tick's counts, relative to its end; signed."""
-        return signed_width(self.max_count * (2 * self.max_count - 1))
+        """Bits of the sum of twice their places; signed."""
+        return (self.most_number**2).bit_length() + 1
 
     @cached_property
-    def _moved(self) -> float:
-        """Counts that v says for a tick, at most: more than a may add to it."""
-        return 2 * max(self.max_count, self.max_velocity * self.longest_tick / 2 ** (self.unit_bits + self.frac_bits))
+    def moved_bits(self) -> int:
+        """Bits of the way of a tick in counts; signed."""
+        return self.longest_tick.bit_length() + 1
 
     @cached_property
-    def mean_bits(self) -> int:
-        """Bits of a mean over the counts of a tick."""
-        return math.ceil(math.log2(self.max_count + self._moved)) + self.frac_bits
+    def velocity_bits(self) -> int:
+        """Fraction bits of the velocity."""
+        return WIDTH - 2 - 3 - ceil_log2(Fraction(self.max_count, self.longest_tick))
 
     @cached_property
-    def gap_shift(self) -> int:
-        """Left shift of a gap after which it is greater than d: no tick is as short as this allows."""
-        return self.gain_bits - LEAST_TICK_BITS
+    def acceleration_bits(self) -> int:
+        """Fraction bits of the acceleration."""
+        greatest = GREATEST_ACCELERATION * self.counts_per_rev / (2 * math.pi) / self.clock_hz**2
+        return WIDTH - 2 - math.ceil(math.log2(greatest))
 
     @cached_property
-    def least_gap(self) -> int:
-        """Fewest clocks between the first two counts."""
-        return max(self.tick_cycles // self.max_count, 1)
+    def shifts(self) -> dict[str, int]:
+        """The right shift of each product, by its name in the listing."""
+        v, a, t = self.velocity_bits, self.acceleration_bits, self.time_bits
+        return {
+            "half_velocity": a - v + t + 1,  # a·t/2
+            "velocity": a - v + t,  # a·t
+            "place": v - PLACE_BITS + t,  # v·t
+            "place_64": v - PLACE_BITS + t + 6,  # v·t/64
+            "time": 0,
+            "mean": 6,
+            "shown": v - self.velocity_out,
+            "acceleration": self.factor_bits - ceil_log2(self.slope),
+        }
 
     @cached_property
-    def start_bits(self) -> int:
-        """Bits that the first velocity is computed coarser by, so that it cannot leave the word."""
-        # Before it is held within the greatest velocity: the counts of a tick and one more in the shortest time.
-        bits = ceil_log2(Fraction((self.max_count + 2) << self.unit_bits, self.least_gap)) + self.frac_bits + 1
-        return min(max(bits - self.width, 0), self.unit_bits)
+    def most_since(self) -> int:
+        """Longest time from an event on that is told from longer ones: a product by it needs no left shift."""
+        return (1 << (min(self.shifts["velocity"], self.shifts["place"]) + DROPPED + 6)) - 1
+
+    @property
+    def memory_seconds(self) -> Fraction:
+        """Seconds, beyond which memory does not grow."""
+        return Fraction(MOST_MEMORY) if self.max_memory is None else self.max_memory
 
     @cached_property
-    def width(self) -> int:
-        """W: bits of a word."""
-        # The greatest d²·U/gap and d³·(U/gap)², which are those of the greatest x.
-        rate = (AGILE if self.agile else 1) * self.rate(0) * (1 << self.unit_bits)
-        d = 1 - math.exp(-self.most(0))
-        of_v, of_a = rate * d**2 / self.most(0), rate**2 * d**3 / self.most(0) ** 2
-        greatest = max(
-            # v before it is held within its limit; a adds a quarter, as no tick is longer than 2·U.
-            self.max_velocity / 2**self.frac_bits * 1.25 + 3 * self.max_error * of_v,
-            # What is multiplied: on its way to a product the adder holds nearly twice as much. The rest of it is less
-            # than another term: v·Στ, as the sum over the counts of a tick, is less than the dividend of their mean;
-            # and e·d is less than h, or, where R < 2, than 4·e.
-            2 * self.max_error * of_v * 2 ** (self.extra_bits + self.ratio_range),  # h
-            2 * self.max_acceleration / 2**self.frac_bits,
-            2.25 * self.max_velocity / 2**self.frac_bits,
-            4 * self.max_error,  # e less its mean
-            self.max_acceleration / 2**self.frac_bits + self.max_error * of_a * 2**self.extra_bits,
-            2 * self.max_error + 2 * self._moved + 2,  # p
-            AGILE * self.rate(0) * (1 << self.gap_bits),  # x
-        )
-        whole = math.ceil(math.log2(greatest))
-        dividend = max(self.number_bits + self.mean_bits, self.gap_bits + self.gap_shift)
-        return max(whole + self.frac_bits, dividend) + 1
-
-    def fixed(self, value: float | Fraction) -> int:
-        """Return a number with F fraction bits."""
-        return round(value * (1 << self.frac_bits))
-
-    def rate_word(self, rate: float) -> int:
-        """Return what a gap in clocks is multiplied by, and the product shifted right by gap_bits − 1, for x =
-        rate·gap.
-        """
-        return round(rate * 2.0 ** (self.frac_bits + self.gap_bits - 1))
-
-    @cached_property
-    def rates(self) -> tuple[int, ...]:
-        """The rates of each level."""
-        return tuple(self.rate_word(self.rate(level)) for level in range(LEVELS))
+    def constants(self) -> dict[str, int]:
+        """Constants of the listing, lead aside."""
+        one, t = 1 << PLACE_BITS, self.time_bits
+        v, a = self.velocity_bits, self.acceleration_bits
+        order = fixed_log(12 - 2 * PLACE_BITS + 2 * a + 4 * t)
+        forget = max(math.ceil(FORGET * self.clock_hz), self.max_time)
+        most = (1 << (WIDTH - 2)) - 16
+        shown = self.max_count << self.velocity_out
+        noises = 1 << (self.factor_bits - CHANCE_BITS - 1)  # one event among those that the noise is learned from
+        of_quality = math.log2(self.quality) + t - PLACE_BITS
+        logs = {
+            "of_straight": math.log2(STRAIGHT) + of_quality, "of_curve": math.log2(CURVE) + of_quality, "none": -127,
+            "log_3_2": math.log2(3 / 2), "log_9_4": math.log2(9 / 4), "log_8": 3, "log_32": 5, "log_64": 6,
+            "log_256": 8, "log_4096": MOST_EVENTS_BITS, "log_4": 2, "log_eighth": -3, "log_half": -1,
+            "log_5_8": math.log2(8 / 5),
+            "of_velocity": v - PLACE_BITS + t, "of_speed": v + t, "of_slope": a - v + t + 1,
+        }  # fmt: skip
+        return {
+            **{name: fixed_log(value) for name, value in logs.items()},
+            "past_4": fixed_log(2) + 1, "log_quarter": -fixed_log(2) - 1,
+            "order": order, "order_lag": order - fixed_log(math.log2(3.5)),
+            "zero": 0, "one": 1, "two": 2, "three": 3, "minus_one": -1,
+            "count": one, "half": one // 2, "quarter": one // 4, "sixteenth": one // 16, "least_noise": one >> 10,
+            "slope": round(self.slope * (1 << self.shifts["acceleration"])),
+            "clock": 1 << t, "tick": self.tick_cycles,
+            "most_since": self.most_since, "most_memory": int(self.memory_seconds * self.clock_hz) << t,
+            "max_time": self.max_time << t, "forget": forget << t,
+            "most_quality": (1 << self.quality_bits) - 1,
+            "most": most, "least": -most, "most_shown": shown, "least_shown": -shown,
+            "noises_one": noises, "noises_first": 8 * noises, "noises_least": 16 * noises,
+            "noises_offset": 256 * noises, "noises_most": 512 * noises,
+        }  # fmt: skip
 
     @cached_property
-    def agile_rate(self) -> int:
-        """The rate of an agile correction."""
-        return self.rate_word(AGILE * self.rate(0))
+    def gains(self) -> tuple[tuple[int, ...], ...]:
+        """Logarithms of the gains of p, v and a over X, X² and X³ of an event, from X = 1/4 on downward."""
+        v = self.velocity_bits - PLACE_BITS + self.time_bits
+        a = self.acceleration_bits - PLACE_BITS + 2 * self.time_bits
 
-    @cached_property
-    def most_x(self) -> tuple[int, ...]:
-        """Greatest x of each level."""
-        return tuple(self.fixed(self.most(level)) for level in range(LEVELS))
+        def all_of(number: int) -> tuple[float, float, float]:
+            x = 2 ** (-2 - (number + 0.5) / GAIN_STEPS)
+            rest = (1 + x) * (1 + 2 * x)
+            return 9 * (1 - x + 2 / 3 * x * x) / rest, 36 * (1 - x / 2) / rest * 2**v, 60 / rest * 2**a
 
-    @cached_property
-    def spans(self) -> tuple[int, ...]:
-        """Clocks without trouble after which each level gives way to the next."""
-        edges = [0.0]
-        for upper, lower in pairwise(RATIOS):
-            edges.append(GROWTH * (1 / math.sqrt(upper * lower) - 1) / float(self.bandwidth))
-        spans = [round((end - begin) * self.clock_hz) for begin, end in pairwise(edges)]
-        longest = (1 << (self.width - 1)) - 1 - self.max_gap
-        return (*(min(span, longest) for span in spans), longest)
+        found = zip(*map(all_of, range(GAINS)), strict=True)
+        return tuple(tuple(fixed_log(math.log2(gain)) for gain in gains) for gains in found)
 
-    @cached_property
-    def late_limit(self) -> int:
-        """How far p may go from the position while no count comes: ½ + 1.5·E."""
-        return self.fixed(Fraction(1, 2) + Fraction(3, 2) * self.edge_error)
 
-    @cached_property
-    def mean_threshold_bits(self) -> int:
-        """Fraction bits of the threshold of the mean error."""
-        return THRESHOLD_BITS - math.floor(2 * math.log2(self.edge_error / 4))
-
-    @cached_property
-    def mean_threshold(self) -> int:
-        """(0.25·E)²: the square of the mean error over the share of the last error in it, that is trouble."""
-        return round((self.edge_error / 4) ** 2 * (1 << self.mean_threshold_bits))
+# Of 1 + (i + ½)/128, and of 2^((i + ½)/256).
+LOGS = tuple(fixed_log(math.log2(1 + (i + 0.5) / 2**LOG_INDEX)) for i in range(2**LOG_INDEX))
+POWERS = tuple(round(2 ** (POWER_BITS + (i + 0.5) / 2**EXP_INDEX)) for i in range(2**EXP_INDEX))

@@ -1,190 +1,354 @@
-"""The operations of the tracking datapath, and how steps become instructions.
+"""How the listing of the tracking method becomes instructions of a machine, and how many clocks these take.
 
-A word of the memory is x. `ac` is the accumulator, `mq` holds multipliers, dividends and quotients, `sign` the sign
-that `KEEP` has found, `flag` a condition. Every path through the program takes the same number of clocks: `Choice` pads
-the shorter of two.
+The machine has one adder with an accumulator, the *sum*; a memory of words; and a unit that takes products,
+logarithms, powers and shifts, and whose result is read as `~`. An instruction takes a clock. It waits while the unit
+works and it needs it. A word is read one instruction before its use, so none is read right behind its change.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property
 
-MAX_STEPS = 127
-
-
-class Op(IntEnum):
-    """Operations of the datapath."""
-
-    LOAD = 0  # ac = x
-    ADD = 1  # ac = ac + x
-    SUB = 2  # ac = ac − x
-    LOAD_SIGNED = 3  # ac = −x if `sign`, else x
-    STORE = 4  # x = ac
-    KEEP = 5  # x = ac, sign = ac < 0
-    SIGN = 23  # sign = ac < 0
-    DOUBLE = 24  # ac = ac << steps, for mq without its leading bit
-    MUL = 6  # ac = x·mq / 2^(steps − 1), rounded, with the low bits of mq
-    DIV = 7  # mq = ⌊mq·2^(steps − W) / x⌋
-    FRACTION = 8  # mq = ⌊ac·2^steps / x⌋, for ac < x and mq without leading bits
-    SHIFT = 9  # ac = ac >> steps
-    TO_MQ = 10  # mq = ac
-    FROM_MQ = 11  # ac = mq
-    INPUT = 12  # ac = an input
-    ADD_INPUT = 25  # ac = ac + an input
-    SUB_INPUT = 26  # ac = ac − an input
-    POSITIVE = 13  # ac = max(ac, 0)
-    NEGATIVE = 14  # ac = min(ac, 0)
-    TEST = 15  # flag = ac ≥ 0
-    TEST_AND = 16  # flag = flag and ac ≥ 0
-    TEST_OR = 17  # flag = flag or ac ≥ 0
-    JUMP = 18  # to the address, if a condition holds
-    LEVEL = 19  # changes the level of λ
-    PHASE = 20  # what the recursion has seen: nothing, a count, a speed
-    OUT = 21  # an update: velocity in mq, acceleration in ac, p in x
-    WAIT = 22
+from tachometry.spec.formats.tracking import (
+    LOGS,
+    POWER_BITS,
+    POWERS,
+    Tracking,
+)
+from tachometry.spec.formats.tracking_listing import LISTING
 
 
-class Input(IntEnum):
-    """Lists the words that `INPUT` loads."""
+class Left(IntEnum):
+    """Lists the left operands of the adder."""
 
-    TIMES = 0  # Σ of the times from the counts of the tick to its end, clocks
-    NUMBER = 1  # n, of these counts, shifted left by the bits of a mean
-    PLACES = 2  # Σ of their places relative to the end of the tick, counts
-    MOVED = 3  # counts of the tick, forward less backward
-    LENGTH = 4  # clocks of the tick
-    LENGTH_SHIFTED = 5  # the same, shifted left as `gap_shifted` is
-    ZERO = 7
+    ZERO = 0
+    SUM = 1
+    LEAST = 2  # min(sum, 0)
+    MOST = 3  # max(sum, 0)
 
 
-class Condition(IntEnum):
-    """When `JUMP` jumps."""
+class Source(IntEnum):
+    """Lists where the right operand comes from."""
 
-    ALWAYS = 0
-    NEGATIVE = 1  # ac < 0
-    FLAG = 2
-    COUNTED = 3  # the tick has counts
-    BEYOND = 4  # more than the greatest speed has
-    RESTS = 5  # phase is rest
-    BEGUN = 6  # phase is one count
-    QUIET = 7  # no count for the maximum time
+    NONE = 0
+    UNIT = 1
+    INPUT = 2
+    WORD = 3
 
 
-class Level(IntEnum):
-    """Lists the effects of `LEVEL`."""
+class Start(IntEnum):
+    """Lists what an instruction begins with the sum."""
 
-    FIRST = 0
-    BACK = 1  # STEP_BACK levels, not beyond the first
-    NEXT = 2  # not beyond the last
-
-
-class Phase(IntEnum):
-    """Says how much the recursion knows."""
-
-    REST = 0
-    BEGUN = 1
-    TRACKS = 2
+    NONE = 0
+    LOG = 1
+    EXP = 2
+    OVER = 3
+    GAIN = 4
+    BY = 5
+    TIMES = 6
+    CHANCE = 7
 
 
-@dataclass(frozen=True)
-class Do:
-    """An instruction: an operation, the name of a word or a number for its address field, and its clocks."""
+class Jump(IntEnum):
+    """When an instruction jumps."""
 
-    op: Op
-    word: str | int = 0
-    steps: int = 1
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Two ways, one of which is gone; both take the same time."""
-
-    condition: Condition
-    then: "Sequence[Step]"
-    otherwise: "Sequence[Step]" = ()
+    NEVER = 0
+    ALWAYS = 1
+    NEG = 2  # sum < 0
+    POS = 3
+    EMPTY = 4  # no count
+    SEVERAL = 5  # more than one
+    END = 6
 
 
-Step = Do | Choice
+INPUTS = ("number", "counts", "places", "times", "last", "moved", "length")
+OFFSETS = ("o0", "o1", "o2", "o3")
+CHOSEN = ("o@last", "o@up", "o@down", "o@m1", "o@m2", "o@m3")  # an offset that the tick chooses
+OUTPUTS = ("", "velocity", "position_fine", "quality", "acceleration")
+ADDRESS_BITS = 7
+FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
+FIRST_INPUT = FIRST_CHOSEN - 8  # of inputs: the words there are 0
+TAKEN = 1  # clock that is lost when a jump is taken
+_LEFTS = {"lo+": Left.LEAST, "hi+": Left.MOST}
 
 
 @dataclass(frozen=True)
 class Instruction:
-    """An instruction as the datapath reads it."""
+    """An instruction.
 
-    op: Op
-    address: int
-    steps: int
-
-
-# A jump that is taken costs two clocks more: what was fetched behind it is not used.
-NOT_TAKEN, TAKEN = 1, 3
-_READS = (Op.LOAD, Op.ADD, Op.SUB, Op.LOAD_SIGNED, Op.MUL, Op.DIV, Op.FRACTION, Op.OUT)
-_CHANGES = (Op.STORE, Op.KEEP, Op.LEVEL)
-
-
-def _spaced(steps: Sequence[Step]) -> list[Step]:
-    """Return the steps, with a wait where one would read a word before it is written, or while another one is.
-
-    A word is read two steps before its use. So none is read two steps behind a change, nor what the last step changed.
+    Parameters
+    ----------
+    left : Left
+    source : Source
+    word : str
+        Of the source.
+    subtract, by_sign, keep : bool
+        Whether the operand is subtracted, or added with the sign that was kept; whether the sign of the sum is kept.
+    store : str
+        Word that takes the sum; empty: none.
+    start : Start
+    how : str
+        Name of a shift, or number of a table of gains.
+    output : str
+    jump : Jump
+    target : str
     """
-    spaced: list[Step] = []
 
-    def changes(back: int) -> Do | None:
-        step = spaced[-back] if len(spaced) >= back else None
-        return step if isinstance(step, Do) and step.op in _CHANGES else None
+    left: Left = Left.SUM
+    source: Source = Source.NONE
+    word: str = ""
+    subtract: bool = False
+    by_sign: bool = False
+    keep: bool = False
+    store: str = ""
+    start: Start = Start.NONE
+    how: str = ""
+    output: str = ""
+    jump: Jump = Jump.NEVER
+    target: str = ""
 
-    for step in steps:
-        if isinstance(step, Choice):
-            if changes(1):  # what is read behind the jump
-                spaced.append(Do(Op.WAIT))
-        elif step.op in _READS:
-            last = changes(1)
-            if last and (last.op == Op.LEVEL or last.word == step.word):
-                spaced += [Do(Op.WAIT)] * 2
-            elif changes(2):
-                spaced.append(Do(Op.WAIT))
-        spaced.append(step)
-    return spaced
-
-
-def clocks(steps: Sequence[Step]) -> int:
-    """Return clocks of some steps."""
-    return sum(
-        step.steps if isinstance(step, Do) else NOT_TAKEN + sum(_ways(step)[0]) + TAKEN for step in _spaced(steps)
-    )
+    @property
+    def needs_unit(self) -> bool:
+        """Whether it waits until the unit has finished."""
+        return self.source == Source.UNIT or self.start not in (Start.NONE, Start.CHANCE)
 
 
-def _ways(choice: Choice) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return clocks of `otherwise` and of `then`, each with those that have to be waited behind it."""
-    otherwise, then = clocks(choice.otherwise), clocks(choice.then)
-    # What follows may read what `then` has written last, so there are two waits between.
-    both = max(NOT_TAKEN + otherwise + TAKEN, TAKEN + then + 2)
-    return (otherwise, both - NOT_TAKEN - otherwise - TAKEN), (then, both - TAKEN - then)
+def _operand(word: str) -> dict[str, object]:
+    if word == "~":
+        return {"source": Source.UNIT}
+    if word.startswith("$"):
+        return {"source": Source.INPUT, "word": word[1:]}
+    return {"source": Source.WORD, "word": word}
 
 
-def assembled(steps: Sequence[Step], address: Callable[[str | int], int], begin: int = 0) -> list[Instruction]:
-    """Return instructions of some steps, the first of which is at `begin`; `address` is that of a word."""
+def _chain(words: list[str]) -> list[Instruction]:
+    """Return the instructions of a line of the listing."""
+    done: list[Instruction] = []
+    store = words[0] if words[1:2] == ["="] else ""
+    rest = iter(words[2:] if store else words)
+    fresh = False  # the sum is 0 as yet
+
+    def add(left: Left, word: str, sign: str) -> None:
+        nonlocal fresh
+        left = Left.ZERO if fresh else left
+        fresh = False
+        operand = {} if word == "zero" else _operand(word)
+        done.append(Instruction(left, subtract="-" in sign, by_sign="s" in sign, **operand))  # type: ignore[arg-type]
+
+    def last(**changes: object) -> None:
+        if not done:
+            done.append(Instruction())
+        done[-1] = replace(done[-1], **changes)  # type: ignore[arg-type]
+
+    for number, word in enumerate(rest):
+        if word in ("+", "-", "s+", "s-"):
+            add(Left.SUM, next(rest), word)
+        elif word in _LEFTS:
+            add(_LEFTS[word], next(rest), "+")
+        elif word in ("min", "max"):
+            limit, left = next(rest), Left.LEAST if word == "min" else Left.MOST
+            if limit != "zero":
+                add(Left.SUM, limit, "-")
+            add(left, limit, "+")
+        elif word == "keep":
+            last(keep=True)
+        elif word in ("log", "exp", "by", "chance") and number:
+            last(start=Start[word.upper()])
+        elif word in ("over", "gain"):
+            last(start=Start[word.upper()], how=next(rest))
+        elif word == "times":
+            done.append(Instruction(Left.ZERO, start=Start.TIMES, **_operand(next(rest)), how=next(rest)))  # type: ignore[arg-type]
+        elif word == "out":
+            last(output=next(rest))
+        elif word in ("zero", "sum"):
+            fresh = word == "zero"
+        else:
+            add(Left.ZERO, word, "+")
+    if fresh:
+        add(Left.ZERO, "zero", "+")
+    if store:
+        last(store=store)
+    return done
+
+
+@dataclass(frozen=True)
+class Code:
+    """Instructions, and the places of the labels among them."""
+
+    instructions: tuple[Instruction, ...]
+    labels: Mapping[str, int]
+
+
+def assembled(listing: str = LISTING) -> Code:
+    """Return the instructions of a listing, with one that does nothing where a word would be read too early."""
     code: list[Instruction] = []
-
-    def wait(clocks: int) -> None:
-        while clocks:
-            now = min(clocks, MAX_STEPS)
-            code.append(Instruction(Op.WAIT, 0, now))
-            clocks -= now
-
-    for step in _spaced(steps):
-        if isinstance(step, Do):
-            code.append(Instruction(step.op, address(step.word), step.steps))
+    labels: dict[str, int] = {}
+    for line in listing.splitlines():
+        words = line.partition("#")[0].split()
+        if not words:
             continue
-        (_, wait_otherwise), (_, wait_then) = _ways(step)
-        jump = len(code)
-        code.append(Instruction(Op.JUMP, 0, step.condition))
-        code += assembled(step.otherwise, address, begin + len(code))
-        wait(wait_otherwise)
-        over = len(code)
-        code.append(Instruction(Op.JUMP, 0, Condition.ALWAYS))
-        code[jump] = Instruction(Op.JUMP, begin + len(code), step.condition)
-        code += assembled(step.then, address, begin + len(code))
-        wait(1)
-        wait(wait_then - 1)
-        code[over] = Instruction(Op.JUMP, begin + len(code), Condition.ALWAYS)
-    return code
+        if words[0].endswith(":"):
+            labels[words[0][:-1]] = len(code)
+        elif words[0] == "if":
+            code.append(Instruction(jump=Jump[words[1].upper()], target=words[3]))
+        elif words[0] == "goto":
+            code.append(Instruction(jump=Jump.ALWAYS, target=words[1]))
+        elif words == ["end"]:
+            code.append(Instruction(jump=Jump.END))
+        else:
+            for one in _chain(words):
+                if code and code[-1].store and one.source == Source.WORD and _same(code[-1].store, one.word):
+                    code.append(Instruction())
+                code.append(one)
+    return Code(tuple(code), labels)
+
+
+def _same(stored: str, read: str) -> bool:
+    """Tell whether two names may be of one word."""
+    return stored == read or ("o@" in stored + read and {stored, read} <= {*OFFSETS, *CHOSEN})
+
+
+@dataclass(frozen=True)
+class Times:
+    """Clocks from the begin of an operation of the unit until its result can be used.
+
+    Parameters
+    ----------
+    log, exp, over, gain, by, times : int
+        At most.
+    """
+
+    log: int
+    exp: int
+    over: int
+    gain: int
+    by: int
+    times: int
+
+    def of(self, instruction: Instruction) -> int:
+        """Return those of what an instruction begins; 0: nothing."""
+        return getattr(self, instruction.start.name.lower(), 0)
+
+
+QUICK = Times(log=4, exp=4, over=3, gain=3, by=2, times=4)
+
+
+def small_times(factor_bits: int) -> Times:
+    """Return those of the small unit: places of a shift are taken by 16, by 4 and by 1."""
+    return Times(log=11, exp=13, over=7, gain=3, by=9, times=factor_bits + 10)
+
+
+@dataclass(frozen=True)
+class Program:
+    """The program of a tracking recursion on a machine, its words, and its clocks.
+
+    Parameters
+    ----------
+    form : Tracking
+    times : Times
+        Of the unit.
+    delay : int
+        Clocks from an edge to the port, less those of the program: the velocity is that of the clock in which it is
+        shown.
+    """
+
+    form: Tracking
+    times: Times
+    delay: int
+
+    @cached_property
+    def code(self) -> Code:
+        """The instructions."""
+        return assembled()
+
+    @property
+    def lead(self) -> int:
+        """Clocks by which the shown velocity is ahead of the tick."""
+        return self.delay + self.clocks
+
+    @cached_property
+    def clocks(self) -> int:
+        """Clocks from the first instruction to the last output, by the longest way."""
+        return self._longest(lambda one: one.output == "acceleration")
+
+    @cached_property
+    def all_clocks(self) -> int:
+        """Clocks from the first instruction to the last one."""
+        return self._longest(lambda one: one.jump == Jump.END)
+
+    def _longest(self, ends: Callable[[Instruction], bool]) -> int:
+        """Return the clocks of the longest way to an instruction; nothing of how ways exclude each other is known."""
+        code, labels = self.code.instructions, self.code.labels
+        entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
+        longest, open_ = 0, [labels["tick"]]
+        while open_:
+            place = open_.pop()
+            clock, free = entry[place]
+            one = code[place]
+            if one.needs_unit:
+                clock = max(clock, free)
+            if begun := self.times.of(one):
+                free = clock + begun
+            clock += 1
+            if ends(one):
+                longest = max(longest, clock)
+                continue
+            following = [(place + 1, clock)] if one.jump not in (Jump.ALWAYS, Jump.END) else []
+            if one.target:
+                following.append((labels[one.target], clock + TAKEN))
+            for after, at in following:
+                before = entry.get(after, (-1, -1))
+                now = max(before[0], at), max(before[1], free)
+                if now != before:
+                    entry[after] = now
+                    open_.append(after)
+        return longest
+
+    @cached_property
+    def constants(self) -> dict[str, int]:
+        """Constants by name."""
+        return {**self.form.constants, "lead": self.lead << self.form.time_bits}
+
+    @cached_property
+    def words(self) -> dict[str, int]:
+        """First contents of all words by name: offsets, what changes, constants."""
+        used = [name for one in self.code.instructions for name in (one.word * (one.source == Source.WORD), one.store)]
+        names = dict.fromkeys(name for name in used if name and name not in CHOSEN)
+        changing = [name for name in names if name not in self.constants and name not in OFFSETS]
+        fixed = [name for name in self.constants if name in names or name == "zero"]  # in the place of no offset
+        return {name: self.constants.get(name, 0) for name in (*OFFSETS, *changing, *fixed)}
+
+    @cached_property
+    def addresses(self) -> dict[str, int]:
+        """Addresses of words, and of what the tick chooses among the offsets."""
+        chosen = {name: FIRST_CHOSEN + number for number, name in enumerate(CHOSEN)}
+        return {name: number for number, name in enumerate(self.words)} | chosen | {"": 0}
+
+    @cached_property
+    def shifts(self) -> tuple[int, ...]:
+        """The shifts that instructions name, by number."""
+        found = {self._shift(one) for one in self.code.instructions}
+        return tuple(sorted(shift for shift in found if shift is not None))
+
+    def _shift(self, one: Instruction) -> int | None:
+        if one.start == Start.TIMES:
+            return self.form.shifts[one.how]
+        return int(one.how) if one.start == Start.OVER and one.how != "by" else None
+
+    def number(self, one: Instruction) -> int:
+        """Return the number of the shift or of the table of an instruction; what `by` says has the last one."""
+        if one.start == Start.GAIN:
+            return int(one.how)
+        shift = self._shift(one)
+        return BY_FACTOR if one.how == "by" else 0 if shift is None else self.shifts.index(shift)
+
+    @cached_property
+    def tables(self) -> tuple[int, ...]:
+        """The tables of the unit: powers less their leading bit, logarithms, gains."""
+        powers = [power - (1 << POWER_BITS) for power in POWERS]
+        return (*powers, *LOGS, *(gain for gains in self.form.gains for gain in gains))
+
+
+HOW_BITS = 4
+BY_FACTOR = (1 << HOW_BITS) - 1

@@ -1,31 +1,59 @@
-"""The tracking method: a filter for fluctuating measurement time (Tsuji 2009, eq. (22), Fig. 11), made an observer."""
+"""The tracking method: least squares over a memory that finds its own length (after Tsuji 2009, eq. (22), Fig. 11)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.recovery import Recovery
+from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.timing import Timing, parse_clocks
+from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
-from tachometry.spec.formats.tracking import Tracking
-from tachometry.spec.formats.tracking_program import Program
+from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
+from tachometry.spec.formats.tracking_code import QUICK, Program, small_times
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
-from tachometry.spec.language.units import FRACTION, Quantity, format_time, parse_bandwidth
+from tachometry.spec.language.units import format_time
 
-MOST_WIDTH = 64  # bits of a word
-MOST_ACCELERATION_WIDTH = 48
-FETCH_CLOCKS = 3  # to fetch the first instruction, to read its word, and to hold both
+FETCH_CLOCKS = 3  # to fetch the first instruction, to read its word, and to hold the result
+NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quarter of what is left at constant speed
+_MULTIPLIERS = ("auto", "serial", "block")
+
+
+class TrackWidths(Widths["TrackTachometer"]):
+    """Counts the bits of the numbers of a tracking core."""
+
+    @property
+    def most_native_frac_bits(self) -> int:
+        return RESULT_BITS - 2 - self.max_velocity.bit_length()
+
+    @property
+    def _wished_frac_bits(self) -> int:
+        spec = self.spec
+        lsb = NOISE * 2000 / spec.encoder.counts_per_rev / Fraction(spec.scale.unit_velocity) * spec.scale.per_count
+        return math.ceil(-math.log2(lsb))
+
+
+class TrackScale(Scale["TrackTachometer"]):
+    """Says what an LSB of the velocity of a tracking core is worth."""
+
+    @property
+    def rounding_lsb(self) -> float:
+        return super().rounding_lsb + 0.5  # what is below an LSB may round up, whatever it is
 
 
 class Acceleration(Follows["TrackTachometer"]):
     """Finds the format of the acceleration that the tracking method shows."""
+
+    width = 32
 
     @property
     def _per_count(self) -> Fraction:
@@ -38,23 +66,17 @@ class Acceleration(Follows["TrackTachometer"]):
         """The unit of the acceleration: that of the velocity per second, or counts per tick²."""
         return {"rad/s": "rad/s²", "rev/s": "rev/s²", "rpm": "rpm/s"}.get(self.spec.unit, "count/tick²")
 
-    @property
-    def width(self) -> int:
-        """Bits of the acceleration: eight more than the velocity has."""
-        return min(self.spec.widths.velocity + 8, MOST_ACCELERATION_WIDTH)
-
-    @property
+    @cached_property
     def of_form(self) -> Fraction:
         """One LSB of the acceleration of the recursion in the unit."""
-        form = self.spec.form
-        return self._per_count / form.unit_ticks**2 / (1 << (form.frac_bits + form.extra_bits))
+        form = self.spec.plain_form
+        return self._per_count * self.spec.timing.tick_cycles**2 / (1 << form.acceleration_bits)
 
     @cached_property
     def frac_bits(self) -> int:
-        """Fraction bits of the acceleration: its error is at most a quarter of an LSB, and the greatest one fits."""
-        form, one = self.spec.form, self.of_form
-        fitting = math.floor(math.log2(((1 << (self.width - 1)) - 2) / (form.max_acceleration * one)))
-        return min(fitting, math.floor(-math.log2(8 * form.acceleration_error * one)))
+        """Fraction bits of the acceleration: the greatest one fits, and what an event adds to it before it is held."""
+        greatest = (2 ** (WIDTH - 2) + 2**RESULT_BITS) * self.of_form
+        return math.floor(math.log2(((1 << (self.width - 1)) - 2) / greatest))
 
     @property
     def rad_per_s2_per_lsb(self) -> float:
@@ -74,13 +96,19 @@ class TrackLatency(Latency["TrackTachometer"]):
     def datapath(self) -> int:
         return self.spec.program.clocks + FETCH_CLOCKS
 
+    @property
+    def busy(self) -> int:
+        # An update is shown before the next tick, so its age needs no number.
+        shown = self.tick_to_velocity + self.low_pass
+        return max(self.spec.program.all_clocks + FETCH_CLOCKS, shown)
+
 
 class TrackRecovery(Recovery["TrackTachometer"]):
     """Says how long a tracking core takes until all is right again after an upset."""
 
     @property
     def clocks(self) -> None:
-        # It forgets gradually, and wholly when the shaft has rested.
+        # It forgets gradually; what it has learned of the disc, not even when the shaft rests.
         return None
 
 
@@ -89,36 +117,23 @@ class TrackWords(Words["TrackTachometer"]):
 
     @property
     def description(self) -> str:
-        return f"third order, {float(self.spec.bandwidth):.4g} rad/s"
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        disc = (
-            f"--edge-error {float(self.spec.edge_error):.4g} suits a disc whose (phase error + duty error)/180 °e + "
-            f"nonuniformity + 3 x jitter is no more"
-        )
-        return (*super().notes, disc)
+        return "least squares over a memory that finds its own length"
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackTachometer(TachometerSpec):
-    """Tachometer that tracks position, velocity and acceleration with a fading-memory filter of third order.
+    """Tachometer that tracks position, velocity and acceleration by least squares; it has no settings.
 
-    It predicts in every tick, and corrects in ticks with counts, with gains for the time since the counts before. The
-    velocity is new in every tick; docs/concepts/track.md has the rules.
+    The memory over which it fits a parabola through the counts grows while they come where they are expected, and falls
+    when they do not. The velocity is new in every tick; docs/concepts/track.md has the rules.
 
     Parameters
     ----------
-    bandwidth : Fraction
-        λ_0 in rad/s: the three poles of the filter while the speed changes.
-    least_memory : Fraction
-        θ_min at λ_0: the least weight of the past when a count comes, however late.
-    edge_error : Fraction
-        E in counts: a count that is off by more is answered at once, by four times the bandwidth.
-    agile : bool
-        Whether it is.
-    growing_memory : bool
-        Whether λ falls to λ_0/10 while the counts come where they are expected.
+    max_memory : int or None
+        Clocks that the memory does not grow beyond; None: 4 s.
+    multiplier : str
+        `serial`: one bit a clock, few cells; `block`: a multiplier of the FPGA, few clocks; `auto`: serial where it
+        fits the tick.
     fine_bits : int
         Fraction bits of `position_fine`.
 
@@ -128,38 +143,28 @@ class TrackTachometer(TachometerSpec):
         If a parameter is out of range.
     """
 
-    bandwidth: Fraction = option(  # noqa: RUF009
+    timing: Timing = Timing.parse(max_time="100ms")  # noqa: RUF009
+    max_memory: int | None = option(
         None,
-        "The three poles λ0 of the filter while the speed changes, in rad/s, Hz or kHz: more follows faster, less is "
-        "less noisy.",
-        text="1000rad/s",
-        metavar="BANDWIDTH",
-        unit="rad/s",
-        parse=parse_bandwidth,
-        tests=("", "400", "5kHz"),
+        "Longest memory, for use inside a control loop: it follows a change that it does not see yet as if the memory "
+        "were so short. In s, ms, us or ns.",
+        shown="4s",
+        metavar="TIME",
+        unit="clocks",
+        parse_at=parse_clocks,
+        tests=("", "5ms"),
     )
-    least_memory: Fraction = option(  # noqa: RUF009
-        None,
-        "The least weight of the past when a count comes, however long after the one before, 0.5 to 0.95.",
-        text="0.7",
-        metavar="THETA",
-        parse=Quantity(FRACTION),
-        tests=("", "0.5"),
+    multiplier: str = option(
+        "auto",
+        "How products are made: serial takes few cells and a bit a clock, block takes a multiplier of the FPGA and few "
+        "clocks; auto is serial where that fits the tick.",
+        choices=_MULTIPLIERS,
+        tests=("", "block"),
     )
-    edge_error: Fraction = option(  # noqa: RUF009
-        None,
-        "Counts that are off by more than E, 0.05 to 2 counts, are taken for a change of the speed, and not for an "
-        "error of the disc.",
-        text="0.4",
-        metavar="E",
-        parse=Quantity(FRACTION),
-        tests=("", "0.7"),
-    )
-    agile: bool = option(True, "Follow counts that are off by more than --edge-error with four times the bandwidth.")
-    growing_memory: bool = option(True, "Let the bandwidth fall to a tenth while the counts come where expected.")
     fine_bits: int = option(6, "Fraction bits of position_fine, 1 to 16.", metavar="N", tests=("", "1", "16"))
 
     method = "track"
+    usual = MappingProxyType({"max-time": "100ms"})
     facts = Facts(
         title="Tracking",
         summary="tracks position, velocity and acceleration",
@@ -173,29 +178,24 @@ class TrackTachometer(TachometerSpec):
     acceleration = cached_property(Acceleration)
     latency = cached_property(TrackLatency)
     recovery = cached_property(TrackRecovery)
+    scale = cached_property(TrackScale)
+    widths = cached_property(TrackWidths)
     words = cached_property(TrackWords)
 
     def __post_init__(self) -> None:
-        if not Fraction(1, 2) <= self.least_memory <= Fraction(19, 20):
-            raise ParameterError("least_memory", f"must be from 0.5 to 0.95, not {float(self.least_memory):.9g}")
+        if self.multiplier not in _MULTIPLIERS:
+            raise ParameterError("multiplier", f"must be auto, serial or block, not {self.multiplier!r}")
         if not 1 <= self.fine_bits <= 16:
             raise ParameterError("fine_bits", f"must be from 1 to 16, not {self.fine_bits}")
-        if not 0 < self.bandwidth <= self.timing.clock_hz:
+        longest = MOST_MEMORY * self.timing.clock_hz
+        if self.max_memory is not None and not self.timing.tick_cycles <= self.max_memory <= longest:
             raise ParameterError(
-                "bandwidth",
-                f"must be more than 0 and at most {self.timing.clock_hz} rad/s here, not {float(self.bandwidth):.9g}",
+                "max_memory",
+                f"must be from {self.timing.tick_cycles}, a tick, to {longest} clocks, not {self.max_memory}",
             )
-        if not Fraction(1, 20) <= self.edge_error <= 2:
-            raise ParameterError("edge_error", f"must be from 0.05 to 2, not {float(self.edge_error):.9g}")
         super().__post_init__()
         if self.bounds:
             raise ParameterError("bounds", f"must not be given with method {self.method}: no window encloses its speed")
-        if self.form.width > MOST_WIDTH:
-            raise ParameterError(
-                "method",
-                f"must not be {self.method} here: its words would have {self.form.width} bits, and {MOST_WIDTH} are "
-                "the most; a shorter max_time or tick, a lower max_speed, fewer frac_bits or another bandwidth helps",
-            )
         shortest = self.times.min_tick_cycles
         if self.timing.tick_cycles < shortest:
             raise ParameterError(
@@ -204,32 +204,44 @@ class TrackTachometer(TachometerSpec):
                 f"here, not {self.timing.tick_cycles}",
             )
 
-    @cached_property
-    def form(self) -> Tracking:
-        """Formats and constants of the recursion."""
+    def _form(self, slope: Fraction) -> Tracking:
         return Tracking(
             clock_hz=self.timing.clock_hz,
             tick_cycles=self.timing.tick_cycles,
             longest_tick=self.times.longest_tick,
-            max_ticks=self.timing.max_ticks,
-            max_count=self.widths.max_count,
             external=self.external_tick,
-            bandwidth=self.bandwidth,
-            least_memory=self.least_memory,
-            edge_error=self.edge_error,
-            agile=self.agile,
-            growing=self.growing_memory,
-            velocity_bits=self.widths.native_frac_bits,
-            fine_bits=self.fine_bits,
+            max_count=self.widths.max_count,
+            counts_per_rev=self.encoder.counts_per_rev,
+            max_memory=None if self.max_memory is None else Fraction(self.max_memory, self.timing.clock_hz),
+            max_time=self.timing.max_ticks * self.timing.tick_cycles,
+            velocity_out=self.widths.native_frac_bits,
+            slope=slope,
+            quality=self.timing.tick_cycles * self.scale.lsb_per_count,
+            quality_bits=min(self.widths.velocity - 1, RESULT_BITS),
         )
+
+    @cached_property
+    def plain_form(self) -> Tracking:
+        """Formats of the recursion without that of the acceleration that is shown, which follows from them."""
+        return self._form(Fraction(1, 2))
+
+    @cached_property
+    def form(self) -> Tracking:
+        """Formats and constants of the recursion."""
+        return self._form(self.acceleration.of_form * Fraction(2) ** self.acceleration.frac_bits)
 
     @cached_property
     def program(self) -> Program:
         """The program of the datapath from a tick to the update."""
-        form = self.form
-        latency, acceleration = self.latency, self.acceleration
+        latency = self.latency
         delay = latency.pin_to_count + latency.tick + FETCH_CLOCKS + latency.low_pass + latency.output
-        return Program(form, Fraction(2) ** acceleration.frac_bits * acceleration.of_form, delay)
+        serial = Program(self.form, small_times(self.form.factor_bits), delay)
+        fits = self.times.has_room(serial.all_clocks + FETCH_CLOCKS)
+        return (
+            serial
+            if self.multiplier == "serial" or (self.multiplier == "auto" and fits)
+            else replace(serial, times=QUICK)
+        )
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
@@ -245,6 +257,11 @@ class TrackTachometer(TachometerSpec):
                 signed=True,
                 unit=f"2^{-self.fine_bits} counts",
                 help="Position at the end of this period, between the counts as well; it wraps as position does.",
+            ),
+            held(
+                *(UPDATE, "quality", self.form.quality_bits),
+                unit=f"2^{-self.widths.frac_bits} {self.unit}",
+                help="Standard deviation that the velocity is expected to have, by the noise that was seen.",
             ),
         )
 

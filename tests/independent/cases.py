@@ -115,25 +115,25 @@ CASES = [
     _case("rairan_rev", "tick=20 max-time=1280 unit=rev/s lsb=2^-6 adaptive=10% bounds=yes", 14000),
     _case("rairan_one", "dt=1 max-time=2047 decoding=2 unit=rpm max-speed=1rev/s velocity-width=20", 3000),
     _case("rairan_exact", "tick=17 max-time=340 paper-exact=yes estimate=n1 frac-bits=24", 9000),
-    _case("track_native", "tick=1250 max-time=12500 bandwidth=300rad/s age=yes", 120_000),
+    _case("track_native", "tick=1250 max-time=12500 age=yes frac-bits=16", 120_000),
     _case(
         "track_rpm",
-        "tick=1200 max-time=7200 max-speed=100rpm velocity-width=14 lsb=2^-4 edge-error=0.2 least-memory=0.5 "
-        f"fine-bits=4 bandwidth=200rad/s agile=no growing-memory=no {_PORTS}",
+        "tick=1200 max-time=7200 max-speed=100rpm velocity-width=14 lsb=2^-4 max-memory=96000 multiplier=serial "
+        f"fine-bits=4 {_PORTS}",
         120_000,
         4,
         seed="track_rpm2",  # with more counts in a tick than may be
     ),
     _case(
         "track_rad",
-        "tick=1100 max-time=11000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes fine-bits=1 bandwidth=50Hz "
-        "least-memory=0.95 growing-memory=no",
+        "tick=1100 max-time=11000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes fine-bits=1 lsb=2^-8 "
+        "multiplier=block",
         120_000,
     ),
     _case(
         "track_rev",
         "tick=1500 max-time=6000 unit=rev/s lsb=2^-10 velocity-width=12 external-tick=yes max-tick-period=2000 "
-        "fine-bits=16 bandwidth=0.2kHz growing-memory=no",
+        "fine-bits=16",
         120_000,
         seed="track_rev1",  # with a speed that does not fit, and a rest
     ),

@@ -34,10 +34,8 @@ _SHARED = {
 _TIMED = {"timer": "timer", "bound_decay": "bound-decay", "paper_exact": "paper-exact"}
 _RAIRAN = {"estimate": "estimate", "paper_exact": "paper-exact", "bound_decay": "bound-decay", "adaptive": "adaptive"}
 _TRACK = {
-    "bandwidth": "bandwidth",
-    "least_memory": "least-memory",
-    "agile": "agile",
-    "growing_memory": "growing-memory",
+    "max_memory": "max-memory",
+    "multiplier": "multiplier",
     "fine_bits": "fine-bits",
 }
 WORDS = {
@@ -61,11 +59,11 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         return settings.flag(word)
     if name == "bound_decay":
         return settings.decays if settings.method != "rairan" else settings.flag(word, True)
-    if name in ("cancel", "agile", "growing_memory"):
+    if name == "cancel":
         return settings.flag(word, True)
     if name == "min_time":
         return shown  # see `check_manifest`
-    if name in ("max_speed", "lowpass", "adaptive", "bandwidth"):
+    if name in ("max_speed", "lowpass", "adaptive"):
         return _canonical_quantity(settings, name, shown)
     values: dict[str, object] = {
         "pulses_per_rev": settings.ppr,
@@ -75,7 +73,8 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "frac_bits": settings.frac_bits,
         "velocity_width": settings.velocity_bits or shown,  # else that of the port, see `check_manifest`
         "edge_error": float(settings.edge_error),
-        "least_memory": float(settings.least_memory),
+        "max_memory": settings.max_memory,
+        "multiplier": settings.words.get("multiplier", "auto"),
         "fine_bits": settings.fine_bits,
         "position_width": settings.position_bits,
         "filter_clocks": settings.filter,
@@ -93,7 +92,7 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
 def _canonical_quantity(settings: Settings, name: str, shown: object) -> object:
     """Return the text of a quantity may be written in several ways: if it means the same, it is right."""
     quantities = {"max_speed": settings.max_speed, "lowpass": settings.lowpass, "adaptive": settings.target}
-    wanted = {**quantities, "bandwidth": settings.bandwidth}[name]
+    wanted = quantities[name]
     if wanted is None or shown is None:
         return None if wanted is None else wanted
     if isinstance(wanted, tuple):
@@ -126,8 +125,7 @@ class Expected:
 
     @property
     def acceleration_bits(self) -> int:
-        """Eight more than the velocity has, and no more than 48."""
-        return min(48, int(self.manifest["velocity"]["width"]) + 8)
+        return 32
 
     @property
     def acceleration_lsb(self) -> float:
@@ -364,6 +362,7 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
             {
                 "acceleration": expected.acceleration_bits,
                 "position_fine": settings.position_bits + settings.fine_bits,
+                "quality": max(int(expected.manifest["velocity"]["width"]) - 1, 1),
             }
             if settings.method == "track"
             else {}
@@ -380,7 +379,7 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
     assert len(found) == len(ports)
     assert [port["name"] for port in ports if port["direction"] == "input"] == inputs
     assert {port["name"] for port in ports if port["direction"] == "output"} == {*widths, *single}
-    unsigned = ("interval", "age", "n_ep1", "n_dt1", "dt_shift", "swallowed_edges")
+    unsigned = ("interval", "age", "quality", "n_ep1", "n_dt1", "dt_shift", "swallowed_edges")
     for name, port in found.items():
         assert set(port) == {"name", "direction", "width", "signed"}
         assert port["signed"] == (name in widths and name not in unsigned), name

@@ -2,7 +2,6 @@
 
 import ast
 import sys
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -20,7 +19,6 @@ ENDS: dict[str, set[object]] = {
     "position_bits": {8, 48},
     "average": {1, 256},
     "decoding": {1, 2, 4},
-    "least_memory": {Fraction(1, 2), Fraction(19, 20)},
     "fine_bits": {1, 16},
 }
 
@@ -33,7 +31,7 @@ def of(method: str) -> list[Settings]:
 # `check_manifest` holds this list against the manifest of every core, so that a new option needs a case here.
 @pytest.mark.parametrize(("method", "word"), [(method, word) for method in WORDS for word in WORDS[method].values()])
 def test_every_option_of_every_method_has_a_case(method: str, word: str) -> None:
-    without = (method, word) in (("rairan", "external-tick"), ("track", "bounds"))
+    without = (method, word) in (("rairan", "external-tick"), ("track", "bounds"), ("track", "edge-error"))
     words = {"frac-bits": {"frac-bits", "lsb"}, "tick": {"tick", "dt"}}.get(word, {word})
     assert without or any(words & settings.words.keys() for settings in of(method))
 
@@ -51,8 +49,8 @@ def test_every_estimate_and_flag_has_a_case() -> None:
         assert {settings.paper_exact for settings in of(method)} == {True, False}
     assert {settings.lattice for settings in of("mt")} == {settings.lattice for settings in of("t")} == {True, False}
     assert any(not settings.flag("cancel", True) for settings in of("s"))
-    for flag in ("agile", "growing-memory"):
-        assert {settings.flag(flag, True) for settings in of("track")} == {True, False}
+    multipliers = {settings.words.get("multiplier", "auto") for settings in of("track")}
+    assert multipliers == {"auto", "serial", "block"}
 
 
 @pytest.mark.parametrize("name", ENDS)

@@ -13,20 +13,17 @@ import pytest
 from proofs.mutation.boxes import BOXES
 from proofs.mutation.cases import CASES, Case
 from proofs.mutation.equivalent import equivalent
-from proofs.mutation.inductive import Known
 from proofs.mutation.loops import LOOPS, Commanded
 from proofs.mutation.netlist import GROUP, exported, mutants
 from proofs.mutation.score import hold
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus, ending, steps, stimulus
-from proofs.mutation.track_lemmas import begins
 from support.nightly import nightly
 
 from tachometry.sim import golden
 from tachometry.sim.golden.control import Command
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec
-from tachometry.spec.formats.tracking_code import NOT_TAKEN, TAKEN, Condition, Instruction, Op
 
 CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=40)
 CLOCKS = 200_000
@@ -98,7 +95,6 @@ def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.Capt
 @nightly
 def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 2)
-    monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known([], ["1"]))
     played = stimulus(CASE.spec, CLOCKS)
     # As many as are played at once: among forty, none may be noticed late.
     flat, found = mutants(exported(CASE.component), GROUP, tmp_path)
@@ -108,38 +104,6 @@ def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch
     assert clocks.max() > CLOCKS // 25
     with ThreadPoolExecutor(2) as pool:
         assert not any(equivalent(CASE, flat, latest, played.pins, tmp_path, pool))
-
-
-@nightly
-def test_lemmas_must_be_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """One that holds at first only, behind one that always holds."""
-    monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known(["wire one = 1;"], ["one", "!{tick}"]))
-    flat, found = mutants(exported(CASE.component), 1, tmp_path)
-    with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError, match=r"lemmas: \[True, False\]"):
-        equivalent(CASE, flat, found, stimulus(CASE.spec, 100).pins, tmp_path, pool)
-
-
-def one_of_track(tmp_path: Path) -> None:
-    """Ask of a mutant of `track` whether it is equivalent, which proves the lemmas first."""
-    case = next(case for case in CASES if case.name == "track, age")
-    flat, found = mutants(exported(case.component), 1, tmp_path)
-    with ThreadPoolExecutor(1) as pool:
-        equivalent(case, flat, found, stimulus(case.spec, 100).pins, tmp_path, pool)
-
-
-@nightly
-def test_lemmas_of_track_are_proven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 1)
-    one_of_track(tmp_path)
-
-
-@nightly  # it makes a netlist of the tracking core
-def test_all_registers_of_lemmas_are_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(proofs.mutation.equivalent, "proven", lambda *arguments: [True])
-    one_of_track(tmp_path)
-    monkeypatch.setattr(proofs.mutation.equivalent, "known", lambda spec: Known([], ["{no.register}"]))
-    with pytest.raises(AssertionError, match="a register of a lemma is not there"):
-        one_of_track(tmp_path)
 
 
 @nightly
@@ -160,15 +124,6 @@ def test_steps_have_windows_of_all_lengths_and_all_counts() -> None:
     run_of = golden.run(spec, steps(spec, np.random.default_rng(1)))
     assert {*run_of.updates.interval.tolist()} == {*range(1, spec.timing.max_ticks + 1)}
     assert {*run_of.ticks.pulse_count.tolist()} == {*range(-spec.widths.max_count, spec.widths.max_count + 1)}
-
-
-def test_every_instruction_has_its_clock() -> None:
-    """A jump over one leads to the same clock as the way without it, or it is refused."""
-    wait, end = Instruction(Op.WAIT, 0, NOT_TAKEN + 1), Instruction(Op.OUT, 0, 1)
-    jump = Instruction(Op.JUMP, 2, Condition.FLAG)
-    assert begins((jump, wait, end)) == [0, NOT_TAKEN, TAKEN]
-    with pytest.raises(AssertionError):
-        begins((jump, replace(wait, steps=1), end))
 
 
 def test_golden_model_is_held_against_the_core() -> None:

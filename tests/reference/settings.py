@@ -177,20 +177,13 @@ class Settings:
 
     @cached_property
     def edge_error(self) -> Fraction:
-        """The error of the distance of two edges, in counts: whole eighths, the word or more. E of tracking."""
-        if self.method == "track":
-            return Fraction(self.words.get("edge-error", "0.4"))
+        """The error of the distance of two edges, in counts: whole eighths, the word or more."""
         return Fraction(math.ceil(8 * Fraction(self.words.get("edge-error", "0"))), 8)
 
     @cached_property
     def lowpass(self) -> Fraction | None:
         """G in rad/s."""
         return self._bandwidth("lowpass")
-
-    @cached_property
-    def bandwidth(self) -> Fraction:
-        """λ0 in rad/s."""
-        return self._bandwidth("bandwidth") or Fraction(1000)
 
     def _bandwidth(self, name: str) -> Fraction | None:
         """Return a bandwidth in rad/s; one in Hz is 2π times as many."""
@@ -203,9 +196,9 @@ class Settings:
         raise AssertionError(word)
 
     @cached_property
-    def least_memory(self) -> Fraction:
-        """θ_min."""
-        return Fraction(self.words.get("least-memory", "0.7"))
+    def max_memory(self) -> int | None:
+        """Clocks that the memory does not grow beyond."""
+        return self._whole("max-memory", 0) or None
 
     @cached_property
     def fine_bits(self) -> int:

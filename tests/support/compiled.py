@@ -10,7 +10,7 @@ from amaranth.back import rtlil
 from amaranth.lib import data, wiring
 
 from support.simulate import Seen, member
-from tachometry.sim.engines.build import cached, compiler, digest, flags, precompiled, run, version
+from tachometry.sim.build import cached, compiler, digest, flags, precompiled, run, version
 from tachometry.sim.engines.cxxrtl import headers, translate
 from tachometry.sim.engines.verilator import verilate
 

@@ -11,6 +11,7 @@ from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.spec import MTachometer, RairanTachometer, STachometer, TachometerSpec, TrackTachometer
+from tachometry.spec.formats.tracking_code import QUICK
 from tachometry.spec.methods.timed import TimedTachometer
 
 STATES = ("00", "10", "11", "01")
@@ -69,10 +70,9 @@ EVENTS = {
     ],
     "t": [*TIMED, *COMMON],
     "track": [
-        "agile",
-        "not agile",
-        "growing memory",
-        "constant memory",
+        "serial product",
+        "multiplier of the FPGA",
+        "bounded memory",
         "several counts",
         "counts that cancel",
         "rest",
@@ -151,10 +151,9 @@ def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
     n = len(updates.clock)
     rest = updates.forced & (updates.interval == spec.timing.max_ticks)
     return {
-        "agile": n * spec.agile,
-        "not agile": n * (not spec.agile),
-        "growing memory": n * spec.growing_memory,
-        "constant memory": n * (not spec.growing_memory),
+        "serial product": n * (spec.program.times != QUICK),
+        "multiplier of the FPGA": n * (spec.program.times == QUICK),
+        "bounded memory": n * (spec.max_memory is not None),
         "several counts": _count(np.abs(m_e) > 1),
         "counts that cancel": _count(~updates.forced & (m_e[:n] == 0)),
         "rest": _count(rest),

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from support.compiled import lint
 from support.serial import Host
 from tachometry.hdl.export import export
+from tachometry.sim import build
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.engines import build
 from tachometry.sim.engines.verilator import home, runtimes, verilate
 from tachometry.sim.golden.registers import GoldenBank
 from tachometry.sim.signals.recording import PinTrace

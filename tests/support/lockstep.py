@@ -145,11 +145,8 @@ def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
         return {"cancel": bool(rng.random() < 0.75)}
     if method == "track":
         return {
-            "bandwidth": Fraction(int(rng.choice([20, 50, 200, 500]))),
-            "least_memory": Fraction(int(rng.choice([5, 7, 9])), 10),
-            "edge_error": Fraction(int(rng.choice([1, 4, 8])), 10),
-            "agile": bool(rng.random() < 0.8),
-            "growing_memory": bool(rng.random() < 0.8),
+            "max_memory": None if rng.random() < 0.7 else int(10 ** rng.uniform(3.1, 6)),
+            "multiplier": str(rng.choice(["serial", "block", "auto"])),
             "fine_bits": int(rng.choice([1, 8, 16])),
         }
     if method == "rairan":

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from tachometry.hdl.export import export
-from tachometry.sim.engines import build, verilator
+from tachometry.sim import build
+from tachometry.sim.engines import verilator
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec

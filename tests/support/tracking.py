@@ -1,246 +1,180 @@
-"""The program of the tracking method, executed in integers without bounds; and hostile counts for it."""
+"""Runs the program of the tracking method instruction by instruction, without gates; and motions for it."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections import Counter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.track import Windows
-from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking import LEVELS, STEP_BACK
-from tachometry.spec.formats.tracking_code import NOT_TAKEN, TAKEN, Condition, Input, Instruction, Level, Op, Phase
-from tachometry.spec.formats.tracking_program import TABLES, Program
+from tachometry.sim.golden.methods.track_recursion import Recursion, log2
+from tachometry.spec import TrackTachometer, of_texts
+from tachometry.spec.formats.tracking import CHANCE_BITS, GAIN_STEPS, GAINS, LOG_BITS, PLACE_BITS, WIDTH
+from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Jump, Left, Program, Source, Start
 
 
-@dataclass(frozen=True)
-class Tick:
-    """Holds the inputs that a tick brings to the program."""
-
-    number: int = 0
-    times: int = 0
-    places: int = 0
-    moved: int = 0
-    length: int = 0
-    beyond: bool = False
-    quiet: bool = False
-
-    @property
-    def counted(self) -> bool:
-        """There were counts."""
-        return self.number > 0
-
-
-class Executed(NamedTuple):
-    """An instruction, the clocks of the program behind it, and what `ac` and `mq` are then; None: not defined."""
-
-    instruction: Instruction
-    clocks: int
-    ac: int | None
-    mq: int
-
-
-# What finds 0 in ac.
-CLEARING = (Op.LOAD, Op.LOAD_SIGNED, Op.MUL, Op.DIV, Op.INPUT)
+class OverflowOfWord(Exception):
+    """A number has left its word."""
 
 
 class Interpreter:
-    """Executes a program as `spec.formats.tracking_code` says, and asserts that all it computes fits its words.
+    """Executes the program of a spec tick by tick; the arithmetic of the unit is that of the golden model.
 
-    Parameters
+    Attributes
     ----------
-    program : Program
+    words : dict
+        Words by name.
+    met : Counter
+        How often each instruction was executed.
     """
 
     def __init__(self, program: Program) -> None:
         self.program = program
-        self.memory = list(program.memory)
-        self.ac = self.mq = self.x = self.level = 0
-        self.flag = self.sign = False
-        self.phase = Phase.REST
-        self.widest = 0  # bits of the widest number so far
+        self.words = dict(program.words)
+        self.met: Counter[int] = Counter()
+        self._unit = Recursion(program.form, program.lead)
 
-    def fitting(self, value: int, what: object) -> int:
-        """Return the value, which fits a word."""
-        width = (value if value >= 0 else ~value).bit_length() + 1
-        self.widest = max(self.widest, width)
-        assert width <= self.program.form.width, f"{what}: {value} has {width} bits, not {self.program.form.width}"
-        return value
+    def tick(self, *row: int) -> tuple[int, ...]:
+        """Take what `Windows.rows` yields."""
+        number, times, places, last, moved, kind, down, end, length = row
+        t = self.program.form.time_bits
+        inputs = {
+            "number": number,
+            "counts": number << PLACE_BITS,
+            "places": places << (PLACE_BITS - 7),
+            "times": times << t,
+            "last": last << t,
+            "moved": moved << PLACE_BITS,
+            "length": length << t,
+        }
+        chosen = {"o@last": kind, "o@up": end, "o@down": (end - 1) & 3}
+        for j in range(3):
+            chosen[f"o@m{j + 1}"] = (kind + j if down else kind - j) & 3 if number & 3 > j else -1
+        unit, code = self._unit, self.program.code.instructions
+        unit._chance = 1 << CHANCE_BITS - 1
+        place, sum_, sign, result, by = self.program.code.labels["tick" if self.met else "reset"], 0, 1, 0, 1
+        shown: dict[str, int] = {}
 
-    def run(self, tick: Tick) -> list[Executed]:
-        """Execute the whole program."""
-        seen: list[Executed] = []
-        place = clocks = 0
-        code = self.program.instructions
-        while not place or code[place - 1].op != Op.OUT:
-            now = code[place]
+        def name(word: str) -> str:
+            return (f"o{chosen[word]}" if chosen[word] >= 0 else "zero") if word in chosen else word
+
+        while True:
+            one: Instruction = code[place]
+            self.met[place] += 1
             place += 1
-            if now.op == Op.JUMP:
-                taken = self._holds(Condition(now.steps), tick)
-                if taken and code[place + 1].op in CLEARING:  # it was fetched
-                    self.ac = None  # type: ignore[assignment]
-                place = now.address if taken else place
-                clocks += TAKEN if taken else NOT_TAKEN
-            else:
-                self.x = self.memory[now.address + (self.level if now.address >= TABLES else 0)]
-                self._execute(now, tick)
-                clocks += now.steps
-            seen.append(Executed(now, clocks, self.ac, self.mq))
-        return seen
-
-    def _holds(self, condition: Condition, tick: Tick) -> bool:
-        if condition == Condition.NEGATIVE:
-            return self.ac < 0
-        return {
-            Condition.ALWAYS: True,
-            Condition.FLAG: self.flag,
-            Condition.COUNTED: tick.counted,
-            Condition.BEYOND: tick.beyond,
-            Condition.RESTS: self.phase == Phase.REST,
-            Condition.BEGUN: self.phase == Phase.BEGUN,
-            Condition.QUIET: tick.quiet,
-        }[condition]
-
-    def _input(self, which: int, tick: Tick) -> int:
-        form = self.program.form
-        if which in (Input.LENGTH, Input.LENGTH_SHIFTED):
-            assert form.external
-        value = {
-            Input.TIMES: tick.times,
-            Input.NUMBER: tick.number << form.mean_bits,
-            Input.PLACES: tick.places << form.frac_bits >> 1,
-            Input.MOVED: tick.moved << form.frac_bits,
-            Input.LENGTH: tick.length,
-            Input.LENGTH_SHIFTED: tick.length << form.gap_shift,
-            Input.ZERO: 0,
-        }[Input(which)]
-        return self.fitting(value, Input(which))
-
-    def _execute(self, now: Instruction, tick: Tick) -> None:
-        x, op, steps = self.x, now.op, now.steps
-        if op == Op.MUL:
-            self._multiply(now, x)
-        elif op == Op.DIV:
-            self._divide(self.mq << (steps - self.program.form.width), x)
-        elif op == Op.FRACTION:
-            assert 0 <= self.ac < x, f"{now}: {self.ac} is not a fraction of {x}"
-            assert not self.mq
-            self._divide(self.ac << steps, x)
-        elif op in (Op.STORE, Op.KEEP):
-            self.memory[now.address] = self.ac
-            self.sign = self.ac < 0 if op == Op.KEEP else self.sign
-        elif op == Op.SIGN:
-            self.sign = self.ac < 0
-        elif op == Op.TO_MQ:
-            self.mq = self.ac
-        elif op in (Op.TEST, Op.TEST_AND, Op.TEST_OR):
-            of_ac = self.ac >= 0
-            self.flag = {Op.TEST: of_ac, Op.TEST_AND: self.flag and of_ac, Op.TEST_OR: self.flag or of_ac}[op]
-        elif op == Op.LEVEL:
-            back, following = max(self.level - STEP_BACK, 0), min(self.level + 1, LEVELS - 1)
-            self.level = {Level.FIRST: 0, Level.BACK: back, Level.NEXT: following}[Level(now.address)]
-        elif op == Op.PHASE:
-            self.phase = Phase(now.address)
-        elif op not in (Op.WAIT, Op.OUT):
-            self.ac = self.fitting(self._sum(now, x, tick), now)
-
-    def _sum(self, now: Instruction, x: int, tick: Tick) -> int:
-        """Return what else is computed."""
-        op, steps = now.op, now.steps
-        if op in (Op.INPUT, Op.ADD_INPUT, Op.SUB_INPUT):
-            value = self._input(now.address, tick)
-            before = 0 if op == Op.INPUT else self.ac
-            return before - value if op == Op.SUB_INPUT else before + value
-        if op == Op.DOUBLE:
-            assert 0 <= self.mq < 1 << (self.program.form.width - 1)
-        if op in (Op.LOAD, Op.FROM_MQ):
-            return x if op == Op.LOAD else self.mq
-        if op == Op.LOAD_SIGNED:
-            return -x if self.sign else x
-        ac = self.ac  # the others read it
-        return {
-            Op.ADD: ac + x,
-            Op.SUB: ac - x,
-            Op.DOUBLE: ac << steps,
-            Op.SHIFT: ac >> steps,
-            Op.POSITIVE: max(ac, 0),
-            Op.NEGATIVE: min(ac, 0),
-        }[op]
-
-    def _multiply(self, now: Instruction, x: int) -> None:
-        steps = now.steps
-        assert 0 <= self.mq < 1 << steps, f"{self.mq} has more than {steps} bits"
-        for bits in range(1, steps):  # what the adder holds on the way
-            self.fitting(x * (self.mq & ((1 << bits) - 1)) >> (bits - 1), f"on the way to a product, {now}")
-        self.ac = self.fitting((x * self.mq + (1 << (steps - 1) >> 1)) >> (steps - 1), now)
-        self.mq = 0
-
-    def _divide(self, dividend: int, x: int) -> None:
-        """The adder holds no more than ±x on the way; what it holds at the end is not defined."""
-        assert x > 0
-        assert dividend >= 0
-        self.mq = self.fitting(dividend // x, "a quotient")
-        self.ac = None  # type: ignore[assignment]
+            if one.jump != Jump.NEVER:
+                if one.jump == Jump.END:
+                    return tuple(shown[name] for name in OUTPUTS[1:])
+                taken = {
+                    Jump.ALWAYS: True,
+                    Jump.NEG: sum_ < 0,
+                    Jump.POS: sum_ >= 0,
+                    Jump.EMPTY: number == 0,
+                    Jump.SEVERAL: number > 1,
+                }[one.jump]
+                place = self.program.code.labels[one.target] if taken else place
+                continue
+            match one.source:
+                case Source.NONE:
+                    operand = 0
+                case Source.UNIT:
+                    operand = result
+                case Source.INPUT:
+                    operand = inputs[one.word]
+                case Source.WORD:
+                    operand = self.words[name(one.word)]
+            left = {Left.ZERO: 0, Left.SUM: sum_, Left.LEAST: min(sum_, 0), Left.MOST: max(sum_, 0)}[one.left]
+            minus = one.subtract != (one.by_sign and sign < 0)
+            sum_ = left - operand if minus else left + operand
+            if not -(1 << (WIDTH - 1)) <= sum_ < 1 << (WIDTH - 1):
+                raise OverflowOfWord(f"{one} in {self.program.form}")
+            if one.keep:
+                sign = -1 if sum_ < 0 else 1
+            if one.store:
+                self.words[name(one.store)] = sum_
+            if one.output:
+                shown[one.output] = sum_
+            match one.start:
+                case Start.LOG:
+                    result = log2(sum_)
+                case Start.EXP:
+                    result = unit._power(sum_, 1)
+                case Start.OVER:
+                    bits = self.program.form.factor_bits
+                    shift = max(by.bit_length() - (bits - CHANCE_BITS), 0) if one.how == "by" else int(one.how)
+                    result = unit._round(sum_, shift)
+                case Start.GAIN:
+                    at = ((~sum_ * GAIN_STEPS) >> LOG_BITS) - 2 * GAIN_STEPS
+                    result = self.program.form.gains[int(one.how)][max(0, min(GAINS - 1, at))]
+                case Start.TIMES:
+                    result = unit._product(sum_, by, one.how)
+                case Start.BY:
+                    by = sum_
+                case Start.CHANCE:
+                    low = sum_ & ((1 << CHANCE_BITS) - 1)
+                    unit._chance = int(f"{low:0{CHANCE_BITS}b}"[::-1], 2)
 
 
-def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tuple[Steps, NDArray[np.int64]]:
-    """Return counts of random number, times and direction, and the last clock of every tick."""
-    form = spec.form
-    longest, shortest = (
-        spec.times.longest_tick,
-        spec.times.min_tick_cycles if form.external else spec.timing.tick_cycles,
-    )
-    most = form.max_count
-    clocks: list[NDArray[np.int64]] = []
-    steps: list[NDArray[np.int64]] = []
-    last = np.empty(n_ticks, dtype=np.int64)
-    now = silent = 0
-    for i in range(n_ticks):
-        length = int(rng.choice([shortest, longest, spec.timing.tick_cycles, int(rng.integers(shortest, longest + 1))]))
-        if i % 40 == 0:  # how many counts a tick has for a while, which way, and when
-            numbers = rng.choice([1, 2, most, most, most + 1, 3 * most, int(rng.integers(1, most + 2))], 3)
-            ways = rng.choice(["+", "-", "random", "turn"])
-            when = rng.choice(["first", "last", "random", "one clock apart"])
-            rare = rng.choice([0, 0.1, 0.5, 0.9])
-        number = 0 if silent or rng.random() < rare else min(int(rng.choice(numbers)), length)
-        silent = max(silent - 1, 0)
-        if rng.random() < 0.03:
-            silent = int(rng.integers(1, spec.timing.max_ticks + 3))
-        at = np.sort(rng.choice(length, number, replace=False))
-        if when in ("first", "last"):
-            at = np.arange(number) + (length - number if when == "last" else 0)
-        elif when == "one clock apart":
-            at = np.arange(number) + int(rng.integers(0, length - number + 1))
-        step = rng.choice([-1, 1], number)
-        if ways != "random":
-            step = np.full(number, -1 if ways == "-" else 1)
-            if ways == "turn":
-                step[int(rng.integers(0, number + 1)) :] = -1
-        clocks.append(now + at)
-        steps.append(step)
-        now += length
-        last[i] = now - 1
-    clock = np.concatenate(clocks).astype(np.int64)
+def core(**options: str) -> TrackTachometer:
+    """Return a core of these options; an underscore in a name stands for a dash."""
+    spec = of_texts("track", {"ppr": "500"} | {name.replace("_", "-"): text for name, text in options.items()})
+    assert isinstance(spec, TrackTachometer)
+    return spec
+
+
+MOTIONS = ("even", "even", "lost", "twins", "rest", "dither", "burst", "random")
+
+
+def motions(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tuple[Steps, NDArray[np.int64]]:
+    """Return counts of motions of all kinds, one after the other, and the last clock of every tick.
+
+    Speeds are constant or change evenly, up to the greatest and beyond, on a disc with errors; counts are lost or
+    added; there are rests, some longer than the maximum time, dither, bursts, and counts without any order.
+    """
+    form, times = spec.form, spec.times
+    lengths = np.full(n_ticks, form.tick_cycles)
+    if form.external:
+        lengths = rng.integers(times.min_tick_cycles, form.longest_tick + 1, n_ticks)
+    last = np.cumsum(lengths) - 1
+    tick, most = form.tick_cycles, min(form.max_count / form.tick_cycles, 1 / 4)
+    clocks, steps, now = [np.empty(0)], [np.empty(0)], 0
+    forget = (form.constants["forget"] >> form.time_bits) + 2 * form.longest_tick
+    while now < last[-1]:
+        duration = tick * int(rng.choice([3, 20, 60, 600]))
+        kind, way = rng.choice(MOTIONS), rng.choice([-1, 1])
+        speed = most * 10 ** rng.uniform(-4, 0.05)
+        if kind in ("even", "lost", "twins"):
+            slope = speed / duration * rng.choice([-0.9, 0, 0, 0, 0.5, 3])
+            way_at = np.cumsum(speed + slope * np.arange(0, duration, 8)) * 8  # an integral is enough
+            at = np.interp(np.arange(1, int(way_at[-1]) + 1), way_at, np.arange(0, duration, 8))
+            at += rng.normal(0, rng.choice([0, 0.02, 0.2]), len(at)) / speed
+            step = np.full(len(at), way)
+            if kind == "lost":
+                first = int(rng.integers(len(at) + 1))
+                kept = np.r_[:first, min(first + int(rng.integers(1, 6)), len(at)) : len(at)]
+                at, step = at[kept], step[kept]
+            elif kind == "twins":  # one clock apart, in two ticks
+                border = last[np.searchsorted(last, min(now + duration // 2, last[-1]))] - now
+                at, step = np.append(at, border + np.arange(2)), np.append(step, [way, way])
+        elif kind == "rest":
+            at, step = np.empty(0), np.empty(0)
+            if now > last[-1] // 4 and forget < last[-1] // 2:
+                duration, forget = forget, 2 * int(last[-1])  # once
+        elif kind == "burst":
+            at = int(rng.integers(tick)) + np.arange(0.0, min(int(rng.integers(1, 3 * form.most_number)), tick))
+            step = np.full(len(at), way)
+        else:
+            at = np.cumsum(rng.exponential(1 / speed, min(int(speed * duration) + 1, 1000)))
+            step = np.resize([way, -way], len(at)) if kind == "dither" else rng.choice([-1, 1], len(at))
+        clocks.append(now + at[at < duration])
+        steps.append(step[at < duration])
+        now += duration
+    clock, which = np.unique(np.concatenate(clocks).astype(np.int64), return_index=True)
+    kept = (clock >= 0) & (clock <= last[-1])
     none = np.empty(0, dtype=np.int64)
-    return Steps(clock, np.concatenate(steps).astype(np.int64), none, none, none), last
+    return Steps(clock[kept], np.concatenate(steps)[which][kept].astype(np.int64), none, none, none), last
 
 
-def ticks_of(spec: TrackTachometer, windows: Windows, core: Interpreter) -> Iterator[Tick]:
-    """Yield these windows, as the front end of the program gives them; `core` runs each of them before the next."""
-    most = spec.widths.max_count
-    silent, before = spec.timing.max_ticks, Phase.REST
-    for i, number in enumerate(windows.number):
-        alone = silent > 0 or before != Phase.TRACKS or number > most
-        before = core.phase  # it is known too late for the next tick
-        yield Tick(
-            number=min(number, 1) if alone else number,
-            times=windows.last_time[i] if alone else windows.times[i],
-            places=windows.last_place[i] if alone else windows.places[i],
-            moved=max(-most, min(windows.moved[i], most)),
-            length=windows.length[i],
-            beyond=abs(windows.moved[i]) > most,
-            quiet=silent + 1 >= spec.timing.max_ticks,
-        )
-        silent = 0 if number else silent + 1
+def windows(spec: TrackTachometer, seed: int, n_ticks: int) -> Windows:
+    """Return what the ticks of such motions hold."""
+    return Windows.of(*motions(spec, np.random.default_rng(seed), n_ticks), spec.form.most_number)

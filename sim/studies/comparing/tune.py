@@ -13,7 +13,6 @@ from tachometry.spec.language.option import ParameterError
 CORES: Mapping[str, tuple[str, str]] = {
     "m": ("average", "1 2 5 10 20 50 100"),
     "mt": ("min-time", "20us 50us 100us 200us 500us 1ms 2ms 5ms 10ms"),
-    "track": ("bandwidth", "100rad/s 200rad/s 350rad/s 500rad/s 700rad/s 1000rad/s 1400rad/s 2000rad/s 4000rad/s"),
 }
 TUNED = ("mt",)
 

@@ -39,6 +39,8 @@ class Kind:
         Of the method.
     shortest : float, s
         The shortest tick of the core; with shorter control ticks it keeps this one.
+    memory : float
+        The longest memory of the core times k_v; 0: it has none.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Kind:
     filtered: bool = True
     options: tuple[tuple[str, str], ...] = ()
     shortest: float = 0.0
+    memory: float = 0.0
 
 
 _SILENT = (("bound-decay", "no"),)  # updates without a count are no measurements, and would have eq. (22)'s weight
@@ -62,6 +65,7 @@ KINDS = (
         filtered=False,
         options=(("max-speed", "100rad/s"),),
         shortest=20e-6,
+        memory=0.6,
     ),
 )
 # Control ticks in seconds, with the clock, and the tick of a core in words.
@@ -74,9 +78,12 @@ TICKS = {
 }
 
 
-def core(kind: Kind, seconds: float, decoding: int = 4) -> TachometerSpec:
+def core(kind: Kind, seconds: float, decoding: int = 4, kv: float = GAINS[0]) -> TachometerSpec:
     """Return the core of a kind at a control tick: at one clock per tick with bits that keep the LSB below 2^-6
     rad/s.
+
+    The memory of the tracking method would grow while a loop swings below what it sees, so it is as short as the loop
+    is fast.
     """
     clock, tick = TICKS[seconds]
     if seconds < kind.shortest:
@@ -84,6 +91,8 @@ def core(kind: Kind, seconds: float, decoding: int = 4) -> TachometerSpec:
     texts = {"ppr": "500", "clock": clock, "tick": tick, "max-time": "10ms", "decoding": str(decoding)}
     if tick == "20ns":
         texts["frac-bits"] = "24"
+    if kind.memory:
+        texts["max-memory"] = f"{round(1e6 * max(kind.memory / kv, seconds))}us"
     return of_texts(kind.method, texts | dict(kind.options))
 
 
@@ -97,7 +106,7 @@ def gains_of(kind: Kind, kv: float, seconds: float) -> Gains:
 
 def setting(kind: Kind, kv: float, seconds: float, encoder: VirtualEncoder, decoding: int = 4) -> Setting:
     """Return the loop with a gain: 39 rad/s, and 0.2 Nm for 0.2 s."""
-    spec, gains = core(kind, seconds, decoding), gains_of(kind, kv, seconds)
+    spec, gains = core(kind, seconds, decoding, kv), gains_of(kind, kv, seconds)
     return Setting(spec=spec, gains=gains, task=TASK, motor=MOTOR, encoder=encoder, begin=0.5)
 
 

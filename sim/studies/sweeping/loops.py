@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from tachometry.sim.engines.build import digest
+from tachometry.sim.build import digest
 from tachometry.sim.studies.loops import control
 from tachometry.sim.studies.loops.control import Outcome, Setting, mean
 from tachometry.sim.studies.sweeping.sweep import OtherCode, Row, code_digest

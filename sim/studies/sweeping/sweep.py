@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from tachometry.sim import golden
+from tachometry.sim.build import digest
 from tachometry.sim.encoder.motion import Motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.engines.build import digest
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.comparing.compare import common_instants, run_curve, score
@@ -61,6 +61,7 @@ _RESULTS: dict[str, tuple[str, str]] = {
     "index_reset": ("bool", "as the option"),
     "age": ("bool", "as the option"),
     "bounds": ("bool", "as the option"),
+    "edge_error": ("float", "counts, of the bounds"),
     "lowpass_rad_s": ("float", "rad/s"),
 }
 _ENCODER: dict[str, tuple[str, str]] = {
@@ -180,6 +181,7 @@ class OtherCode(ImportError):
 # Code that decides the row of a point, and, where an engine runs the hardware beside the golden model, that, too.
 _CODE = (
     "spec",
+    "sim/build.py",
     "sim/golden",
     "sim/encoder",
     "sim/signals",

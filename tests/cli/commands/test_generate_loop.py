@@ -10,7 +10,7 @@ from support import docs
 from support.command import run
 from support.compiled import lint
 
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_entries

@@ -9,7 +9,7 @@ from distributed import LocalCluster
 from support import command
 from support.nightly import nightly
 
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.sim.engines.loop import COLUMNS
 from tachometry.sim.studies.sweeping import cluster
 

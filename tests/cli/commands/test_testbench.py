@@ -28,7 +28,7 @@ CASES = {
     "rairan": "--method rairan --bounds --filter 1",
 }
 LOOP = (
-    "--ppr 25 --clock 1MHz --tick 100us --max-time 1ms --max-speed 2000rad/s --loop --multiplier parallel "
+    "--ppr 25 --clock 1MHz --tick 100us --max-time 1ms --max-speed 2000rad/s --loop --loop-multiplier parallel "
     "--inertia 1e-5 --motion ramp:0:300rad/s:8ms+sine:40rad/s:300Hz:7ms+stop:5ms"
 )
 LOOPS = {"commands": "--index --no-synchronised", "generator": "--command generator --gains inputs"}

@@ -5,6 +5,9 @@ from pathlib import Path
 import pytest
 from support.command import run
 
+from tachometry.spec import METHODS, LoopSpec
+from tachometry.spec.language.option import options_of
+
 CORE = ["--ppr", "500", "--clock", "10MHz", "--tick", "100us", "--max-speed", "400rad/s"]
 COMMANDS = {
     "generate": ["generate", *CORE, "--loop"],
@@ -39,3 +42,9 @@ def test_refused(command: str, option: tuple[str, str], tmp_path: Path, capsys: 
     output = ["-o", tmp_path] if command == "generate" else []
     assert run(*COMMANDS[command], *option, *output) == 2
     assert capsys.readouterr().err == f"tachometry: error: {REFUSED[option]}\n"
+
+
+def test_no_option_of_the_loop_is_one_of_a_method() -> None:
+    """One of the two could not be given."""
+    loop = {about.name for about in options_of(LoopSpec)}
+    assert not loop & {about.name for spec in METHODS.values() for about in options_of(spec)}

@@ -13,10 +13,9 @@ from support.native import HEADER, NAME, check_golden, library, logged, snapshot
 from support.script import load
 
 from tachometry.hdl.export.registers.files import register_files, tables
-from tachometry.sim import golden
+from tachometry.sim import build, golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.engines import build
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
 from tachometry.spec.registers.map import RegisterMap

@@ -235,11 +235,18 @@ MUTANTS = [
     Mutant(
         "upset, M/T of whole cycles: cycles", "lemma_waived", MTMethod, "cycled.eq(0), waived.eq(0)", "cycled.eq(0)"
     ),
-    Mutant("counts of a tick", "pk_number", TickCounts, "counts & (alone |", "counts & (0 |"),
-    Mutant("counts of a tick", "pk_number", TickCounts, "~number.any() | ~self.tracks", "~number.any()"),
-    Mutant("counts of a tick", "pk_times", TickCounts, "times.eq(times + number)", "times.eq(times + 1)"),
-    Mutant("counts of a tick", "pk_places", TickCounts, "minus.eq(~backward)", "minus.eq(1)"),
-    Mutant("counts of a tick", "pk_elapsed", TickCounts, "self.elapsed + ~quiet", "self.elapsed + 1", 40),
+    Mutant("counts of a tick", "pk_number", TickCounts, "before != form.most_number", "number != form.most_number"),
+    Mutant(
+        "counts of a tick",
+        "pk_times",
+        TickCounts,
+        "times.eq(Mux(fresh, 0, times + number))",
+        "times.eq(times + number)",
+    ),
+    Mutant("counts of a tick", "pk_places", TickCounts, "way).as_signed() + self.step", "way).as_signed() + 1"),
+    Mutant("counts of a tick", "pk_of_count", TickCounts, "(position - backward)", "position"),
+    Mutant("counts of a tick", "pk_moved", TickCounts, "way = Mux(fresh, 0, moved)", "way = moved"),
+    Mutant("counts of a tick", "pk_elapsed", TickCounts, "(self.elapsed != self._max_ticks)", "1", 40),
     Mutant("counts of a tick", "pk_length", TickCounts, "length), length.eq(1)", "length), length.eq(0)"),
     Mutant("wishbone", "pb_error", RegisterBank, "(bus.address >= len(self._map.registers))", "0"),
     Mutant("wishbone", "pb_read", RegisterBank, "init=(1 << len(bus.address)) - 1", "init=0"),

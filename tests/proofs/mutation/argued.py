@@ -15,30 +15,6 @@ _NO_COUNT = (
     "velocity is 0, and the speed that the time allows is no less"
 )
 
-_OUTPUT_OF_COUNTS = "a tick sets it before the program reads it"
-_EVEN = (
-    "it is inverted in every clock from a tick to the next; the program reads it an even number of clocks after "
-    "the tick, but where it asks for more than one, and then 2 and 3 are exchanged, and 0 and 1"
-)
-_EVEN_PLACES = (
-    "it is inverted like that if the number of counts is even, and the program reads the places of two counts an even "
-    "number of clocks after the tick"
-)
-_NUMBER = '"number": Out(form.number_bits),'
-_PLACES = '"places": Out(signed(form.places_bits)),'
-_SETS_MQ = "with m.If(work & (now.multiply | now.divide | now.to_mq)):"
-_SKIPPED = "a word that a jump skips sets mq too, but where there is one mq is set again before it is used"
-_UNUSED_READ = "what is read then is not used: no operation that is executed reads two behind one that writes"
-_POSITIVE = (
-    "the time between the first two counts is not held at `least_gap` any more, and only there is `POSITIVE` used: a "
-    "count in less time is faster than the greatest speed, at which it is held, and the quotient fits the word"
-)
-_PAST = "steps are counted only when it has been set after a reset"
-_LEVEL = "the program sets the level before there is a speed, and reads tables only where there is one"
-_MET = "return Cat(met[item] for item in Condition).bit_select(condition, 1)"
-_AT_REST = "with m.If(stop | (~fetched & ~self.begin)):  # at rest it is at the first instruction"
-_READS = "read.en.eq(done & ~write.en),  # the program never reads while it writes"
-_CLEAR = "(done & following.clear & ~taken) | (work & now.positive & negative) | (work & now.negative & ~negative)"
 _GOES_ON = (
     "the division of a bound only goes on for longer, and the bound is taken when that of the velocity has come to its "
     "end"
@@ -111,52 +87,6 @@ ARGUED = {
     ("t, in clocks", '"running": Out(1),', "divider_velocity_upper.$procmux$33.B[0] const1"): _GOES_ON,
     ("mt, in clocks", '"running": Out(1),', "divider_velocity_upper.running[0] const1"): _GOES_ON,
     ("mt, in clocks", _LEFT, "left[1] const1"): _GOES_ON,
-    ("track, age", _NUMBER, "B[0] inv"): _OUTPUT_OF_COUNTS,
-    ("track, index", _NUMBER, "S[0] const0"): _OUTPUT_OF_COUNTS,
-    ("track, external tick", _NUMBER, "B[0] const1"): _OUTPUT_OF_COUNTS,
-    ("track, external tick", _PLACES, "B[3] const1"): _OUTPUT_OF_COUNTS,
-    ("track, external tick", "fresh = Signal()", "B[0] const1"): (
-        "in the clock behind a reset it sets all registers to what the reset has set them to"
-    ),
-    ("track, age", _NUMBER, "number[0] cnot1"): _EVEN,
-    ("track, external tick", _NUMBER, "number[0] cnot1"): _EVEN,
-    ("track, index", _NUMBER, "number[0] inv"): _EVEN,
-    ("track, external tick", _NUMBER, "number[0] cnot0"): _EVEN,
-    ("track, age", _PLACES, "places[3] cnot0"): _EVEN_PLACES,
-    ("track, external tick", _PLACES, "A[2] cnot0"): _EVEN_PLACES,
-    ("track, index", "", "datapath.$procmux$195.A[5] inv"): (
-        "the position is inverted in every clock from a tick to the next, and taken an even number of clocks after it"
-    ),
-    ("track, index", "", "machine.$procmux$33.B[0] cnot0"): (
-        "rest and one count are exchanged by a `TEST_OR`, which the program has only where there is a speed"
-    ),
-    ("track, age", "Condition.BEGUN: phase == Phase.BEGUN,", "A[0] const1"): (
-        "whether the phase is one count is asked only where it is not rest"
-    ),
-    ("track, age", "flag = Signal()", "S[0] const0"): "after a reset nothing reads the flag before a `TEST` sets it",
-    ("track, age", "past_b = Signal()", "S[0] const0"): _PAST,
-    ("track, external tick", "past_a = Signal()", "B[0] inv"): _PAST,
-    ("track, external tick", "level = Signal(range(LEVELS))", "B[1] const1"): _LEVEL,
-    ("track, age", "level = Signal(range(LEVELS))", "B[1] const1"): _LEVEL,
-    ("track, age", "with m.If(self.tick & ~was_silent):", "A[0] const1"): (
-        "it comes to its full number in the clock behind a tick with counts, not with the next tick; and it is used "
-        "only with a tick behind one without counts"
-    ),
-    ("track, index", _MET, "A[2] cnot0"): "the flag is asked for only in ticks with counts",
-    (
-        "track, index",
-        "m.d.sync += mq.eq(Mux(now.multiply, mq >> 1, Mux(now.divide, Cat(~total[-1], mq), ac)))",
-        "B[24] const0",
-    ): "that is the highest bit of a multiplier, and no product takes as many steps",
-    ("track, index", _AT_REST, "$247.A[0] const0"): (
-        "it is 0 a clock later, as always at rest, and no tick comes as early"
-    ),
-    ("track, age", _READS, "$185.Y[0] const1"): _UNUSED_READ,
-    ("track, external tick", _READS, "$194.A[0] const0"): _UNUSED_READ,
-    ("track, index", _CLEAR, "$210.A[0] const0"): _POSITIVE,
-    ("track, age", _CLEAR, "$209.A[0] const1"): "no word that a jump skips is `POSITIVE` or `NEGATIVE`",
-    ("track, age", _SETS_MQ, "$322.A[0] const1"): _SKIPPED,
-    ("track, external tick", _SETS_MQ, "$340.A[0] const1"): _SKIPPED,
     ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
     ("mt, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
     (

@@ -5,11 +5,10 @@ The netlist is cut at its flip-flops. Core and mutant run side by side from thei
 equal in every clock. A large memory that is written is cut out as well: core and mutant must write the same to it,
 and what either reads is any word, but the same one if the addresses are the same.
 
-First `proofs.mutation.inductive` is asked, where it knows enough of the core. In what ABC is asked, a mutant has the
-core's flip-flops, but for those that it was seen to set differently: of these it has its own. Proven with the outputs
-is then that what goes into the shared ones is equal, wherefore they may be shared, and the lemmas of the case, which
-are about the core's registers. What is left is tried once more with nothing shared, and without lemmas, if the core is
-small.
+In what ABC is asked first, a mutant has the core's flip-flops, but for those that it was seen to set differently: of
+these it has its own. Proven with the outputs is then that what goes into the shared ones is equal, wherefore they may
+be shared, and the lemmas of the case, which are about the core's registers. What is left is tried once more with
+nothing shared, and without lemmas, if the core is small.
 """
 
 import ctypes
@@ -22,13 +21,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from proofs.mutation.cases import Case, Pins
-from proofs.mutation.inductive import Known, proven
-from proofs.mutation.lemmas import known, lemmas
+from proofs.mutation.lemmas import lemmas
 from proofs.mutation.netlist import SELECTOR, Mutant, yosys
 from proofs.mutation.opened import Opened, Register, opened, written
 from proofs.mutation.simulate import compiled, key
 
-from tachometry.sim.engines import build
+from tachometry.sim import build
 
 _WATCH = """
 struct State {{ {registers} }};
@@ -242,11 +240,6 @@ def equivalent(
         return {number for number in numbers if _holds(own / f"verdict_{number}", own / f"left_{number}.il")}
 
     alike: set[int] = set()
-    found = known(case.spec)
-    if found:
-        named = Known(_named(found.definitions, cut), _named(found.lemmas, cut))
-        assert list(map(len, named)) == list(map(len, found)), "a register of a lemma is not there"
-        alike.update(np.flatnonzero(proven(case.pins, cut, differ, named, folder, pool)) + 1)
     for together in (_TOGETHER,) if many else (_TOGETHER, 1):
         left = [number for number in range(1, len(group) + 1) if number not in alike]
         parts = [left[first : first + together] for first in range(0, len(left), together)]

@@ -3,11 +3,8 @@
 In Verilog; `{name}` is a register of the core by name, which may be the end of a path, `[name]` that of the mutant.
 """
 
-from proofs.mutation import track_lemmas
-from proofs.mutation.inductive import Known
-
 from tachometry.hdl.arithmetic.saturate import raised_for
-from tachometry.spec import STachometer, TachometerSpec, TrackTachometer
+from tachometry.spec import STachometer, TachometerSpec
 from tachometry.spec.methods.timed import TimedTachometer
 
 
@@ -18,11 +15,6 @@ def lemmas(spec: TachometerSpec) -> list[str]:
     if isinstance(spec, TimedTachometer):
         return _gap(spec)
     return []
-
-
-def known(spec: TachometerSpec) -> Known | None:
-    """Return what a step of induction needs; None if that is not known of the method."""
-    return track_lemmas.known(spec) if isinstance(spec, TrackTachometer) else None
 
 
 def _within(name: str, limit: object, middle: int = 0) -> str:

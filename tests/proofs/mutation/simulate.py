@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from proofs.mutation.cases import Pins
 from proofs.mutation.netlist import SELECTOR, WIDTH, Mutant, grouped
 
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.sim.engines.cxxrtl import headers, mangled, translate
 
 _OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory

@@ -15,7 +15,6 @@ for _where, _change in {
     f"{_FRONT_END}: count.wrapped": "position + half → position - half",
     "sim/golden/command_generator.py: Generator.command": "self.place + (1 << wide - 1) → self.place - (1 << wide - 1)",
     "sim/golden/emulator.py: GoldenEmulator._play": ("fine - moved[:n] - _TURN // 2 → fine - moved[:n] + _TURN // 2"),
-    "sim/golden/methods/track.py: Model.updates": "fine + half → fine - half",
 }.items():
     _argue(_where, "Both are off by half of 2^w from a multiple of it, and the remainder modulo 2^w is taken.", _change)
 _argue(
@@ -62,16 +61,6 @@ _argue(
     *("self._turned >= target → self._turned > target", "self._turned <= target → self._turned < target"),
 )
 _argue("sim/golden/emulator.py: GoldenEmulator._play", "There are as many lines as levels.", "True → False")
-_argue(
-    "sim/golden/methods/track.py: Recursion._second",
-    "From the same place to the same place the speed is 0.",
-    "e >= 0 → e > 0",
-)
-_argue(
-    "sim/golden/methods/track.py: Recursion._late",
-    "A p of 0 is near the position, so its sign is not used.",
-    "0 → 1",
-)
 _argue("sim/golden/ordered.py: not_before", "What the passes do not find is searched for.", "1 → 0 #5")
 _argue("sim/golden/sampling.py: windows", "A level is 0 or 1, so its difference from 2 is no rise either.", "1 → 2 #2")
 _argue(
@@ -339,17 +328,8 @@ _argue(
 )
 _argue(f"{_RAIRAN}: Model._regime", "It is only asked whether it is 1.", "0 → -1")
 
-_argue(
-    "spec/formats/tracking.py: Tracking._gains",
-    "Where x reaches its most within a tick, errors of two ticks are at most those of the longest silence.",
-    "1 → 2 #3",
-)
-_argue("spec/formats/tracking_code.py: Op", "No other operation has this number.", "26 → 27")
-_argue("spec/formats/tracking_code.py: Do", "What has no word does not use what is read.", "0 → 1")
 _argue("spec/methods/axes.py: _nearest", "No tick of one clock has a turn of an axis.", "0 → 1")
 _argue("hdl/export/registers/values.py: CapturedValue.field", "A register of a value has one field.", "0 → -1 #2")
-_argue("spec/formats/tracking_code.py: assembled", "It is replaced when the address is known.", "0 → -1 #2")
-_argue("spec/formats/tracking_code.py: assembled.wait", "A wait does not use the word that is read.", "0 → 1")
 _argue("spec/methods/mt.py: MTForm.max_interval", "A window takes a period at least anyway.", "0 → -1")
 for _where in ("_narrowest", "_fewest"):
     _argue(f"spec/formats/reciprocal.py: {_where}", "There are as many fractions as divisors.", "True → False")

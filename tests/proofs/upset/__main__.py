@@ -1,4 +1,4 @@
-"""Single flip-flop upsets of every method, and how long they are seen: `make upset`.
+"""Single flip-flop upsets of every method but `track`, and how long they are seen: `make upset`.
 
 Names of methods as arguments choose those, `axes` a core of many, and `loop` those with a control loop; `--upsets N`
 says how many of each.
@@ -10,19 +10,17 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from proofs.upset import axes, loops
-from proofs.upset.campaign import Campaign, by_register, upsets
+from proofs.upset.campaign import UPSET, Campaign, by_register, upsets
 from rich.console import Console
 from rich.progress import track
 from support.report import Table, arguments, chosen
 
-from tachometry.spec import METHODS
-
 SUBJECTS: dict[str, Callable[[int], Campaign]] = {
-    **{method: partial(upsets, method) for method in METHODS},
+    **{method: partial(upsets, method) for method in UPSET},
     "axes": axes.upsets,
     **{name: partial(loops.upsets, name) for name in loops.LOOPS},
 }
-GROUPS = (*METHODS, "axes", "loop")
+GROUPS = (*UPSET, "axes", "loop")
 
 
 def _ticks(campaign: Campaign, clocks: int) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 from unittest.mock import patch
 
@@ -14,21 +13,14 @@ from tachometry.sim import golden
 from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
-from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
+from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
 
 TICK_CYCLES, MAX_TICKS = 100, 20
-_OPTIONS: dict[str, dict[str, Any]] = {
-    "m": {"average": 10},
-    # A tick in which the program has room, and few of them to a rest.
-    "track": {
-        "timing": Timing(35_000_000, 700, 6),
-        "frac_bits": 6,
-        "bandwidth": Fraction(5000),
-        "max_speed": Speed.parse("500rad/s"),
-    },
-}
-_CYCLES = {"track": 12}  # of a motion; others have 40
+_OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 10}}
+# Of `track` the rounding, and the noise and the offsets that it learns gradually, outlive every rest: after an upset it
+# is not equal in all bits again.
+UPSET = [method for method in METHODS if method != "track"]
 _OF_POSITION = ("position", "index_position", "swallowed_edges")
 
 
@@ -160,20 +152,13 @@ def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> 
     return np.append(last, trace.n_clocks)[found] + rest + spec.latency.tick_to_velocity - clock
 
 
-def _forgive(shown: NDArray[np.int64], right: NDArray[np.int64], column: int, fine_bits: int) -> None:
-    """Whole counts by which the fine position is off, as the position is, until the next reset."""
-    off = shown[-1, column] - right[-1, column]
-    if off % (1 << fine_bits) == 0:
-        shown[:, column] -= off
-
-
 def upsets(method: str, n: int, seed: int = 1) -> Campaign:
     """Flip every bit as often as any other, at random clocks, `n` times in all, and see how long that is seen.
 
     Right are the outputs that the golden model gives for these pins with the core's own ticks.
     """
     spec = spec_of(method)
-    trace = motion(spec, _CYCLES.get(method, 40), seed)
+    trace = motion(spec, 40, seed)
     core = Upsettable(spec, trace)
     end = allowed(spec, trace, np.arange(trace.n_clocks))
     outputs = [port.name for port in spec.ports if port.direction == "output"]
@@ -191,8 +176,6 @@ def upsets(method: str, n: int, seed: int = 1) -> Campaign:
         if phase not in expected:
             expected[phase] = _expected(spec, trace, phase)
         right = expected[phase][clock : clock + len(shown)]
-        if "position_fine" in _compared(spec):
-            _forgive(shown, right, _compared(spec).index("position_fine"), spec.parameters["fine_bits"])
         return (shown != right).any(axis=1)
 
     return play(method, spec, core, trace, n, end, seed, wrong)

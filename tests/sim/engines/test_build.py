@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tachometry.sim.engines import build
-from tachometry.sim.engines.build import cached, compile_library, digest, find_compiler
+from tachometry.sim import build
+from tachometry.sim.build import cached, compile_library, digest, find_compiler
 
 
 @pytest.fixture(autouse=True)

@@ -10,8 +10,7 @@ import pytest
 from support.lockstep import random_case
 from support.nightly import nightly, only
 
-from tachometry.sim import golden
-from tachometry.sim.engines import build
+from tachometry.sim import build, golden
 from tachometry.sim.engines.compiled import CompiledEngine
 from tachometry.sim.engines.engine import Engine, Interrupted
 from tachometry.sim.engines.pick import ENGINES, NAMES, pick, present

@@ -50,21 +50,25 @@ def test_what_is_described_does_not_change() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_defaults_are_those_of_python(method: str) -> None:
-    made = METHODS[method]
+    made, usual = METHODS[method], {"max_time": "100ms"} if method == "track" else {}
     assert of_texts(method, PPR) == made(encoder=Encoder(500))
-    assert of_texts(method, PPR).timing == Timing.parse() == Timing(48_000_000, 960, 500)
+    assert Timing.parse() == Timing(48_000_000, 960, 500)
+    assert of_texts(method, PPR).timing == Timing.parse(**usual)
     assert Timing.parse("10MHz") == Timing.parse("10MHz", "20us", "10ms") == Timing(10_000_000, 200, 500)
     for unit in ("count/tick", "rad/s", "rev/s", "rpm"):
         spec = made(encoder=Encoder(500), unit=unit)
         assert of_texts(method, PPR | {"unit": unit}) == spec
-        assert spec.widths.frac_bits == (16 if unit == "count/tick" else 10)
+        if method == "track":  # its noise is less than that of others
+            assert spec.scale.rad_per_s_per_lsb < 7e-5
+        else:
+            assert spec.widths.frac_bits == (16 if unit == "count/tick" else 10)
     texts = had_by(method, {"ppr": "20", "clock": "100MHz", "tick": "4", "max-time": "2000", "unit": "rpm"})
     coarse = Timing(100_000_000, int(texts["tick"]), 500)
     assert of_texts(method, texts) == made(encoder=Encoder(20), timing=coarse, unit="rpm")
     assert of_texts(method, texts).widths.frac_bits < 10  # as many as there can be
     if not made.facts.own_ticks:
         external = of_texts(method, PPR | {"external-tick": "yes", "clock": "50MHz"})
-        assert external == made(encoder=Encoder(500), timing=Timing.parse("50MHz"), external_tick=True)
+        assert external == made(encoder=Encoder(500), timing=Timing.parse("50MHz", **usual), external_tick=True)
         assert external.times.longest_tick == 2000
 
 
@@ -184,7 +188,7 @@ def test_a_manifest_says_which_core_it_is(bus: str, tmp_path: Path, monkeypatch:
         core,
         LoopSpec(tachometer=core, gains="inputs"),
         LoopSpec(
-            tachometer=of_texts("track", PPR | {"tick": "6001", "max-time": "600100", "bandwidth": "150Hz"}),
+            tachometer=of_texts("track", PPR | {"tick": "6001", "max-time": "600100", "max-memory": "5ms"}),
             gains="inputs",
         ),
         LoopSpec(tachometer=core, gains="inputs", observer=Fraction(50, 3), velocity_filter=Fraction(0)),

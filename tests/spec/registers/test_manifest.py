@@ -57,10 +57,10 @@ def test_acceleration_and_fine_position() -> None:
     }
     for unit, (own, one) in units.items():
         texts = {name: text for name, text in base.items() if name != "frac-bits"} | {"unit": unit}
-        described = manifest(spec := of_texts("track", texts))
+        described = manifest(of_texts("track", texts))
         acceleration = described["acceleration"]
         assert acceleration["unit"] == own
-        assert acceleration["width"] == min(48, spec.widths.velocity + 8)
+        assert acceleration["width"] == 32
         assert acceleration["rad_per_s2_per_lsb"] == pytest.approx(one * 0.5 ** acceleration["frac_bits"], rel=1e-12)
         assert described["position_fine"] == {"frac_bits": 3}
 

@@ -16,7 +16,7 @@ from support.nightly import only
 from support.options import had_by
 
 from tachometry.hdl.export import export
-from tachometry.sim.engines import build
+from tachometry.sim import build
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
 

@@ -20,8 +20,7 @@ from support.rio import component, hal_type, loaded
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.targets.rio import hal_pins
-from tachometry.sim import golden
-from tachometry.sim.engines import build
+from tachometry.sim import build, golden
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.language.port import INDEX, TICK, UPDATE

@@ -1,12 +1,107 @@
-"""The golden tracking method where it once did not settle."""
+"""The golden tracking method: its twins in C++ and in Python, and where the recursion of before did not settle."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.nightly import nightly, only
+from support.tracking import core, windows
 
-from tachometry.sim import golden
+from tachometry.sim import build, golden
+from tachometry.sim.golden.methods import track
+from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.sim.signals.recording import PinTrace, quadrature
-from tachometry.spec import of_texts
+from tachometry.spec import TrackTachometer
+from tachometry.spec.formats.tracking import WIDTH
+
+CORES = {
+    "default": core(),
+    "external": core(external_tick="yes", max_tick_period="683us", decoding="2"),
+    "few lines": core(ppr="16", decoding="1", frac_bits="4"),
+    "many lines": core(ppr="81000", multiplier="block"),
+    "slow clock": core(clock="12MHz", tick="100us", max_speed="500rad/s"),
+    "fast clock": core(clock="100MHz", max_memory="5ms", max_time="1s"),
+    "long ticks": core(tick="1ms", max_speed="1000rad/s", max_time="20ms"),
+}
+
+
+def compiled(spec: TrackTachometer, held: track.Windows) -> NDArray[np.int64]:
+    """Return what the twin in C++ shows."""
+    found = track.compiled(tuple(track.constants_of(spec.form, spec.program.lead)))
+    assert found
+    return found(spec.form, spec.program.lead, held)
+
+
+@pytest.mark.parametrize("name", CORES)
+def test_twins(name: str) -> None:
+    """The C++ shows what the Python shows, bit by bit, and all of it changes."""
+    spec = CORES[name]
+    held = windows(spec, 1, 1500)
+    right = track.rows(spec.form, spec.program.lead, held)
+    assert np.array_equal(compiled(spec, held), right)
+    assert all(len(np.unique(column)) > 30 for column in right.T)
+
+
+# Speeds and accelerations are the greatest in bursts at the shortest distance, of which the first core has many.
+@pytest.mark.parametrize("name", only(["default"], CORES))
+def test_what_is_shown_fits_the_ports(name: str) -> None:
+    spec = CORES[name]
+    velocity, _, quality, acceleration = np.concatenate(
+        [compiled(spec, windows(spec, seed, 20_000)) for seed in range(2)]
+    ).T
+    assert np.abs(velocity).max() < 1 << spec.widths.native - 1
+    assert quality.min() >= 0
+    assert quality.max() < 1 << spec.form.quality_bits
+    assert 1 << spec.acceleration.width - 3 < np.abs(acceleration).max() < 1 << spec.acceleration.width - 1
+
+
+@nightly
+@pytest.mark.parametrize("seed", range(10))
+def test_states_stay_within_their_words(seed: int) -> None:
+    """In 10^5 ticks, from one to the next."""
+    spec = CORES[[*CORES][seed % len(CORES)]]
+    state, held = Recursion(spec.form, spec.program.lead), windows(spec, seed, 10_000)
+    words = [name for name, value in vars(state).items() if isinstance(value, int)]
+    for row in held.rows():
+        state.tick(*row)
+        assert max(abs(value) for value in [*(getattr(state, word) for word in words), *state.offsets]) < 1 << WIDTH - 1
+        assert all(abs(offset) <= spec.form.constants["count"] for offset in state.offsets)
+
+
+@nightly
+@pytest.mark.parametrize("seed", range(10))
+def test_twins_on_more_motions(seed: int) -> None:
+    spec = CORES[[*CORES][seed % len(CORES)]]
+    held = windows(spec, seed, 20_000)
+    assert np.array_equal(compiled(spec, held), track.rows(spec.form, spec.program.lead, held))
+
+
+def trace_of(clock: NDArray[np.int64], position: NDArray[np.int64]) -> PinTrace:
+    """Return the lines of a shaft that is at these positions from these clocks on."""
+    level = quadrature(np.append(0, position))
+    return PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + 10)
+
+
+def test_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The Python is used, and shows the same."""
+    spec = core()
+    trace = trace_of(np.arange(1, 300) ** 2 * 5, np.arange(1, 300))
+    right = golden.run(spec, trace).updates
+    used: list[track.Windows] = []
+
+    def rows(*given: object) -> NDArray[np.int64]:
+        used.append(given[2])  # type: ignore[arg-type]
+        return python(*given)  # type: ignore[arg-type]
+
+    python = track.rows
+    track.compiled.cache_clear()
+    monkeypatch.setattr(build, "find_compiler", lambda: None)
+    monkeypatch.setattr(track, "rows", rows)
+    found = golden.run(spec, trace).updates
+    track.compiled.cache_clear()
+    assert used
+    assert right.velocity.any()
+    for name in ("velocity", "acceleration", "position_fine"):
+        assert np.array_equal(found[name], right[name])
 
 
 def places(start: str, gap: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -20,13 +115,10 @@ def places(start: str, gap: float) -> tuple[NDArray[np.int64], NDArray[np.int64]
 
 
 @pytest.mark.parametrize("start", ["reversal", "doubled speed"])
-@pytest.mark.parametrize("options", [{}, {"agile": "no"}, {"growing-memory": "no"}, {"edge-error": "0.2"}], ids=str)
-def test_a_constant_speed_is_settled_upon(start: str, options: dict[str, str]) -> None:
+def test_a_constant_speed_is_settled_upon(start: str) -> None:
     """A tick without a count at nearly a count per tick must not throw the velocity away."""
-    spec = of_texts("track", {"ppr": "500", "max-speed": "1000rad/s"} | options)
+    spec = core(max_speed="1000rad/s")
     for counts_per_tick in (0.5, 0.75, 0.9, 0.95, 1.05):
-        clock, position = places(start, spec.timing.tick_cycles / counts_per_tick)
-        level = quadrature(np.append(0, position))
-        trace = PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + 10)
+        trace = trace_of(*places(start, spec.timing.tick_cycles / counts_per_tick))
         velocity = golden.run(spec, trace).updates.velocity[-300:] / 2.0**spec.widths.frac_bits
         assert np.abs(velocity) == pytest.approx(np.full(300, counts_per_tick), rel=2e-3), counts_per_tick

@@ -28,6 +28,7 @@ from tachometry.sim.studies.loops.usable_gain import (
     KINDS,
     MOTOR,
     REAL,
+    core,
     is_usable,
     setting,
     usable,
@@ -170,3 +171,9 @@ def test_every_variant_is_another_loop() -> None:
     every = dict(variants(setting(KINDS[0], 80.0, 20e-6, REAL)))
     assert len(every) == 14
     assert all(one != other for k, one in enumerate(every.values()) for other in list(every.values())[:k])
+
+
+def test_the_memory_of_tracking_is_as_short_as_the_loop_is_fast() -> None:
+    """It is no longer than 0.6/k_v, and no shorter than a tick."""
+    memories = [core(KINDS[-1], 1e-3, kv=kv).options["max-memory"] for kv in (20.0, 120.0, 1200.0)]
+    assert memories == ["30ms", "5ms", "1ms"]

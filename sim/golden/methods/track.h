@@ -1,0 +1,196 @@
+// The recursion of track.py, line by line. `Constants` and `Windows` stand before this text; tables and state come with
+// the call.
+static inline int bits_of(int64_t x) { return x ? 64 - __builtin_clzll((uint64_t)x) : 0; }
+static inline int64_t sign_of(int64_t x) { return x < 0 ? -1 : 1; }
+
+struct Recursion {
+  const Constants &k;
+  const int64_t *logs, *powers, *gains, *reversed;
+  int64_t phase = 0, turn = 0, noises, p = 0, v = 0, a = 0, shown_v = 0, shown_a = 0, memory = 0, log_memory = 0;
+  int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
+  int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit = 0, chance, moved = 0, quality = 0;
+  int64_t *row = nullptr;
+
+  Recursion(const Constants &k, const int64_t *logs, const int64_t *powers, const int64_t *gains, const int64_t *reversed)
+      : k(k), logs(logs), powers(powers), gains(gains), reversed(reversed) {
+    noises = k.noises_first;
+    noise = sure = k.quarter;
+    log_share = -k.log_4;
+  }
+
+  int64_t log2(int64_t x) const {
+    int64_t size = std::max<int64_t>(x < 0 ? ~x : x, 1);
+    int whole = bits_of(size) - 1;
+    return ((int64_t)whole << LOG_BITS) + logs[((size << LOG_INDEX) >> whole) & ((1 << LOG_INDEX) - 1)];
+  }
+  int64_t round(int64_t product, int64_t shift) const {
+    return ((product << CHANCE_BITS >> std::min<int64_t>(shift, 63)) + chance) >> CHANCE_BITS;
+  }
+  int64_t power(int64_t x, int64_t sign) const {
+    int64_t whole = std::min<int64_t>(x >> LOG_BITS, RESULT_BITS - 1);
+    int64_t mantissa = powers[(x & ((1 << LOG_BITS) - 1)) >> (LOG_BITS - EXP_INDEX)];
+    return sign * round(mantissa << (RESULT_BITS - POWER_BITS), RESULT_BITS - whole);
+  }
+  int64_t product(int64_t x, int64_t by, int64_t shift) const {
+    int64_t exponent = std::max<int64_t>(bits_of(by) - k.factor_bits, -CHANCE_BITS);
+    int64_t factor = (by << CHANCE_BITS) >> (exponent + CHANCE_BITS);
+    int64_t full = (x * factor << (CHANCE_BITS - DROPPED)) >> (shift - exponent - DROPPED), most = (int64_t)1 << RESULT_BITS;
+    if (full >> CHANCE_BITS >= most) return most;
+    if (full >> CHANCE_BITS < -most) return -most;
+    return (full + chance) >> CHANCE_BITS;
+  }
+  int64_t gain(int number) const {
+    int64_t place = ((~log_share * GAIN_STEPS) >> LOG_BITS) - 2 * GAIN_STEPS;
+    return gains[number * GAINS + std::max<int64_t>(0, std::min<int64_t>(GAINS - 1, place))];
+  }
+  int64_t shift(int64_t n) const { return bits_of(n) - (k.factor_bits - CHANCE_BITS); }
+  int64_t ahead() const { return shown_v + product(shown_a, since + k.lead, k.velocity); }
+  int64_t place() const {
+    return p + product(shown_v + product(shown_a, since, k.half_velocity), since, k.place);
+  }
+  void emit(int64_t velocity, int64_t place) {
+    int64_t shown = product(velocity, k.tick, k.shown);
+    row[0] = std::max(-k.most_shown, std::min(shown, k.most_shown));
+    row[1] = place;
+    row[2] = std::min(power(round(log_limit - k.order + log_share, 1) + quality - log_memory, 1), k.most_quality);
+    row[3] = product(shown_a, k.slope, k.acceleration);
+  }
+
+  void tick(int64_t number, int64_t times, int64_t places, int64_t last, int64_t moved_, int kind, bool down, int end, int64_t length) {
+    int64_t t = k.time_bits;
+    chance = 1 << (CHANCE_BITS - 1);
+    since = std::min(since + (length << t), k.most_since);
+    quiet = std::min(quiet + (length << t), k.most);
+    moved = moved_ * k.count;
+    if (!number) return silence(end);
+    quiet = last << t;
+    event(number, times << t, places, kind, down);
+  }
+  void event(int64_t n, int64_t times, int64_t places, int kind, bool down) {
+    int64_t tau = times, raw = places * k.half, at = raw - offsets[kind], log_n = 0, left = 0, total = 0;
+    if (n > 1) {
+      int64_t off = 0;
+      for (int j = 0; j < (n & 3); j++) off += offsets[(down ? kind + j : kind - j) & 3];
+      log_n = log2(n);
+      tau = power(log2(times) - log_n, 1);
+      left = times - product(tau, n, k.time);
+      total = places * (k.half >> 6) - round(off, 6);
+      at = raw = power(log2(total) + k.log_64 - log_n, sign_of(total));
+    }
+    turn = (turn + 1) & ((1 << CHANCE_BITS) - 1);
+    chance = reversed[turn];
+    if (phase == 0) {
+      phase = 1, slips = 0, since = tau, v = a = shown_v = shown_a = 0, quality = k.none;
+      p = at - moved, edge = raw - moved;
+      return emit(0, place());
+    }
+    int64_t dt = std::max(since - tau, k.clock), log_dt = log2(dt);
+    if (phase == 1) return begin(at, raw, tau, dt, log_dt);
+    int64_t h = product(a, dt, k.half_velocity), V = v + h + h, way = product(v + h, dt, k.place);
+    if (std::abs(raw - edge) < k.sixteenth && std::abs(way) < k.quarter) {
+      edge -= moved, p -= moved;
+      return emit(ahead(), place());
+    }
+    int64_t P = p + way, e = at - P;
+    edge = raw - moved;
+    int64_t step = power(std::min<int64_t>(log_dt - log_memory, 0) + log_memory + log_growth, 1);
+    int64_t grown = std::min(memory + (grows >= 0 ? step : -step), k.most_memory);
+    if (log_dt - log_memory + k.log_4096 < 0 && grows >= 0) grown = memory;
+    since = tau;
+    if (n > 1) {
+      int64_t rest = total - product(P, n, k.mean) + sign_of(left) * product(V, std::abs(left), k.place_64);
+      e = power(log2(rest) + k.log_64 - log_n, sign_of(rest));
+    }
+    int64_t log_e = log2(e);
+    if (std::abs(e) >= k.half + n * k.count) {
+      slips++;
+      if (slips >= 3 || log_dt + k.log_4 - log_memory - 1 >= 0) return begin(at, raw, tau, dt, log_dt);
+      p = at - moved;
+      return emit(ahead(), place());
+    }
+    slips = 0;
+    mean += round(e - mean, 2);
+    if (std::abs(e) >= 4 * sure) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
+    else if (2 * std::abs(mean) >= 3 * sure) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_32, 1));
+    memory = grown, log_memory = log2(memory);
+    int64_t x = log_share = std::min(log_dt - log_memory, k.log_quarter), of_v = log_e - log_dt + x + x;
+    v = V + power(of_v + gain(1), sign_of(e));
+    a += power(of_v + x - log_dt + gain(2), sign_of(e));
+    p = P - moved + power(log_e + x + gain(0), sign_of(e));
+    int64_t change = e - error;
+    error = e;
+    bool is_long = x + k.log_256 < 0;
+    int64_t log_at = log2(a) + log_memory;
+    shown_v = v, shown_a = a, quality = k.of_curve;
+    if (x + k.log_64 < 0 && 2 * (log_at + log_memory) - x - log_limit - (is_long ? k.log_9_4 : 0) < 0)
+      shown_v -= power(log_at - k.of_slope, sign_of(a)), shown_a = 0, quality = k.of_straight;
+    emit(ahead(), place());
+    // What is learned.
+    noises = std::min(noises + k.noises_one, k.noises_most);
+    if (is_long) change = e + round(e, 1);
+    noise += round(std::min(std::abs(change) - noise, 3 * noise), shift(std::min(noises, k.noises_offset)));
+    noise = std::max(noise, k.least_noise);
+    v = std::max(-k.most, std::min(v, k.most)), a = std::max(-k.most, std::min(a, k.most));
+    int64_t off = e - lag;
+    lag += power(log2(off) + x + k.log_3_2, sign_of(off));
+    if (n == 1 && x + k.past_4 < 0) {
+      int64_t quarter = sign_of(e) * round(std::min(std::abs(e), k.half), shift(std::max(noises, k.noises_least)));
+      offsets[kind] += 4 * quarter;
+      for (auto &offset : offsets) offset -= quarter;
+    }
+    ready();
+  }
+  void ready() {
+    log_limit = 2 * log2(noise) + k.order;
+    sure = noise;
+    int64_t lagging = log_share + log_limit - k.order_lag;
+    if (log_share + k.log_256 < 0) sure += round(noise, 1), lagging += k.log_9_4;
+    grows = 1, log_growth = 0;
+    int64_t trouble = 2 * log2(lag) - lagging;
+    if (trouble >= 0) {
+      grows = -1, log_growth = k.log_half;
+      if (trouble - k.log_4 >= 0) slow_until = 2 * memory;
+    } else if (memory < slow_until) log_growth = k.log_eighth;
+  }
+  void begin(int64_t at, int64_t raw, int64_t tau, int64_t dt, int64_t log_dt) {
+    int64_t e = at - p;
+    phase = 2, slips = 0;
+    v = shown_v = power(log2(e) + k.of_velocity - log_dt, sign_of(e));
+    p = at - moved, edge = raw - moved;
+    since = tau, memory = dt, log_memory = log_dt, log_share = k.log_quarter;
+    a = shown_a = mean = lag = error = slow_until = 0, quality = k.of_curve;
+    emit(ahead(), place());
+    ready();
+  }
+  void silence(int end) {
+    if (quiet >= k.forget) phase = since = quiet = p = 0;
+    if (phase != 2) {
+      shown_a = 0, quality = k.none;
+      return emit(0, p);
+    }
+    int64_t z = place(), sign = sign_of(z), velocity = ahead();
+    int64_t beyond = std::max<int64_t>(sign * (z + offsets[(z < 0 ? end - 1 : end) & 3]), 0) - k.half - 5 * sure;
+    if (beyond >= 0) {
+      z -= sign * beyond;
+      int64_t share = beyond - k.half >= 0 ? k.log_5_8 : 0;
+      velocity = sign * std::min(sign * velocity, power(k.of_speed - log2(quiet + k.lead) - share, 1));
+    }
+    if (quiet >= k.max_time) velocity = shown_a = 0;
+    emit(velocity, z);
+  }
+};
+
+extern "C" __attribute__((visibility("default"))) void track(const int64_t *constants, const int64_t *tables, int64_t ticks, const int64_t *windows, int64_t *rows) {
+  int64_t reversed[1 << CHANCE_BITS];
+  for (int i = 0; i < 1 << CHANCE_BITS; i++) {
+    reversed[i] = 0;
+    for (int bit = 0; bit < CHANCE_BITS; bit++) reversed[i] |= (int64_t)(i >> bit & 1) << (CHANCE_BITS - 1 - bit);
+  }
+  const int64_t *logs = tables, *powers = logs + (1 << LOG_INDEX), *gains = powers + (1 << EXP_INDEX);
+  Recursion state(*(const Constants *)constants, logs, powers, gains, reversed);
+  for (int64_t i = 0; i < ticks; i++) {
+    auto of = [&](int column) { return windows[column * ticks + i]; };
+    state.row = rows + 4 * i;
+    state.tick(of(0), of(1), of(2), of(3), of(4), (int)of(5), of(6) != 0, (int)of(7), of(8));
+  }
+}

@@ -1,0 +1,310 @@
+"""The tracking recursion in integers, tick by tick: docs/concepts/track.md has its rules, track.h its twin in C++."""
+
+from tachometry.spec.formats.tracking import (
+    CHANCE_BITS,
+    EXP_INDEX,
+    GAIN_STEPS,
+    GAINS,
+    LOG_BITS,
+    LOG_INDEX,
+    LOGS,
+    PLACE_BITS,
+    POWER_BITS,
+    POWERS,
+    RESULT_BITS,
+    Tracking,
+)
+
+REST, ONE, TRACKS = range(3)
+Row = tuple[int, int, int, int]  # velocity, place at the end of the tick, deviation to be expected, acceleration
+_HALF = 1 << CHANCE_BITS - 1
+
+
+def log2(x: int) -> int:
+    """Return the logarithm of |x|; of a negative one less 1, and that of 1 for 0."""
+    size = max(~x if x < 0 else x, 1)
+    whole = size.bit_length() - 1
+    return (whole << LOG_BITS) + LOGS[((size << LOG_INDEX) >> whole) & (len(LOGS) - 1)]
+
+
+def factor(x: int, bits: int) -> tuple[int, int]:
+    """Return x > 0 as m and k, so that it is m·2^k: m has so many bits, eight of which are a fraction for a small x."""
+    k = max(x.bit_length() - bits, -CHANCE_BITS) if x > 0 else -CHANCE_BITS
+    return ((x << CHANCE_BITS) >> (k + CHANCE_BITS)) & ((1 << bits) - 1) if x > 0 else 0, k
+
+
+class Recursion:
+    """Keeps the state, and changes it in every tick; all numbers are as `spec.formats.tracking` describes them.
+
+    Parameters
+    ----------
+    form : Tracking
+    lead : int
+        Clocks by which the velocity that is shown is ahead of the end of the tick.
+    """
+
+    def __init__(self, form: Tracking, lead: int) -> None:
+        self._form = form
+        self._k = k = form.constants
+        self._lead = lead << form.time_bits
+        self._gains = form.gains
+        self.phase, self.turn, self.noises = REST, 0, k["noises_first"]
+        self.p = self.v = self.a = self.shown_v = self.shown_a = 0
+        self.memory = self.log_memory = self.slow_until = 0
+        self.since = self.quiet = 0
+        self.noise = self.sure = k["quarter"]
+        self.error = self.mean = self.lag = self.edge = self.slips = 0
+        self.log_share = -k["log_4"]
+        self.offsets = [0] * 4
+        self.grows, self.log_growth = 1, 0
+        self.log_limit = 0
+        self._chance, self.quality = _HALF, 0
+
+    # The arithmetic.
+
+    def _round(self, product: int, shift: int) -> int:
+        """Return a product over 2^shift, rounded by the number of the event."""
+        full = (product << CHANCE_BITS) >> shift
+        return (full + self._chance) >> CHANCE_BITS
+
+    def _power(self, x: int, sign: int = 0) -> int:
+        """Return 2^x, or −2^x for sign < 0."""
+        whole = min(x >> LOG_BITS, RESULT_BITS - 1)
+        mantissa = POWERS[(x & ((1 << LOG_BITS) - 1)) >> (LOG_BITS - EXP_INDEX)]
+        size = self._round(mantissa << (RESULT_BITS - POWER_BITS), RESULT_BITS - whole)
+        return -size if sign < 0 else size
+
+    def _product(self, x: int, by: int, name: str) -> int:
+        """Return x·by/2^shift, held within 2^36."""
+        m, k = factor(by, self._form.factor_bits)
+        full = ((x * m) << CHANCE_BITS) >> (self._form.shifts[name] - k)
+        if full >> CHANCE_BITS >= 1 << RESULT_BITS:
+            return 1 << RESULT_BITS
+        if full >> CHANCE_BITS < -(1 << RESULT_BITS):
+            return -(1 << RESULT_BITS)
+        return (full + self._chance) >> CHANCE_BITS
+
+    def _gain(self, number: int) -> int:
+        """Return the logarithm of the gain of p, v or a."""
+        place = ((~self.log_share * GAIN_STEPS) >> LOG_BITS) - 2 * GAIN_STEPS
+        return self._gains[number][max(0, min(GAINS - 1, place))]
+
+    # The recursion.
+
+    def tick(
+        self,
+        number: int,
+        times: int,
+        places: int,
+        last: int,
+        moved: int,
+        kind: int,
+        down: int,
+        end: int,
+        length: int,
+    ) -> Row:
+        """Take a tick; velocity, place relative to the position, the deviation to be expected, acceleration."""
+        k, bits = self._k, self._form.time_bits
+        self._chance = _HALF
+        self.since = min(self.since + (length << bits), k["most_since"])
+        self.quiet = min(self.quiet + (length << bits), k["most"])
+        self._moved = moved << PLACE_BITS
+        if number:
+            self.quiet = last << bits
+            return self._event(number, times << bits, places, kind, down)
+        return self._silence(end)
+
+    def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:
+        k = self._k
+        if n == 1:
+            tau = times
+            raw = places * k["half"]
+            at = raw - self.offsets[kind]
+        else:
+            rest = range(n & 3)
+            off = sum(self.offsets[(kind + j if down else kind - j) & 3] for j in rest)
+            log_n = log2(n)
+            tau = self._power(log2(times) - log_n)
+            left = times - self._product(tau, n, "time")
+            total = (places << 13) - self._round(off, 6)
+            at = raw = self._power(log2(total) + k["log_64"] - log_n, -1 if total < 0 else 1)
+        self.turn = (self.turn + 1) & ((1 << CHANCE_BITS) - 1)
+        self._chance = int(f"{self.turn:0{CHANCE_BITS}b}"[::-1], 2)
+        if self.phase == REST:
+            return self._first(at, raw, tau)
+        dt = max(self.since - tau, k["clock"])
+        log_dt = log2(dt)
+        if self.phase == ONE:
+            return self._begin(at, raw, tau, dt, log_dt)
+        h = self._product(self.a, dt, "half_velocity")
+        v = self.v + h + h
+        way = self._product(self.v + h, dt, "place")
+        if abs(raw - self.edge) < k["sixteenth"] and abs(way) < k["quarter"]:
+            self.edge -= self._moved
+            self.p -= self._moved
+            return self._emit(self._ahead())
+        p = self.p + way
+        self.edge = raw - self._moved
+        e = at - p
+        # Memory.
+        log_step = min(log_dt - self.log_memory, 0) + self.log_memory + self.log_growth
+        step = self._power(log_step)
+        if log_dt - self.log_memory + k["log_4096"] < 0 <= self.grows:
+            memory = self.memory
+        else:
+            memory = min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"])
+        self.since = tau
+        if n > 1:
+            rest_of = total - self._product(p, n, "mean")
+            more = self._product(v, abs(left), "place_64")
+            rest_of += more if left >= 0 else -more
+            e = self._power(log2(rest_of) + k["log_64"] - log_n, -1 if rest_of < 0 else 1)
+        log_e = log2(e)
+        if abs(e) >= k["half"] + (n << PLACE_BITS):
+            self.slips += 1
+            if self.slips >= 3 or log_dt + k["log_4"] - self.log_memory - 1 >= 0:
+                return self._begin(at, raw, tau, dt, log_dt)
+            self.p = at - self._moved
+            return self._emit(self._ahead())
+        self.slips = 0
+        # A change of the speed leaves 8 or 32 events.
+        quarter = self._round(e - self.mean, 2)
+        self.mean += quarter
+        if abs(e) >= 4 * self.sure:
+            self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_8"]))
+        elif 2 * abs(self.mean) >= 3 * self.sure:
+            self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_32"]))
+        self.memory, self.log_memory = memory, log2(memory)
+        # The least squares.
+        self.log_share = x = min(log_dt - self.log_memory, k["log_quarter"])
+        sign = -1 if e < 0 else 1
+        of_v = log_e - log_dt + x + x
+        self.v = v + self._power(of_v + self._gain(1), sign)
+        self.a += self._power(of_v + x - log_dt + self._gain(2), sign)
+        self.p = p - self._moved + self._power(log_e + x + self._gain(0), sign)
+        change, self.error = e - self.error, e
+        self._show_order()
+        shown = self._ahead()
+        row = self._emit(shown)
+        self._learn(n, e, change, kind)
+        self._ready()
+        return row
+
+    def _show_order(self) -> None:
+        """Show the same least squares of order one, where the acceleration is not seen."""
+        k, x = self._k, self.log_share
+        log_at = log2(self.a) + self.log_memory
+        long = x + k["log_256"] < 0
+        unseen = 2 * (log_at + self.log_memory) - x - self.log_limit - (k["log_9_4"] if long else 0) < 0
+        if x + k["log_64"] < 0 and unseen:
+            self.shown_v = self.v - self._power(log_at - k["of_slope"], -1 if self.a < 0 else 1)
+            self.shown_a, self.quality = 0, k["of_straight"]
+        else:
+            self.shown_v, self.shown_a, self.quality = self.v, self.a, k["of_curve"]
+
+    def _learn(self, n: int, e: int, change: int, kind: int) -> None:
+        """Learn the noise, the lag and the offsets of the edges."""
+        k, x = self._k, self.log_share
+        self.noises = min(self.noises + k["noises_one"], k["noises_most"])
+        shift = self._shift(min(self.noises, k["noises_offset"]))
+        if x + k["log_256"] < 0:
+            change = e + self._round(e, 1)
+        self.noise += self._round(min(abs(change) - self.noise, 3 * self.noise), shift)
+        self.noise = max(self.noise, k["least_noise"])
+        most = k["most"]
+        self.v, self.a = max(-most, min(self.v, most)), max(-most, min(self.a, most))
+        off = e - self.lag
+        self.lag += self._power(log2(off) + x + k["log_3_2"], -1 if off < 0 else 1)
+        if n == 1 and x + k["past_4"] < 0:
+            size = min(abs(e), k["half"])
+            quarter = self._round(size, self._shift(max(self.noises, k["noises_least"])))
+            quarter = -quarter if e < 0 else quarter
+            self.offsets[kind] += 4 * quarter
+            self.offsets = [offset - quarter for offset in self.offsets]
+
+    def _shift(self, noises: int) -> int:
+        """Return ⌊log2⌋ of a number of events, by which what is learned is shifted."""
+        return noises.bit_length() - (self._form.factor_bits - CHANCE_BITS)
+
+    def _ready(self) -> None:
+        """Find what the next event takes of this one: growth of the memory, noise."""
+        k = self._k
+        self.log_limit = 2 * log2(self.noise) + k["order"]
+        self.sure = self.noise
+        lagging = self.log_share + self.log_limit - k["order_lag"]
+        if self.log_share + k["log_256"] < 0:
+            self.sure += self._round(self.noise, 1)
+            lagging += k["log_9_4"]
+        self.grows, self.log_growth = 1, 0
+        trouble = 2 * log2(self.lag) - lagging
+        if trouble >= 0:
+            self.grows, self.log_growth = -1, k["log_half"]
+            if trouble - k["log_4"] >= 0:
+                self.slow_until = 2 * self.memory
+        elif self.memory < self.slow_until:
+            self.log_growth = k["log_eighth"]
+
+    def _first(self, at: int, raw: int, tau: int) -> Row:
+        self.phase, self.slips, self.since = ONE, 0, tau
+        self.v = self.a = self.shown_v = self.shown_a = 0
+        self.quality = self._k["none"]
+        self.p, self.edge = at - self._moved, raw - self._moved
+        return self._emit(0)
+
+    def _begin(self, at: int, raw: int, tau: int, dt: int, log_dt: int) -> Row:
+        """Take the speed from the event before to this one."""
+        k = self._k
+        e = at - self.p
+        self.phase, self.slips = TRACKS, 0
+        self.v = self.shown_v = self._power(log2(e) + k["of_velocity"] - log_dt, -1 if e < 0 else 1)
+        self.p, self.edge = at - self._moved, raw - self._moved
+        self.since, self.memory, self.log_memory, self.log_share = tau, dt, log_dt, k["log_quarter"]
+        self.a = self.shown_a = self.mean = self.lag = self.error = self.slow_until = 0
+        self.quality = k["of_curve"]
+        row = self._emit(self._ahead())
+        self._ready()
+        return row
+
+    def _ahead(self) -> int:
+        """Return the velocity at the time when it is shown."""
+        return self.shown_v + self._product(self.shown_a, self.since + self._lead, "velocity")
+
+    @property
+    def _place(self) -> int:
+        """The place at the end of the tick."""
+        mean = self.shown_v + self._product(self.shown_a, self.since, "half_velocity")
+        return self.p + self._product(mean, self.since, "place")
+
+    def _silence(self, end: int) -> Row:
+        """Say what the silence of a tick says."""
+        k = self._k
+        if self.quiet >= k["forget"]:
+            self.phase, self.since, self.quiet, self.p = REST, 0, 0, 0
+        if self.phase != TRACKS:
+            self.shown_a, self.quality = 0, k["none"]
+            return self._emit(0, self.p)
+        z = self._place
+        sign = -1 if z < 0 else 1
+        offset = self.offsets[(end - 1 if z < 0 else end) & 3]
+        beyond = max(sign * (z + offset), 0) - k["half"] - 4 * self.sure - self.sure
+        velocity = self._ahead()
+        if beyond >= 0:
+            z -= sign * beyond
+            share = k["log_5_8"] if beyond - k["half"] >= 0 else 0
+            bound = self._power(k["of_speed"] - log2(self.quiet + self._lead) - share)
+            velocity = sign * min(sign * velocity, bound)
+        if self.quiet >= k["max_time"]:
+            velocity = self.shown_a = 0
+        return self._emit(velocity, z)
+
+    def _emit(self, velocity: int, place: int | None = None) -> Row:
+        """Return what is shown."""
+        k, place = self._k, self._place if place is None else place
+        shown = self._product(velocity, k["tick"], "shown")
+        noise = self._round(self.log_limit - k["order"] + self.log_share, 1)
+        return (
+            max(-k["most_shown"], min(shown, k["most_shown"])),
+            place,
+            min(self._power(noise + self.quality - self.log_memory), k["most_quality"]),
+            self._product(self.shown_a, k["slope"], "acceleration"),
+        )

@@ -1,0 +1,46 @@
+"""The listing of the tracking method computes what the recursion says, on every way, and nothing overflows."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from support.nightly import nightly
+from support.tracking import Interpreter, core, windows
+
+from tachometry.sim.golden.methods.track import rows
+from tachometry.spec import TrackTachometer
+
+# Ticks of few clocks and of many, of one length and of several; words as wide as they come.
+CORES = [
+    core(tick="200us", clock="12MHz", max_speed="500rad/s", max_time="8ms"),
+    core(external_tick="yes", max_tick_period="683us", ppr="81000"),
+    core(tick="1ms", max_time="20ms", ppr="16"),
+    core(max_memory="5ms"),
+]
+# Motions that meet every instruction.
+MOTIONS = [(CORES[0], 1, 1100), (CORES[1], 4, 300), (CORES[1], 5, 300), (CORES[2], 3, 300), (CORES[3], 5, 400)]
+
+
+def run(spec: TrackTachometer, seed: int, n_ticks: int) -> Counter[int]:
+    """Run the program; how often each instruction was met."""
+    held = windows(spec, seed, n_ticks)
+    machine = Interpreter(spec.program)
+    found = np.array([machine.tick(*row) for row in held.rows()])
+    wrong = np.flatnonzero((found != rows(spec.form, spec.program.lead, held)).any(axis=1))
+    assert not len(wrong), f"seed {seed}, tick {wrong[0]}"
+    return machine.met
+
+
+def test_listing() -> None:
+    """Every instruction is met."""
+    met = sum((run(*motion) for motion in MOTIONS), Counter[int]())
+    code = CORES[0].program.code
+    labels = {place: label for label, place in code.labels.items()}
+    missed = [(labels.get(place), one) for place, one in enumerate(code.instructions) if not met[place]]
+    assert not missed
+
+
+@nightly
+@pytest.mark.parametrize("seed", range(2, 22))
+def test_more_motions(seed: int) -> None:
+    run(CORES[seed % len(CORES)], seed, 4000)

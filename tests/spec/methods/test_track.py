@@ -1,0 +1,68 @@
+"""Options, widths and latencies of the tracking core, and what is refused."""
+
+from fractions import Fraction
+
+import pytest
+from support.tracking import core
+
+from tachometry.spec import ParameterError, TrackTachometer
+from tachometry.spec.formats.tracking import GREATEST_ACCELERATION, WIDTH
+from tachometry.spec.formats.tracking_code import FIRST_CHOSEN, QUICK
+
+
+def test_ends_of_ranges() -> None:
+    assert [core(fine_bits=bits).fine_bits for bits in ("1", "16")] == [1, 16]
+    assert [core(max_memory=time).max_memory for time in ("960", "20us", "4s")] == [960, 960, 192_000_000]
+    assert core().max_memory is None
+    for name, text, allowed in (
+        ("fine_bits", "0", "from 1 to 16, not 0"),
+        ("fine_bits", "17", "from 1 to 16, not 17"),
+        ("max_memory", "959", "from 960, a tick, to 192000000 clocks, not 959"),
+        ("max_memory", "192000001", "from 960, a tick, to 192000000 clocks, not 192000001"),
+        ("multiplier", "large", "^multiplier must be auto, serial or block, not 'large'"),
+    ):
+        with pytest.raises(ParameterError, match=allowed):
+            core(**{name: text})
+
+
+def with_tick(cycles: int, multiplier: str) -> TrackTachometer:
+    return core(tick=str(cycles), max_time=str(500 * cycles), multiplier=multiplier)
+
+
+@pytest.mark.parametrize("multiplier", ["serial", "block"])
+def test_the_shortest_tick_is_that_of_the_program(multiplier: str) -> None:
+    """Its last instruction, and three clocks until the first; the update comes earlier."""
+    spec = core(multiplier=multiplier)
+    shortest = spec.times.min_tick_cycles
+    assert shortest == spec.program.all_clocks + 3 == spec.latency.busy
+    assert spec.latency.datapath == spec.program.clocks + 3 < shortest
+    assert with_tick(shortest, multiplier).times.min_tick_cycles == shortest
+    with pytest.raises(ParameterError, match=f"^tick_cycles must be at least {shortest} "):
+        with_tick(shortest - 1, multiplier)
+
+
+def test_the_multiplier_is_serial_where_that_fits_the_tick() -> None:
+    serial = core(multiplier="serial").times.min_tick_cycles
+    for cycles, quick in ((serial, False), (serial - 1, True)):
+        assert (with_tick(cycles, "auto").program.times == QUICK) == quick
+    assert core(multiplier="block").program.times == QUICK
+    assert core(multiplier="block").latency.datapath < core(multiplier="serial").latency.datapath / 2
+
+
+@pytest.mark.parametrize("options", [{}, {"ppr": "16", "decoding": "1"}, {"ppr": "81000", "max_speed": "2000rpm"}])
+@pytest.mark.parametrize("times", [{}, {"clock": "12MHz", "tick": "100us"}, {"tick": "1ms"}, {"clock": "100MHz"}])
+def test_words_hold_the_greatest_speed_and_acceleration(options: dict[str, str], times: dict[str, str]) -> None:
+    """Eight times the greatest speed fits, and what is finer than a place in a tick at any."""
+    spec = core(**options, **times)
+    form = spec.form
+    most = 2 ** (WIDTH - 2)
+    speed = Fraction(form.max_count, form.longest_tick)
+    assert 8 * speed * 2**form.velocity_bits <= most < 32 * speed * 2**form.velocity_bits
+    acceleration = GREATEST_ACCELERATION * spec.encoder.counts_per_rev / 6.2832 / spec.timing.clock_hz**2
+    assert acceleration * 2**form.acceleration_bits <= most
+    assert (form.longest_tick << form.time_bits) < 1 << form.factor_bits
+    assert form.most_number * (form.longest_tick - 1) < 1 << form.times_bits
+    assert all(0 <= shift < 64 for shift in spec.program.shifts)
+    assert len(spec.program.shifts) < 15  # each has a number of four bits, the last of which is another
+    assert all(abs(value) < 1 << WIDTH - 1 for value in spec.program.words.values())
+    assert len(spec.program.words) <= FIRST_CHOSEN
