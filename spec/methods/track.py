@@ -187,12 +187,10 @@ class TrackTachometer(TachometerSpec):
             raise ParameterError("multiplier", f"must be auto, serial or block, not {self.multiplier!r}")
         if not 1 <= self.fine_bits <= 16:
             raise ParameterError("fine_bits", f"must be from 1 to 16, not {self.fine_bits}")
-        longest = MOST_MEMORY * self.timing.clock_hz
-        if self.max_memory is not None and not self.timing.tick_cycles <= self.max_memory <= longest:
-            raise ParameterError(
-                "max_memory",
-                f"must be from {self.timing.tick_cycles}, a tick, to {longest} clocks, not {self.max_memory}",
-            )
+        shortest, longest = self.timing.tick_cycles, MOST_MEMORY * self.timing.clock_hz
+        if self.max_memory is not None and not shortest <= self.max_memory <= longest:
+            least, given = (format_time(self.times.seconds(clocks)) for clocks in (shortest, self.max_memory))
+            raise ParameterError("max_memory", f"must be from {least}, a tick, to {MOST_MEMORY}s, not {given}")
         super().__post_init__()
         if self.bounds:
             raise ParameterError("bounds", f"must not be given with method {self.method}: no window encloses its speed")

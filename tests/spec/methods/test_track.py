@@ -17,8 +17,8 @@ def test_ends_of_ranges() -> None:
     for name, text, allowed in (
         ("fine_bits", "0", "from 1 to 16, not 0"),
         ("fine_bits", "17", "from 1 to 16, not 17"),
-        ("max_memory", "959", "from 960, a tick, to 192000000 clocks, not 959"),
-        ("max_memory", "192000001", "from 960, a tick, to 192000000 clocks, not 192000001"),
+        ("max_memory", "959", "from 20us, a tick, to 4s, not 19.9791667us"),
+        ("max_memory", "192000001", "from 20us, a tick, to 4s, not 4.00000002s"),
         ("multiplier", "large", "^multiplier must be auto, serial or block, not 'large'"),
     ):
         with pytest.raises(ParameterError, match=allowed):
