@@ -71,7 +71,7 @@ test-all: lint icarus lowest ## lint, types and all tests: every pair of options
 lowest: $(VENV)/.test icarus ## a smoke run with the lowest versions that pyproject.toml allows of what it names
 	$(PIP) uv
 	$(BIN)/uv venv -q --clear -p $(BIN)/python build/lowest
-	$(BIN)/uv pip install -q -p build/lowest/bin/python --resolution lowest-direct '.[test]'
+	UV_NATIVE_TLS=true $(BIN)/uv pip install -q -p build/lowest/bin/python --resolution lowest-direct '.[test]'
 	BIN=build/lowest/bin OUT=build/lowest/demo TIME=500ms sh docs/demo.sh
 	build/lowest/bin/pytest -q -n auto -m "not nightly" -W default::DeprecationWarning -W default::PendingDeprecationWarning $(SMOKE)
 

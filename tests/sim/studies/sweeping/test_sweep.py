@@ -20,7 +20,7 @@ from tachometry.sim.studies.sweeping import sweep
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, OtherCode, Point, code_digest, run_packed, run_point
 from tachometry.spec import METHODS, Encoder, MTTachometer, RairanTachometer, Speed, STachometer, Timing
 
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(sweep.__file__).resolve().parents[3]  # of the layers, in the tree or where they are installed
 TIMING = Timing(1_000_000, 1000, 20)
 SPEC = STachometer(encoder=Encoder(100), timing=TIMING)
 TEXT = "sine:30rad/s:5Hz:400ms"
