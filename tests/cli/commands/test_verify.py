@@ -135,7 +135,7 @@ def test_workers_end_with_a_command_that_is_killed() -> None:
 
 
 def test_signals_are_held_back_while_workers_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is raised in a fork is lost; the workers end with the context."""
+    """A fork loses what is raised in it; the workers end with the context."""
     seen: list[Any] = []
 
     @contextmanager
