@@ -203,7 +203,6 @@ class TrackMachine(wiring.Component):
             if name:
                 with m.If(go & (now.output == number)):
                     m.d.sync += getattr(self, name).eq(total)
-        self.inside = go, now.jump, sum_  # for tests
         # The unit.
         uses = from_unit | ((now.start != Start.NONE) & (now.start != Start.CHANCE))
         m.d.comb += [

@@ -95,7 +95,7 @@ class Unit(wiring.Component):
             place.eq((~self.sum)[low : low + 9] - 2 * GAIN_STEPS),
             gain.eq(Mux(place >= GAINS, GAINS - 1, place)),
         ]
-        first_gains = (len(self._program.tables) - 3 * GAINS) // GAINS
+        first_gains = (len(values) - 3 * GAINS) // GAINS
         self.gain_address = Cat(gain, (how[:2] + first_gains)[:3])
         self.power_address = self.sum[LOG_BITS - EXP_INDEX : LOG_BITS]
         # How far powers, products, and all others, go to the right.
@@ -246,7 +246,7 @@ class State(Enum):
 
 
 class SmallUnit(Unit):
-    """One register that is shifted by 16, by 4 or by 1 a clock, and adds for products; `SMALL` has its times."""
+    """One register that is shifted by 16, by 4 or by 1 a clock, and adds for products; see `small_times`."""
 
     def _work(self, m: Module) -> None:
         bits, doing = self._bits, self.doing

@@ -25,6 +25,7 @@ from tachometry.spec.language.units import format_time
 
 FETCH_CLOCKS = 3  # to fetch the first instruction, to read its word, and to hold the result
 NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quarter of what is left at constant speed
+_MAX_TIME = "100ms"  # by default
 _MULTIPLIERS = ("auto", "serial", "block")
 
 
@@ -143,7 +144,7 @@ class TrackTachometer(TachometerSpec):
         If a parameter is out of range.
     """
 
-    timing: Timing = Timing.parse(max_time="100ms")  # noqa: RUF009
+    timing: Timing = Timing.parse(max_time=_MAX_TIME)  # noqa: RUF009
     max_memory: int | None = option(
         None,
         "Longest memory, for use inside a control loop: it follows a change that it does not see yet as if the memory "
@@ -164,7 +165,7 @@ class TrackTachometer(TachometerSpec):
     fine_bits: int = option(6, "Fraction bits of position_fine, 1 to 16.", metavar="N", tests=("", "1", "16"))
 
     method = "track"
-    usual = MappingProxyType({"max-time": "100ms"})
+    usual = MappingProxyType({"max-time": _MAX_TIME})
     facts = Facts(
         title="Tracking",
         summary="tracks position, velocity and acceleration",

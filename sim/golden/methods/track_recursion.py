@@ -184,8 +184,7 @@ class Recursion:
         self.p = p - self._moved + self._power(log_e + x + self._gain(0), sign)
         change, self.error = e - self.error, e
         self._show_order()
-        shown = self._ahead()
-        row = self._emit(shown)
+        row = self._emit(self._ahead())
         self._learn(n, e, change, kind)
         self._ready()
         return row
