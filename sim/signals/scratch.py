@@ -68,10 +68,12 @@ class Claim:
     def __init__(self, parent: Path) -> None:
         while True:
             self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=parent))
-            self._lock = _lock(self.folder, wait=True)
+            self._lock = None
+            with suppress(FileNotFoundError):
+                self._lock = _lock(self.folder, wait=True)
             if self.folder.exists():
                 return
-            if self._lock is not None:  # another process has just taken it for one that was left
+            if self._lock is not None:  # another process or thread has just taken it for one that was left
                 os.close(self._lock)
 
     def remove(self) -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -136,22 +137,18 @@ def test_a_pass_that_drops_inputs_is_off(version: str, without: bool, monkeypatc
 
 def test_builds_at_the_same_time(folder: Path) -> None:
     """Each is given a whole file, whoever is first, and other processes find it."""
-    found: list[bytes] = []
-    together = threading.Barrier(4)
+    together = threading.Barrier(4, timeout=60)  # one that fails must not leave the others waiting
 
-    def work(k: int) -> None:
+    def work(k: int) -> bytes:
         def make(inside: Path) -> Path:
             together.wait()
             (inside / "x").write_bytes(b"made by %d" % k * 100_000)
             return inside / "x"
 
-        found.append(cached("one", ".bin", make).read_bytes())
+        return cached("one", ".bin", make).read_bytes()
 
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(work, range(4)))
     assert sorted(found) == [b"made by %d" % k * 100_000 for k in range(4)]
     make = Maker()
     assert cached("one", ".bin", make).read_bytes() in found

@@ -3,8 +3,11 @@
 import os
 import signal
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -63,6 +66,22 @@ def test_what_killed_processes_have_left_is_removed(tmp_path: Path) -> None:
     with scratch(tmp_path) as living, scratch(tmp_path) as other:
         assert set(tmp_path.iterdir()) == {living, other, tmp_path / ".tachometry-cache"}
     assert list(tmp_path.iterdir()) == [tmp_path / ".tachometry-cache"]
+
+
+def test_a_folder_that_another_run_takes_for_one_that_was_left_is_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def make(**options: Any) -> str:
+        made.append(tempfile.mkdtemp(**options))
+        if len(made) == 1:
+            os.rmdir(made[0])
+        return made[-1]
+
+    monkeypatch.setattr("tachometry.sim.signals.scratch.tempfile", SimpleNamespace(mkdtemp=make))
+    with scratch(tmp_path) as folder:
+        assert [folder] == list(tmp_path.iterdir())
 
 
 TOOL = """
