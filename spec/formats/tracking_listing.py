@@ -154,7 +154,7 @@ shown:
     times velocity shown
     z out position_fine
     ~ min most_shown max least_shown out velocity
-    limit - order + log_X over 1        # D·√X
+    trouble + log_4 max zero + limit - order + log_X over 1  # D·√X, more if errors keep a sign
     ~ + quality - log_T exp
     ~ min most_quality out quality
     slope by

@@ -8,7 +8,7 @@ struct Recursion {
   const int64_t *logs, *powers, *gains, *reversed;
   int64_t phase = 0, turn = 0, noises, p = 0, v = 0, a = 0, shown_v = 0, shown_a = 0, memory = 0, log_memory = 0;
   int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
-  int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit = 0, chance, moved = 0, quality = 0;
+  int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit = 0, trouble = 0, chance, moved = 0, quality = 0;
   int64_t *row = nullptr;
 
   Recursion(const Constants &k, const int64_t *logs, const int64_t *powers, const int64_t *gains, const int64_t *reversed)
@@ -52,7 +52,8 @@ struct Recursion {
     int64_t shown = product(velocity, k.tick, k.shown);
     row[0] = std::max(-k.most_shown, std::min(shown, k.most_shown));
     row[1] = place;
-    row[2] = std::min(power(round(log_limit - k.order + log_share, 1) + quality - log_memory, 1), k.most_quality);
+    int64_t more = std::max<int64_t>(trouble + k.log_4, 0);
+    row[2] = std::min(power(round(more + log_limit - k.order + log_share, 1) + quality - log_memory, 1), k.most_quality);
     row[3] = product(shown_a, k.slope, k.acceleration);
   }
 
@@ -146,7 +147,7 @@ struct Recursion {
     int64_t lagging = log_share + log_limit - k.order_lag;
     if (log_share + k.log_256 < 0) sure += round(noise, 1), lagging += k.log_9_4;
     grows = 1, log_growth = 0;
-    int64_t trouble = 2 * log2(lag) - lagging;
+    trouble = 2 * log2(lag) - lagging;
     if (trouble >= 0) {
       grows = -1, log_growth = k.log_half;
       if (trouble - k.log_4 >= 0) slow_until = 2 * memory;

@@ -57,7 +57,7 @@ class Recursion:
         self.log_share = -k["log_4"]
         self.offsets = [0] * 4
         self.grows, self.log_growth = 1, 0
-        self.log_limit = 0
+        self.log_limit = self.trouble = 0
         self._chance, self.quality = _HALF, 0
 
     # The arithmetic.
@@ -235,10 +235,10 @@ class Recursion:
             self.sure += self._round(self.noise, 1)
             lagging += k["log_9_4"]
         self.grows, self.log_growth = 1, 0
-        trouble = 2 * log2(self.lag) - lagging
-        if trouble >= 0:
+        self.trouble = 2 * log2(self.lag) - lagging
+        if self.trouble >= 0:
             self.grows, self.log_growth = -1, k["log_half"]
-            if trouble - k["log_4"] >= 0:
+            if self.trouble - k["log_4"] >= 0:
                 self.slow_until = 2 * self.memory
         elif self.memory < self.slow_until:
             self.log_growth = k["log_eighth"]
@@ -300,7 +300,8 @@ class Recursion:
         """Return what is shown."""
         k, place = self._k, self._place if place is None else place
         shown = self._product(velocity, k["tick"], "shown")
-        noise = self._round(self.log_limit - k["order"] + self.log_share, 1)
+        more = max(self.trouble + k["log_4"], 0)
+        noise = self._round(more + self.log_limit - k["order"] + self.log_share, 1)
         return (
             max(-k["most_shown"], min(shown, k["most_shown"])),
             place,
