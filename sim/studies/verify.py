@@ -9,8 +9,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import Pool, parent_process
-from typing import TypeVar
+from itertools import islice
+from multiprocessing import Pipe, Process, parent_process
+from multiprocessing.connection import wait
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,6 +34,7 @@ Result = TypeVar("Result")
 _EDGES, _MOST_EDGES = 300, 50_000  # at a speed, of a motion
 # Some thousand times slower than the others, it runs a thousandth of their clocks.
 _SLOW, _SLOW_SHARE, _SLOW_LEAST = "pysim", 1000, 10_000
+_PATIENCE = 10.0  # seconds in which a process that is told to end does so
 
 
 @dataclass(frozen=True)
@@ -155,14 +158,21 @@ def _check(
     return core, verify(core.spec, engines, n_clocks, seed)
 
 
-def _heed_only_the_pool() -> None:
-    """In a process of the pool: ignore Ctrl-C and a closed terminal, at which the main process ends the others; end
-    after it.
+def _work(check: Callable[[Core], Result], calls: Any) -> None:
+    """In a process of its own: answer every core that is sent.
+
+    The main process ends it at Ctrl-C and when the terminal is closed, so that it ignores both.
     """
     for name in {"SIGINT", "SIGHUP"} & set(dir(signal)):
         signal.signal(getattr(signal, name), signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(1))  # in order, with a compiler that it runs
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    while True:
+        core = calls.recv()
+        try:
+            calls.send((check(core), None))
+        except Exception as error:
+            calls.send((None, error))
 
 
 def _end_with_the_parent() -> None:
@@ -175,14 +185,51 @@ def _end_with_the_parent() -> None:
 
 @contextmanager
 def _each(check: Callable[[Core], Result], cores: list[Core], n_jobs: int) -> Iterator[Iterable[Result]]:
-    """Yield results as they come; what still runs ends with the context."""
+    """Yield results as they come; what still runs ends with the context.
+
+    Taking a result raises OSError if a process was killed, as the system does when memory runs out.
+    """
     if n_jobs == 1:
         yield map(check, cores)
         return
+    processes: list[Process] = []
     with ExitStack() as stack:
+        stack.callback(_end, processes)
+        ends = []
         with held_back():  # what is raised in a fork is lost
-            pool = stack.enter_context(Pool(n_jobs, _heed_only_the_pool))
-        yield pool.imap_unordered(check, cores)
+            for _ in cores[:n_jobs]:
+                mine, theirs = Pipe()
+                ends.append(stack.enter_context(mine))
+                with theirs:
+                    processes.append(Process(target=_work, args=(check, theirs), daemon=True))
+                    processes[-1].start()
+        left = iter(cores)
+        for end, core in zip(ends, left, strict=False):
+            end.send(core)
+        yield (_answer(ends, left) for _ in cores)
+
+
+def _answer(ends: list[Any], left: Iterator[Any]) -> Any:
+    """Return the next answer of a process, which is given one of the cores that are left."""
+    end: Any = wait(ends)[0]
+    try:
+        result, error = end.recv()
+    except EOFError:
+        raise OSError("a process of verify was killed, perhaps for want of memory: take fewer --jobs") from None
+    if error is not None:
+        raise error
+    for core in islice(left, 1):
+        end.send(core)
+    return result
+
+
+def _end(processes: list[Process]) -> None:
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.join(_PATIENCE)
+        process.kill()
+        process.join()
 
 
 def motions(spec: CoreSpec, seed: int, n_clocks: int) -> Iterator[tuple[int, Trace]]:

@@ -144,18 +144,35 @@ def test_signals_are_held_back_while_workers_start(monkeypatch: pytest.MonkeyPat
         yield
         seen.append("free")
 
-    def start(*arguments: Any) -> Any:
-        seen.append(real(*arguments))
+    def start(*arguments: Any, **options: Any) -> Any:
+        seen.append(real(*arguments, **options))
         return seen[-1]
 
-    real = vars(study)["Pool"]
-    monkeypatch.setattr(study, "Pool", start)
+    real = vars(study)["Process"]
+    monkeypatch.setattr(study, "Process", start)
     monkeypatch.setattr(study, "held_back", held_back)
-    with study._each(abs, [1], 2) as results:
-        assert list(results) == [1]
-    assert (seen[0], seen[2]) == ("held", "free")
-    with pytest.raises(ValueError, match="Pool not running"):
-        seen[1].map(abs, [1])
+    with study._each(abs, [1, -2, 3], 2) as results:
+        assert sorted(results) == [1, 2, 3]
+    first, *workers, last = seen
+    assert (first, last, len(workers)) == ("held", "free", 2)
+    assert not any(worker.is_alive() for worker in workers)
+
+
+def end_or_wait(core: int) -> None:
+    os._exit(9) if core == 1 else signal.pause()
+
+
+@pytest.mark.parametrize(
+    ("check", "error", "message"),
+    [
+        (end_or_wait, OSError, "^a process of verify was killed, perhaps for want of memory: take fewer --jobs$"),
+        (int, ValueError, "invalid literal for int"),
+    ],
+)
+def test_a_worker_that_fails_is_told(check: Any, error: type[Exception], message: str) -> None:
+    cores: list[Any] = [0, 1] if check is end_or_wait else ["x", "y"]
+    with pytest.raises(error, match=message), study._each(check, cores, 2) as results:
+        list(results)
 
 
 def compile_for_ever(folder: Path, core: object) -> None:

@@ -141,7 +141,7 @@ def test_builds_at_the_same_time(folder: Path) -> None:
 
     def work(k: int) -> bytes:
         def make(inside: Path) -> Path:
-            together.wait()
+            together.wait(60)
             (inside / "x").write_bytes(b"made by %d" % k * 100_000)
             return inside / "x"
 
@@ -168,7 +168,7 @@ trace = PinTrace(np.array([0, 30, 90]), np.array([0, 1, 1], dtype=np.uint8), np.
 assert compare(golden.run(spec, trace), pick("cxxrtl").run(spec, trace)) == (0, [])
 """
     runs = [subprocess.Popen([sys.executable, "-c", program]) for _ in range(2)]
-    assert [run.wait() for run in runs] == [0, 0]
+    assert [run.wait(300) for run in runs] == [0, 0]
     assert not list(folder.glob(".tachometry-*"))
     # A run of which only half a library was left makes it anew.
     for library in folder.glob("*.so"):
