@@ -24,7 +24,7 @@ from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.studies.plan import plan_at
 from tachometry.sim.testbench.vectors import cocotb_bench
-from tachometry.spec import AxesSpec, TachometerSpec
+from tachometry.spec import AxesSpec
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
 from tachometry.spec.registers.manifest import check_module_name
@@ -126,7 +126,7 @@ def generate(
     bus: str | None,
     baud: int | None,
     target: str,
-    record: Callable[[TachometerSpec], Encoding] | None,
+    record: Callable[..., Encoding] | None,
     tables: list[Path],
 ) -> int:
     """Write a core as Verilog, with its manifest and all that it takes to build it into a design."""
@@ -152,13 +152,14 @@ def generate(
     return 0
 
 
-def _bench(spec: AnySpec, name: str, bus: str, record: Callable[[TachometerSpec], Encoding] | None) -> dict[str, str]:
-    if spec.axes is not None:
-        raise ValueError("--testbench must not be given together with --axes: it is of one axis")
+def _bench(spec: AnySpec, name: str, bus: str, record: Callable[..., Encoding] | None) -> dict[str, str]:
     if spec is not spec.tachometer and bus != "none":
         raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
 
-    return cocotb_bench(spec, name, None if record is None else record(spec.tachometer).recording)
+    recordings = None
+    if record is not None:
+        recordings = [record(spec.tachometer, axis, spec.axes).recording for axis in range(spec.axes or 1)]
+    return cocotb_bench(spec, name, recordings)
 
 
 @singledispatch

@@ -4,7 +4,7 @@ from typing import Any
 
 from tachometry.cli.options.option import Group, option
 from tachometry.spec import ParameterError, TachometerSpec, with_axes
-from tachometry.spec.methods.axes import MAX_AXES
+from tachometry.spec.methods.axis import MAX_AXES
 
 _AXES = "Axes"
 

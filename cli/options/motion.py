@@ -37,7 +37,7 @@ def _motion(required: bool) -> Callable[[Any], Any]:
         "--motion",
         required=required,
         metavar="MOTION",
-        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below. With --axes of simulate "
+        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below. With --axes "
         "several, with commas between: each axis has its own, the last one those that are left, and the next seed.",
     )
 

@@ -9,8 +9,13 @@ from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.axes.axis_window import AxisWindow
 from tachometry.hdl.axes.turns import Turns
+from tachometry.hdl.output.update import update_layout
+from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.spec.methods.axes import DECIDE, READ, AxesSpec
+from tachometry.spec.methods.axes import AxesSpec
+from tachometry.spec.methods.axis import DECIDE, READ
+
+_UPDATE = ("velocity", "interval", "forced")
 
 
 class _Turn:
@@ -18,10 +23,13 @@ class _Turn:
 
     def __init__(self, datapath: "AxesDatapath") -> None:
         position, window = datapath.position.shape(), datapath.window.state.shape()
-        kept = data.StructLayout({"position": position, "window": window})
+        resets = "handed_position" in datapath.signature.members
+        kept = data.StructLayout({"window": window} if resets else {"position": position, "window": window})
+        self.resets = resets
         self.decides = datapath.turns.step[DECIDE]
         self.after = Signal(kept)
-        self.count = Signal.like(datapath.count)
+        handed = ("count", "handed_position") if resets else ("count",)
+        self.handed = Signal(data.StructLayout({name: getattr(datapath, name).shape() for name in handed}))
         self.before = Signal(kept)
 
 
@@ -45,12 +53,14 @@ class AxesDatapath(wiring.Component):
     slot : In(range(slots))
         Whose count it is.
     count : In(signed)
+    handed_position : In(signed)
+        Of this axis, only with `index_reset`; else it is the sum of the counts.
     tick : Out(1)
         One clock for every axis in every tick.
     axis : Out(range(axes))
         Valid with `tick`; as are `pulse_count`, `position`, `overflow` and `stalled`.
     velocity_valid : Out(1)
-        Only together with `tick`: `velocity`, `interval` and `forced` are new.
+        Only together with `tick`: `velocity`, `interval`, `forced` are new, and `velocity_overflow` if there is one.
     """
 
     def __init__(self, spec: AxesSpec) -> None:
@@ -71,11 +81,15 @@ class AxesDatapath(wiring.Component):
             tag=data.StructLayout({"forced": 1}),
             serial=True,
         )
+        self.velocity_output: PipelinedVelocityOutput | None = None
+        if axis.scale.output is not None:
+            self.velocity_output = PipelinedVelocityOutput(axis.scale.output, update_layout(axis))
         super().__init__(
             {
                 "complete": In(1),
                 "slot": In(range(spec.slots)),
-                "count": In(signed(spec.rounds.bit_length() + 1)),
+                "count": In(signed(axis.times.longest_tick.bit_length() + 1)),
+                **({"handed_position": In(signed(axis.position_width))} if axis.index_reset else {}),
                 "tick": Out(1),
                 "axis": Out(len(self.turns.axis)),
                 "pulse_count": Out(signed(axis.widths.count)),
@@ -83,9 +97,10 @@ class AxesDatapath(wiring.Component):
                 "overflow": Out(1),
                 "stalled": Out(1),
                 "velocity_valid": Out(1),
-                "velocity": Out(signed(axis.widths.native)),
+                "velocity": Out(signed(axis.widths.velocity)),
                 "interval": Out(axis.widths.interval),
                 "forced": Out(1),
+                **({} if axis.scale.output is None else {"velocity_overflow": Out(1)}),
             }
         )
 
@@ -109,33 +124,36 @@ class AxesDatapath(wiring.Component):
     def _read(self, m: Module, turn: _Turn) -> None:
         """Read the count that was handed over, and the state; both are registered, as block RAM is slow."""
         turns = self.turns
-        m.submodules.handed_over = handed = Memory(shape=self.count.shape(), depth=self._spec.slots, init=[])
+        shape = turn.handed.shape()
+        m.submodules.handed_over = handed = Memory(shape=shape, depth=self._spec.slots, init=[])
         read_count = handed.read_port()
         write_count = handed.write_port()
         m.d.comb += [
             turns.begin.eq(self.complete & (self.slot == 0)),
             write_count.addr.eq(self.slot),
-            write_count.data.eq(self.count),
+            *(write_count.data[name].eq(getattr(self, name)) for name in shape.members),
             write_count.en.eq(self.complete),
             read_count.addr.eq(turns.axis),
         ]
         stored = self._stored(m, turn)
         with m.If(turns.step[READ - 1]):
-            m.d.sync += [turn.count.eq(read_count.data), turn.before.eq(stored)]
+            m.d.sync += [turn.handed.eq(read_count.data), turn.before.eq(stored)]
 
     def _add(self, m: Module, turn: _Turn) -> None:
         """Make m_e and the position."""
         turns, axis = self.turns, self._spec.axis
         overflow = Signal()
-        m_e = turn.count
-        if axis.widths.max_count < self._spec.rounds:
-            m_e, overflow = saturate(m, turn.count, axis.widths.max_count)
+        count = turn.handed.count
+        m_e = count
+        if axis.widths.max_count < axis.times.longest_tick:
+            m_e, overflow = saturate(m, count, axis.widths.max_count)
+        position = turn.handed.handed_position if turn.resets else turn.before.position + count
         with m.If(turns.step[READ]):
             m.d.sync += [
                 self.axis.eq(turns.axis),
                 self.pulse_count.eq(m_e),
                 self.overflow.eq(overflow),
-                self.position.eq(turn.before.position + turn.count),
+                self.position.eq(position),
             ]
             with m.If(turns.clears):
                 m.d.sync += [self.pulse_count.eq(0), self.overflow.eq(0), self.position.eq(0)]
@@ -152,7 +170,7 @@ class AxesDatapath(wiring.Component):
             window.clears.eq(self.turns.clears),
             window.state.eq(turn.before.window),
             window.m_e.eq(self.pulse_count),
-            turn.after.position.eq(self.position),
+            *([] if turn.resets else [turn.after.position.eq(self.position)]),
             turn.after.window.eq(window.next),
             quotient.m.eq(window.state.m_s),
             quotient.load.eq(turn.decides),
@@ -164,16 +182,23 @@ class AxesDatapath(wiring.Component):
 
     def _show(self, m: Module) -> None:
         """Show a tick as late as its velocity: what the next turn has by then does not show yet."""
-        found = self.quotient.results
+        updates = self.quotient.results
+        if self.velocity_output is not None:
+            m.submodules.velocity_output = output = self.velocity_output
+            m.d.comb += output.updates.valid.eq(updates.valid)
+            m.d.comb += [output.updates.p[name].eq(updates.p["m" if name == "interval" else name]) for name in _UPDATE]
+            updates = output.shown
         ended = self.turns.step[-1] & ~self.turns.clears
         (tick,) = delay(m, ended, clocks=READ + 1)
         m.d.comb += [
             self.tick.eq(tick),
-            self.velocity_valid.eq(found.valid),
-            self.velocity.eq(found.p.velocity),
-            self.interval.eq(found.p.m),
-            self.forced.eq(found.p.forced),
+            self.velocity_valid.eq(updates.valid),
+            self.velocity.eq(updates.p.velocity),
+            self.interval.eq(updates.p.m if self.velocity_output is None else updates.p.interval),
+            self.forced.eq(updates.p.forced),
         ]
+        if self.velocity_output is not None:
+            m.d.comb += self.velocity_overflow.eq(updates.p.velocity_overflow)
 
     def _stored(self, m: Module, turn: _Turn) -> Value | data.View:
         """Return the state of the axis that has its turn, as it was; it becomes `after` where the axis decides."""

@@ -17,7 +17,7 @@ class AxisCounters(wiring.Component):
 
     Parameters
     ----------
-    axes, slots : int
+    slots : int
     rounds : int
         Rounds of a tick: most steps of an axis in it.
     decoding : int
@@ -26,10 +26,12 @@ class AxisCounters(wiring.Component):
     Members
     -------
     slot : In(range(slots))
-    first, last, ready : In(1)
+    first, last : In(1)
         Of this round, see `Rounds`.
-    level_a, level_b : In(axes)
-        Levels in this clock, bit k of axis k.
+    ready : In(1)
+        The levels of this round and of the one before are those of the lines.
+    level_a, level_b : In(1)
+        Levels of the axis whose slot it is.
     axis : Out(range(slots))
         Of the other outputs.
     step : Out(signed(2))
@@ -42,7 +44,7 @@ class AxisCounters(wiring.Component):
         Sum of its steps in this tick.
     """
 
-    def __init__(self, *, axes: int, slots: int, rounds: int, decoding: int) -> None:
+    def __init__(self, *, slots: int, rounds: int, decoding: int) -> None:
         self._slots = slots
         self._decoding = decoding
         super().__init__(
@@ -51,8 +53,8 @@ class AxisCounters(wiring.Component):
                 "first": In(1),
                 "last": In(1),
                 "ready": In(1),
-                "level_a": In(axes),
-                "level_b": In(axes),
+                "level_a": In(1),
+                "level_b": In(1),
                 "axis": Out(range(slots)),
                 "step": Out(signed(2)),
                 "decode_error": Out(1),
@@ -67,8 +69,7 @@ class AxisCounters(wiring.Component):
         m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
         read = memory.read_port()
         write = memory.write_port()
-        level_a, level_b = (of_slot(line, self.slot) for line in (self.level_a, self.level_b))
-        seen = level_a, level_b, self.slot, self.first, self.last, self.ready
+        seen = self.level_a, self.level_b, self.slot, self.first, self.last, self.ready
         a, b, slot, first, last, ready = delay(m, *seen, clocks=2)
         # Block RAM is slow.
         before = Signal(kept)

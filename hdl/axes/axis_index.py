@@ -5,7 +5,6 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.axes.axis_counters import of_slot
 from tachometry.hdl.wires.delay import delay
 
 
@@ -18,17 +17,21 @@ class AxisIndex(wiring.Component):
 
     Parameters
     ----------
-    axes, slots : int
+    slots : int
     width : int
         Bits of a position.
+    resets : bool
+        A rise sets the position to 0.
 
     Members
     -------
     slot : In(range(slots))
     ready : In(1)
         Of this round, see `Rounds`.
-    level_z : In(axes)
-        Levels in this clock, bit k of axis k.
+    level_z : In(1)
+        Level of the axis whose slot it is.
+    known : In(1)
+        The levels of this round and of the one before are those of the line.
     step : In(signed(2))
         Of the slot three clocks ago.
     axis : Out(range(slots))
@@ -37,19 +40,24 @@ class AxisIndex(wiring.Component):
         One clock per rise.
     index_position : Out(signed(width))
         Sum of the steps of this axis.
+    position : Out(signed(width))
+        The same, or 0 with a rise that resets.
     """
 
-    def __init__(self, *, axes: int, slots: int, width: int) -> None:
+    def __init__(self, *, slots: int, width: int, resets: bool) -> None:
         self._slots = slots
+        self._resets = resets
         super().__init__(
             {
                 "slot": In(range(slots)),
                 "ready": In(1),
-                "level_z": In(axes),
+                "level_z": In(1),
+                "known": In(1),
                 "step": In(signed(2)),
                 "axis": Out(range(slots)),
                 "index_valid": Out(1),
                 "index_position": Out(signed(width)),
+                "position": Out(signed(width)),
             }
         )
 
@@ -59,9 +67,9 @@ class AxisIndex(wiring.Component):
         m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
         read = memory.read_port()
         write = memory.write_port()
-        level, slot, ready = delay(m, of_slot(self.level_z, self.slot), self.slot, self.ready)
+        level, known, slot, ready = delay(m, self.level_z, self.known, self.slot, self.ready)
         m.d.comb += read.addr.eq(slot)
-        level, slot, ready = delay(m, level, slot, ready, clocks=2)
+        level, known, slot, ready = delay(m, level, known, slot, ready, clocks=2)
         # Block RAM is slow.
         before = Signal(kept)
         m.d.sync += before.eq(read.data)
@@ -69,14 +77,15 @@ class AxisIndex(wiring.Component):
         m.d.sync += [
             z.eq(level),
             self.axis.eq(slot),
-            self.index_valid.eq(ready & level & ~before.z),
+            self.index_valid.eq(known & level & ~before.z),
             # The memory is not that of a reset.
             self.index_position.eq(Mux(ready, before.position, 0) + self.step),
         ]
         m.d.comb += [
+            self.position.eq(Mux(self.index_valid & int(self._resets), 0, self.index_position)),
             write.addr.eq(self.axis),
             write.data.z.eq(z),
-            write.data.position.eq(self.index_position),
+            write.data.position.eq(self.position),
             write.en.eq(1),
         ]
         return m

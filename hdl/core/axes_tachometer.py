@@ -1,10 +1,13 @@
 """The whole core for many axes."""
 
+from collections.abc import Sequence
+
 from amaranth import Module, Signal, Value
 from amaranth.lib import wiring
 
 from tachometry.hdl.axes.axes_datapath import AxesDatapath
-from tachometry.hdl.axes.axis_counters import AxisCounters
+from tachometry.hdl.axes.axis_counters import AxisCounters, of_slot
+from tachometry.hdl.axes.axis_filter import AxisFilter
 from tachometry.hdl.axes.axis_index import AxisIndex
 from tachometry.hdl.axes.held_outputs import HeldOutputs
 from tachometry.hdl.axes.rounds import Rounds
@@ -12,7 +15,8 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
-from tachometry.spec.methods.axes import WARM_UP, AxesSpec
+from tachometry.spec.methods.axes import AxesSpec
+from tachometry.spec.methods.axis import WARM_UP
 
 
 class AxesTachometer(wiring.Component):
@@ -30,14 +34,19 @@ class AxesTachometer(wiring.Component):
     def __init__(self, spec: AxesSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        self.rounds = Rounds(spec.slots, spec.rounds, WARM_UP)
+        times = spec.axis.times
+        external = (times.min_tick_cycles, times.longest_tick) if spec.axis.external_tick else None
+        self.rounds = Rounds(spec.slots, spec.rounds, WARM_UP, external)
+        self.axis_filter: AxisFilter | None = None
+        if spec.axis.filter_clocks:
+            self.axis_filter = AxisFilter(slots=spec.slots, looks=spec.axis.filter_clocks, lines=spec.lines)
         self.axis_counters = AxisCounters(
-            axes=spec.axes, slots=spec.slots, rounds=spec.rounds, decoding=spec.axis.encoder.decoding
+            slots=spec.slots, rounds=times.longest_tick, decoding=spec.axis.encoder.decoding
         )
         self.datapath = AxesDatapath(spec)
         self.axis_index: AxisIndex | None = None
         if spec.axis.index:
-            self.axis_index = AxisIndex(axes=spec.axes, slots=spec.slots, width=spec.axis.position_width)
+            self.axis_index = AxisIndex(slots=spec.slots, width=spec.axis.position_width, resets=spec.axis.index_reset)
 
     @property
     def spec(self) -> AxesSpec:
@@ -50,31 +59,60 @@ class AxesTachometer(wiring.Component):
         m.submodules.rounds = rounds = self.rounds
         m.submodules.axis_counters = counters = self.axis_counters
         m.submodules.datapath = datapath = self.datapath
-        level = {pin.name: Signal(spec.axes, name=f"level_{pin.name}") for pin in spec.ports.pins}
+        level: dict[str, Value] = {pin.name: Signal(pin.width, name=f"level_{pin.name}") for pin in spec.ports.pins}
         for name, levels in level.items():
             m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), levels)
-        follow(m, counters, rounds, ("slot", "first", "last", "ready"))
+        if spec.axis.external_tick:
+            m.d.comb += [rounds.tick_in.eq(level["tick_in"]), self.tick_error.eq(rounds.tick_error)]
+        at, level, known = self._looks(m, {name: level[name] for name in spec.lines})
         m.d.comb += [
+            *(getattr(counters, name).eq(at[name]) for name in ("slot", "first", "last")),
+            counters.ready.eq(at["ready"] & known["a"] & known["b"]),
             counters.level_a.eq(level["a"]),
             counters.level_b.eq(level["b"]),
-            datapath.complete.eq(counters.complete),
-            datapath.slot.eq(counters.axis),
-            datapath.count.eq(counters.count),
             self.decode_error.eq(counters.decode_error),
             self.decode_error_axis.eq(counters.axis),
+        ]
+        handed: Sequence[Signal] = counters.complete, counters.axis, counters.count
+        if spec.axis.index_reset:  # the position is a clock later
+            handed = delay(m, *handed)
+        m.d.comb += [
+            box.eq(value) for box, value in zip((datapath.complete, datapath.slot, datapath.count), handed, strict=True)
         ]
         self._show(m, TICK, datapath.tick, "axis", datapath.axis, datapath)
         self._show(m, UPDATE, datapath.velocity_valid, "axis", datapath.axis, datapath)
         if self.axis_index is not None:
             m.submodules.axis_index = index = self.axis_index
             m.d.comb += [
-                index.slot.eq(rounds.slot),
-                index.ready.eq(rounds.ready),
+                index.slot.eq(at["slot"]),
+                index.ready.eq(at["ready"]),
+                index.known.eq(at["ready"] & known["z"]),
                 index.level_z.eq(level["z"]),
                 index.step.eq(counters.step),
             ]
+            if spec.axis.index_reset:
+                m.d.comb += datapath.handed_position.eq(index.position)
             self._show(m, INDEX, index.index_valid, "index_axis", index.axis, index)
         return m
+
+    def _looks(
+        self, m: Module, levels: dict[str, Value]
+    ) -> tuple[dict[str, Value], dict[str, Value], dict[str, Value]]:
+        """Return of the axis whose slot it is its place in the tick, its levels, and whether they are known by then."""
+        rounds = self.rounds
+        level = {name: of_slot(value, rounds.slot) for name, value in levels.items()}
+        names = ("slot", "first", "last", "ready")
+        if self.axis_filter is None:
+            known = dict.fromkeys(level, rounds.ready)
+            return {name: getattr(rounds, name) for name in names}, level, known
+        m.submodules.axis_filter = box = self.axis_filter
+        follow(m, box, rounds, (*names, "real"))
+        m.d.comb += [getattr(box, f"level_{name}").eq(value) for name, value in level.items()]
+        return (
+            {name: getattr(box, f"seen_{name}") for name in names},
+            {name: getattr(box, f"filtered_{name}") for name in level},
+            {name: getattr(box, f"known_{name}") for name in level},
+        )
 
     def _show(self, m: Module, name: str, strobe: Value, axis_name: str, axis: Value, box: wiring.Component) -> None:
         """Show what is new with a strobe: as it comes, or held for each axis."""

@@ -55,7 +55,7 @@ def _help(port: Port) -> str:
 
 def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     """Return where the synchroniser of each pin is in the core: the boxes from the outermost to itself."""
-    box = {"tick_in": ["sampling_clock"]}
+    box = {"tick_in": ["sampling_clock"]} if spec.axes is None else {}
     default = ["conditioner"] if spec.axes is None else []
     boxes = {pin.name: box.get(pin.name, default) for pin in spec.tachometer.ports.pins}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
@@ -87,12 +87,12 @@ def _(tacho: AxesSpec) -> dict[str, object]:
     return {
         "axes": tacho,
         # Before the first edge there are rounds in which no axis is counted.
-        "hold": max(_hold(tacho), 4 * tacho.slots),
+        "hold": max(_hold(tacho), (4 + tacho.axis.filter_clocks) * tacho.slots),
         "a": f"{{{', '.join(a)}}}",
         "b": f"{{{', '.join(b)}}}",
         "velocity": "velocity_0" if tacho.parallel else "velocity",
         "store": f"begin {stores} end" if tacho.parallel else "positions[axis] <= position;",
-        "compared": f"simulate --axes {tacho.axes}",
+        "compared": "generate --testbench cocotb",
         "expected": _MOVED * tacho.axis.encoder.decoding // 4,
     }
 

@@ -24,6 +24,8 @@ class ExternalTick(wiring.Component):
         Fewest and most clocks in a window.
     latency : int
         That of `tick`, at least 2.
+    synchronous : bool
+        `tick_in` is of the clock domain already, and a rise in a clock makes it the last of its window.
 
     Members
     -------
@@ -40,19 +42,23 @@ class ExternalTick(wiring.Component):
         If `min_cycles` is not in 2 … `max_cycles`.
     """
 
-    def __init__(self, min_cycles: int, max_cycles: int, latency: int = 2) -> None:
+    def __init__(self, min_cycles: int, max_cycles: int, latency: int = 2, *, synchronous: bool = False) -> None:
         if not 2 <= min_cycles <= max_cycles:
             raise ValueError(f"min_cycles must be from 2 to {max_cycles}, not {min_cycles}")
         self._min_cycles = min_cycles
         self._max_cycles = max_cycles
         self._latency = latency
+        self._synchronous = synchronous
         super().__init__({"tick_in": In(1), "last": Out(1), "tick_error": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         level = Signal()
         past = Signal()
-        m.submodules.sync_tick_in = Synchronizer(self.tick_in, level)
+        if self._synchronous:
+            m.d.comb += level.eq(self.tick_in)
+        else:
+            m.submodules.sync_tick_in = Synchronizer(self.tick_in, level)
         # Two clocks for the synchroniser, which has no reset, one for the level before.
         clocks_since_reset = Signal(3)
         m.d.sync += [past.eq(level), clocks_since_reset.eq((clocks_since_reset << 1) | 1)]

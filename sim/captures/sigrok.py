@@ -123,7 +123,7 @@ def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chun
     if trace.n_clocks < 1:
         raise ValueError(f"n_clocks must be at least 1, not {trace.n_clocks}")
     if isinstance(trace, AxesTrace):
-        level, channels = trace.levels, [f"{_CHANNELS[name]}{axis}" for axis, name in trace.names]
+        level, channels = trace.levels, [_channel(axis, name) for axis, name in trace.names]
     else:
         level, channels = trace.level.reshape(-1, 1), [_CHANNELS[name] for name in trace.lines]
     with writing(Path(path)) as beside, zipfile.ZipFile(beside, "w") as archive:
@@ -357,3 +357,8 @@ def _halves(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.flo
     scaled = x * 134217729.0  # 2^27 + 1
     high = scaled - (scaled - x)
     return high, x - high
+
+
+def _channel(axis: int, name: str) -> str:
+    """Return the channel of a line of one of many axes; all have the external tick together."""
+    return _CHANNELS[name] if name == "tick_in" else f"{_CHANNELS[name]}{axis}"

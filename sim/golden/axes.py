@@ -3,13 +3,16 @@
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.sim.signals.axes import AxesTrace
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.recording import PinTrace, merged
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
-from tachometry.spec.methods.axes import COUNT_LATENCY, AxesSpec
+from tachometry.spec.methods.axes import AxesSpec
+from tachometry.spec.methods.axis import WARM_UP
 
 
 def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]]) -> Run:
@@ -20,19 +23,25 @@ def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec,
     for axis, pins in enumerate(trace.each):
         rows = tables(spec.axis, seen(spec, pins, axis))
         ticks, updates = rows[TICK], rows[UPDATE]
-        number = (updates["cause"] - ticks.clock[0]) // spec.rounds
+        latency = spec.axis.latency.tick
         clocks = {
-            TICK: spec.tick_clock(axis, np.arange(len(ticks))),
-            UPDATE: spec.tick_clock(axis, number),
-            "decode_error": spec.look(axis, rows["decode_error"].clock) + COUNT_LATENCY,
-            INDEX: spec.look(axis, rows[INDEX].clock - spec.axis.latency.tick) + spec.latency.index,
+            TICK: spec.shown(axis, ticks.clock - latency),
+            UPDATE: spec.shown(axis, updates["cause"] - latency),
+            "decode_error": spec.look(axis, rows["decode_error"].clock) + spec.latency.count,
+            INDEX: spec.look(axis, rows[INDEX].clock - latency) + spec.latency.index,
+            "tick_error": spec.look(0, rows["tick_error"].clock - latency + 2),
         }
         for name, tables_of_name in found.items():
+            if name == "tick_error" and axis:
+                continue  # it is of all axes
             own = {"clock": clocks[name], "axis": np.full(len(rows[name]), axis)}
             tables_of_name.append(rows[name].having(**own))
     every = {name: _merged(each, trace.n_clocks) for name, each in found.items()}
     if spec.parallel:
-        every = {name: _held(table, spec.axis.ports.strobes[name], spec.axes) for name, table in every.items()}
+        strobes = spec.axis.ports.strobes
+        every = {
+            name: _held(table, strobes[name], spec.axes) if strobes[name] else table for name, table in every.items()
+        }
     named = {
         name: table.having(**{f"{name.removesuffix('_valid')}_axis": table["axis"]}) for name, table in every.items()
     }
@@ -45,13 +54,32 @@ def seen(spec: AxesSpec, pins: PinTrace, axis: int) -> PinTrace:
     The first level that counts is looked at in the third round; a core of its own has its first in the third clock.
     """
     core = spec.axis
-    first = spec.look(axis, core.latency.pin_to_count) - core.latency.pin_to_count
+    first = spec.look(axis, WARM_UP - 1) - (WARM_UP - 1)
     look = np.maximum(-(-(pins.clock - first) // spec.slots), 0)
     last = np.append(look[1:] != look[:-1], True)  # of the levels between two looks
     lines = {name: line[last] for name, line in pins.lines.items()}
     # So long that all that is shown within the trace has come.
-    n_clocks = pins.n_clocks // spec.slots + core.latency.datapath + 2 * spec.rounds
-    return PinTrace(look[last], n_clocks=n_clocks, **lines)
+    n_clocks = pins.n_clocks // spec.slots + core.latency.tick_to_velocity + 2 * spec.rounds
+    at = look[last]
+    if pins.tick_in is not None:
+        clock, level = _ticks(spec, pins)
+        merged_clock = merged(at, clock)
+        lines = {name: line[np.searchsorted(at, merged_clock, side="right") - 1] for name, line in lines.items()}
+        lines["tick_in"] = level[np.searchsorted(clock, merged_clock, side="right") - 1]
+        at = merged_clock
+    return PinTrace(at, n_clocks=n_clocks, **lines)
+
+
+def _ticks(spec: AxesSpec, pins: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Return clocks and levels of the external tick for an axis: a round is high if the line was high in any clock."""
+    assert pins.tick_in is not None
+    until = np.append(pins.clock[1:], pins.n_clocks)
+    high = pins.tick_in == 1
+    begin, end = ((clock[high] + TICK_IN_TO_WINDOW_END) // spec.slots - 1 for clock in (pins.clock, until - 1))
+    change = np.zeros(pins.n_clocks // spec.slots + 4, dtype=np.int64)
+    np.add.at(change, np.maximum(begin, 0), 1)
+    np.add.at(change, np.maximum(end + 1, 0), -1)
+    return np.arange(len(change)), (np.cumsum(change) > 0).astype(np.uint8)
 
 
 def _merged(tables: list[Table], n_clocks: int) -> Table:

@@ -34,9 +34,15 @@ class AxesTrace:
 
     @classmethod
     def of(cls, each: Sequence[PinTrace]) -> AxesTrace:
-        """Return traces up to where the last of them ends: where another ends earlier, its levels stay."""
-        n_clocks = max(trace.n_clocks for trace in each)
-        return cls(tuple(replace(trace, n_clocks=n_clocks) for trace in each))
+        """Return traces up to where the last of them ends: where another ends earlier, its levels stay. All have the
+        external ticks of the longest.
+        """
+        longest = max(each, key=lambda trace: trace.n_clocks)
+        n_clocks = longest.n_clocks
+        if longest.tick_in is None:
+            return cls(tuple(replace(trace, n_clocks=n_clocks) for trace in each))
+        rises = longest.clock[np.flatnonzero(np.diff(longest.tick_in, prepend=1) == 1)]
+        return cls(tuple(replace(trace, n_clocks=n_clocks, tick_in=None).with_tick_in(rises) for trace in each))
 
     @classmethod
     def placed(cls, recordings: Sequence[Recording], spec: AxesSpec) -> AxesTrace:
@@ -68,13 +74,17 @@ class AxesTrace:
         for axis, trace in enumerate(self.each):
             held = np.searchsorted(trace.clock, self.clock, side="right") - 1
             for name, line in trace.lines.items():
+                if name == _SHARED and axis:
+                    continue
                 found[name] |= line[held].astype(np.uint64) << np.uint64(axis)
         return found
 
     @property
     def names(self) -> list[tuple[int, str]]:
         """Every line by its axis and its name: those of axis 0, of axis 1 …."""
-        return [(axis, name) for axis, trace in enumerate(self.each) for name in trace.lines]
+        return [
+            (axis, name) for axis, trace in enumerate(self.each) for name in trace.lines if name != _SHARED or not axis
+        ]
 
     @property
     def levels(self) -> NDArray[np.uint8]:
@@ -87,6 +97,7 @@ class AxesTrace:
         return AxesTrace(tuple(trace.until(n_clocks) for trace in self.each))
 
 
+_SHARED = "tick_in"  # a line that all axes have together
 Trace = PinTrace | AxesTrace
 
 
@@ -103,7 +114,9 @@ def of_axis(spec: AxesSpec, run: Run, axis: int) -> Run:
         if strobe == UPDATE:
             chosen = np.isin(table.clock, own)
         else:
-            chosen = table["axis" if strobe == TICK else f"{strobe.removesuffix('_valid')}_axis"] == axis
+            # An error of the external tick is one of all axes.
+            whose = table.columns.get("axis" if strobe == TICK else f"{strobe.removesuffix('_valid')}_axis")
+            chosen = np.ones(len(table), dtype=bool) if whose is None else whose == axis
         rows = table.rows(chosen)
         found[strobe] = rows
         if spec.parallel:

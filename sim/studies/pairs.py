@@ -126,11 +126,12 @@ def _axes_words(axes: int, tick: int, max_ticks: int, *more: str) -> tuple[str, 
 # Few and many axes, all slots taken and not, turns that fill the tick, and every option that many axes have.
 AXES: tuple[tuple[str, ...], ...] = (
     _axes_words(8, 960, 20, "--max-speed", "1000rad/s"),
-    (*_axes_words(5, 120, 3, "--max-speed", "10000rad/s", "--index"), "--parallel"),
+    (*_axes_words(5, 120, 3, "--max-speed", "10000rad/s", "--index", "--index-reset"), "--parallel"),
     _axes_words(3, 40, 2, "--decoding", "2", "--position-width", "8"),
     _axes_words(1, 63, 2048, "--no-cancel", "--index"),
     _axes_words(64, 960, 5, "--max-speed", "500rad/s", "--decoding", "1", "--frac-bits", "4", "--position-width", "48"),
-    (*_axes_words(17, 1000, 4, "--frac-bits", "24", "--index"), "--parallel"),
+    (*_axes_words(17, 1000, 4, "--frac-bits", "24", "--index", "--filter", "30", "--external-tick"), "--parallel"),
+    _axes_words(3, 120, 4, "--unit", "rpm", "--velocity-width", "24", "--external-tick", "--filter", "5"),
 )
 
 

@@ -19,6 +19,7 @@ from tachometry.sim.signals.tables import HeldVelocity, VelocityError, held_from
 from tachometry.sim.studies.lockstep import Lockstep, lockstep
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.language.units import format_time
+from tachometry.spec.methods.axis import WARM_UP
 
 Window = Callable[[CoreSpec, int], tuple[int, int]]
 
@@ -178,13 +179,15 @@ def _sampled(clock: int, clock_hz: int) -> float:
 def _(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
     own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
     held = held_from(own.ticks.clock, own.updates, alone)
-    if truth is not None and (n_ticks := len(own.ticks)):
+    if truth is not None and len(own.ticks):
         # From the first look at the axis to the last one of the last tick.
-        latency = spec.axis.latency.pin_to_count
-        clocks = np.array([spec.look(axis, latency), spec.look(axis, n_ticks * spec.rounds - 1)]) - latency
+        last = (int(own.ticks.clock[-1]) - spec.shown(axis, 0)) // spec.slots - spec.axis.filter_clocks
+        clocks = np.array([spec.look(axis, number) for number in (WARM_UP - 1, last)]) - (WARM_UP - 1)
         first, last = truth.true_position(clocks / spec.timing.clock_hz, spec.axis.encoder.decoding)
         counts_in = int(last - first)
         error = velocity_error(held, truth.true_speed)
-    counts_out = int(own.ticks.position[-1]) if len(own.ticks) else 0
+    counts_out = 0
+    if len(own.ticks):
+        counts_out = int(own.ticks.pulse_count.sum() if alone.index_reset else own.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz // spec.slots, run.n_clocks // spec.slots)
     return Axis(alone, own, recording, truth, n_merged, counts_in, counts_out, held, error)

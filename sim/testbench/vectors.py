@@ -1,6 +1,7 @@
 """A testbench stands on its own: its data say what to put on the pins, and what the outputs must show."""
 
 import json
+from collections.abc import Sequence
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -12,34 +13,35 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace, Recording, check_ticks
 from tachometry.sim.signals.run import Run
 from tachometry.sim.testbench.loop_inputs import changes as loop_changes
 from tachometry.sim.testbench.loop_inputs import loop_inputs
-from tachometry.spec import TachometerSpec
-from tachometry.spec.control import LoopSpec
+from tachometry.spec import AxesSpec, TachometerSpec
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.provenance import LICENSE, generator, notice
 
 # It has no hole: it reads its name and its data where it lies, so it is a program that linters and mypy read.
 _BENCH = Path(__file__).parent / "templates" / "test_NAME.py"
-# Clocks of the motion, and of the standstill after it: Icarus takes some 40,000 a second.
-_MOVING, _STANDING = 160_000, 800_000
+# Clocks of the motion, and five times as many of the standstill after it: Icarus takes some 40,000 a second.
+_MOVING = 160_000
 _FEWEST_TICKS, _MOST_TICKS = 3, 1000
 _MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 
 
-def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recording | None = None) -> dict[str, str]:
+def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | None = None) -> dict[str, str]:
     """Return a bench for cocotb as texts by file name: `test_NAME.py` and `NAME_vectors.json`.
 
     Parameters
     ----------
-    core : TachometerSpec or LoopSpec
+    core : TachometerSpec, AxesSpec or LoopSpec
         The inputs of a loop are given numbers of all sizes.
     name : str
         Of the module; `NAME.v` and its manifest `NAME.json` must lie beside the bench.
-    recording : Recording or None
-        What to put on the pins; None: `usual_motion`.
+    recordings : sequence of Recording or None
+        What to put on the pins, of each axis; None: `usual_motion`.
 
     Raises
     ------
@@ -47,72 +49,93 @@ def cocotb_bench(core: TachometerSpec | LoopSpec, name: str, recording: Recordin
         If it does not last for a tick, or for too many.
     """
     spec = core.tachometer
-    recording = usual_motion(spec) if recording is None else recording
-    check_ticks(recording.duration, spec, _MOST_BENCH_TICKS)
-    trace = recording.place(spec.timing.clock_hz)
-    if spec.external_tick:
-        trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
-    vectors = _vectors(core, trace)
+    traces = []
+    for recording in _usual(core) if recordings is None else recordings:
+        check_ticks(recording.duration, spec, _MOST_BENCH_TICKS // (core.axes or 1))
+        trace = recording.place(spec.timing.clock_hz)
+        if spec.external_tick:
+            trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
+        traces.append(trace)
+    vectors = _vectors(core, traces)
     text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
     return {f"test_{name}.py": notice("#") + _BENCH.read_text(encoding="utf-8"), f"{name}_vectors.json": text}
 
 
-def _vectors(core: TachometerSpec | LoopSpec, trace: PinTrace) -> dict[str, Any]:
+def _vectors(core: AnySpec, traces: list[PinTrace]) -> dict[str, Any]:
     """Return the content of `NAME_vectors.json`; test_NAME.py says what stands where."""
-    pins, changes, run = _put(core, trace)
+    pins, changes, run = _put(core, traces)
     if not len(run.ticks.clock):
-        raise ParameterError("motion", f"must last for a tick, not for {trace.n_clocks} clocks")
+        raise ParameterError("motion", f"must last for a tick, not for {run.n_clocks} clocks")
     return {
         "generator": generator(),
         "license": LICENSE,
-        "clocks": trace.n_clocks,
+        "clocks": run.n_clocks,
         "pins": pins,
         "changes": _rows(*changes),
-        "strobes": strobe_rows(run),
+        "strobes": strobe_rows(run, holds=core.axes is None),
     }
 
 
 @singledispatch
-def _put(core: TachometerSpec | LoopSpec, trace: PinTrace) -> tuple[list[str], list[NDArray[Any]], Run]:
+def _put(core: AnySpec, traces: list[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
     """Return names of the inputs, the clocks of changes with their values, and what the core must show."""
+    (trace,) = traces
     return [*trace.lines], [trace.clock, *trace.lines.values()], golden.run(core.tachometer, trace)
 
 
 @_put.register
-def _(core: LoopSpec, trace: PinTrace) -> tuple[list[str], list[NDArray[Any]], Run]:
+def _(core: AxesSpec, traces: list[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
+    trace = AxesTrace.of(traces)
+    return [*trace.lines], [trace.clock, *trace.lines.values()], golden.run(core, trace)
+
+
+@_put.register
+def _(core: LoopSpec, traces: list[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
+    (trace,) = traces
     inputs, run = loop_inputs(core, trace)
     return [*trace.lines, *inputs], [*loop_changes(core, trace, inputs)], run
 
 
-def usual_motion(spec: TachometerSpec) -> Recording:
+@singledispatch
+def _usual(core: AnySpec) -> list[Recording]:
+    return [usual_motion(core.tachometer)]
+
+
+@_usual.register
+def _(core: AxesSpec) -> list[Recording]:
+    return [usual_motion(core.axis, seed=axis + 1, most=_MOVING // core.slots) for axis in range(core.axes)]
+
+
+def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Recording:
     """Return fast and slow, forward, backward and back over the index, with jitter and illegal transitions, then at
     rest.
 
-    The rest outlasts the maximum time, so that the core reads zero, unless that takes a million clocks or more.
+    It moves for at most so many clocks. The rest outlasts the maximum time, so that the core reads zero, unless that
+    takes as many as a million clocks for 160,000 of them.
     """
     encoder = VirtualEncoder(
         spec.encoder.pulses_per_rev,
         jitter=0.1,
         illegal=0.01,
-        bounce=Bounce(1, spec.filter_clocks / spec.timing.clock_hz) if spec.filter_clocks else None,
+        bounce=Bounce(1, float(spec.filter_clocks / spec.timing.clock_hz)) if spec.filter_clocks else None,
         start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
-        seed=1,
+        seed=seed,
         index=spec.index,
     )
-    return encoder.record(parse_motion(_usual_form(spec))).recording
+    return encoder.record(parse_motion(_usual_form(spec, most, backward=seed % 2 == 0))).recording
 
 
-def _usual_form(spec: TachometerSpec) -> str:
+def _usual_form(spec: TachometerSpec, longest: int, *, backward: bool) -> str:
     """Return the segments of `usual_motion`."""
     cycles, clock_hz = spec.timing.tick_cycles, spec.timing.clock_hz
-    moving = max(min(_MOVING, _MOST_TICKS * cycles), _FEWEST_TICKS * cycles)
-    standing = min(_STANDING, cycles * (8 * spec.timing.max_ticks // 5 + 10))
+    moving = max(min(longest, _MOST_TICKS * cycles), _FEWEST_TICKS * cycles)
+    standing = min(5 * longest, cycles * (8 * spec.timing.max_ticks // 5 + 10))
     # Counts per tick that the lines can have: an edge in two clocks, slower with a filter.
     most = cycles * spec.encoder.decoding / 8 / (1 + spec.filter_clocks)
     part = moving / 8 / clock_hz
 
     def speed(counts_per_tick: float) -> str:
-        return f"{spec.scale.unit_velocity * counts_per_tick}rad/s"
+        return f"{spec.scale.unit_velocity * (-counts_per_tick if backward else counts_per_tick)}rad/s"
 
     brisk, fast = min(3.3, most), min(1.5 * spec.widths.max_count, most)
     return (
@@ -134,13 +157,13 @@ def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
     return np.cumsum(np.maximum(gap, 2)).astype(np.int64)
 
 
-def strobe_rows(run: Run) -> dict[str, Any]:
-    """Return each strobe of the core, with its ports and rows; with `tick` also what is held since the last update."""
+def strobe_rows(run: Run, *, holds: bool = True) -> dict[str, Any]:
+    """Return each strobe of the core, with its ports and rows; with `tick` also what it holds since the last update."""
     last = np.searchsorted(run.updates.clock, run.ticks.clock, side="right")
     held = {name: np.array([None, *column], dtype=object)[last] for name, column in run.updates.columns.items()}
     strobes = {}
     for strobe, table in run.tables.items():
-        columns = {**table.columns, **(held if table is run.ticks else {})}
+        columns = {**table.columns, **(held if table is run.ticks and holds else {})}
         strobes[strobe] = {"ports": list(columns), "rows": _rows(table.clock, *columns.values())}
     return strobes
 

@@ -7,34 +7,32 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.formats.reciprocal import Reciprocal
-from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, Ports, held, pin, strobe
-from tachometry.spec.language.units import Speed
+from tachometry.spec.methods.axis import (
+    COUNT_LATENCY,
+    FILTER_LATENCY,
+    MAX_AXES,
+    MIN_SLOTS,
+    READ,
+    WARM_UP,
+    SAxis,
+    fits,
+    nearest_ticks,
+    one_axis,
+    slots_of,
+    turn_cycles,
+)
 from tachometry.spec.methods.s import MAX_TABLE, STachometer
-
-MAX_AXES = 64
-# What is counted is back in memory before the same axis is looked at again.
-MIN_SLOTS = 4
-_NEAR = 2000  # clocks; 64 axes need some 800
-WARM_UP = 3  # rounds after reset: two until the levels are those of the pins, one for the level before
-# Clocks from a look at an axis: the count is in its register, is handed over, and the datapath begins.
-COUNT_LATENCY = 3
-HAND_OVER_LATENCY = 4
-# Clocks of a turn of the datapath: what its memories have is in registers, and m_e is.
-READ, DECIDE = 2, 3
 
 _FOR_ONE = "is for one axis"
 # Options of the core of one axis, the value that leaves them out, and why many axes do not have them.
 _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
-    ("unit", NATIVE, f"the conversion of the velocity {_FOR_ONE}"),
-    ("filter_clocks", 0, "the levels of an axis are not looked at in every clock"),
-    ("index_reset", False, "the position of an axis is in the memory of the datapath"),
-    ("external_tick", False, "the core makes the ticks in step with its rounds"),
     ("age", False, f"what counts the ticks {_FOR_ONE}"),
     ("bounds", False, f"what finds them {_FOR_ONE}"),
     ("lowpass", None, f"the filter {_FOR_ONE}"),
@@ -45,52 +43,9 @@ _STROBES = {
     "decode_error": "One clock: both lines of an axis changed at once, so the direction is unknown and nothing was "
     "counted.",
     INDEX: "One clock for every rising edge of z of an axis.",
+    "tick_error": "One clock: an external tick was missing, and the core made one, or it came too early and was left "
+    "out.",
 }
-
-
-def _slots(axes: int, cycles: int) -> int | None:
-    """Return S for a tick of so many clocks; None if no number divides it."""
-    return next((slots for slots in range(max(axes, MIN_SLOTS), MAX_AXES + 1) if cycles % slots == 0), None)
-
-
-def _axis(spec: STachometer, slots: int) -> STachometer:
-    """Return the core that each axis is if a round has so many slots."""
-    timing, speed = spec.timing, spec.max_speed
-    return replace(
-        spec,
-        timing=Timing(timing.clock_hz, timing.tick_cycles // slots, timing.max_ticks),
-        max_speed=None if speed is None else Speed(speed.value * slots, speed.unit),
-    )
-
-
-def _turn_cycles(axis: STachometer) -> int:
-    # The next axis begins while the velocity of this one is shown. One clock starts the scaler, one takes its sum.
-    return DECIDE + 1 + axis.form.looked_up.digits + 1 - READ
-
-
-def _fits(spec: STachometer, axes: int, cycles: int) -> bool:
-    """Tell whether a tick of so many clocks has whole rounds, and room for the turns of all axes."""
-    slots = _slots(axes, cycles)
-    if slots is None:
-        return False
-    most = spec.timing.max_ticks * spec.timing.tick_cycles // cycles
-    axis = _axis(replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2))), slots)
-    return axes * _turn_cycles(axis) + slots <= cycles
-
-
-def _nearest(spec: STachometer, axes: int) -> list[int]:
-    """Return the longest tick below that of `spec` that fits, and the shortest above, in clocks, if they are near."""
-
-    def possible(cycles: int) -> bool:
-        try:
-            return _fits(spec, axes, cycles)
-        except ParameterError:  # no axis can have this tick
-            return False
-
-    cycles = spec.timing.tick_cycles
-    ways = (range(cycles - 1, max(cycles - _NEAR, 0), -1), range(cycles + 1, cycles + _NEAR))
-    found = (next(filter(possible, way), None) for way in ways)
-    return [one for one in found if one is not None]
 
 
 class _OfAxes:
@@ -110,13 +65,13 @@ class AxesLatency(_OfAxes):
 
     @property
     def pin_to_count(self) -> int:
-        """Most clocks from the sampling of a level to its look: the synchroniser, and a round."""
-        return self.spec.axis.latency.pin_to_count + self.spec.slots - 1
+        """Most clocks from the sampling of a level to its look: the synchroniser, a round, and more for the filter."""
+        return WARM_UP - 1 + self.spec.slots - 1 + self.spec.axis.filter_clocks * self.spec.slots
 
     @property
     def tick(self) -> int:
         """Clocks from the last one of a tick to the one in which it is shown of the last axis."""
-        return int(self.spec.tick_clock(self.spec.axes - 1, 0)) - (self.spec.times.longest_tick - 1)
+        return int(self.spec.tick_clock(self.spec.axes - 1, 0)) - (self.spec.timing.tick_cycles - 1)
 
     @property
     def tick_to_velocity(self) -> int:
@@ -130,12 +85,23 @@ class AxesLatency(_OfAxes):
             "pin_to_count": self.pin_to_count,
             "tick_latency": self.tick,
             "tick_to_velocity": self.tick_to_velocity,
+            **({"tick_in_to_window_end": self.tick_in_to_window_end} if self.spec.tachometer.external_tick else {}),
         }
+
+    @property
+    def tick_in_to_window_end(self) -> int:
+        """Most clocks from the rise of an external tick to the end of its window: the next round is the last."""
+        return TICK_IN_TO_WINDOW_END + 2 * self.spec.slots - 1
+
+    @property
+    def count(self) -> int:
+        """Clocks from the look at an axis to its count."""
+        return COUNT_LATENCY + FILTER_LATENCY * (self.spec.axis.filter_clocks > 0)
 
     @property
     def index(self) -> int:
         """Clocks from the look that sees the rise of an index line to `index_valid`."""
-        return COUNT_LATENCY + 1 + self.spec.parallel
+        return self.count + 1 + self.spec.parallel
 
 
 class AxesRecovery(_OfAxes):
@@ -151,7 +117,7 @@ class AxesRecovery(_OfAxes):
         own = self.spec.axis.recovery.clocks
         assert own is not None  # there is no low-pass filter
         slots = self.spec.slots
-        return own * slots + (1 << (slots - 1).bit_length()) + 2 * self.spec.times.longest_tick
+        return own * slots + (1 << (slots - 1).bit_length()) + 2 * self.spec.axis.times.longest_tick * slots
 
 
 class AxesWords(_OfAxes):
@@ -210,10 +176,6 @@ class AxesSpec:
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
                 raise ParameterError(name, f"must not be given together with axes: {why}")
-        if spec.velocity_width not in (None, spec.widths.native):
-            raise ParameterError(
-                "velocity_width", "must not be given together with axes: it is what the greatest speed needs"
-            )
         if spec.timing.max_ticks > MAX_TABLE:
             raise ParameterError(
                 "max_ticks",
@@ -223,10 +185,10 @@ class AxesSpec:
 
     def _check_tick(self) -> None:
         cycles = self.timing.tick_cycles
-        if not _fits(self.tachometer, self.axes, cycles):
+        if not fits(self.tachometer, self.axes, cycles):
             fewest = max(self.axes, MIN_SLOTS)
             some = f"a number from {fewest} to {MAX_AXES}" if fewest < MAX_AXES else f"{MAX_AXES}"
-            near = " or ".join(map(str, _nearest(self.tachometer, self.axes)))
+            near = " or ".join(map(str, nearest_ticks(self.tachometer, self.axes)))
             raise ParameterError(
                 "tick_cycles",
                 f"must be a multiple of {some}, and long enough for a turn of every axis with --axes {self.axes}"
@@ -251,14 +213,14 @@ class AxesSpec:
     @cached_property
     def slots(self) -> int:
         """S, clocks of a round: the least number that is no less than N and divides a tick."""
-        found = _slots(self.axes, self.timing.tick_cycles)
+        found = slots_of(self.axes, self.timing.tick_cycles)
         assert found is not None  # see `_check_tick`
         return found
 
     @cached_property
-    def axis(self) -> STachometer:
-        """The core that each axis is: one of its clocks is a round of this core, and so speeds are S times as great."""
-        return _axis(self.tachometer, self.slots)
+    def axis(self) -> SAxis:
+        """The core that each axis is: one of its clocks is a round of this core."""
+        return one_axis(self.tachometer, self.axes, self.slots)
 
     @property
     def rounds(self) -> int:
@@ -268,7 +230,7 @@ class AxesSpec:
     @property
     def turn_cycles(self) -> int:
         """Clocks for which an axis has the datapath."""
-        return _turn_cycles(self.axis)
+        return turn_cycles(self.axis)
 
     @property
     def reciprocal(self) -> Reciprocal:
@@ -282,8 +244,15 @@ class AxesSpec:
         return number * self.slots + axis
 
     def tick_clock(self, axis: int, tick: Any) -> Any:
-        """Return the clock in which `tick` is high for the `tick`-th tick of an axis, of a number or an array."""
-        begun = self.look(0, (tick + 1) * self.rounds - 1) + HAND_OVER_LATENCY
+        """Return the clock in which `tick` is high for the `tick`-th tick of an axis, of a number or an array.
+
+        All ticks are as long as nominal.
+        """
+        return self.shown(axis, (tick + 1) * self.rounds - 1)
+
+    def shown(self, axis: int, last: Any) -> Any:
+        """Return the clock in which `tick` is high for a tick of an axis that ends with the round `last`."""
+        begun = self.look(0, last) + self.latency.count + 1 + self.tachometer.index_reset
         return begun + axis * self.turn_cycles + self.turn_cycles + READ + self.parallel
 
     @property
@@ -294,10 +263,15 @@ class AxesSpec:
     def _inputs(self) -> Iterable[Port]:
         spec = self.axis
         for port in (*spec.ports[:2], *spec.ports.pins):
-            if port.name in ("clk", "rst"):
+            if port.name in ("clk", "rst", "tick_in"):
                 yield port
             else:
                 yield pin(port.name, f"Bit k, of axis k: {port.help}", self.axes)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Lines of an encoder."""
+        return tuple(pin.name for pin in self.axis.ports.pins if pin.name != "tick_in")
 
     def _strobed(self) -> Iterable[Port]:
         """Return strobes and what axis they are of; what is new with them, if it is not held for each axis."""
@@ -308,7 +282,7 @@ class AxesSpec:
                     yield port
                 continue
             yield strobe(port.name, _STROBES[port.name])
-            if port.name != UPDATE:
+            if port.name not in (UPDATE, "tick_error"):
                 name = "axis" if port.name == TICK else f"{port.name.removesuffix('_valid')}_axis"
                 yield held(port.name, name, last, help=f"The axis, from 0, that {port.name} is of.")
 
@@ -334,11 +308,12 @@ class AxesSpec:
         of_velocity = {
             "width": axis.widths.velocity,
             "full_scale": axis.scale.full_scale * 2.0**-axis.widths.frac_bits,
-            "full_scale_rad_per_s": axis.scale.full_scale * alone.scale.rad_per_s_per_lsb,
+            "full_scale_rad_per_s": axis.scale.full_scale * axis.scale.rad_per_s_per_lsb,
         }
         return of_one | {
             "velocity": of_one["velocity"] | of_velocity,
             "recovery_cycles": self.recovery.clocks,
+            **({"external_tick_cycles": self._external} if alone.external_tick else {}),
             "axes": {
                 "axes": self.axes,
                 "parallel": self.parallel,
@@ -348,6 +323,11 @@ class AxesSpec:
             },
             "latency_cycles": self.latency.entries,
         }
+
+    @property
+    def _external(self) -> dict[str, int]:
+        times = self.axis.times
+        return {"min": times.min_tick_cycles * self.slots, "max": times.longest_tick * self.slots}
 
     @property
     def tick_to_result(self) -> int:

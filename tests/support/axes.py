@@ -15,11 +15,13 @@ TICK_CYCLES = 40
 MAX_TICKS = 4
 
 
-def small(axes: int = 3, *, parallel: bool = False, most: int | None = 2, **options: Any) -> AxesSpec:
-    """Return a tick of 40 clocks, in which `most` counts are the most that are measured."""
-    timing = Timing(CLOCK_HZ, TICK_CYCLES, MAX_TICKS)
-    speed = None if most is None else Speed(Fraction(most * CLOCK_HZ, 100 * TICK_CYCLES), "rev/s")
-    alone = STachometer(encoder=Encoder(25), timing=timing, frac_bits=8, max_speed=speed, **options)
+def small(
+    axes: int = 3, *, parallel: bool = False, most: int | None = 2, tick: int = TICK_CYCLES, **options: Any
+) -> AxesSpec:
+    """Return a tick of 40 clocks if nothing else is said, in which `most` counts are the most that are measured."""
+    timing = Timing(CLOCK_HZ, tick, MAX_TICKS)
+    speed = None if most is None else Speed(Fraction(most * CLOCK_HZ, 100 * tick), "rev/s")
+    alone = STachometer(encoder=Encoder(25), timing=timing, max_speed=speed, **({"frac_bits": 8} | options))
     return AxesSpec(tachometer=alone, axes=axes, parallel=parallel)
 
 

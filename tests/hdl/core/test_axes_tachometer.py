@@ -11,17 +11,20 @@ from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import AxesSpec
 
+SPECS = {
+    "three axes": small(),
+    "one axis": small(1, index=True, cancel=False),
+    "two held": small(2, parallel=True, index=True),
+    "no greatest speed": small(3, most=None, position_width=8),
+    "rpm, and an index that resets": small(3, unit="rpm", index=True, index_reset=True, tick=60),
+    "few bits": small(2, most=None, velocity_width=9, parallel=True),
+    "filter": small(3, filter_clocks=5, index=True),
+    "ticks from outside, held": small(2, external_tick=True, filter_clocks=1, parallel=True),
+    "all": small(3, external_tick=True, tick=60, unit="rad/s", index=True, index_reset=True),
+}
 
-@pytest.mark.parametrize(
-    "spec",
-    [
-        small(),
-        small(1, index=True, cancel=False),
-        small(2, parallel=True, index=True),
-        small(3, most=None, position_width=8),
-    ],
-    ids=["three axes", "one axis", "two held", "no greatest speed"],
-)
+
+@pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 def test_small_cores(spec: AxesSpec) -> None:
     check(spec)
 

@@ -20,7 +20,7 @@ class Counted(wiring.Component):
     def __init__(self, axes: int, slots: int, n_rounds: int) -> None:
         # By the names in their modules, where a mutant takes their place.
         self.rounds = rounds.Rounds(slots, n_rounds, 3)
-        self.counters = axis_counters.AxisCounters(axes=axes, slots=slots, rounds=n_rounds, decoding=4)
+        self.counters = axis_counters.AxisCounters(slots=slots, rounds=n_rounds, decoding=4)
         super().__init__(
             {
                 "level_a": In(axes),
@@ -39,8 +39,8 @@ class Counted(wiring.Component):
         m.submodules.counters = counters = self.counters
         m.d.comb += [
             *(getattr(counters, name).eq(getattr(self.rounds, name)) for name in _SAME),
-            counters.level_a.eq(self.level_a),
-            counters.level_b.eq(self.level_b),
+            counters.level_a.eq(axis_counters.of_slot(self.level_a, self.rounds.slot)),
+            counters.level_b.eq(axis_counters.of_slot(self.level_b, self.rounds.slot)),
             *(
                 getattr(self, name).eq(getattr(counters, name))
                 for name in ("axis", "step", "decode_error", "complete", "count")

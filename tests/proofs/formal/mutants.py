@@ -285,7 +285,7 @@ MUTANTS = [
         "s_axi_rdata.eq(self.native.read_data",
         "s_axi_rdata.eq(self.native.read_data >> 1",
     ),
-    Mutant("positions of two axes", "px_position", AxesDatapath, "before.position + turn.count", "before.position", 60),
+    Mutant("positions of two axes", "px_position", AxesDatapath, "before.position + count", "before.position", 60),
     Mutant("positions of two axes", "px_once", Turns, "ends & ~final", "ends & final", 40),
     Mutant("two axes of four slots", "px_axis", AxisCounters, "self.axis.eq(slot)", "self.axis.eq(self.slot)"),
     Mutant("two axes of four slots", "px_step", AxisCounters, "write.data.b.eq(new_b)", "write.data.b.eq(b)"),

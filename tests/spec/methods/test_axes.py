@@ -103,6 +103,30 @@ def test_latencies(parallel: bool) -> None:
     assert told == {"pin_to_count": 2 + 8 - 1, "tick_latency": spec.tick_clock(7, 0) - 959, "tick_to_velocity": 0}
 
 
+@pytest.mark.parametrize(("clocks", "looks"), [(1, 1), (2, 2), (9, 2), (10, 3), (255, 33)])
+def test_a_filter_looks_once_more_than_a_shorter_glitch_can_be_seen(clocks: int, looks: int) -> None:
+    """With eight clocks from look to look, a glitch of 8 clocks is seen once, and one of 9 twice."""
+    spec = spec_of(8, filter_clocks=clocks)
+    assert spec.axis.filter_clocks == looks
+    assert spec.latency.pin_to_count == 2 + 8 - 1 + 8 * looks
+
+
+def test_an_external_tick_has_turns_for_all_axes() -> None:
+    spec = spec_of(8, external_tick=True)
+    least, most = manifest(spec)["external_tick_cycles"].values()
+    assert 8 * spec.turn_cycles + 8 <= least < 8 * spec.turn_cycles + 16
+    assert most == 2 * 960
+    assert manifest(spec)["latency_cycles"]["tick_in_to_window_end"] == 2 + 2 * 8 - 1
+
+
+def test_a_unit_is_one_of_seconds_whatever_a_round_lasts() -> None:
+    """An LSB of an axis is that of a core of its own, also where a round is no whole number of hertz."""
+    for axes in (1, 7, 33):
+        spec = spec_of(axes, unit="rpm", tick=9240)
+        assert spec.axis.scale.rad_per_s_per_lsb == pytest.approx(spec.tachometer.scale.rad_per_s_per_lsb, rel=1e-12)
+        assert spec.axis.scale.lsb_per_count == spec.tachometer.scale.lsb_per_count
+
+
 def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
     """In rounds; and two ticks and a round for what all axes share."""
     for spec in (spec_of(), spec_of(3, tick=1000), spec_of(5, tick=1000)):
@@ -117,18 +141,11 @@ def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
     [
         (0, {}, "axes must be from 1 to 64, not 0"),
         (65, {}, "axes must be from 1 to 64, not 65"),
-        (
-            8,
-            {"unit": "rpm"},
-            "unit must not be given together with axes: the conversion of the velocity is for one axis",
-        ),
-        (8, {"filter_clocks": 2}, "filter_clocks must not be given together with axes: "),
-        (8, {"index": True, "index_reset": True}, "index_reset must not be given together with axes: "),
-        (8, {"external_tick": True}, "external_tick must not be given together with axes: "),
-        (8, {"age": True}, "age must not be given together with axes: "),
+        (8, {"unit": "rpm", "velocity_width": 22, "filter_clocks": 2, "index": True, "index_reset": True}, ""),
+        (8, {"external_tick": True}, ""),
+        (8, {"age": True}, "age must not be given together with axes: what counts the ticks is for one axis"),
         (8, {"bounds": True}, "bounds must not be given together with axes: "),
         (8, {"lowpass": Fraction(100)}, "lowpass must not be given together with axes: "),
-        (8, {"velocity_width": 22}, "velocity_width must not be given together with axes: "),
         (8, {"max_ticks": 4096}, "max_ticks must be at most 2048 with axes, not 4096: 1/m_s is looked up"),
         (8, {"max_ticks": 2048}, ""),
         (8, {"tick": 67 * 16}, ""),
