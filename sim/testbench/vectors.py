@@ -56,12 +56,16 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
         if spec.external_tick:
             trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
         traces.append(trace)
-    vectors = _vectors(core, traces)
-    text = json.dumps(vectors, separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
+    return bench_of(core, name, traces)
+
+
+def bench_of(core: AnySpec, name: str, traces: Sequence[PinTrace]) -> dict[str, str]:
+    """Return the same with what the pins of each axis see."""
+    text = json.dumps(_vectors(core, traces), separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
     return {f"test_{name}.py": notice("#") + _BENCH.read_text(encoding="utf-8"), f"{name}_vectors.json": text}
 
 
-def _vectors(core: AnySpec, traces: list[PinTrace]) -> dict[str, Any]:
+def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
     """Return the content of `NAME_vectors.json`; test_NAME.py says what stands where."""
     pins, changes, run = _put(core, traces)
     if not len(run.ticks.clock):
@@ -77,20 +81,20 @@ def _vectors(core: AnySpec, traces: list[PinTrace]) -> dict[str, Any]:
 
 
 @singledispatch
-def _put(core: AnySpec, traces: list[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
+def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
     """Return names of the inputs, the clocks of changes with their values, and what the core must show."""
     (trace,) = traces
     return [*trace.lines], [trace.clock, *trace.lines.values()], golden.run(core.tachometer, trace)
 
 
 @_put.register
-def _(core: AxesSpec, traces: list[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
+def _(core: AxesSpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
     trace = AxesTrace.of(traces)
     return [*trace.lines], [trace.clock, *trace.lines.values()], golden.run(core, trace)
 
 
 @_put.register
-def _(core: LoopSpec, traces: list[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
+def _(core: LoopSpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
     (trace,) = traces
     inputs, run = loop_inputs(core, trace)
     return [*trace.lines, *inputs], [*loop_changes(core, trace, inputs)], run

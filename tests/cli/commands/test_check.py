@@ -1,0 +1,110 @@
+"""`tachometry check` finds any change of any file, and proves that what other versions wrote is the same core."""
+
+import json
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+from support.command import run
+from support.nightly import only
+
+from tachometry.hdl.export import export
+from tachometry.hdl.export.targets.target import TARGETS
+from tachometry.sim.testbench.check import check
+from tachometry.spec.language import provenance
+
+SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us --max-speed 2000rad/s --method"
+CORES = {
+    "s": f"{SMALL} s --bus axi-lite --testbench cocotb",
+    "rio": f"{SMALL} t --for rio",
+    "litex": f"{SMALL} mt --for litex --index",
+    "axes": f"{SMALL} s --axes 3 --tick 20us --testbench cocotb",
+    "loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --gains inputs --bus uart --baud 50000",
+    "bench of a loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --testbench cocotb",
+    "external ticks": f"{SMALL} m --external-tick --testbench cocotb",
+    "track": f"{SMALL} track --tick 1ms --max-time 10ms --bus apb",
+}
+BUSES = {name: target.bus for name, target in TARGETS.items()}
+Generated = Callable[..., Path]
+
+
+@pytest.mark.parametrize("core", only(["rio", "loop", "external ticks"], [*CORES]))
+def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str, generated: Generated) -> None:
+    folder = generated("core", *CORES[core].split())
+    made = cache(export)  # once, not for every change
+
+    def right() -> bool:
+        return check(folder / "core.json", made, BUSES, simulation=False).right
+
+    assert right()
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    for path in files:
+        before = path.read_bytes()
+        for place in (len(before) // 3, len(before) - 2):
+            path.write_bytes(before[:place] + bytes([before[place] ^ 1]) + before[place + 1 :])
+            try:
+                assert not right(), (path.name, place)
+            except ValueError:
+                assert path.name == "core.json"
+        path.unlink()
+        if path.suffix in (".v", ".h", ".xdc"):
+            assert not right(), path.name
+        path.write_bytes(before)
+
+
+def test_what_other_versions_wrote_is_proved(
+    generated: Generated, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(provenance, "version", lambda: "0.0.9")
+        folder = generated("core", *CORES["s"].split())
+    verilog = folder / "core.v"
+    text = verilog.read_text()
+    renamed = re.sub(r"\\\$(\d+) ", r"other_\1 ", text)
+    assert renamed != text
+    assert run("check", folder, "--no-simulation") == 0
+    assert "equivalent" not in capsys.readouterr().out
+    verilog.write_text(renamed)
+    assert run("check", folder, "--no-simulation") == 0
+    assert re.search(r"core\.v +equivalent, but written by other versions", capsys.readouterr().out)
+    verilog.write_text(re.sub(r" \+ ", " - ", renamed, count=1))
+    assert run("check", folder, "--no-simulation") == 1
+    assert re.search(r"core\.v +not what the manifest says +line \d+ has '", capsys.readouterr().out)
+    # The same text, as if these versions had written it, is somebody's change.
+    manifest = folder / "core.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | provenance.entries(), indent=2) + "\n")
+    verilog.write_text(renamed)
+    assert run("check", folder, "--no-simulation") == 1
+    assert re.search(r"core\.v +not what the manifest says", capsys.readouterr().out)
+
+
+def test_the_core_that_lies_there_is_simulated(generated: Generated, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = generated("core", *CORES["s"].split())
+    wrong = folder / "netlist.v"
+    text = (folder / "core.v").read_text()
+    assert run("check", folder) == 0
+    assert capsys.readouterr().out.splitlines()[-1].endswith("1 agree with the golden model")
+    wrong.write_text(re.sub(r" - ", " + ", text, count=1))
+    assert wrong.read_text() != text
+    assert run("check", folder / "core.json", "--verilog", wrong) == 1
+    assert "core differs from the golden model: clock" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "must have the manifest NAME.json of a core, and has none"),
+        ("{}", "must have the manifest NAME.json of a core, and has none"),
+        ('{"module": "core", "options": {"method": "x"}}', "method must be one of s, m,"),
+        ('{"module": "other", "options": {"method": "s", "ppr": "9"}}', "must have the name of its module, other.json"),
+    ],
+)
+def test_what_is_no_core_is_refused(
+    text: str | None, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if text is not None:
+        (tmp_path / "core.json").write_text(text)
+    assert run("check", tmp_path) == 2
+    assert message in capsys.readouterr().err
