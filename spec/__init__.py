@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -100,7 +101,7 @@ def of_options(options: Mapping[str, str]) -> AnySpec:
     spec: CoreSpec = of_texts(texts.pop("method", ""), texts)
     if axes != "no":
         spec = with_axes(spec.tachometer, parse_whole("axes", axes), parallel=parse_flag("parallel", parallel))
-    return with_loop(spec, of_loop) if parse_flag("loop", loop) else spec
+    return _looped(spec, of_loop) if parse_flag("loop", loop) else spec
 
 
 def with_axes(spec: TachometerSpec, axes: int, *, parallel: bool) -> AxesSpec:
@@ -111,7 +112,15 @@ def with_axes(spec: TachometerSpec, axes: int, *, parallel: bool) -> AxesSpec:
 
 
 def with_loop(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:
-    """Return a core with a control loop, from texts of its options; ParameterError if there cannot be one."""
+    """Return a core with a control loop, from texts of its options; ParameterError if there cannot be one.
+
+    The tachometer is as such a loop needs it: with method track, its memory is bounded.
+    """
+    loop = _looped(spec, texts)
+    return replace(loop, tachometer=loop.tachometer.in_loop(loop.velocity_gain))
+
+
+def _looped(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:
     if spec.axes is not None:
         raise ParameterError("axes", "must not be given together with --loop: it is of one axis")
     return LoopSpec(tachometer=spec.tachometer, **read_options(LoopSpec, texts, vars(spec.timing)))

@@ -158,12 +158,12 @@ def _setting(
     if task.load is not None and not begin + 0.002 <= task.load.begin < duration:
         raise ValueError(f"--load must begin 2ms or more after --from, and within --motion, not {load}")
     encoder = VirtualEncoder(spec.encoder.pulses_per_rev, **faults)
-    motor, gains = _motor_and_gains(spec, **given)
+    spec, motor, gains = _core_motor_and_gains(spec, **given)
     setting = Setting(spec=spec, gains=gains, task=task, motor=motor, encoder=encoder, begin=begin)
     return in_gates(setting) if gates else setting
 
 
-def _motor_and_gains(
+def _core_motor_and_gains(
     spec: TachometerSpec,
     *,
     measured_acceleration: bool,
@@ -174,7 +174,7 @@ def _motor_and_gains(
     friction: float,
     viscous: float,
     **of_law: Any,
-) -> tuple[Any, Any]:
+) -> tuple[TachometerSpec, Any, Any]:
     from tachometry.sim.engines.loop import Gains, Motor, Observer
 
     if measured_acceleration and "acceleration" not in spec.method_entries:
@@ -210,7 +210,7 @@ def _motor_and_gains(
         torque_constant=torque_constant,
         current_limit=float(law.current_limit),
     )
-    return motor, gains
+    return spec.in_loop(law.velocity_gain), motor, gains
 
 
 # Gives what makes a setting of a core, the motion in words, and the first seed.

@@ -22,6 +22,8 @@ class UpdateWindow(wiring.Component):
     Members
     -------
     update : In(1)
+    measured : In(1)
+        Valid with `update`: it is a measurement; else the velocity is only held until one comes.
     velocity : In(signed)
         Valid with `update`.
     tick : In(1)
@@ -45,7 +47,7 @@ class UpdateWindow(wiring.Component):
         limit = form.current_limit.bit_length() + 1
         super().__init__(
             {
-                **dict.fromkeys(("update", "tick", "clear", "add"), In(1)),
+                **dict.fromkeys(("update", "measured", "tick", "clear", "add"), In(1)),
                 "velocity": In(signed(form.velocity_width)),
                 "current": In(signed(limit)),
                 "held": Out(signed(form.velocity_width)),
@@ -63,7 +65,7 @@ class UpdateWindow(wiring.Component):
             m.d.comb += self.due.eq(waits | (self.n == self._longest))
             with m.If(self.tick):
                 m.d.sync += [ticked.eq(1), waits.eq(0)]
-            with m.If(self.update & (ticked | self.tick)):
+            with m.If(self.update & self.measured & (ticked | self.tick)):
                 m.d.sync += waits.eq(1)
             with m.If(self.update & (~waits | self.tick)):
                 m.d.sync += self.held.eq(self.velocity)

@@ -92,6 +92,7 @@ class LoopCore(wiring.Component):
         m.d.comb += [
             window.tick.eq(clock.tick),
             window.update.eq(tachometer.velocity_valid),
+            window.measured.eq(~tachometer.forced if self._spec.tachometer.facts.awaits_count else 1),
             window.velocity.eq(tachometer.velocity),
             window.clear.eq(controller.clear),
             window.add.eq(controller.valid),

@@ -8,7 +8,8 @@ static inline int64_t extended(Integer raw, int width, bool is_signed) {
 
 struct Core {
   double rad_per_s, rad_per_s2, rad_per_count;  // of an LSB of the velocity, the acceleration and the position
-  int64_t velocity, valid, position, acceleration;  // columns; -1: there is none
+  int64_t velocity, valid, position, acceleration, forced;  // columns; -1: there is none
+  int64_t longest;  // clocks after which an update without a count is taken as a measurement
   double clock_seconds;
 };
 
@@ -104,8 +105,9 @@ struct Watch {
     if (!outputs[core.valid]) return;
     double acceleration = core.acceleration < 0 ? 0 : double(outputs[core.acceleration]) * core.rad_per_s2;
     double seconds = double(now - begun) * core.clock_seconds;
-    control.update(double(outputs[core.velocity]) * core.rad_per_s, acceleration, seconds);
-    begun = now;
+    bool measured = core.forced < 0 || !outputs[core.forced] || now - begun >= core.longest;
+    control.update(double(outputs[core.velocity]) * core.rad_per_s, acceleration, seconds, measured);
+    if (measured) begun = now;
   }
 #endif
 

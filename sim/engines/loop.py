@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control.units import longest_interval
 from tachometry.spec.language.option import ParameterError
 
 PARTS = ("plant.h", "control.h", "loop.h")
@@ -197,7 +198,7 @@ CONTROLLER = struct(
 _CORE = struct(
     "Core",
     **dict.fromkeys(("rad_per_s", "rad_per_s2", "rad_per_count"), _D),
-    **dict.fromkeys(("velocity", "valid", "position", "acceleration"), _I),
+    **dict.fromkeys(("velocity", "valid", "position", "acceleration", "forced", "longest"), _I),
     clock_seconds=_D,
 )
 _COURSE = struct("Course", speed=_P, angle=_P, load=_P, current=_P, n=_I, clocks=_I)
@@ -271,7 +272,7 @@ class LoopSimulation:
                 len(jitter),
             ),
             controller=controller,
-            core=self._core(),
+            core=self._core(controller.clocks),
             course=_COURSE(*(one.ctypes.data for one in tables), len(course.speed), self.clocks(course.seconds)),
             **{"step": self.clocks(step), "end": end, "log": apart, "rows": rows.ctypes.data},
             away=-1,
@@ -312,10 +313,12 @@ class LoopSimulation:
             delay,
         )
 
-    def _core(self) -> Any:
+    def _core(self, period: int) -> Any:
         spec, names = self._spec, [port.name for port in self._design.outputs]
         acceleration = float(spec.method_entries.get("acceleration", {}).get("rad_per_s2_per_lsb", 0.0))
         columns = [names.index(name) for name in ("velocity", "velocity_valid", "position")]
         columns.append(names.index("acceleration") if acceleration else -1)
+        columns.append(names.index("forced") if spec.facts.awaits_count else -1)
+        columns.append(longest_interval(spec, period) * period)
         per_count = 2 * np.pi / spec.encoder.counts_per_rev
         return _CORE(spec.scale.rad_per_s_per_lsb, acceleration, per_count, *columns, 1 / spec.timing.clock_hz)

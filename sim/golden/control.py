@@ -64,12 +64,12 @@ class Control:
             self._terms[term] = (form.terms[term].shift, (one << form.gain_shift,))
         self._limit = min(gains.limit, form.current_limit)
 
-    def update(self, velocity: int) -> None:
-        """Take an update of the velocity, after the last control tick."""
+    def update(self, velocity: int, *, measured: bool = True) -> None:
+        """Take an update of the velocity, after the last control tick; one that is not measured is only held."""
         if self._form.synchronised and self._waits:
             return
         self._held = velocity
-        self._waits = self._ticked
+        self._waits = self._ticked and measured
 
     def tick(self, position: int, command: Command) -> int:
         """Return a control tick at a position, in counts: the new current."""
@@ -140,6 +140,9 @@ def control(
     loop = Control(spec.form)
     rows: list[tuple[int, bool, int, int]] = []
     velocity = updates.velocity.tolist()
+    measured = [True] * len(velocity)
+    if spec.tachometer.facts.awaits_count:
+        measured = (updates.forced == 0).tolist()
     # An update in the clock of a control tick comes after it.
     before = np.searchsorted(updates.clock, clock, side="left").tolist()
     done = 0
@@ -147,7 +150,7 @@ def control(
         if gains is not None:
             loop.set(gains[number])
         for row in range(done, until):
-            loop.update(velocity[row])
+            loop.update(velocity[row], measured=measured[row])
         done = until
         loop.tick(place, command)
         rows.append((loop.current, loop.saturated, loop.y, loop.w))

@@ -7,9 +7,16 @@ from fractions import Fraction
 from tachometry.spec.control import form
 from tachometry.spec.control.form import ACCELERATION_WIDTH
 from tachometry.spec.control.law import Law
+from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.units import PI
 
 MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
+
+
+def longest_interval(spec: TachometerSpec, period: int) -> int:
+    """Return the most control ticks, so many clocks apart, that an update of a core can stand for."""
+    ticks = -(-(spec.timing.max_ticks * spec.times.longest_tick) // period) + 2
+    return min((1 << ticks.bit_length()) - 1, MAX_INTERVAL)
 
 
 @dataclass(frozen=True)
@@ -37,11 +44,7 @@ class Units:
     @property
     def longest(self) -> int:
         """Most control ticks that an update can stand for; then the velocity that is held is taken as one."""
-        if not self.law.synchronised:
-            return 1
-        spec = self.law.tachometer
-        ticks = -(-(spec.timing.max_ticks * spec.times.longest_tick) // self.period) + 2
-        return min((1 << ticks.bit_length()) - 1, MAX_INTERVAL)
+        return longest_interval(self.law.tachometer, self.period) if self.law.synchronised else 1
 
     @property
     def rad_per_s(self) -> Fraction:

@@ -23,6 +23,8 @@ class Facts:
         Whether the 0 that the maximum time forces is the last update before the next count.
     rest_tenths : int
         Tenths of the maximum time after which it shows that the shaft stands, counted from the last count but one.
+    awaits_count : bool
+        Whether the observer of a control loop waits for a count: it takes no update that is `forced`.
     pairs_all : bool
         Whether pairwise tests give all options all of their values.
     """
@@ -34,4 +36,5 @@ class Facts:
     bounds: bool
     last_at_rest: bool
     rest_tenths: int
+    awaits_count: bool
     pairs_all: bool

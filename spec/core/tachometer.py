@@ -203,6 +203,10 @@ class TachometerSpec:
         """The core of one axis that it is."""
         return self
 
+    def in_loop(self, velocity_gain: Fraction) -> "TachometerSpec":
+        """Return the core as a control loop with this gain, in 1/s, needs it: options that are not given follow."""
+        return self
+
     @property
     def tick_to_result(self) -> int:
         """Clocks from its tick to what the core is for: here to the velocity."""

@@ -140,6 +140,7 @@ class MTachometer(TachometerSpec):
         bounds=True,
         last_at_rest=False,
         rest_tenths=17,
+        awaits_count=False,
         pairs_all=False,
     )
     form = cached_property(MForm)

@@ -106,6 +106,7 @@ class MTTachometer(TimedTachometer):
         bounds=True,
         last_at_rest=False,
         rest_tenths=22,
+        awaits_count=False,
         pairs_all=False,
     )
     equation = 13

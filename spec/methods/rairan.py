@@ -276,6 +276,7 @@ class RairanTachometer(TachometerSpec):
         bounds=True,
         last_at_rest=True,
         rest_tenths=17,
+        awaits_count=False,
         pairs_all=False,
     )
     form = cached_property(RairanForm)

@@ -247,6 +247,7 @@ class STachometer(TachometerSpec):
         bounds=True,
         last_at_rest=False,
         rest_tenths=17,
+        awaits_count=False,
         pairs_all=True,
     )
     form = cached_property(SForm)

@@ -54,6 +54,7 @@ class TTachometer(TimedTachometer):
         bounds=True,
         last_at_rest=False,
         rest_tenths=22,
+        awaits_count=False,
         pairs_all=False,
     )
     equation = 9

@@ -25,6 +25,7 @@ from tachometry.spec.language.units import format_time
 
 FETCH_CLOCKS = 3  # to fetch the first instruction, to read its word, and to hold the result
 NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quarter of what is left at constant speed
+LOOP_MEMORY = Fraction(3, 5)  # over k_v: the longest memory in a loop
 _MAX_TIME = "100ms"  # by default
 _MULTIPLIERS = ("auto", "serial", "block")
 
@@ -118,7 +119,16 @@ class TrackWords(Words["TrackTachometer"]):
 
     @property
     def description(self) -> str:
-        return "least squares over a memory that finds its own length"
+        return f"least squares over a memory that finds its own length{self._bound}"
+
+    @property
+    def heading(self) -> str:
+        return f"{super().heading}{self._bound}"
+
+    @property
+    def _bound(self) -> str:
+        longest = self.spec.max_memory
+        return "" if longest is None else f", memory of at most {format_time(self.spec.times.seconds(longest))}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +159,7 @@ class TrackTachometer(TachometerSpec):
         None,
         "Longest memory, for use inside a control loop: it follows a change that it does not see yet as if the memory "
         "were so short. In s, ms, us or ns.",
-        shown="4s",
+        shown="4s; with --loop 0.6/k_v",
         metavar="TIME",
         unit="clocks",
         parse_at=parse_clocks,
@@ -174,6 +184,7 @@ class TrackTachometer(TachometerSpec):
         bounds=False,
         last_at_rest=False,
         rest_tenths=17,
+        awaits_count=True,
         pairs_all=False,
     )
     acceleration = cached_property(Acceleration)
@@ -202,6 +213,13 @@ class TrackTachometer(TachometerSpec):
                 f"must be at least {shortest} ({format_time(self.times.seconds(shortest))}) with method {self.method} "
                 f"here, not {self.timing.tick_cycles}",
             )
+
+    def in_loop(self, velocity_gain: Fraction) -> "TrackTachometer":
+        if self.max_memory is not None:
+            return self
+        # A memory that sets itself lets the loop swing just below what it can see.
+        memory = min(LOOP_MEMORY / velocity_gain, Fraction(MOST_MEMORY))
+        return replace(self, max_memory=max(math.floor(memory * self.timing.clock_hz), self.timing.tick_cycles))
 
     def _form(self, slope: Fraction) -> Tracking:
         return Tracking(

@@ -19,7 +19,7 @@ from tachometry.sim.golden.command_generator import Command, Demand, Gains
 from tachometry.sim.golden.control import control, run_loop
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table, compare, observed
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import Encoder, Speed, STachometer, Timing, TrackTachometer
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.form import GAINS, ControlForm
 from tachometry.spec.control.ports import GAIN_PORTS
@@ -36,6 +36,17 @@ SMALL = LoopSpec(
     multiplier="parallel",
 )
 CONVENTIONAL = replace(SMALL, synchronised=False, velocity_filter=Fraction(3000))
+TRACKING = replace(
+    SMALL,
+    tachometer=TrackTachometer(
+        encoder=Encoder(500),
+        timing=Timing(1_000_000, 1000, 2),
+        frac_bits=8,
+        max_speed=Speed.parse("60rad/s"),
+        multiplier="block",
+    ),
+    velocity_filter=None,
+)
 UNFILTERED = replace(SMALL, velocity_filter=Fraction(0))
 SERIAL = replace(SMALL, multiplier="serial", control_period=320)
 WITH_INPUTS = replace(SMALL, gains="inputs")
@@ -65,6 +76,7 @@ class Beside(wiring.Component):
                 **{name: In(shape) for name, shape in self.inputs.items()},
                 "tick": In(1),
                 "update": In(1),
+                "measured": In(1),
                 "velocity": In(self.window.velocity.shape()),
                 "valid": Out(1),
                 **{name: Out(getattr(self.controller, name).shape()) for name in COLUMNS},
@@ -78,6 +90,7 @@ class Beside(wiring.Component):
         m.d.comb += [
             window.tick.eq(self.tick),
             window.update.eq(self.update),
+            window.measured.eq(self.measured),
             window.velocity.eq(self.velocity),
             window.clear.eq(controller.clear),
             window.add.eq(controller.valid),
@@ -130,9 +143,11 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
         rows[at] |= {"tick": 1, **{name: int(column[k]) for name, column in (commands | gains).items()}}
         rows[at + 1] |= {name: int(column[k - 1]) for name, column in commands.items()}  # which is not taken
     commands |= gains
-    for at, value in zip(came.tolist(), velocity.tolist(), strict=True):
-        rows[at] |= {"update": 1, "velocity": value}
-    return Table(came, {"velocity": velocity}), Table(clock, commands), rows
+    # Half of what comes is no measurement, for a method that says which ones are.
+    forced = (rng.random(len(came)) < 0.5) & spec.tachometer.facts.awaits_count
+    for at, value, silent in zip(came.tolist(), velocity.tolist(), forced.tolist(), strict=True):
+        rows[at] |= {"update": 1, "velocity": value, "measured": not silent}
+    return Table(came, {"velocity": velocity, "forced": forced}), Table(clock, commands), rows
 
 
 def random_gains(form: ControlForm, rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -39,8 +40,6 @@ class Kind:
         Of the method.
     shortest : float, s
         The shortest tick of the core; with shorter control ticks it keeps this one.
-    memory : float
-        The longest memory of the core times k_v; 0: it has none.
     """
 
     name: str
@@ -49,7 +48,6 @@ class Kind:
     filtered: bool = True
     options: tuple[tuple[str, str], ...] = ()
     shortest: float = 0.0
-    memory: float = 0.0
 
 
 _SILENT = (("bound-decay", "no"),)  # updates without a count are no measurements, and would have eq. (22)'s weight
@@ -65,7 +63,6 @@ KINDS = (
         filtered=False,
         options=(("max-speed", "100rad/s"),),
         shortest=20e-6,
-        memory=0.6,
     ),
 )
 # Control ticks in seconds, with the clock, and the tick of a core in words.
@@ -81,9 +78,6 @@ TICKS = {
 def core(kind: Kind, seconds: float, decoding: int = 4, kv: float = GAINS[0]) -> TachometerSpec:
     """Return the core of a kind at a control tick: at one clock per tick with bits that keep the LSB below 2^-6
     rad/s.
-
-    The memory of the tracking method would grow while a loop swings below what it sees, so it is as short as the loop
-    is fast.
     """
     clock, tick = TICKS[seconds]
     if seconds < kind.shortest:
@@ -91,9 +85,7 @@ def core(kind: Kind, seconds: float, decoding: int = 4, kv: float = GAINS[0]) ->
     texts = {"ppr": "500", "clock": clock, "tick": tick, "max-time": "10ms", "decoding": str(decoding)}
     if tick == "20ns":
         texts["frac-bits"] = "24"
-    if kind.memory:
-        texts["max-memory"] = f"{round(1e6 * max(kind.memory / kv, seconds))}us"
-    return of_texts(kind.method, texts | dict(kind.options))
+    return of_texts(kind.method, texts | dict(kind.options)).in_loop(Fraction(kv))
 
 
 def gains_of(kind: Kind, kv: float, seconds: float) -> Gains:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.control import CONVENTIONAL, SERIAL, SMALL, UNFILTERED, WITH_INPUTS, check
+from support.control import CONVENTIONAL, SERIAL, SMALL, TRACKING, UNFILTERED, WITH_INPUTS, check
 from support.nightly import only
 
 SPECS = {"synchronised": SMALL, "conventional": CONVENTIONAL, "unfiltered": UNFILTERED, "inputs": WITH_INPUTS}
@@ -29,3 +29,9 @@ def test_with_numbers_that_saturate_now_and_then(name: str) -> None:
 
 def test_with_a_serial_multiplier() -> None:
     check(SERIAL, 40, less=8)
+
+
+def test_only_ticks_with_counts_are_updates_for_the_observer() -> None:
+    """Of a method that updates in every tick, what comes in a tick without a count is only held."""
+    wanted = check(TRACKING, 120, less=8)
+    assert len(np.unique(wanted.filtered_velocity)) > 10

@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 from support.tracking import core
 
-from tachometry.spec import ParameterError, TrackTachometer
+from tachometry.spec import ParameterError, TrackTachometer, of_options, with_loop
 from tachometry.spec.formats.tracking import GREATEST_ACCELERATION, WIDTH
 from tachometry.spec.formats.tracking_code import FIRST_CHOSEN, QUICK
 
@@ -23,6 +23,18 @@ def test_ends_of_ranges() -> None:
     ):
         with pytest.raises(ParameterError, match=allowed):
             core(**{name: text})
+
+
+def test_the_memory_in_a_loop_follows_from_its_gain() -> None:
+    """It is 0.6/k_v, from a tick to 4 s, unless it is given; the options of the core make it again."""
+    for gain, memory in (("120", 240_000), ("1/10", 192_000_000), ("1000000", 960)):
+        assert core(max_speed="400rad/s").in_loop(Fraction(gain)).max_memory == memory
+    loop = with_loop(core(max_speed="400rad/s"), {"kv": "80", "loop-multiplier": "parallel"})
+    assert loop.options["max-memory"] == "7.5ms"
+    assert loop.tachometer.words.heading == "Tracking method, memory of at most 7.5ms"
+    assert loop.tachometer.words.description.endswith(" length, memory of at most 7.5ms")
+    assert of_options(loop.options) == loop
+    assert with_loop(core(max_memory="1ms"), {"loop-multiplier": "parallel"}).options["max-memory"] == "1ms"
 
 
 def with_tick(cycles: int, multiplier: str) -> TrackTachometer:

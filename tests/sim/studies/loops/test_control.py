@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.nightly import nightly
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Log, LoopSimulation, Observer
@@ -177,3 +178,16 @@ def test_the_memory_of_tracking_is_as_short_as_the_loop_is_fast() -> None:
     """It is no longer than 0.6/k_v, and no shorter than a tick."""
     memories = [core(KINDS[-1], 1e-3, kv=kv).options["max-memory"] for kv in (20.0, 120.0, 1200.0)]
     assert memories == ["30ms", "5ms", "1ms"]
+
+
+@nightly  # tests/hdl/control holds gates against the golden model; this is the engine's controller
+def test_the_observer_waits_for_counts_of_tracking() -> None:
+    """Between two counts y stays, whatever the core shows."""
+    one = setting(KINDS[-1], 40.0, 100e-6, IDEAL)
+    one = replace(one, task=Task(motion=parse_motion("ramp:0:2:50ms+constant:2:100ms")))
+    log = one.run(one.simulation, 0)
+    counted = np.diff(log["position"], prepend=0) != 0
+    late = counted | np.roll(counted, 1) | np.roll(counted, 2)  # an update is as late as the program is long
+    assert 0.02 < np.mean(counted) < 0.2
+    assert np.all(np.diff(log["y"], prepend=0)[~late] == 0)
+    assert np.any(np.diff(log["held"], prepend=0)[~late] != 0)
