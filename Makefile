@@ -118,7 +118,7 @@ docs: demo ## the pages of options, ports and registers, written to docs/referen
 	cp build/demo/ramp.png docs/demo.png
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
-	$(BIN)/pdoc --docformat numpy -o build/api $(addprefix tachometry.,$(LAYERS)) \
+	$(BIN)/pdoc --docformat numpy -o build/api tachometry.api $(addprefix tachometry.,$(LAYERS)) \
 	  $(addprefix tachometry.,$(subst /,.,$(filter-out %/py %/export,$(basename $(wildcard spec/[a-z]* hdl/[a-z]*)))))
 
 lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks and tests

@@ -88,8 +88,9 @@ def test_demo_without_a_compiler(tmp_path: Path) -> None:
     assert (tmp_path / "build" / "demo" / "ramp.csv").stat().st_size > 0
 
 
-def test_python_examples(capsys: pytest.CaptureFixture[str]) -> None:
+def test_python_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """The examples build on each other; the one of docs/guides/testbench.md runs the simulation."""
+    monkeypatch.chdir(tmp_path)
     namespace: dict[str, object] = {"__name__": "readme"}
     page = (ROOT / "docs" / "guides" / "testbench.md").read_text(encoding="utf-8")
     for number, block in enumerate([*blocks("python"), *blocks("python", page)]):

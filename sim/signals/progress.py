@@ -1,7 +1,7 @@
 """Work that takes long shows how much of it is done, on whatever the caller has."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
 Progress = Callable[[float], None]
@@ -13,3 +13,9 @@ class Bar(Protocol):
     def __call__(
         self, verb: str, total: float, unit: str = "", *, rate: bool = False
     ) -> AbstractContextManager[Progress]: ...
+
+
+@contextmanager
+def no_bar(verb: str, total: float, unit: str = "", *, rate: bool = False) -> Iterator[Progress]:
+    """Show nothing."""
+    yield lambda done: None

@@ -1,0 +1,290 @@
+"""The functions of a script or notebook make a core by its options, simulate, replay, compare and write it."""
+
+import inspect
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.hdl.export import export
+from tachometry.sim.captures.read import read_capture, with_last_tick
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.options import EncoderOptions
+from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.sim.signals.progress import no_bar
+from tachometry.sim.signals.recording import Recording
+from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
+from tachometry.sim.studies.simulation import Axis, Simulation
+from tachometry.sim.studies.simulation import simulate as simulation_of
+from tachometry.spec import METHODS, CoreSpec, TachometerSpec, common_options, of_options, own_options
+from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.language.option import ParameterError, options_of, read_options
+
+__all__ = ["Run", "Tachometer", "compare", "generate", "read_capture", "replay", "simulate"]
+
+_OPTIONS = {
+    about.name.replace("-", "_"): about
+    for about in (*common_options(), *(one for method in METHODS for one in own_options(method)), *options_of(LoopSpec))
+}
+
+
+def Tachometer(**options: object) -> AnySpec:  # a noun, as it makes what it says
+    """Return a core, as `tachometry generate` makes it of options of these names, with _ for each - within a name.
+
+    Parameters
+    ----------
+    **options
+        Texts as on the command line, numbers, and True or False for flags: `ppr=500, max_speed="400rad/s"`. Also
+        `method` (without it the best that fits the tick), `axes`, `parallel` and `loop`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such option, or it is not what it must be.
+
+    Examples
+    --------
+    >>> spec = Tachometer(ppr=2500, clock="100MHz", tick="100us", max_speed="6000rpm", method="mt")
+    >>> spec.method, spec.timing.tick_cycles
+    ('mt', 10000)
+    """
+    texts = {name.replace("_", "-"): _text(value) for name, value in options.items() if value is not None}
+    return of_options(texts)
+
+
+Tachometer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]  # editors complete the names
+    [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=str | None)
+        for name in ("method", *_OPTIONS, "axes", "parallel", "loop")
+    ],
+    return_annotation=AnySpec,
+)
+
+
+def _text(value: object) -> str:
+    return ("no", "yes")[value] if isinstance(value, bool) else str(value)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Holds what a core has shown, compared with its golden model in every bit.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        All of it: `simulation.lockstep` has the rows of every port, `simulation.axes` what each axis made of them.
+    axis : int
+        The axis whose arrays are shown.
+    """
+
+    simulation: Simulation
+    axis: int = 0
+
+    @property
+    def _axis(self) -> Axis:
+        return self.simulation.axes[self.axis]
+
+    @property
+    def n_mismatches(self) -> int:
+        """Number of values in which hardware and golden model differ: 0."""
+        return self.simulation.lockstep.n_mismatches
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Times of the ticks from the first update on, in seconds, shape (n,)."""
+        return self._axis.held.time
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """Velocity that the core shows at these times, in rad/s, shape (n,)."""
+        return self._axis.held.velocity_rad_s
+
+    @property
+    def true_velocity(self) -> NDArray[np.float64] | None:
+        """True velocity of the shaft at these times, in rad/s, shape (n,); None: a capture does not tell it."""
+        truth = self._axis.truth
+        return None if truth is None else truth.true_speed(self.time)
+
+    @property
+    def position(self) -> NDArray[np.int64]:
+        """Position at each tick in counts, shape (m,)."""
+        return self._axis.run.ticks.position
+
+    def plot(self, path: str | os.PathLike[str]) -> None:
+        """Draw velocity, error, pulse numbers and measurement times into a .png or .pdf."""
+        from tachometry.sim.plots.run import save_plot  # Matplotlib is slow to import
+
+        truth = self._axis.truth
+        save_plot(Path(path), self._axis.spec, self._axis.run, None if truth is None else truth.true_speed)
+
+
+def simulate(spec: AnySpec, motion: str | Sequence[str], *, engine: str = "auto", **encoder: object) -> Run:
+    """Run a core on a virtual encoder, against its golden model, as `tachometry simulate` does.
+
+    Parameters
+    ----------
+    spec : AnySpec
+        Of a core with a loop, the tachometer alone is run.
+    motion : str or sequence of str
+        As of `--motion`, `"ramp:0:40rad/s:500ms"`; for many axes one for each.
+    engine : str
+        As of `--engine`.
+    **encoder
+        What is wrong with the encoder, as the command's options: `jitter=0.05, nonuniformity=0.1, seed=2`.
+
+    Raises
+    ------
+    ValueError
+        If a motion, an engine or an option is not what it must be.
+
+    Examples
+    --------
+    >>> spec = Tachometer(ppr=500, clock="1MHz", tick="1ms", method="s")
+    >>> run = simulate(spec, "constant:300rpm:50ms", jitter=0.05)
+    >>> run.n_mismatches, round(float(run.velocity[-1]), 1)
+    (0, 31.4)
+    """
+    motions = [motion] if isinstance(motion, str) else motion
+    if len(motions) != (spec.axes or 1):
+        raise ValueError(f"motion must be one for each of {spec.axes or 1} axes, not {len(motions)}")
+    truths = [_recorded(spec, one, axis, encoder) for axis, one in enumerate(motions)]
+    return _run(spec, "motion", [truth.recording for truth in truths], truths, engine)
+
+
+def replay(spec: AnySpec, *captures: str | os.PathLike[str] | Recording, engine: str = "auto") -> Run:
+    """Run a core on captured signals, one capture for each axis, as `tachometry replay` does.
+
+    Parameters
+    ----------
+    spec : AnySpec
+    *captures : path or Recording
+        Files whose channels are found by their names; or what `read_capture` reads, which takes the names of others.
+    engine : str
+        As of `--engine`.
+
+    Raises
+    ------
+    ValueError
+        If a capture is not what it must be.
+    """
+    recordings = [one if isinstance(one, Recording) else read_capture(one) for one in captures]
+    if len(recordings) != (spec.axes or 1):
+        raise ValueError(f"captures must be one for each of {spec.axes or 1} axes, not {len(recordings)}")
+    return _run(spec, "the capture", [with_last_tick(one, _core(spec)) for one in recordings], None, engine)
+
+
+def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: object) -> Comparison:
+    """Compare cores on the same edges of a virtual encoder, as `tachometry compare` does.
+
+    Parameters
+    ----------
+    specs : sequence of TachometerSpec
+        Of different methods; the first one's encoder, clock and tick are those of all.
+    motion : str
+    **encoder
+        As of `simulate`.
+
+    Raises
+    ------
+    ValueError
+        If a method is there twice; if a motion or an option is not what it must be.
+
+    Examples
+    --------
+    >>> cores = [Tachometer(ppr=500, clock="1MHz", tick="1ms", method=method) for method in ("s", "mt")]
+    >>> [score.name for score in compare(cores, "constant:300rpm:50ms", jitter=0.05).scores]
+    ['s', 'mt']
+    """
+    named = {spec.method: spec for spec in specs}
+    if len(named) != len(specs) or not specs:
+        raise ValueError("specs must be of different methods, at least one")
+    truth = _recorded(specs[0], motion, 0, encoder)
+    source = Source("motion", truth.recording, truth.true_speed)
+    return comparison(
+        specs[0],
+        dict(named),
+        lambda method, texts: named[method],
+        source,
+        earliest=None,
+        latest=float("inf"),
+        tune=False,
+        tradeoff=False,
+        bar=no_bar,
+    )
+
+
+def generate(
+    spec: AnySpec,
+    folder: str | os.PathLike[str],
+    name: str = "tachometer",
+    *,
+    bus: str | None = None,
+    baud: int | None = None,
+    target: str = "none",
+) -> list[Path]:
+    """Write a core as Verilog, with its manifest and all that it takes to build it in, as `tachometry generate` does.
+
+    Parameters
+    ----------
+    spec : AnySpec
+    folder : path
+        It is made if it does not exist, and files in it are overwritten.
+    name : str
+        Of the module and of the files.
+    bus, baud, target
+        See `tachometry.hdl.export.export`.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    ValueError
+        If the name, the bus or the target cannot be.
+    OSError
+        If the files cannot be written.
+    """
+    texts = export(spec, name, bus, baud, target)
+    paths = []
+    for file, text in texts.items():
+        paths.append(Path(folder) / file)
+        paths[-1].parent.mkdir(parents=True, exist_ok=True)
+        paths[-1].write_text(text, encoding="utf-8", newline="\n")
+    return paths
+
+
+def _recorded(spec: AnySpec, motion: str, axis: int, encoder: dict[str, Any]) -> Encoding:
+    known = [about.name.replace("-", "_") for about in options_of(EncoderOptions)]
+    for name in encoder:
+        if name not in known:
+            raise ParameterError(name, f"must be an option of the encoder: {', '.join(known)}")
+    texts = {name.replace("_", "-"): _text(value) for name, value in encoder.items()}
+    values = read_options(EncoderOptions, texts)
+    alone = spec.tachometer
+    whole = VirtualEncoder(alone.encoder.pulses_per_rev, index=alone.index, **values)
+    return replace(whole, seed=whole.seed + axis).record(parse_motion(motion))
+
+
+def _run(spec: AnySpec, source: str, recordings: list[Recording], truths: list[Encoding] | None, engine: str) -> Run:
+    return Run(
+        simulation_of(
+            _core(spec),
+            source,
+            recordings,
+            truths,
+            engine,
+            window=lambda _, n_clocks: (0, n_clocks),
+            vcd=None,
+            bar=no_bar,
+        )
+    )
+
+
+def _core(spec: AnySpec) -> CoreSpec:
+    core: CoreSpec = spec.tachometer if spec.axes is None else spec
+    return core
