@@ -1,5 +1,6 @@
 """All tests share these fixtures and hooks."""
 
+import gc
 import os
 import signal
 from collections.abc import Callable
@@ -13,6 +14,14 @@ os.environ.setdefault("TACHOMETRY_CACHE", str(Path(__file__).parent.parent / "bu
 # A shell ignores Ctrl-C for what it runs in the background, and commands that tests begin would ignore it, too.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+gc.disable()  # while tests are collected, which all stay
+
+
+def pytest_collection_finish() -> None:
+    """Let Python look for garbage among what tests make, and no more in what was collected."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture

@@ -191,7 +191,7 @@ class LoopSpec(Law):
         """Formats of the command generator."""
         return generator_form(self.units, self.form.command_width)
 
-    @property
+    @cached_property
     def ports(self) -> Ports:
         """Ports of the exported core, in order: those of the tachometer first."""
         return Ports((*self.tachometer.ports, *loop_ports(self)))

@@ -217,7 +217,7 @@ class TachometerSpec:
         """Outputs that only this method has; they are new with `velocity_valid`."""
         return ()
 
-    @property
+    @cached_property
     def ports(self) -> Ports:
         """Ports of the exported core, in order."""
         return Ports(ports_of(self, (*bound_ports(self), *self.method_ports)))

@@ -255,7 +255,7 @@ class AxesSpec:
         begun = self.look(0, last) + self.latency.count + 1 + self.tachometer.index_reset
         return begun + axis * self.turn_cycles + self.turn_cycles + READ + self.parallel
 
-    @property
+    @cached_property
     def ports(self) -> Ports:
         """Ports of the exported core, in order."""
         return Ports((*self._inputs(), *self._strobed(), *(self._held() if self.parallel else ())))

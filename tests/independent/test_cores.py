@@ -135,9 +135,8 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
     assert any(row.get("velocity_overflow") for row in shown) == case.settings.narrow
 
 
-# One core of each method has most of its options, two the timer of ticks and the greatest width; the rest are ends of
-# ranges.
-SHORT = {"s_rpm", "s_two", "m_rpm", "t_lattice", "mt_rpm", "rairan_rpm", "track_rpm"}
+# One core of each method has most of its options; the rest are ends of ranges.
+SHORT = {"s_rpm", "m_rpm", "t_lattice", "mt_rpm", "rairan_rpm", "track_rpm"}
 NIGHTLY = [case.name for case in CASES if case.name not in SHORT]
 
 

@@ -11,11 +11,12 @@ from pathlib import Path
 
 import pytest
 from independent.bench import Manifest, Row, in_verilator
-from independent.cases import CASES, Case, parameters
+from independent.cases import CASES, Case
 from independent.show import check_velocity
 from independent.stimulus import Lines, steady
 from reference.front import conditioned, wrapped
 from reference.settings import Settings, arguments
+from support.nightly import nightly
 
 TRACKING = [case for case in CASES if case.settings.method == "track"]
 FIRST = 5  # ticks before the motion
@@ -156,7 +157,8 @@ def check_rest(motion: Motion) -> None:
         assert motion.settings.lowpass is not None or row["velocity"] == 0
 
 
-@pytest.mark.parametrize("case", parameters(TRACKING, nightly=("track_native", "track_rad", "track_rev")))
+@nightly  # in every tick of a core, test_cores.py has what tracking may show; tests/sim/golden has how well it does
+@pytest.mark.parametrize("case", TRACKING, ids=lambda case: case.name)
 def test_a_known_motion(case: Case, generated: Callable[..., Path]) -> None:
     settings = case.settings
     folder = generated(case.name, "--method", "track", *arguments(settings.words))

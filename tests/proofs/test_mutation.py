@@ -126,6 +126,7 @@ def test_steps_have_windows_of_all_lengths_and_all_counts() -> None:
     assert {*run_of.ticks.pulse_count.tolist()} == {*range(-spec.widths.max_count, spec.widths.max_count + 1)}
 
 
+@nightly
 def test_golden_model_is_held_against_the_core() -> None:
     played = stimulus(CASE.spec, 1000)
     traces = [trace for trace in played.traces if isinstance(trace, PinTrace)]

@@ -5,13 +5,14 @@ from proofs.formal.mutants import RECURSIVE_SUM
 from proofs.source import mutant
 from proofs.upset import axes, loops
 from proofs.upset.campaign import UPSET, upsets
-from support.nightly import nightly, only
+from support.nightly import nightly
 
 from tachometry.hdl.control.control_clock import ControlClock
 from tachometry.hdl.methods.m import MovingSum
 
 
-@pytest.mark.parametrize("method", only(["m"], UPSET))  # the fewest flip-flops
+@nightly
+@pytest.mark.parametrize("method", UPSET)
 def test_outputs_are_right_again_in_time(method: str) -> None:
     """Every bit once."""
     campaign = upsets(method, 700)

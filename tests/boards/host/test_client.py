@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from support.lockstep import random_case
 from support.native import NativeCore, check_golden, logged, snapshots
+from support.nightly import nightly
 
 from tachometry.boards.host import client
 from tachometry.boards.host.snapshot import Snapshot
@@ -87,6 +88,7 @@ def test_snapshots_are_those_of_the_golden_bank(method: str, seed: int) -> None:
     assert dict(bench.snapshot()) != dict(first)
 
 
+@nightly  # the C driver plays on this core, too, and the golden bank above is that of the gates
 def test_on_the_simulated_core(tmp_path: Path) -> None:
     spec, trace, _ = case("m", 16)
     registers = RegisterMap(spec)

@@ -26,6 +26,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.spec import Encoder, STachometer, Timing
 
 CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
+FEW_CLOCKS = ("--engine", "pysim")  # fewer than a core is worth compiling for
 MOTION = ["--motion", "ramp:0:20:200ms+stop:50ms+constant:-15:100ms"]
 OUTPUTS = {"--vcd": "v.vcd", "--plot": "p.png", "--trace": "t.csv", "--counts": "c.csv", "--save-capture": "s.sr"}
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()"]
@@ -175,7 +176,7 @@ def test_every_imperfection_reaches_the_pins_and_so_does_the_index(tmp_path: Pat
 
 
 def test_overflow_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("simulate", *CORE, "--motion", "constant:100:20ms", "--max-speed", "50rad/s") == 0
+    assert run("simulate", *CORE, "--motion", "constant:100:20ms", "--max-speed", "50rad/s", *FEW_CLOCKS) == 0
     assert "faster than --max-speed" in summary(capsys.readouterr().out)["overflow"]
 
 
@@ -355,7 +356,9 @@ def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signa
 
 def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture[str]) -> None:
     # Each line changes every 21 clocks or so; some levels hold for less than 18.
-    assert run("simulate", *CORE, "--motion", "constant:30:200ms", "--jitter", "0.3", "--filter", "18") == 0
+    assert (
+        run("simulate", *CORE, "--motion", "constant:30:200ms", "--jitter", "0.3", "--filter", "18", *FEW_CLOCKS) == 0
+    )
     rows = summary(capsys.readouterr().out)
     assert int(rows["edges swallowed"].split()[0]) > 0
     assert rows["mismatches"] == "0"

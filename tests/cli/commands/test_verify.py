@@ -41,7 +41,11 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.mark.parametrize(
     ("methods", "engines", "few"),
-    [(["m"], ["pysim", "cxxrtl", "verilator"], 1), pytest.param(list(METHODS), ["pysim"], 1, marks=nightly)],
+    [
+        (["m"], ["pysim", "cxxrtl"], 1),
+        pytest.param(["m"], ["cxxrtl", "verilator"], 1, marks=nightly),  # whose core takes long to compile
+        pytest.param(list(METHODS), ["pysim"], 1, marks=nightly),
+    ],
     indirect=["few"],
 )
 def test_engines_and_methods(

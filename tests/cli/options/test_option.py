@@ -29,6 +29,6 @@ def test_a_capture_keeps_index_and_tick(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_a_tick_that_stays_away_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "x.csv").write_text("time,a,b,sync\n0,0,0,0\n0.001,0,0,1\n0.0015,0,0,0\n0.01,0,0,0\n")
-    words = ["--external-tick", "--tick-in", "sync"]
+    words = ["--external-tick", "--tick-in", "sync", "--engine", "pysim"]
     assert run("replay", tmp_path / "x.csv", *CORE, *words) == 0
     assert " tick errors 4 (external tick too early or missing)" in " ".join(capsys.readouterr().out.split())

@@ -12,7 +12,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import METHODS
 from tachometry.spec.registers.map import RegisterMap
 
-CLOCKS, SEEDS = 2500, range(6)
+CLOCKS, SEEDS = 1500, range(6)
 
 
 def random_accesses(registers: RegisterMap, seed: int, n_clocks: int) -> tuple[list[Access], list[int]]:

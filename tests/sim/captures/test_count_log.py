@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.command import run
+from support.nightly import only
 
 from tachometry.sim.captures.count_log import CountLog, read_count_log
 from tachometry.sim.captures.file import CaptureError
@@ -100,7 +101,8 @@ def test_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyte
     assert re.search(r"note between two of the 4 rows .* counts in (2[0-9]|30) counts out \1 errors flagged 0", told)
 
 
-@pytest.mark.parametrize("decoding", ["1", "2", "4"])
+# The engine counts in every decoding in test_matrix.py; x2 could be either of the others by mistake.
+@pytest.mark.parametrize("decoding", only(["2"], ["1", "2", "4"]))
 def test_a_motion_counts_what_the_log_says(
     decoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -34,11 +34,11 @@ def turning(n_clocks: int, spacing: int = 7) -> PinTrace:
 @pytest.mark.parametrize(
     ("name", "method", "seed"),
     [
-        ("cxxrtl", "m", 4),
-        *(pytest.param("cxxrtl", *case, marks=nightly) for case in [("s", 9), ("mt", 2), ("t", 0), ("rairan", 1)]),
-        pytest.param("verilator", "mt", 2, marks=nightly),  # which plays on many more cores in test_matrix.py
+        *(("cxxrtl", *case) for case in [("m", 4), ("s", 9), ("mt", 2), ("t", 0), ("rairan", 1)]),
+        ("verilator", "mt", 2),
     ],
 )
+@nightly  # the tests below hold CXXRTL against the golden model, too, and test_matrix.py holds Verilator
 def test_random_cases(name: str, method: str, seed: int) -> None:
     spec, _, trace = random_case(seed, method)
     run = pick(name).run(spec, trace)

@@ -181,7 +181,7 @@ def test_docs_have_every_claim_with_the_number_that_is_computed(name: str) -> No
         assert row.replace("|Σ m_e|", "Σ m_e") in DOCS, row
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", only(QUICK, FIGURES))
 def test_curves_can_be_drawn(name: str) -> None:
     result = computed(name)
     assert len({panel.x_label for panel in result.panels}) == 1  # of the CSV

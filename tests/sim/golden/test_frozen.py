@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ ROOMS = ("tachometry.spec.", "tachometry.sim.golden.", "tachometry.sim.signals.r
 SMALL = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100", "bounds": "yes", "lowpass": "1kHz"}
 
 
+@cache
 def used() -> None:
     """Something of every module, so that it can be told from others which this test runs."""
     line = (np.arange(3000) // 30 % 2).astype(np.uint8)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -189,15 +189,16 @@ TEXTS: dict[str, Check] = {
 }
 
 
-def text_of(registers: RegisterMap, file: str) -> str:
-    return register_files(registers, "spindle")[file] if file else ""
+@cache
+def texts_of(registers: RegisterMap) -> Mapping[str, str]:
+    return {"": "", **register_files(registers, "spindle")}
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("file", TEXTS)
 def test_every_register_and_field_is_there(file: str, method: str, tmp_path: Path) -> None:
     for registers in maps(method):
-        TEXTS[file](registers, text_of(registers, file), tmp_path)
+        TEXTS[file](registers, texts_of(registers)[file], tmp_path)
 
 
 @pytest.mark.parametrize("command", ["ports", "generator"])
@@ -205,7 +206,7 @@ def test_every_register_and_field_is_there(file: str, method: str, tmp_path: Pat
 def test_every_register_of_a_control_loop_is_there(file: str, command: str, tmp_path: Path) -> None:
     core = of_texts("s", BASE | {"max-speed": "500rad/s"})
     spec = LoopSpec(tachometer=core, gains="inputs", command=command, multiplier="parallel")
-    TEXTS[file](registers_of(spec), text_of(registers_of(spec), file), tmp_path)
+    TEXTS[file](registers_of(spec), texts_of(registers_of(spec))[file], tmp_path)
 
 
 def test_the_configurations_have_all_kinds() -> None:
