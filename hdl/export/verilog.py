@@ -17,6 +17,9 @@ from tachometry.spec.language.tools import complaint
 # Yosys wakes `always @*` by giving a register its value; SystemVerilog does that too early where it is declared.
 _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
 
+# Amaranth's name for what it leads through the boundary of a box; viewers of waveforms show it as it stands.
+_LED = re.compile(r"\\port\$(\d+)\$(\d+) ")
+
 
 @contextmanager
 def bundled_yosys() -> Iterator[None]:
@@ -39,5 +42,5 @@ def verilog_of(top: wiring.Component, described: Mapping[str, Any]) -> str:
     name = described["module"]
     with bundled_yosys():
         text = verilog.convert(top, name=name, emit_src=False)
-    text = _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", text)
+    text = _LED.sub(r"port_\1_\2 ", _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", text))
     return render("NAME.v", **described, name=name, verilog=text.removesuffix("\n"))

@@ -27,6 +27,7 @@ def test_files(spec: STachometer) -> None:
     assert list(files) == [file.replace("NAME", "speed_meter") for file in CORE_FILES]
     described = json.loads(files["speed_meter.json"])
     assert described["module"] == "speed_meter"
+    assert "\\port$" not in files["speed_meter.v"]  # which no viewer of waveforms shows well
     # The ports of the module are those of the manifest, in width and direction.
     top = re.search(r"\nmodule speed_meter\(.*?\nendmodule", files["speed_meter.v"], re.DOTALL)
     assert top is not None
