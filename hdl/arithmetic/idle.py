@@ -1,19 +1,38 @@
-"""A simulation may skip clocks in which counters count or a division goes on, and nothing else happens."""
+"""A simulation may skip clocks in which only registers move whose way is known, and nothing else happens."""
 
-from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Protocol, Self, runtime_checkable
 
 
 @dataclass(frozen=True)
-class IdleCounter:
-    """A counter on whose value nothing depends but at its stops.
+class Idle:
+    """A register, or several, on whose values nothing depends but at their stops.
 
-    In clocks in which all else stands still, a simulation may move it on to the next stop at once.
+    In clocks in which all else stands still, a simulation may move them on to the next stop at once. All texts are
+    names of signals, behind those of the boxes around them: `sampling_clock.left`.
+    """
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        raise NotImplementedError
+
+    def within(self, box: str) -> Self:
+        """Return the same from outside of a box."""
+        names = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(
+            self, **{name: f"{box}.{path}" for name, path in names.items() if path and isinstance(path, str)}
+        )
+
+
+@dataclass(frozen=True)
+class IdleCounter(Idle):
+    """A counter.
 
     Parameters
     ----------
     path : str
-        Name of the signal, behind those of the boxes around it: `sampling_clock.left`.
     step : int
         What it counts by, −1 or 1.
     stops : tuple of int
@@ -32,19 +51,32 @@ class IdleCounter:
         """Signals that it moves on."""
         return (self.path,)
 
-    def within(self, box: str) -> "IdleCounter":
-        """Return the same from outside of a box."""
-        return replace(self, path=f"{box}.{self.path}")
+
+@dataclass(frozen=True)
+class IdleSum(Idle):
+    """A sum to which every clock adds the same as long as all else stands still; it wraps.
+
+    Parameters
+    ----------
+    path : str
+    """
+
+    path: str
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        return (self.path,)
 
 
 @dataclass(frozen=True)
-class IdleDivision:
+class IdleDivision(Idle):
     """A division of `spec.formats.reciprocal.DividedReciprocal`, on whose steps nothing depends until it is done.
 
     Parameters
     ----------
     digits, less_one, m : str
-        Names of the signals, as that of an `IdleCounter`. m stands still as long as the division goes on.
+        m stands still as long as the division goes on.
     steps : int
         At most 62.
     """
@@ -59,16 +91,16 @@ class IdleDivision:
         """Signals that it moves on."""
         return (self.digits, self.less_one)
 
-    def within(self, box: str) -> "IdleDivision":
-        """Return the same from outside of a box."""
-        digits, less_one, m = (f"{box}.{path}" for path in (self.digits, self.less_one, self.m))
-        return replace(self, digits=digits, less_one=less_one, m=m)
-
 
 @runtime_checkable
-class HasIdleCounters(Protocol):
-    """A box with such counters, or such a division."""
+class HasIdle(Protocol):
+    """A box with such registers."""
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
-        """With paths within the box."""
+    def idle(self) -> tuple[Idle, ...]:
+        """With names within the box."""
+
+
+def idle_of(boxes: Mapping[str, object]) -> tuple[Idle, ...]:
+    """Return what may be skipped in boxes within a box, by their names."""
+    return tuple(one.within(name) for name, box in boxes.items() if isinstance(box, HasIdle) for one in box.idle)

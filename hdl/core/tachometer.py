@@ -3,7 +3,7 @@
 from amaranth import Module, Signal
 from amaranth.lib import stream, wiring
 
-from tachometry.hdl.arithmetic.idle import HasIdleCounters, IdleCounter, IdleDivision
+from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
 from tachometry.hdl.front_end.external_tick import ExternalTick
@@ -81,17 +81,12 @@ class Tachometer(wiring.Component):
         return self._spec
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
-        """Counters and divisions that a simulation may skip: `IdleCounter` and `IdleDivision`."""
+    def idle(self) -> tuple[Idle, ...]:
+        """Registers that a simulation may move on."""
         boxes: dict[str, object] = {"datapath": self.datapath}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
-        return tuple(
-            counter.within(name)
-            for name, box in boxes.items()
-            if isinstance(box, HasIdleCounters)
-            for counter in box.idle_counters
-        )
+        return idle_of(boxes)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -4,7 +4,7 @@ from amaranth import Cat, Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from tachometry.hdl.arithmetic.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 
 # Bits whose parity makes a shift register of so many bits go through all states but one (Alfke, XAPP 052).
 _TAPS = {
@@ -63,7 +63,7 @@ class SamplingClock(wiring.Component):
         return tuple(found)
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter, ...]:
+    def idle(self) -> tuple[Idle, ...]:
         """Counters that a simulation may skip: `IdleCounter`."""
         if self.states:
             return (IdleCounter("state", order=self.states),)

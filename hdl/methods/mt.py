@@ -2,7 +2,7 @@
 
 from amaranth import Module, Mux, Signal, Value, ValueLike
 
-from tachometry.hdl.arithmetic.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
 
@@ -25,9 +25,9 @@ class MTMethod(TimedDatapath):
         self._cycle_counts = spec.form.cycle_counts
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter, ...]:
+    def idle(self) -> tuple[Idle, ...]:
         """Counters that a simulation may skip: `IdleCounter`."""
-        counters = super().idle_counters
+        counters = super().idle
         stops = (self._min_periods, self._patient_periods)
         return (*counters, IdleCounter("length", 1, stops)) if counters else ()
 

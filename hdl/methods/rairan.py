@@ -5,7 +5,7 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.hdl.wires.delay import delay
@@ -60,7 +60,7 @@ class RairanMethod(wiring.Component):
         return {"c_ep": self.counters.c_more + self.counters.any, "c_dt": self.counters.c_dt}
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter, ...]:
+    def idle(self) -> tuple[Idle, ...]:
         """Counters that a simulation may skip: `IdleCounter`."""
         return (IdleCounter("counters.left", -1, (-1,)),) if self._spec.timing.tick_cycles > 1 else ()
 

@@ -4,7 +4,7 @@ from amaranth import Module, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.idle import IdleDivision
+from tachometry.hdl.arithmetic.idle import Idle, IdleDivision
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
@@ -78,7 +78,7 @@ class SMethod(wiring.Component):
         }
 
     @property
-    def idle_counters(self) -> tuple[IdleDivision, ...]:
+    def idle(self) -> tuple[Idle, ...]:
         """Divisions that a simulation may skip: q is read from the next tick on."""
         found = self._spec.form.reciprocal
         if not isinstance(found, DividedReciprocal) or found.steps > 62:

@@ -4,6 +4,7 @@ from amaranth import Cat, Const, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleSum
 from tachometry.spec.formats.tracking import Tracking
 
 
@@ -61,6 +62,12 @@ class TickCounts(wiring.Component):
                 "length": Out(range(form.longest_tick + 1), init=form.tick_cycles),
             }
         )
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """Sums that a simulation may move on: all are taken, and begin anew, with a tick or a count."""
+        names = ("open_last", "open_times", *("open_length",) * self._form.external)
+        return tuple(IdleSum(name) for name in names)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -4,7 +4,7 @@ from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from tachometry.hdl.arithmetic.idle import IdleCounter
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.methods.count_way import CountWay
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
@@ -52,7 +52,7 @@ class TimedDatapath(wiring.Component):
         return {"gap": self.gap_timer.age}
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter, ...]:
+    def idle(self) -> tuple[Idle, ...]:
         """Counters that a simulation may skip: `IdleCounter`."""
         if self._spec.form.on_lattice:  # which counts with the tick
             return ()

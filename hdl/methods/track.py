@@ -4,6 +4,7 @@ from amaranth import Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, idle_of
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
@@ -42,6 +43,11 @@ class TrackMethod(wiring.Component):
     def probes(self) -> dict[str, Value]:
         """Signals of the inside that a waveform should show."""
         return {"counts_number": self.tick_counts.number, "counts_times": self.tick_counts.times}
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """Registers that a simulation may move on."""
+        return (IdleCounter("left", -1, (1,)), *idle_of({"tick_counts": self.tick_counts}))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

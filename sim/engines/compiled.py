@@ -17,8 +17,8 @@ import numpy as np
 from amaranth.lib import wiring
 from numpy.typing import NDArray
 
-from tachometry.hdl import Tachometer, core_of
-from tachometry.hdl.arithmetic.idle import IdleCounter, IdleDivision
+from tachometry.hdl import core_of
+from tachometry.hdl.arithmetic.idle import HasIdle, Idle
 from tachometry.sim.engines.engine import Interrupted, driven_pins
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
@@ -86,9 +86,9 @@ class Design:
         return 0 if self.watched is None else self.watched.n_words
 
     @property
-    def idle_counters(self) -> tuple[IdleCounter | IdleDivision, ...]:
-        """Counters that may be moved on; none where signals are shown, as these change with them."""
-        return self.component.idle_counters if isinstance(self.component, Tachometer) else ()
+    def idle(self) -> tuple[Idle, ...]:
+        """Registers that may be moved on; none where signals are shown, as these change with them."""
+        return self.component.idle if isinstance(self.component, HasIdle) else ()
 
     @property
     def outputs(self) -> list[Port]:
@@ -166,7 +166,7 @@ class Play:
         self._trace = trace
         self.window = window
         self._every_clock = every_clock
-        self.done = 0
+        self.done = self.skipped = 0  # clocks
         self._found: list[NDArray[np.int64]] = []
         self._columns = 1 + len(design.outputs)
         self._n_words = design.n_words
@@ -201,6 +201,7 @@ class Play:
                 if progress is not None:
                     progress(self.done)
         finally:
+            self.skipped = job.skipped
             self._library.tachometer_delete(model)
 
     def _job(self) -> Any:
@@ -223,6 +224,7 @@ class Play:
                 ("shown_from", long),
                 ("shown_to", long),
                 ("every_clock", long),
+                ("skipped", long),
                 ("last", ctypes.c_uint32 * (self._n_words + 1)),
             )
 

@@ -16,6 +16,7 @@ struct Job {
   int64_t n_shown, shown_capacity;
   int64_t shown_from, shown_to;  // clocks
   int64_t every_clock;  // none is skipped
+  int64_t skipped;  // clocks
   uint32_t last[N_SHOWN + 1];  // words shown last
 };
 
@@ -70,6 +71,7 @@ ENTRY __attribute__((flatten)) void tachometer_run(void *home, Job *job) {
         if (idle > until - clock) idle = until - clock;
         model.move_on(idle);
         clock += idle - 1;
+        job->skipped += idle - 1;
       } else {
         model.edge();
       }
