@@ -23,7 +23,9 @@ Motions, joined by + into one:
   ramp:FROM:TO:TIME
   sine:AMPLITUDE:FREQUENCY:TIME
   trapezoid:SPEED:ACCEL_TIME:HOLD_TIME
+  s-curve:FROM:TO:TIME
   stop:TIME
+  N*(SEGMENT+...)  repeats what is in it
   csv:FILE    alone: a table with the header time,angle_rad in s and rad
   counts:FILE:TIME:COUNT  alone, in no loop or sweep: the log of a counter,
               by the names of its columns; see replay --count
@@ -44,7 +46,7 @@ def _motion(required: bool) -> Callable[[Any], Any]:
 
 _OPTIONS = [declared(about.group, about) for about in options_of(EncoderOptions)]
 # What may be wrong where a loop is closed about the encoder.
-_OF_LOOPS = ("jitter", "nonuniformity", "phase-error", "duty-error", "seed")
+_OF_LOOPS = ("jitter", "nonuniformity", "eccentricity", "phase-error", "duty-error", "seed")
 
 
 def tables_of(motion: str) -> list[Path]:

@@ -27,9 +27,11 @@ _FIELDS: dict[str, dict[str, Units]] = {
     "ramp": {"FROM": SPEED, "TO": SPEED, "TIME": TIME},
     "sine": {"AMPLITUDE": SPEED, "FREQUENCY": FREQUENCY, "TIME": TIME},
     "trapezoid": {"SPEED": SPEED, "ACCEL_TIME": TIME, "HOLD_TIME": TIME},
+    "s-curve": {"FROM": SPEED, "TO": SPEED, "TIME": TIME},
     "stop": {"TIME": TIME},
 }
-_FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items())
+_FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items()) + ", N*(SEGMENT+...)"
+_REPEATED = re.compile(r"(?<!\d)(\d{1,4})\*\(([^()]*)\)")
 _CSV_HEADER = ["time", "angle_rad"]
 _MOST_CSV = 1 << 26  # bytes
 _BELOW = 1e30  # times, angles, speeds and accelerations: what is computed of them is finite
@@ -247,8 +249,9 @@ def parse_motion(text: str) -> Motion:
     ----------
     text : str
         Segments joined by `+`: constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME,
-        trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, stop:TIME. Or csv:FILE alone: a table with the header `time,angle_rad`
-        (seconds, rad) between whose rows the angle is interpolated linearly; its first time becomes 0.
+        trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, s-curve:FROM:TO:TIME (the acceleration is a raised cosine), stop:TIME.
+        N*(...) repeats segments. Or csv:FILE alone: a table with the header `time,angle_rad` (seconds, rad) between
+        whose rows the angle is interpolated linearly; its first time becomes 0.
         Speeds are in rad/s (default), rev/s or rpm, times in s (default), ms, us or ns, frequencies in Hz (default),
         kHz, MHz or GHz.
 
@@ -260,6 +263,7 @@ def parse_motion(text: str) -> Motion:
     kind, _, file = text.strip().partition(":")
     if kind == "csv":
         return _read_csv(file)
+    text = _REPEATED.sub(lambda match: "+".join([match[2]] * int(match[1])), text)
     # a + before a digit is a sign or part of an exponent
     return Motion._joined(
         segment for part in re.split(r"\+(?![\d.])", text) for segment in _parse_segment(part.strip())
@@ -287,6 +291,9 @@ def _parse_segment(text: str) -> list[_Segment]:
             return [_Segment(duration, start, (end - start) / duration)]
         case "sine", [amplitude, frequency, duration]:
             return [_Segment(duration, sine_speed=amplitude, sine_frequency=frequency)]
+        case "s-curve", [start, end, duration]:
+            rise = end - start
+            return [_Segment(duration, start, rise / duration, -rise / (2 * math.pi), 1 / duration)]
         case "trapezoid", [speed, rise, hold]:
             return [_Segment(rise, 0.0, speed / rise), _Segment(hold, speed), _Segment(rise, speed, -speed / rise)]
         case _:

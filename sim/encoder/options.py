@@ -53,12 +53,14 @@ class EncoderOptions:
         neighbours (edges, start and end of the recording). Shifts are clipped at 0.49 gaps: edges keep their order.
     nonuniformity : float, from 0 to less than 0.5
         The disc's offsets are uniform between plus and minus this many pitches.
+    eccentricity : float, from 0 to less than 0.5
+        The disc sits off centre: its edges are displaced by a sine over a turn with this amplitude, in pitches.
     phase_error_deg : float, electrical degrees, more than -90 and less than 90
         The centre of B's pulse comes this much later, forwards, than a quarter period after the centre of A's.
     duty_error_deg : float, electrical degrees, more than -90 and less than 90
-        The pulses of both lines are this much wider than 180, and the pauses narrower. Phase error, duty error and
-        nonuniformity (a pitch is 90 degrees, and both edges of a state may be off) must add up to less than 90: then
-        no state vanishes. They are of the disc, hence part of the truth.
+        The pulses of both lines are this much wider than 180, and the pauses narrower. Phase error, duty error,
+        nonuniformity and eccentricity (a pitch is 90 degrees, and both edges of a state may be off) must add up to
+        less than 90: then no state vanishes. They are of the disc, hence part of the truth.
     bounce : Bounce or None
         After an edge the line falls back and returns so many times, at random moments within the bounce time or half
         the time to the next edge of either line, whichever is less. Edges that come together do not bounce.
@@ -93,6 +95,11 @@ class EncoderOptions:
     )
     nonuniformity: float = _fault(
         "Edges of the disc are displaced by up to this many edge pitches, below 0.5, the same in every turn.",
+        "FRACTION",
+        number_reader(FRACTION),
+    )
+    eccentricity: float = _fault(
+        "The disc sits off centre: its edges are displaced by up to this many edge pitches, as a sine over a turn.",
         "FRACTION",
         number_reader(FRACTION),
     )
@@ -131,7 +138,8 @@ class EncoderOptions:
     )
 
     def __post_init__(self) -> None:
-        for name, value in (("jitter", self.jitter), ("nonuniformity", self.nonuniformity)):
+        for name in ("jitter", "nonuniformity", "eccentricity"):
+            value = getattr(self, name)
             if not 0 <= value < 0.5:
                 raise ParameterError(name, f"must be from 0 to less than 0.5, not {value}")
         for name, value in (("illegal", self.illegal), ("lost", self.lost)):
@@ -140,11 +148,12 @@ class EncoderOptions:
         for name, value in (("phase_error_deg", self.phase_error_deg), ("duty_error_deg", self.duty_error_deg)):
             if not -90 < value < 90:
                 raise ParameterError(name, f"must be more than -90 and less than 90, not {value}")
-        errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * self.nonuniformity
+        uneven = self.nonuniformity + self.eccentricity
+        errors = abs(self.phase_error_deg) + abs(self.duty_error_deg) + 180 * uneven
         if not errors < 90:
             raise ValueError(
-                "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical "
-                f"degrees, not {errors:.6g}"
+                "phase error, duty error and 180 times nonuniformity and eccentricity together must be less than 90 "
+                f"electrical degrees, not {errors:.6g}"
             )
         if self.seed < 0:
             raise ParameterError("seed", f"must be at least 0, not {self.seed}")

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tachometry.sim.encoder import imperfections
 from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY
-from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration
+from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
 from tachometry.spec.language.option import ParameterError
@@ -87,11 +87,10 @@ class VirtualEncoder(EncoderOptions):
         super().__post_init__()
         if not 1 <= self.pulses_per_rev <= MAX_PULSES_PER_REV:
             raise ParameterError("pulses_per_rev", f"must be from 1 to {MAX_PULSES_PER_REV}, not {self.pulses_per_rev}")
-        if self.nonuniformity and self.pulses_per_rev > MAX_UNEVEN_PULSES:
-            raise ParameterError(
-                "nonuniformity",
-                f"must be 0 with more than {MAX_UNEVEN_PULSES} pulses per revolution, not {self.nonuniformity}",
-            )
+        for name in ("nonuniformity", "eccentricity"):
+            if getattr(self, name) and self.pulses_per_rev > MAX_UNEVEN_PULSES:
+                rest = f"must be 0 with more than {MAX_UNEVEN_PULSES} pulses per revolution, not {getattr(self, name)}"
+                raise ParameterError(name, rest)
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
 
@@ -103,6 +102,8 @@ class VirtualEncoder(EncoderOptions):
         if self.nonuniformity > 0:
             random = self._stream(NONUNIFORMITY)
             offset = self.nonuniformity * (2 * imperfections.uniform(random, n_edges) - 1)
+        if self.eccentricity > 0:
+            offset = offset + self.eccentricity * sin2pi(np.arange(n_edges) / n_edges)
         if self.phase_error_deg or self.duty_error_deg:
             displaced = imperfections.displaced_edges(self.phase_error_deg, self.duty_error_deg)
             offset = offset + np.tile(displaced, max(len(offset) // 4, 1))
@@ -182,8 +183,8 @@ class Encoding:
     def true_position(self, t: ArrayLike, decoding: int = 4) -> NDArray[np.int64]:
         """Return counts since time 0 that an ideal decoder of the disc would have at times `t` in seconds.
 
-        Decoding 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low. Vibration and what
-        is of the disc (nonuniformity, phase and duty error) are in it; jitter, bounce, lost pulses and illegal
+        Decoding 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low. Vibration and what is of the
+        disc (nonuniformity, eccentricity, phase and duty error) are in it; jitter, bounce, lost pulses and illegal
         transitions, which are faults of the lines, are not.
         """
         if decoding not in (1, 2, 4):

@@ -40,7 +40,7 @@ NOT_RANDOM = [situation for situation in situations.SITUATIONS if not situation.
 def test_row_of_all_situations(situation: Any) -> None:
     """Of those that take one seed; some errors are nothing but rounding, which is that of the machine."""
     columns = (*situations.OURS, *situations.RIVALS)
-    (found,) = situations.best(situations.measured([situation], 20, 1, columns), columns).values()
+    (found,) = situations.best(situations.measured([situation], 10, 1, columns), columns).values()
     shown = [float(cell) for cell in cells("All situations", situation.name)]
     assert [cell.mean for cell in found] == pytest.approx(shown, rel=0.01, abs=1e-7)
     assert all(cell.spread is None for cell in found)
@@ -51,11 +51,12 @@ def test_row_of_all_situations(situation: Any) -> None:
 def test_row_of_one_setting_for_all(name: str) -> None:
     part = DOCS.split("## One setting for all situations\n")[1]
     heads = re.findall("`([^`]+)`", next(line for line in part.splitlines() if line.startswith("| situation")))
-    (n_seeds,) = re.findall(r"with seeds 1 to (\d+)", DOCS)
+    ((first, last),) = re.findall(r"with seeds (\d+) to (\d+)", DOCS)
+    assert int(first) == situations.FIRST_SEED
     (situation,) = [one for one in situations.SITUATIONS if one.name == name]
     assert tuple(heads[: len(situations.OURS)]) == situations.OURS
     columns = ["hostmot2", "mt", *situations.OURS]
-    table = situations.measured([situation], int(n_seeds), 1, columns)[name]
+    table = situations.measured([situation], int(last) - int(first) + 1, 1, columns)[name]
     checked = 0
     for head, shown in zip(heads, cells("One setting for all situations", name), strict=True):
         if head in table:
@@ -66,8 +67,22 @@ def test_row_of_one_setting_for_all(name: str) -> None:
 
 def test_options_of_the_models_are_on_the_page() -> None:
     assert situations.model_table() in DOCS
-    for situation in situations.SITUATIONS:
+    for situation in (*situations.SITUATIONS, *situations.OTHERS):
         assert f"| {situation.name} | `{situation.options}` |" in DOCS
+
+
+def test_the_verdict_follows_from_the_tables_and_tracking_tells_where_others_are_better() -> None:
+    found = {}
+    for heading in ("All situations", "Other situations"):
+        part = DOCS.split(f"## {heading}\n")[1]
+        for line in part.split("\n\nThe situations as")[0].split("---: |\n")[1].splitlines():
+            name, *texts = line.strip("| ").split(" | ")
+            found[name] = [situations.Cell("", float(text.strip("*").split()[0]), None) for text in texts]
+    assert list(found) == [situation.name for situation in (*situations.SITUATIONS, *situations.OTHERS)]
+    assert " ".join(situations.verdict(found).split()) in " ".join(DOCS.split())
+    page_of_track = (page.PAGE.parents[1] / "concepts" / "track.md").read_text(encoding="utf-8")
+    told = page_of_track.split("## Where others are better\n")[1]
+    assert [name for name, over in situations.wins(found).items() if over > 1.1 and f"*{name}*" not in told] == []
 
 
 def cell(name: str, *errors: float) -> Any:

@@ -49,7 +49,7 @@ CORE = """
     --velocity-width --cancel --no-cancel --max-speed --position-width --filter --index --index-reset
 """.split()
 DEFAULTS = ("48MHz", "20us", "10ms, with method track 100ms", "count/tick", "4", "as many as it can need")
-FAULTS = "--jitter --nonuniformity --phase-error --duty-error --bounce --lost --illegal".split()
+FAULTS = "--jitter --nonuniformity --eccentricity --phase-error --duty-error --bounce --lost --illegal".split()
 OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
 
 

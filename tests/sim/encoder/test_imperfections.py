@@ -30,6 +30,12 @@ def test_nonuniformity_is_of_the_disc() -> None:
     assert np.std(offset) == pytest.approx(0.3 / math.sqrt(3), rel=0.1)
 
 
+def test_an_eccentric_disc_displaces_its_edges_by_a_sine_over_a_turn() -> None:
+    edges = record("constant:1rev/s:2s", eccentricity=0.3, pulses_per_rev=64, start_angle_rad=math.pi / 256)
+    offset = edges.recording.time[1:] * 256 - (np.arange(512) + 0.5)
+    np.testing.assert_allclose(offset, 0.3 * np.sin(2 * math.pi * np.arange(1, 513) / 256), atol=1e-9)
+
+
 def test_jitter_has_the_given_deviation() -> None:
     parameters = {"start_angle_rad": PITCH / 2}
     ideal = record("constant:10rev/s:5s", **parameters).recording
@@ -351,8 +357,8 @@ def test_new_imperfections_leave_the_old_as_they_were() -> None:
         ({"duty_error_deg": -90.0}, "duty_error_deg must be more than -90 and less than 90, not -90.0"),
         (
             {"phase_error_deg": -50.0, "duty_error_deg": 31.0, "nonuniformity": 0.05},
-            "phase error, duty error and 180 times the nonuniformity together must be less than 90 electrical degrees, "
-            "not 90",
+            "phase error, duty error and 180 times nonuniformity and eccentricity together must be less than 90 "
+            "electrical degrees, not 90",
         ),
         ({"lost": 1.5}, "lost must be from 0 to 1, not 1.5"),
         ({"lost": -0.1}, "lost must be from 0 to 1, not -0.1"),

@@ -11,7 +11,7 @@ from tachometry.sim.encoder.motion import Motion, Vibration, cos2pi, parse_motio
 TOO_LARGE = "times, angles, speeds and accelerations of a motion must be below 1e30, in s and rad"
 FORMS = (
     "constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME, trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, "
-    "stop:TIME, csv:FILE"
+    "s-curve:FROM:TO:TIME, stop:TIME, N*(SEGMENT+...), csv:FILE"
 )
 
 
@@ -64,6 +64,20 @@ def test_trapezoid() -> None:
     assert motion.breakpoints.tolist() == [0, 1, 4, 5]
     assert motion.speed([0, 0.5, 1, 2, 4, 4.5]).tolist() == [0, 5, 10, 10, 10, 5]
     assert motion.angle([0, 1, 4, 5]).tolist() == [0, 5, 35, 40]
+
+
+def test_s_curve_begins_and_ends_without_acceleration() -> None:
+    motion = parse_motion("s-curve:2:-6:4s")
+    np.testing.assert_allclose(motion.speed([0, 1, 2, 4]), [2, 2 - 8 * (1 / 4 - 1 / (2 * math.pi)), -2, -6])
+    np.testing.assert_allclose(motion.acceleration([0, 1, 2, 3.999999]), [0, -2, -4, 0], atol=1e-9)
+    assert motion.angle(4) == pytest.approx(-8)
+
+
+def test_segments_are_repeated() -> None:
+    texts = ("2*(stop:1+ramp:0:+5:2)", "stop:1+ramp:0:5:2+stop:1+ramp:0:5:2")
+    angles = [parse_motion(text).angle([1, 4, 6]) for text in texts]
+    assert angles[0].tolist() == angles[1].tolist()
+    assert parse_motion("stop:1+10*(constant:1:1)+stop:1").angle(12) == 10
 
 
 def test_segments_join_with_continuous_angle() -> None:
@@ -154,6 +168,8 @@ def test_max_travel_bounds_the_way(text: str) -> None:
         ("constant:1", f"motion segment must be one of {FORMS}, not 'constant:1'"),
         ("stop:1s:2s", f"motion segment must be one of {FORMS}, not 'stop:1s:2s'"),
         ("", f"motion segment must be one of {FORMS}, not ''"),
+        ("0*(stop:1s)", f"motion segment must be one of {FORMS}, not ''"),
+        ("10000*(stop:1s)", f"motion segment must be one of {FORMS}, not '10000*(stop:1s)'"),
         ("stop:1s+", f"motion segment must be one of {FORMS}, not ''"),
         ("stop:1s+csv:x", "csv:FILE must be the whole motion, not a segment of it: 'csv:x'"),
         ("constant:fast:1", "SPEED of constant must be a number in rad/s, rev/s, rpm (default rad/s), not 'fast'"),
