@@ -1,8 +1,10 @@
 """How the benchmarks write the docs."""
 
+import re
 from pathlib import Path
 
 import pytest
+from support.docs import DOCS
 from support.script import load
 
 pages = load("pages")
@@ -26,3 +28,8 @@ def test_a_block_of_a_page_is_replaced(tmp_path: Path) -> None:
     )
     with pytest.raises(ValueError, match="unpack"):
         pages.write_block(file, "three", "")
+
+
+def test_the_site_has_every_page_once() -> None:
+    shown = re.findall(r": (\w+/[\w-]+\.md)$", (DOCS.parent / "mkdocs.yml").read_text(), re.MULTILINE)
+    assert sorted(shown) == sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
