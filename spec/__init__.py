@@ -1,14 +1,14 @@
 """Frozen objects say what is to be built: hardware, golden models, manifest and documents all read them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.core.encoder import Encoder
-from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.tachometer import CHOSEN, TachometerSpec
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.language.option import Option, ParameterError, options_of, parse_flag, parse_whole, read_options
@@ -27,6 +27,12 @@ METHODS: dict[str, type[TachometerSpec]] = {
     spec.method: spec
     for spec in (STachometer, MTachometer, TTachometer, MTTachometer, RairanTachometer, TrackTachometer)
 }
+
+AUTO = "auto"
+_PREFERRED = ("track", "mt", "s")  # the first of them that can be is what `auto` takes
+# Where none is given, the tick is the first of these with which the method can be.
+_TICKS = ("20us", "25us", "40us", "50us", "100us", "125us", "200us", "250us", "500us", "1ms")
+_OF_TICK = ("tick", "tick_cycles", "max_time", "max_ticks")  # parameters that another tick may suit
 
 
 @cache
@@ -50,28 +56,114 @@ def methods_with(name: str) -> list[str]:
 def spec_class(method: str) -> type[TachometerSpec]:
     """Return the spec of a method; ParameterError if there is none of this name."""
     if method not in METHODS:
-        raise ParameterError("method", f"must be one of {', '.join(METHODS)}, not {method!r}")
+        raise ParameterError("method", f"must be one of {', '.join((AUTO, *METHODS))}, not {method!r}")
     return METHODS[method]
 
 
-def of_texts(method: str, texts: Mapping[str, str | None]) -> TachometerSpec:
+def of_texts(
+    method: str, texts: Mapping[str, str | None], within: Callable[[TachometerSpec], object] | None = None
+) -> TachometerSpec:
     """Return the core that texts of options describe, as on the command line, in files of sweeps and in tests.
 
     Parameters
     ----------
     method : str
-        One of `METHODS`.
+        One of `METHODS`, or `auto`: track where its program fits the tick, else M/T where its division does, else S.
+        An option that only some methods have leaves the others out. `chosen` then says why.
     texts : mapping of str to str or None
         By the names of the options without dashes, `{"ppr": "500", "max-speed": "400rad/s"}`; flags are `yes` or `no`.
-        None stands for leaving the option out.
+        None stands for leaving the option out. Without a tick it is 20 µs, or as long as the method needs at the clock.
+    within : callable or None
+        Makes of the core what it is for, with a ParameterError where it cannot be that; then `auto` takes another
+        method.
 
     Raises
     ------
     ParameterError
         If the method has no such option, or a text is not what it must be.
     """
+    given = {name: text for name, text in texts.items() if text is not None}
+
+    def made(name: str) -> TachometerSpec:
+        return _with_tick(given, lambda texts: _of_method(name, texts), within)
+
+    if method != AUTO:
+        return made(method)
+    methods, asked = _able(given)
+    refused: list[str] = []
+    for name in methods:
+        try:
+            spec = made(name)
+            if name != methods[-1]:
+                _check_division(spec)
+        except ParameterError as error:
+            if name == methods[-1]:
+                raise
+            refused.append(f"{name} {error.brief}")
+            continue
+        break
+    why = " and ".join(refused)
+    if not why and asked:
+        why = f"it has --{asked[0]}"
+    elif not why:
+        why = f"its {spec.latency.busy} clocks fit the tick of {spec.timing.tick_cycles}"
+    return replace(spec, chosen=f"as {why}")
+
+
+def _with_tick(
+    given: Mapping[str, str],
+    make: Callable[[Mapping[str, str]], TachometerSpec],
+    within: Callable[[TachometerSpec], object] | None,
+) -> TachometerSpec:
+    """Return the core of these options; without a tick among them, with the first of the usual ones that suits it."""
+    has_tick = any(about.name in given for about in options_of(Timing) if about.field == "tick_cycles")
+    refused: list[ParameterError] = []
+    for texts in [given] if has_tick else [{**given, "tick": tick} for tick in _TICKS]:
+        try:
+            spec = make(texts)
+            if within is not None:
+                within(spec)
+            return spec
+        except ParameterError as error:
+            if error.parameter not in _OF_TICK:
+                raise
+            refused.append(error)
+    raise refused[0]
+
+
+def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Return methods that have all of these options, the best first, and the options that not all of the best have.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such method.
+    """
+
+    def has(method: str, name: str) -> bool:
+        declared = (*common_options(), *own_options(method))
+        return any(about.name == name and about.fits_in(METHODS[method]) for about in declared)
+
+    asked = [name for name in given if not all(has(method, name) for method in _PREFERRED)]
+    able = [name for name in METHODS if all(has(name, one) for one in asked)]
+    if not able:
+        if unknown := {name: given[name] for name in asked if not any(has(method, name) for method in METHODS)}:
+            _of_method(_PREFERRED[-1], unknown)
+        others = " and ".join(f"--{name}" for name in asked[:-1])
+        raise ParameterError(asked[-1], f"must not be given together with {others}: no method has all of them")
+    return [name for name in _PREFERRED if name in able] or able, asked
+
+
+def _check_division(spec: TachometerSpec) -> None:
+    """Refuse M/T with a ParameterError where a division takes longer than a tick."""
+    if isinstance(spec, MTTachometer) and not spec.times.has_room(clocks := spec.form.division_clocks):
+        raise ParameterError("tick_cycles", f"must be at least {clocks}", f"needs a tick of {clocks} clocks")
+
+
+def _of_method(method: str, texts: Mapping[str, str]) -> TachometerSpec:
+    """Return the core of a method."""
     spec = spec_class(method)
-    given = {**spec.usual, **{name: text for name, text in texts.items() if text is not None}}
+    given = {**spec.usual, **texts}
     known = {about.name: about for about in (*common_options(), *own_options(method))}
     for name in given:
         parameter = name.replace("-", "_")
@@ -98,16 +190,24 @@ def of_options(options: Mapping[str, str]) -> AnySpec:
     texts = dict(options)
     axes, parallel, loop = (texts.pop(name, "no") for name in ("axes", "parallel", "loop"))
     of_loop = {about.name: texts.pop(about.name) for about in options_of(LoopSpec) if about.name in texts}
-    spec: CoreSpec = of_texts(texts.pop("method", ""), texts)
-    if axes != "no":
-        spec = with_axes(spec.tachometer, parse_whole("axes", axes), parallel=parse_flag("parallel", parallel))
-    return _looped(spec, of_loop) if parse_flag("loop", loop) else spec
+    method, chosen = texts.pop("method", AUTO), texts.pop(CHOSEN, "")
+
+    def whole(spec: TachometerSpec) -> AnySpec:
+        core: CoreSpec = spec
+        if axes != "no":
+            core = with_axes(spec, parse_whole("axes", axes), parallel=parse_flag("parallel", parallel))
+        looped = with_loop if method == AUTO else _looped
+        return looped(core, of_loop) if parse_flag("loop", loop) else core
+
+    spec = of_texts(method, texts, whole)
+    return whole(replace(spec, chosen=chosen) if chosen else spec)
 
 
 def with_axes(spec: TachometerSpec, axes: int, *, parallel: bool) -> AxesSpec:
     """Return a core of so many axes, each of which is as `spec`; ParameterError if there cannot be one."""
     if not isinstance(spec, STachometer):
-        raise ParameterError("method", f"must be s together with --axes, not {spec.method}")
+        why = f"must be s together with --axes, not {spec.method}"
+        raise ParameterError("method", why, "is of one axis")
     return AxesSpec(tachometer=spec, axes=axes, parallel=parallel)
 
 
@@ -145,6 +245,7 @@ def of_manifest(path: Path) -> AnySpec:
 
 
 __all__ = [
+    "AUTO",
     "METHODS",
     "AxesSpec",
     "CoreSpec",

@@ -99,7 +99,7 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
         assert "--doubled / --no-doubled Everything is measured twice, which changes nothing." in text
         assert "[default: no-doubled]" in text
     if command not in ("compare", "verify", "sweep"):
-        assert "[s|m|t|mt|rairan|track|x]" in text
+        assert "[auto|s|m|t|mt|rairan|track|x]" in text
         assert "x does what m does" in text
     if command == "verify":
         assert "of s, m, t, mt, rairan, track, x." in text
@@ -178,5 +178,5 @@ def test_pairs_have_the_option() -> None:
     assert factors("x")["doubled"] == ("", "yes")
     assert "average" not in {about.name for about in common_options()}
     words = [" ".join(core) for core in configurations("x")]
-    for other in ("--average 8", "--bounds", "--external-tick", "--tick 1 "):
+    for other in ("--average 8", "--bounds", "--external-tick", "--tick 1clk "):
         assert any("--doubled" in core and other in core for core in words), other

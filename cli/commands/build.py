@@ -12,8 +12,8 @@ import click
 from tachometry.boards.fpga.board import Board
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.board import board_argument, boards_help, default_folder
-from tachometry.cli.options.core import BOARD_CORE_OPTIONS
-from tachometry.cli.options.loop import LOOP_OPTIONS
+from tachometry.cli.options.core import board_core_options
+from tachometry.cli.options.loop import LOOP
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.cli.reports.build import print_build
 from tachometry.spec import TachometerSpec
@@ -41,8 +41,7 @@ Examples:
   tachometry program tang-nano-9k rig""",
 )
 @board_argument
-@BOARD_CORE_OPTIONS
-@LOOP_OPTIONS
+@board_core_options(LOOP)
 @option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
 @option(
     "Files",
@@ -126,7 +125,7 @@ def build(
     for kind in suffixes:
         click.echo(click.format_filename(folder / f"{name}{kind}"))
     click.echo()
-    print_build(board, built, time.monotonic() - begun)
+    print_build(spec.tachometer, board, built, time.monotonic() - begun)
     return 0
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.axes import AXES_OPTIONS
-from tachometry.cli.options.core import CORE_OPTIONS
-from tachometry.cli.options.loop import LOOP_OPTIONS
+from tachometry.cli.options.axes import AXES
+from tachometry.cli.options.core import core_options
+from tachometry.cli.options.loop import LOOP
 from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.cli.reports.axes import print_axes_core
@@ -70,9 +70,7 @@ Examples:
   tachometry generate --ppr 500 --max-speed 1000rad/s --loop \\
       --gains inputs --command generator --bus axi-lite -o drive""",
 )
-@CORE_OPTIONS
-@AXES_OPTIONS
-@LOOP_OPTIONS
+@core_options(AXES, LOOP)
 @option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
 @option(
     "Files",

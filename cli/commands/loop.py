@@ -20,6 +20,7 @@ from tachometry.sim import build
 from tachometry.sim.signals.files import write_csv
 from tachometry.sim.studies.sweeping.grid import Loops
 from tachometry.sim.studies.sweeping.run import LoopResult, run_loops
+from tachometry.spec import AUTO
 
 
 @click.command(
@@ -49,9 +50,10 @@ Examples:
 @option(
     "Sweep",
     "--methods",
-    default="s",
+    default=AUTO,
     metavar="LIST",
-    help="Methods to run: all, or names with commas between, with options as in mt:timer=tick.",
+    help="Methods to run: auto, which chooses one as --method does, all, or names with commas between, with options "
+    "as in mt:timer=tick.",
 )
 @option("Sweep", "--seeds", type=int, default=6, metavar="N", help="Runs of each loop, with seeds from --seed on.")
 @option(

@@ -8,9 +8,9 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.axes import AXES_OPTIONS
+from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
-from tachometry.cli.options.core import CORE_OPTIONS
+from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.option import FilePath, GroupedCommand
 from tachometry.cli.options.outputs import OUTPUT_OPTIONS, refuse_plot, write_outputs
@@ -34,8 +34,7 @@ Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
 a --clock that is a few times the edge rate then. Edges closer than a clock are flagged as errors or lost.""",
 )
 @click.argument("capture", type=FilePath())
-@CORE_OPTIONS
-@AXES_OPTIONS
+@core_options(AXES)
 @CAPTURE_OPTIONS
 @OUTPUT_OPTIONS
 @ENGINE_OPTIONS

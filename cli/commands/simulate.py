@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.axes import AXES_OPTIONS
-from tachometry.cli.options.core import CORE_OPTIONS
+from tachometry.cli.options.axes import AXES
+from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.motion import FORMS, MOTION_OPTIONS
 from tachometry.cli.options.option import GroupedCommand
@@ -39,8 +39,7 @@ Examples:
 Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
 a --clock that is a few times the edge rate then.""",
 )
-@CORE_OPTIONS
-@AXES_OPTIONS
+@core_options(AXES)
 @MOTION_OPTIONS
 @OUTPUT_OPTIONS
 @ENGINE_OPTIONS

@@ -18,6 +18,7 @@ from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.studies.sweeping.grid import Points
 from tachometry.sim.studies.sweeping.run import SweepResult, run_sweep
+from tachometry.spec import AUTO
 from tachometry.spec.language.units import parse_time
 
 # What a heat map can show: the column, what it is, and whether colours go by its logarithm. Columns of speeds are in
@@ -61,9 +62,10 @@ Examples:
 @option(
     "Sweep",
     "--methods",
-    default="all",
+    default=AUTO,
     metavar="LIST",
-    help="Methods to run: all, or names with commas between, with options as in m:average=10.",
+    help="Methods to run: auto, which chooses one for each point as --method does, all, or names with commas between, "
+    "with options as in m:average=10.",
 )
 @option(
     "Sweep",

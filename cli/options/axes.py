@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from tachometry.cli.options.option import Group, option
-from tachometry.spec import ParameterError, TachometerSpec, with_axes
+from tachometry.cli.options.core import Part
+from tachometry.cli.options.option import option
+from tachometry.spec import CoreSpec, ParameterError, with_axes
 from tachometry.spec.methods.axis import MAX_AXES
 
 _AXES = "Axes"
@@ -21,11 +22,16 @@ _OPTIONS = [
 ]
 
 
-def _read(*, spec: TachometerSpec, axes: int | None, parallel: bool, **others: Any) -> dict[str, Any]:
+def _take(given: dict[str, Any]) -> Any:
+    axes, parallel = given.pop("axes"), given.pop("parallel")
     if axes is None and parallel:
         raise ParameterError("parallel", "must be given together with --axes")
-    return dict(spec=spec if axes is None else with_axes(spec, axes, parallel=parallel), **others)
+
+    def within(spec: CoreSpec) -> CoreSpec:
+        return spec if axes is None else with_axes(spec.tachometer, axes, parallel=parallel)
+
+    return within
 
 
-AXES_OPTIONS = Group(_OPTIONS, _read)
-"""Below the options of the core: `spec` is that of many axes, if there are to be many."""
+AXES = Part(_OPTIONS, _take)
+"""The core is of many axes, if there are to be many."""

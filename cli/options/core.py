@@ -1,9 +1,8 @@
 """Options of the core: what all methods share, and what each has of its own, as spec/ declares them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 import click
@@ -11,15 +10,18 @@ from click.core import ParameterSource
 
 from tachometry.cli.options.option import Group, Option, default_of, kind_of, later, option
 from tachometry.spec import (
+    AUTO,
     METHODS,
     ParameterError,
     TachometerSpec,
+    Timing,
     common_options,
     methods_with,
     of_texts,
     own_options,
 )
 from tachometry.spec.language import option as declaration
+from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import parse_frequency
 
 _PREFIX = "core_"
@@ -30,10 +32,16 @@ Make = Callable[[str, Mapping[str, str]], TachometerSpec]
 
 
 def _methods_help() -> str:
-    return f"How velocity is measured: {'; '.join(f'{name} {spec.facts.summary}' for name, spec in METHODS.items())}."
+    each = "; ".join(f"{name} {spec.facts.summary}" for name, spec in METHODS.items())
+    return (
+        f"How velocity is measured: {each}. auto is track where its program fits the tick, else mt, else s, and it is "
+        "told which was taken; an option that only some methods have leaves the others out."
+    )
 
 
-_METHOD = option("Core", "--method", default="s", metavar=lambda: f"[{'|'.join(METHODS)}]", help=_methods_help)
+_METHOD = option(
+    "Core", "--method", default=AUTO, metavar=lambda: f"[{'|'.join((AUTO, *METHODS))}]", help=_methods_help
+)
 
 
 def _common() -> tuple[click.Option, ...]:
@@ -47,7 +55,6 @@ def _made_common(declared: tuple[declaration.Option, ...]) -> tuple[click.Option
             [f"--{about.name}", _argument(about.name)],
             group=about.group,
             help=(about.help if about.flag else about.help + default_of(about)) + _otherwise(about.name),
-            required=about.required,
             **kind_of(about),
         )
         for about in declared
@@ -95,7 +102,7 @@ def _argument(name: str) -> str:
 
 def own_texts(method: str, words: list[str]) -> Texts:
     """Return options of a method from words such as `average=8` or `cancel=no`, by their names."""
-    own = [about.name for about in own_options(method)]
+    own = [] if method == AUTO else [about.name for about in own_options(method)]
     given: Texts = {}
     for word in words:
         name, _, text = word.partition("=")
@@ -116,28 +123,62 @@ def _taken(given: dict[str, Any]) -> Texts:
     return texts
 
 
+@dataclass(frozen=True)
+class Part:
+    """Options of what a core of one axis may be made into.
+
+    Parameters
+    ----------
+    options : sequence of callable
+        See `Group`.
+    take : callable
+        Takes the options out of what click gives a command, and gives what makes of a core what it is for.
+    """
+
+    options: Sequence[Callable[[Any], Any]]
+    take: Callable[[dict[str, Any]], Callable[[Any], Any]]
+
+
 def _read_make(**given: Any) -> dict[str, Any]:
-    texts = _taken(given)
+    texts = _with_tick(_taken(given))
     return dict(make=lambda method, own: of_texts(method, texts | own), **given)
 
 
 def _read_spec_and_make(*, method: str, **given: Any) -> dict[str, Any]:
     texts = _taken(given)
-    common = {name: text for name, text in texts.items() if not methods_with(name)}
-    return dict(spec=of_texts(method, texts), make=lambda other, own: of_texts(other, common | own), **given)
+    spec = of_texts(method, texts)
+    common = _with_tick({name: text for name, text in texts.items() if not methods_with(name)}, spec.options["tick"])
+    return dict(spec=spec, make=lambda other, own: of_texts(other, common | own), **given)
 
 
-def _read_spec(*, method: str, **given: Any) -> dict[str, Any]:
-    texts = _taken(given)
-    return dict(spec=of_texts(method, texts), **given)
+def _with_tick(texts: Texts, tick: str = "20us") -> Texts:
+    """Return options with a tick that all methods have alike."""
+    given = any(about.name in texts for about in options_of(Timing) if about.field == "tick_cycles")
+    return texts if given else {**texts, "tick": tick}
 
 
-def _read_spec_of_board(*, method: str, board: Any, **given: Any) -> dict[str, Any]:
-    texts = _taken(given)
-    text = texts.pop(_CLOCK, None)
-    if text is not None and parse_frequency(_CLOCK, text) != board.clock_hz:
-        raise ParameterError(_CLOCK, f"must be that of the board, {board.clock_hz} Hz, not {text}: there is no PLL")
-    return dict(spec=of_texts(method, {**texts, _CLOCK: str(board.clock_hz)}), board=board, **given)
+def _reader(parts: Sequence[Part]) -> Callable[..., dict[str, Any]]:
+    """Return what reads the options of a core, of a board if there is one, and of what it is made into."""
+
+    def read(*, method: str, **given: Any) -> dict[str, Any]:
+        texts, steps = _taken(given), [part.take(given) for part in parts]
+        if (board := given.get("board")) is not None:
+            texts = _at(texts, board.clock_hz, ": there is no PLL")
+
+        def within(spec: TachometerSpec) -> Any:
+            return reduce(lambda core, step: step(core), steps, spec)
+
+        return dict(spec=within(of_texts(method, texts, within)), **given)
+
+    return read
+
+
+def _at(texts: Texts, clock_hz: int, why: str = "") -> Texts:
+    """Return options with the clock of a board, which none may contradict."""
+    text = texts.get(_CLOCK)
+    if text is not None and parse_frequency(_CLOCK, text) != clock_hz:
+        raise ParameterError(_CLOCK, f"must be that of the board, {clock_hz} Hz, not {text}{why}")
+    return {**texts, _CLOCK: str(clock_hz)}
 
 
 def _common_of_board() -> tuple[click.Option, ...]:
@@ -175,10 +216,7 @@ class CoreTexts:
         ParameterError
             If an option is wrong, or missing.
         """
-        text = self.texts.get(_CLOCK)
-        if text is not None and parse_frequency(_CLOCK, text) != clock_hz:
-            raise ParameterError(_CLOCK, f"must be that of the board, {clock_hz} Hz, not {text}")
-        return of_texts(self.method, {**self.texts, _CLOCK: str(clock_hz)})
+        return of_texts(self.method, _at(self.texts, clock_hz))
 
 
 def _read_core(*, method: str, **given: Any) -> dict[str, Any]:
@@ -188,36 +226,38 @@ def _read_core(*, method: str, **given: Any) -> dict[str, Any]:
 
 
 def _common_optional() -> tuple[click.Option, ...]:
-    options = _made_common(
+    return _made_common(
         tuple(
             replace(about, shown="that of the board") if about.name == "clock" else about for about in common_options()
         )
     )
-    return tuple(_not_required(option) for option in options)
-
-
-def _not_required(option: click.Option) -> click.Option:
-    option = copy(option)
-    option.required = False
-    return option
 
 
 _OWN = later("method-options", own_click_options)
 
-CORE_OPTIONS = Group([later("core-options", _common), _METHOD, _OWN], _read_spec)
-"""The options of the core, handed to the command as one argument `spec`."""
+_CORE = [later("core-options", _common), _METHOD, _OWN]
 
-CORE_AND_MAKE_OPTIONS = Group(CORE_OPTIONS.options, _read_spec_and_make)
-"""As `CORE_OPTIONS`, with what makes a spec of another method as `make`, see `COMMON_CORE_OPTIONS`."""
+
+def core_options(*parts: Part) -> Group:
+    """Return options of the core, and of what it may be made into, handed to the command as one argument `spec`."""
+    return Group([*_CORE, *(one for part in parts for one in part.options)], _reader(parts))
+
+
+CORE_AND_MAKE_OPTIONS = Group(_CORE, _read_spec_and_make)
+"""As `core_options`, with what makes a spec of another method as `make`, see `COMMON_CORE_OPTIONS`."""
 
 COMMON_CORE_OPTIONS = Group([later("core-options", _common)], _read_make)
 """What all methods share, handed over as `make`: of a method's name and texts of its own options it makes a spec."""
 
-BOARD_CORE_OPTIONS = Group([later("core-options", _common_of_board), _METHOD, _OWN], _read_spec_of_board)
-"""As `CORE_OPTIONS`, of a command that is given a `board`, whose clock is that of the core."""
+
+def board_core_options(*parts: Part) -> Group:
+    """Return those of a command that is given a `board`, whose clock is that of the core."""
+    own = [later("core-options", _common_of_board), _METHOD, _OWN]
+    return Group([*own, *(one for part in parts for one in part.options)], _reader(parts))
+
 
 OPTIONAL_CORE_OPTIONS = Group([later("core-options", _common_optional), _METHOD, _OWN], _read_core)
-"""As `CORE_OPTIONS`, but none must be given; handed over as `core`, of `CoreTexts`."""
+"""As `core_options`, but none must be given; handed over as `core`, of `CoreTexts`."""
 
 
 def core_click_options() -> dict[str, click.Option]:

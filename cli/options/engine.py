@@ -6,7 +6,7 @@ import click
 
 from tachometry.cli.options.option import Group, option
 from tachometry.spec import ParameterError, TachometerSpec
-from tachometry.spec.language.units import parse_time
+from tachometry.spec.core.timing import time_or_clocks
 
 _SIMULATION = "Simulation"
 
@@ -25,13 +25,13 @@ _OPTIONS = [
         _SIMULATION,
         "--vcd-from",
         metavar="TIME",
-        help="Time at which the waveform of --vcd begins; a plain number is clocks.",
+        help="Time at which the waveform of --vcd begins, such as 20us or 960clk.",
     ),
     option(
         _SIMULATION,
         "--vcd-to",
         metavar="TIME",
-        help="Time at which the waveform of --vcd ends; a plain number is clocks.",
+        help="Time at which the waveform of --vcd ends, such as 20us or 960clk.",
     ),
 ]
 
@@ -58,9 +58,6 @@ The function gives the first clock of the waveform and the one after the last; V
 
 def _clock(what: str, text: str, spec: TachometerSpec) -> int:
     """Return the clock in which an instant lies."""
-    if text.isdecimal():
-        return int(text)
-    seconds = parse_time(what, text)
-    if seconds < 0:
+    if (seconds := time_or_clocks(what, text, spec.timing.clock_hz)) < 0:
         raise ParameterError(what, f"must be at least 0, not {text}")
     return int(seconds * spec.timing.clock_hz)

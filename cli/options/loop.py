@@ -2,8 +2,10 @@
 
 from typing import Any
 
-from tachometry.cli.options.option import Group, declared, option, take_texts
+from tachometry.cli.options.core import Part
+from tachometry.cli.options.option import declared, option, take_texts
 from tachometry.spec import CoreSpec, LoopSpec, ParameterError, with_loop
+from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import options_of
 
 _LOOP = "Loop"
@@ -21,16 +23,16 @@ _OPTIONS = [
 ]
 
 
-def _read(*, spec: CoreSpec, loop: bool, **others: Any) -> dict[str, Any]:
-    texts = take_texts(LoopSpec, others)
-    return dict(spec=with_loop(spec, texts) if loop else _alone(spec, texts), **others)
+def _take(given: dict[str, Any]) -> Any:
+    loop, texts = given.pop("loop"), take_texts(LoopSpec, given)
+    if texts and not loop:
+        raise ParameterError(next(iter(texts)).replace("-", "_"), "must be given together with --loop")
+
+    def within(spec: CoreSpec) -> AnySpec:
+        return with_loop(spec, texts) if loop else spec
+
+    return within
 
 
-LOOP_OPTIONS = Group(_OPTIONS, _read)
-"""Below those of the axes: `spec` is that of a core with a control loop, if there is to be one."""
-
-
-def _alone(spec: CoreSpec, texts: dict[str, str]) -> CoreSpec:
-    for name in texts:
-        raise ParameterError(name.replace("-", "_"), "must be given together with --loop")
-    return spec
+LOOP = Part(_OPTIONS, _take)
+"""The core has a control loop, if there is to be one; behind the axes."""

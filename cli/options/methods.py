@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from tachometry.cli.options.core import Make, Texts, own_texts
 from tachometry.cli.options.option import message_of
-from tachometry.spec import METHODS, TachometerSpec
+from tachometry.spec import AUTO, METHODS, TachometerSpec
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,14 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
         return Methods(specs | dict.fromkeys(others), left_out)
     specs = {}
     for name, method, given in listed_methods(text, others):
-        specs[name] = None if method is None else make(method, given)
+        spec = None if method is None else make(method, given)
+        specs[name if spec is None else shown_name(name, spec)] = spec
     return Methods(specs)
+
+
+def shown_name(name: str, spec: TachometerSpec) -> str:
+    """Return what a method of a list is called: the one that was taken, if none was named."""
+    return spec.method if spec.chosen else name
 
 
 def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, Texts]]:
@@ -68,10 +74,10 @@ def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, s
     methods: list[tuple[str, str | None, Texts]] = []
     for name in (word.strip() for word in text.split(",")):
         method, *words = name.split(":")
-        if method in METHODS:
+        if method in METHODS or method == AUTO:
             methods.append((name, method, own_texts(method, words)))
         elif method in others:
             methods.append((name, None, {}))
         else:
-            raise ValueError(f"--methods must be of {', '.join([*METHODS, *others])}, or all, not {name!r}")
+            raise ValueError(f"--methods must be of {', '.join([AUTO, *METHODS, *others])}, or all, not {name!r}")
     return methods

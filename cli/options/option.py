@@ -35,14 +35,18 @@ def _shown(name: str) -> str:
         if about.parameter == parameter:
             return f"--{about.name}"
     of_field = [about for about in options if about.field == parameter]
-    for about in of_field:
-        if about.unit:
-            return f"--{about.name}, in {about.unit},"
-    if of_field:
-        return f"--{of_field[0].name}"
     context = click.get_current_context(silent=True)
     of_command = [] if context is None else context.command.get_params(context)
+    if of_field:
+        given = {one.opts[0] for one in of_command if context and _is_given(context, one)}
+        shown = next((f"--{about.name}" for about in of_field if f"--{about.name}" in given), f"--{of_field[0].name}")
+        unit = next((about.unit for about in of_field if about.unit), "")
+        return f"{shown}, in {unit}," if unit else shown
     return next((one.opts[0] for one in of_command if one.name == parameter), name)
+
+
+def _is_given(context: click.Context, one: click.Parameter) -> bool:
+    return context.get_parameter_source(one.name or "") is ParameterSource.COMMANDLINE
 
 
 @contextmanager

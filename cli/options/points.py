@@ -10,7 +10,7 @@ import click
 
 from tachometry.cli.options.closed_loop import LOOP, loop_click_options, loop_options
 from tachometry.cli.options.core import core_click_options
-from tachometry.cli.options.methods import listed_methods
+from tachometry.cli.options.methods import listed_methods, shown_name
 from tachometry.cli.options.option import message_of
 from tachometry.cli.options.settings import Settings, Text, arguments
 from tachometry.cli.options.sweep import ENCODER, by_name, point_options
@@ -19,7 +19,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.studies.sweeping.grid import Grid, Item, Loops, Points
 from tachometry.sim.studies.sweeping.loops import LoopPoint, seeds_from
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Point
-from tachometry.spec import METHODS, TachometerSpec, common_options, methods_with, of_texts
+from tachometry.spec import AUTO, METHODS, TachometerSpec, common_options, methods_with, of_texts
 from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, read_nearest
 
 Words = tuple[str, ...]
@@ -63,6 +63,8 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
 
 def _has_option(settings: Settings, method: str, name: str) -> bool:
     """Tell whether an option is for a method."""
+    if method == AUTO:
+        return True
     own_ticks = METHODS[method].facts.own_ticks
     if name == "dt":
         return own_ticks
@@ -121,7 +123,7 @@ class _Maker:
         values = {key: read_nearest(f"{{{key}}}", text, _UNITS, "rad/s") for key, text in places.items()}
         motion = _PLACE.sub(lambda place: places[place[1]], motion)
         moved = self._motion(motion)
-        return Point(name, spec, encoder(spec), moved, motion, values, self._earliest, self._engine)
+        return Point(shown_name(name, spec), spec, encoder(spec), moved, motion, values, self._earliest, self._engine)
 
 
 def _words(texts: Mapping[str, Text], command: click.Command) -> Words:
@@ -175,8 +177,8 @@ def _loop(n_seeds: int, name: str, method: str, given: Mapping[str, str], texts:
     of_loop = {key: text for key, text in texts.items() if key in loop_click_options()}
     with LOOP.make_context("loop", arguments(of_loop, loop_click_options())) as context:
         make, motion, seed = LOOP.invoke(context)
-    setting = make(of_texts(method, core))
-    return LoopPoint(name, setting, motion, seeds_from(seed, n_seeds))
+    setting = make(of_texts(method, core, make))
+    return LoopPoint(shown_name(name, setting.spec), setting, motion, seeds_from(seed, n_seeds))
 
 
 def _fill(

@@ -13,7 +13,7 @@ import click
 from tachometry.cli.options.motion import tables_of
 from tachometry.spec.language.files import read_text
 from tachometry.spec.language.option import ParameterError, parse_flag
-from tachometry.spec.language.units import QUANTITY, ratio
+from tachometry.spec.language.units import CLOCKS, QUANTITY, ratio
 
 Text = str | None  # None: without the option
 
@@ -198,7 +198,7 @@ def _range(name: str, item: str, match: re.Match[str], whole: bool) -> list[str]
     else:
         inner = [low + (high - low) * k / (count - 1) for k in range(1, count - 1)]
     every = [low, *inner, high]
-    if whole and not unit and low.denominator == high.denominator == 1:
+    if whole and unit in ("", CLOCKS) and low.denominator == high.denominator == 1:
         every = [Fraction(round(value)) for value in every]
     return [f"{_decimal(value)}{unit}" for value in every]
 

@@ -103,7 +103,7 @@ def _simulated(port: str, core: CoreTexts) -> Target:
     bus, spec = bus_of(_BUS), core.at(BOARDS[board].clock_hz)
     assert bus is not None
     bus.bit_cycles(spec.timing.clock_hz)
-    return Target(port, f"{board}, simulated: {spec.words.heading}", DemoMap(spec), bus)
+    return Target(port, f"{board}, simulated: {spec.words.method}", DemoMap(spec), bus)
 
 
 def _attached(port: str, core: CoreTexts, path: Path | None) -> Target:

@@ -35,7 +35,7 @@ def print_loops(result: LoopResult) -> None:
         rows = [(str(seed), *_cells(row)) for seed, row in zip(first.seeds, result.seeds, strict=True)]
         means = [("mean", *_cells(row)) for row in result.rows.values()] if len(rows) > 1 else []
         print_table(("seed", *_HEADS), [*rows, *means])
-        stdout_console().print(Text(f"\n{first.setting.spec.words.heading}; {first.text}"), soft_wrap=True)
+        stdout_console().print(Text(f"\n{first.setting.spec.words.method}; {first.text}"), soft_wrap=True)
         return
     table = [
         (grid.points[digest].method, *(grid.at[digest].get(name, "-") for name in axes), *_cells(row))
@@ -43,6 +43,9 @@ def print_loops(result: LoopResult) -> None:
     ]
     print_table(("method", *axes, *_HEADS), table)
     console = stdout_console()
+    specs = [point.setting.spec for point in grid.points.values()]
+    for line in dict.fromkeys(spec.words.method for spec in specs if spec.chosen):
+        console.print(Text(line), soft_wrap=True)
     for name, reason in grid.left_out.items():
         console.print(Text(f"{name}: left out: {reason}"), soft_wrap=True)
     loops, seeds = plural(len(table), "loop"), plural(len(first.seeds), "seed")

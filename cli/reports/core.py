@@ -28,7 +28,10 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     latencies = manifest(spec)["latency_cycles"]
     memory = spec.words.memory
     return [
-        ("method", f"{spec.method.upper()}, {spec.words.description}"),
+        (
+            "method",
+            f"{spec.method.upper()}, {f'{spec.chosen}: ' if spec.chosen else ''}{spec.words.description}",
+        ),
         ("encoder", counts),
         ("clock", f"{timing.clock_hz:,} Hz"),
         ("tick", f"{short_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
@@ -48,6 +51,11 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ("standstill", _standstill(spec)),
         *(("note", note) for note in spec.words.notes),
     ]
+
+
+def choice(spec: TachometerSpec) -> list[tuple[str, str]]:
+    """Return the row of a table that says which method was taken, if none was named."""
+    return [("method", spec.words.method)] if spec.chosen else []
 
 
 def full_scale_text(spec: TachometerSpec, full_scale: int) -> str:

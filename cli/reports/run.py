@@ -8,6 +8,7 @@ import numpy as np
 from rich.text import Text
 
 from tachometry.cli.reports.capture import axis_warnings, capture_rows, channels, index_distance
+from tachometry.cli.reports.core import choice
 from tachometry.cli.reports.streams import INTERRUPTED
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
@@ -25,7 +26,7 @@ def print_simulation(simulation: Simulation) -> int:
     time, n_ticks = format_time(spec.times.seconds(run.n_clocks)), len(run.ticks) // len(axes)
     simulated = ("simulated", f"{run.n_clocks} clocks ({time}), {n_ticks} ticks")
     rows, warnings = _summary(spec, axes, ("mismatches", str(lockstep.n_mismatches)))
-    print_rows([("engine", simulation.engine), simulated, *rows])
+    print_rows([*choice(spec.tachometer), ("engine", simulation.engine), simulated, *rows])
     console = stdout_console()
     for mismatch in lockstep.first:
         console.print(Text(f"first mismatch in {mismatch}"))

@@ -57,6 +57,8 @@ def print_sweep(result: SweepResult, results: Path | None) -> int:
     print_table(heads, table)
     console = stdout_console()
     console.print("\nMedians of all points, and the worst. error/V: RMS error over RMS of the true speed.")
+    for line in dict.fromkeys(point.spec.words.method for point in grid.points.values() if point.spec.chosen):
+        console.print(Text(line), soft_wrap=True)
     for name, reason in grid.left_out.items():
         console.print(Text(f"{name}: left out: {reason}"))
     n_points = plural(len(grid.points), "point")

@@ -119,7 +119,7 @@ def spec_of(words: tuple[str, ...]) -> TachometerSpec:
 
 
 def _axes_words(axes: int, tick: int, max_ticks: int, *more: str) -> tuple[str, ...]:
-    core = ("--ppr", "500", "--clock", "48000000", "--tick", str(tick), "--max-time", str(tick * max_ticks))
+    core = ("--ppr", "500", "--clock", "48000000", "--tick", f"{tick}clk", "--max-time", f"{tick * max_ticks}clk")
     return ("--method", "s", *core, *more, "--axes", str(axes))
 
 
@@ -168,8 +168,8 @@ def _texts(method: str, row: Texts) -> Texts:
         elif value:
             texts[name] = value
     cycles, decoding = int(texts.get("tick", "960")), int(texts.get("decoding", "4"))
-    longest = str(cycles * int(texts.get("max-time", "500")))
-    texts["max-time"] = longest
+    longest = f"{cycles * int(texts.get('max-time', '500'))}clk"
+    texts |= {"tick": f"{cycles}clk", "max-time": longest} if "tick" in texts else {"max-time": longest}
     if "min-time" in texts:
         texts["min-time"] = longest
     if "max-speed" in texts:

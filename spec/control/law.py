@@ -110,7 +110,7 @@ class Law(Motor):
     )
     control_period: int | None = option(
         None,
-        "Time between two control ticks, a whole number of clocks; a plain number is clocks.",
+        "Time between two control ticks, a whole number of clocks, such as 20us or 960clk.",
         shown="one tick",
         metavar="TIME",
         unit="clocks",

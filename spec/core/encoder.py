@@ -1,10 +1,27 @@
 """The incremental encoder."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from tachometry.spec.language.option import REQUIRED, ParameterError, option, parse_whole
+from tachometry.spec.language.option import REQUIRED, Option, ParameterError, option, parse_whole
 
 _GROUP = "Encoder"
+_MOST = 1 << 24  # counts
+_OF_TURN: dict[str, Any] = {"metavar": "N", "group": _GROUP, "parse": parse_whole}
+
+
+def _of_counts(what: str, text: str, known: Mapping[str, Any]) -> int:
+    counts, decoding = parse_whole(what, text), int(known["decoding"])
+    if not decoding <= counts <= _MOST:
+        raise ParameterError(what, f"must be from {decoding} to {_MOST}, not {counts}")
+    if counts % decoding:
+        raise ParameterError(
+            what,
+            f"must be a multiple of {decoding}, the counts of a line, not {counts}: for {counts} cycles, as some data "
+            f"sheets have it, type --lines {counts}",
+        )
+    return counts // decoding
 
 
 @dataclass(frozen=True)
@@ -31,6 +48,15 @@ class Encoder:
         metavar="N",
         group=_GROUP,
         parse=parse_whole,
+        also=(
+            Option("Lines of the disc, which are pulses per revolution (instead of --ppr).", name="lines", **_OF_TURN),
+            Option(
+                "Counts per revolution, after decoding (instead of --ppr): of 2500 lines 10000.",
+                name="cpr",
+                parse_at=_of_counts,
+                **_OF_TURN,
+            ),
+        ),
     )
     decoding: int = option(
         4,
@@ -43,11 +69,10 @@ class Encoder:
     def __post_init__(self) -> None:
         if self.decoding not in (1, 2, 4):
             raise ParameterError("decoding", f"must be 1, 2 or 4, not {self.decoding}")
-        if not 1 <= self.counts_per_rev <= 1 << 24:
+        if not 1 <= self.counts_per_rev <= _MOST:
             raise ParameterError(
                 "pulses_per_rev",
-                f"must be from 1 to {(1 << 24) // self.decoding} with x{self.decoding} decoding, "
-                f"not {self.pulses_per_rev}",
+                f"must be from 1 to {_MOST // self.decoding} with x{self.decoding} decoding, not {self.pulses_per_rev}",
             )
 
     @property

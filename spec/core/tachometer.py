@@ -1,7 +1,7 @@
 """A tachometer says what is asked for: from encoder pins to velocity, whatever the method."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from types import MappingProxyType
@@ -24,6 +24,8 @@ from tachometry.spec.language.docstrings import with_inherited
 from tachometry.spec.language.option import Option, option, options_of, parse_whole
 from tachometry.spec.language.port import Port, Ports
 from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, written_time
+
+CHOSEN = "method-chosen"  # what `options` call why a method was taken
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +71,8 @@ class TachometerSpec:
         The distance of any two edges is off by at most so many counts, 0 to 1; it is rounded up to eighths.
     lowpass : Fraction or None
         G of the low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, in rad/s; None: no filter.
+    chosen : str
+        Why this method was taken, where none was named; empty: it was named.
 
     Raises
     ------
@@ -175,6 +179,7 @@ class TachometerSpec:
         parse=parse_bandwidth,
         tests=("", "20kHz"),
     )
+    chosen: str = field(default="", compare=False, repr=False)
 
     # Name of the method, and what sets it apart.
     method: ClassVar[str]
@@ -263,7 +268,7 @@ class TachometerSpec:
     @property
     def options(self) -> dict[str, str]:
         """Texts of all options that are asked for, by their names; `of_options` makes the core of them again."""
-        found = {"method": self.method}
+        found = {"method": self.method} | ({CHOSEN: self.chosen} if self.chosen else {})
         for part in (self.encoder, self.timing, self):
             found |= written(part, self)
         return found

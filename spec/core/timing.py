@@ -7,7 +7,17 @@ from fractions import Fraction
 from typing import Any
 
 from tachometry.spec.language.option import REQUIRED, Option, ParameterError, option, read_options
-from tachometry.spec.language.units import TIME, format_time, parse_frequency, plural, read_exactly
+from tachometry.spec.language.units import (
+    CLOCKS,
+    FREQUENCY,
+    TIME,
+    Unit,
+    format_time,
+    parse_frequency,
+    plural,
+    read_exactly,
+    read_quantity,
+)
 
 MAX_CLOCK_HZ = 10**11
 MAX_TICK_CYCLES = 1 << 20
@@ -23,7 +33,17 @@ def parse_clocks(what: str, text: str, timing: Mapping[str, Any]) -> int:
 
 def _tick(what: str, text: str, timing: Mapping[str, Any]) -> int:
     _check_clock(timing["clock_hz"])
+    if text.strip().lower().endswith("hz"):
+        return _of_frequency(what, text, timing)
     return _check_tick(parse_clocks(what, text, timing))
+
+
+def _of_frequency(what: str, text: str, timing: Mapping[str, Any]) -> int:
+    _check_clock(timing["clock_hz"])
+    hertz = read_exactly(what, text, FREQUENCY, "Hz")
+    if hertz <= 0:
+        raise ParameterError(what, f"must be greater than 0, not {text}")
+    return _check_tick(_whole(what, text, 1 / hertz, Fraction(1, timing["clock_hz"]), "clock"))
 
 
 def _check_clock(hertz: int) -> None:
@@ -39,7 +59,9 @@ def _check_tick(cycles: int) -> int:
 
 def _ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
     clock = Fraction(1, timing["clock_hz"])
-    return _whole(what, text, timing["tick_cycles"] * clock, "tick", clock, MIN_TICKS)
+    return _whole(
+        what, text, time_or_clocks(what, text, timing["clock_hz"]), timing["tick_cycles"] * clock, "tick", MIN_TICKS
+    )
 
 
 @dataclass(frozen=True)
@@ -72,8 +94,10 @@ class Timing:
     )
     tick_cycles: int = option(
         REQUIRED,
-        "Sampling period Ts, in s, ms, us or ns, a whole number of clocks; a plain number is clocks.",
+        "Sampling period Ts, in s, ms, us or ns, or its frequency in Hz or kHz, a whole number of clocks; 960clk are "
+        "960 clocks.",
         text="20us",
+        shown="20us, or as long as the method needs at this clock",
         name="tick",
         metavar="TIME",
         unit="clocks",
@@ -82,6 +106,13 @@ class Timing:
         tests=("1", "3", "960", "2"),
         few=3,
         also=(
+            Option(
+                "Frequency of the PWM, one period of which is the sampling period (instead of --tick).",
+                name="pwm",
+                metavar="FREQUENCY",
+                group=_GROUP,
+                parse_at=_of_frequency,
+            ),
             Option(
                 "Sampling period of method rairan, whose tick is called dt (instead of --tick).",
                 name="dt",
@@ -95,7 +126,7 @@ class Timing:
     max_ticks: int = option(
         REQUIRED,
         "Longest measurement: after it an update is forced, so that standstill is seen. In s, ms, us or ns, 2 to 2^20 "
-        "whole ticks; a plain number is clocks.",
+        "whole ticks; 960clk are 960 clocks.",
         text="10ms",
         shown="10ms, with method track 100ms",
         name="max-time",
@@ -117,8 +148,8 @@ class Timing:
     def parse(
         cls, clock: str | int | None = None, tick: str | int | None = None, max_time: str | int | None = None
     ) -> "Timing":
-        """Return timing from texts (`48MHz`, `20us`, `10ms`) or whole numbers (Hz, clocks, clocks); None is the
-        default.
+        """Return timing from texts (`48MHz`, `20us`, `10ms`, `960clk`) or whole numbers (Hz, clocks, clocks); None is
+        the default.
 
         Raises
         ------
@@ -126,8 +157,10 @@ class Timing:
             Also if the tick is not a whole number of clocks, or the maximum time not of ticks: the message names the
             two nearest that are.
         """
-        given = {"clock": clock, "tick": tick, "max-time": max_time}
-        return cls(**read_options(cls, {name: str(value) for name, value in given.items() if value is not None}))
+        times = {"tick": tick, "max-time": max_time}
+        given = {name: f"{value}clk" if isinstance(value, int) else value for name, value in times.items()}
+        texts = {"clock": None if clock is None else str(clock), **given}
+        return cls(**read_options(cls, {name: text for name, text in texts.items() if text is not None}))
 
     @property
     def tick_seconds(self) -> Fraction:
@@ -136,25 +169,30 @@ class Timing:
 
 
 def whole_clocks(what: str, given: str, clock_hz: int) -> int:
-    """Return a time such as `40us`, or a number of clocks, as a whole number of clocks;
+    """Return a time such as `40us`, or clocks such as `960clk`, as a whole number of clocks;
     ParameterError if it is none.
     """
-    return _whole(what, given, Fraction(1, clock_hz), "clock", Fraction(1, clock_hz))
+    return _whole(what, given, time_or_clocks(what, given, clock_hz), Fraction(1, clock_hz), "clock")
 
 
-def _whole(what: str, given: str, period: Fraction, name: str, given_in: Fraction, least: int = 1) -> int:
-    """Return `given`, a time or a number of clocks, as a whole number of periods, of which `least` are needed."""
-    number = given.strip()
-    plain = re.fullmatch(r"\d{1,30}", number, re.ASCII)
-    or_plain = "or a whole number of clocks"
-    seconds = int(number) * given_in if plain else read_exactly(what, number, TIME, also=or_plain)
+def time_or_clocks(what: str, given: str, clock_hz: int) -> Fraction:
+    """Return a time such as `40us`, or clocks such as `960clk`, in seconds; ParameterError if it is neither."""
+    if re.fullmatch(r"[\d.]+", number := given.strip(), re.ASCII):
+        raise ParameterError(what, f"must have a unit: type {number}us, or {number}clk for clocks, not {number}")
+    value, unit = read_quantity(what, given, {**TIME, CLOCKS: Unit()})
+    return value / clock_hz if unit == CLOCKS else value * TIME[unit].exact
+
+
+def _whole(what: str, given: str, seconds: Fraction, period: Fraction, name: str, least: int = 1) -> int:
+    """Return seconds as a whole number of periods, of which `least` are needed."""
     if seconds <= 0:
         raise ParameterError(what, f"must be longer than 0, not {given}")
     periods = seconds / period
     if periods.denominator == 1:
         return int(periods)
     possible = sorted({max(int(periods) + more, least) for more in (0, 1)})
-    nearest = " and ".join(f"{plural(n, name)} ({format_time(n * period)})" for n in possible)
+    typed = (f"{n}{CLOCKS}" if name == "clock" else plural(n, name) for n in possible)
+    nearest = " and ".join(f"{text} ({format_time(n * period)})" for text, n in zip(typed, possible, strict=True))
     raise ParameterError(
         what, f"must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"
     )

@@ -18,6 +18,11 @@ class Words(Follows[S]):
         return f"{self.spec.facts.title} method"
 
     @property
+    def method(self) -> str:
+        """The method, and why it was taken where none was named."""
+        return ", ".join(filter(None, (self.spec.method, self.spec.chosen)))
+
+    @property
     def remark(self) -> str:
         """A remark below the plan of the method; empty: none."""
         return ""

@@ -25,12 +25,15 @@ class ParameterError(ValueError):
         Name of the field, or of the option that was read; the command line shows its option in its place.
     rest : str
         The message behind the name.
+    brief : str
+        Why, in a few words behind the name of a method that another one is taken for; empty: the message.
     """
 
-    def __init__(self, parameter: str, rest: str) -> None:
+    def __init__(self, parameter: str, rest: str, brief: str = "") -> None:
         super().__init__(parameter, rest)
         self.parameter = parameter
         self.rest = rest
+        self.brief = brief or f"refuses: {self}"
 
     def __str__(self) -> str:
         return f"{self.parameter} {self.rest}"
@@ -87,8 +90,8 @@ class Option:
     parse : callable
         Makes the value from the name of the option in messages, and from the text.
     parse_at : callable or None
-        Makes it instead, of a text that says nothing without the timing of the core: its third argument is what is
-        known of the fields of `Timing`.
+        Makes it instead, of a text that says nothing without other options: its third argument is what is known of the
+        fields of the same class and of `Timing`.
     text : str or None
         The default, if it is read as it would be if it were given.
     flag : bool
@@ -237,19 +240,19 @@ def read_options(
         if other := given.get(about.field):
             raise ParameterError(about.parameter, f"must not be given together with --{other.name}")
         given[about.field] = about
-    values: dict[str, Any] = {}
+    read: dict[str, Option] = {}
     for about in options_of(spec):
-        if about.field in values:
-            continue
         if about.required and about.field not in given:
-            raise ParameterError(about.parameter, "must be given")
-        if about.field in given:
-            about = given[about.field]
-        elif about.text is None:
-            continue
+            others = (f", or --{one.name}" for one in options_of(spec) if one.field == about.field and one is not about)
+            raise ParameterError(about.parameter, f"must be given{''.join(others)}")
+        if about.field in given or about.text is not None:
+            read.setdefault(about.field, given.get(about.field, about))
+    known = {about.field: about.default for about in options_of(spec)} | dict(timing)
+    values: dict[str, Any] = {}
+    for about in sorted(read.values(), key=lambda one: one.parse_at is not None):  # which needs what others say
         text = texts.get(about.name, about.text or "")
         if about.parse_at is None:
             values[about.field] = about.parse(about.parameter, text)
         else:
-            values[about.field] = about.parse_at(about.parameter, text, {**timing, **values})
+            values[about.field] = about.parse_at(about.parameter, text, {**known, **values})
     return values

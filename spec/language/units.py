@@ -55,6 +55,7 @@ def _decimal(**exponents: int) -> dict[str, Unit]:
     return {name: Unit(Fraction(10) ** exponent) for name, exponent in exponents.items()}
 
 
+CLOCKS = "clk"
 TIME = _decimal(s=0, ms=-3, us=-6, ns=-9)
 FREQUENCY = _decimal(Hz=0, kHz=3, MHz=6, GHz=9)
 SPEED = {"rad/s": Unit(), "rev/s": Unit(pi=Fraction(2)), "rpm": Unit(pi=Fraction(1, 30))}
@@ -162,9 +163,9 @@ def decimal(value: Fraction) -> str:
 
 
 def written_time(clocks: int, clock_hz: int) -> str:
-    """Return a number of clocks as a time, or as it is if that has no end."""
+    """Return a number of clocks as a time, or as clocks if that has no end."""
     seconds = Fraction(clocks, clock_hz)
-    return Quantity(TIME).written(seconds) if decimal(seconds) else str(clocks)
+    return Quantity(TIME).written(seconds) if decimal(seconds) else f"{clocks}{CLOCKS}"
 
 
 def number_reader(units: Units, default: str = "") -> Callable[[str, str], float]:

@@ -84,7 +84,7 @@ class MTTachometer(TimedTachometer):
 
     min_time: int | None = option(
         None,
-        "Tc: a measurement lasts longer than this. In s, ms, us or ns; a plain number is clocks.",
+        "Tc: a measurement lasts longer than this. In s, ms, us or ns, or clocks: 960clk.",
         shown="a tick",
         metavar="TIME",
         unit="clocks",

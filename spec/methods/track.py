@@ -212,6 +212,7 @@ class TrackTachometer(TachometerSpec):
                 "tick_cycles",
                 f"must be at least {shortest} ({format_time(self.times.seconds(shortest))}) with method {self.method} "
                 f"here, not {self.timing.tick_cycles}",
+                f"needs a tick of {shortest} clocks",
             )
 
     def in_loop(self, velocity_gain: Fraction) -> "TrackTachometer":

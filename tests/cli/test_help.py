@@ -48,7 +48,14 @@ CORE = """
     --ppr --decoding --clock --tick --max-time --external-tick --max-tick-period --unit --frac-bits --lsb
     --velocity-width --cancel --no-cancel --max-speed --position-width --filter --index --index-reset
 """.split()
-DEFAULTS = ("48MHz", "20us", "10ms, with method track 100ms", "count/tick", "4", "as many as it can need")
+DEFAULTS = (
+    "48MHz",
+    "20us, or as long as the method needs at this clock",
+    "10ms, with method track 100ms",
+    "count/tick",
+    "4",
+    "as many as it can need",
+)
 FAULTS = "--jitter --nonuniformity --eccentricity --phase-error --duty-error --bounce --lost --illegal".split()
 OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
 

@@ -72,7 +72,7 @@ def check_first_count(before: int, rows_of: Callable[[Lines], list[Row]]) -> Non
 
 
 def test_the_filter_keeps_out_a_glitch_in_the_first_samples(generated: Generated) -> None:
-    words = {"ppr": "500", "clock": "1000000Hz", "tick": str(TICK), "max-time": str(TICK * MOST), "filter": "5"}
+    words = {"ppr": "500", "clock": "1000000Hz", "tick": f"{TICK}clk", "max-time": f"{TICK * MOST}clk", "filter": "5"}
     folder, manifest = made(generated, Case("core", Settings("m", words), 0))
     for line, length in ((0, 1), (1, 4)):
         rows = in_icarus(folder, manifest, Lines(6 * TICK, 0, [], [(0, line, length)]).play())

@@ -58,7 +58,7 @@ def test_a_speed_that_is_cut_is_told(capsys: pytest.CaptureFixture[str]) -> None
 
 @pytest.mark.parametrize("command", ["generate", "plan"])
 def test_times_that_are_stretched_are_told(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = "--ppr 500 --method mt --tick 10 --max-time 20 --min-time 5".split()
+    options = "--ppr 500 --method mt --tick 10clk --max-time 20clk --min-time 5clk".split()
     assert run(command, *options, *(["-o", tmp_path] if command == "generate" else [])) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "note minimum time raised from 5 clocks to 21: a division takes 22" in told

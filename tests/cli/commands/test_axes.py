@@ -16,7 +16,7 @@ from tachometry.hdl.export import export
 from tachometry.sim.studies import verify as study
 from tachometry.sim.studies.pairs import AXES, core_of
 
-CORE = "--ppr 25 --clock 20kHz --tick 2ms --max-time 8ms --max-speed 100rad/s --engine pysim".split()
+CORE = "--method s --ppr 25 --clock 20kHz --tick 2ms --max-time 8ms --max-speed 100rad/s --engine pysim".split()
 MOTIONS = "ramp:0:60:100ms,constant:-40:100ms"
 
 

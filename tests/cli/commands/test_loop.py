@@ -137,7 +137,7 @@ def test_a_controller_in_gates(tmp_path: Path) -> None:
         ("--vary speed=1,2", "--vary must be of ppr, decoding, clock, "),
         ("--vary kv=1,-2", "--kv must be greater than 0, not -2 (method s, kv=-2)"),
         ("--min-time 1ms", "--min-time must be given with a method that has it: mt"),
-        ("--methods s,x", "--methods must be of s, m, t, mt, rairan, track, or all, not 'x'"),
+        ("--methods s,x", "--methods must be of auto, s, m, t, mt, rairan, track, or all, not 'x'"),
         ("--bounce 3:1ms", "No such option '--bounce'"),
     ],
 )

@@ -267,7 +267,7 @@ def test_files_that_are_no_manifests(
     ("change", "message"),
     [
         ({"bus": "spi"}, "--manifest must be that of a board with --bus uart, not spi"),
-        ({"options": {"method": "x"}}, ": method must be one of s, m, t, mt, rairan, track, not 'x'"),
+        ({"options": {"method": "x"}}, ": method must be one of auto, s, m, t, mt, rairan, track, not 'x'"),
         ({"options": {"method": "s", "loop": "yes"}}, "--manifest must be that of a board without --loop, whose"),
         ({"registers": {"configuration": 5}}, "must be that of a demo which this version of tachometry makes: its "),
         ({"baud": 0}, ": baud must be at least 1, not 0"),

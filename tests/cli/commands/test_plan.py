@@ -18,7 +18,7 @@ from tachometry.spec import Encoder, Speed, STachometer, Timing
 from tachometry.spec.formats.reciprocal import DividedReciprocal
 from tachometry.spec.registers.manifest import manifest
 
-OPTIONS = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400rad/s".split()
+OPTIONS = "--method s --ppr 500 --clock 48MHz --tick 20us --max-time 10ms --max-speed 400rad/s".split()
 SPEC = STachometer(
     encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), max_speed=Speed.parse("400rad/s")
 )
@@ -116,7 +116,7 @@ def test_units_of_speeds(text: str | None, first: str, last: str, capsys: pytest
 
 
 def test_without_a_greatest_speed_ten_counts_per_tick_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("plan", "--ppr", "500") == 0
+    assert run("plan", "--method", "s", "--ppr", "500") == 0
     _, _, rows = tables(capsys.readouterr().out)
     assert (rows[0][1], rows[-1][1]) == ("0.002", "10")
 

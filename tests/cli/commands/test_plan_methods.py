@@ -70,4 +70,4 @@ def test_all_methods(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_name_that_is_no_method(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("--methods", "s,odrive") == 2
-    assert "--methods must be of s, m" in capsys.readouterr().err
+    assert "--methods must be of auto, s, m" in capsys.readouterr().err

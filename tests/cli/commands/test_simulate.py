@@ -275,7 +275,7 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
         ("--motion stop:1s --vcd {new}/v.vcd --vcd-from=-1ms", "--vcd-from must be at least 0, not -1ms"),
         ("--motion stop:1s --vcd-from 1ms", "--vcd must be given together with --vcd-from and --vcd-to"),
         (
-            "--motion stop:1s --vcd {new}/v.vcd --vcd-from 5ms --vcd-to 90",
+            "--motion stop:1s --vcd {new}/v.vcd --vcd-from 5ms --vcd-to 90clk",
             "--vcd-from must be before --vcd-to and the end of the run, clock 90, not 100",
         ),
         ("--motion stop:1s --vcd {new}/v.vcd --vcd-to 1m", "vcd-to must be"),

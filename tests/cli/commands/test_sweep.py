@@ -91,7 +91,10 @@ def test_options_are_for_the_methods_that_have_them(
     motion = ["--motion", "ramp:0:30rad/s:100ms", "--jitter", "0.1"]
     axes = ["--vary=average=1,4", "--vary=dt=1ms,2ms", "--vary=lowpass=none,200rad/s", "--vary=seed=1..3:3"]
     files = ["--results", tmp_path / "r.parquet", "--plot", tmp_path / "r.pdf", "--axes", "dt,average"]
-    assert run(*CORE, "--tick", "1ms", "--bounds", *motion, *axes, *files, "--metric=delay", *scheduler) == 0
+    assert (
+        run(*CORE, "--tick", "1ms", "--bounds", *motion, *axes, *files, "--metric=delay", "--methods=all", *scheduler)
+        == 0
+    )
     found = rows(tmp_path / "r.parquet")
     counts = {method: sum(row["method"] == method for row in found) for method in ("s", "m", "t", "mt", "rairan")}
     assert counts == {"s": 6, "m": 12, "t": 6, "mt": 6, "rairan": 12}
@@ -103,7 +106,10 @@ def test_options_are_for_the_methods_that_have_them(
 
 
 def test_what_cannot_be_of_all_methods_is_left_out(scheduler: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(*CORE, "--external-tick", "--motion", "stop:50ms", "--vary", "tick=1ms,2ms", *scheduler) == 0
+    assert (
+        run(*CORE, "--external-tick", "--motion", "stop:50ms", "--vary", "tick=1ms,2ms", "--methods=all", *scheduler)
+        == 0
+    )
     told = " ".join(capsys.readouterr().out.split())
     assert "rairan: left out: method must be another than rairan for an external tick" in told
     assert "(method rairan, tick=1ms)" in told
@@ -159,12 +165,12 @@ BAD = [
     (["--vary", "speed=1m"], "{speed} must be a number in rad/s, rev/s, rpm, s, ms, us, ns, Hz, kHz, MHz, GHz"),
     (["--vary", "speed=none"], "{speed} must be a number in"),
     (["--vary", "tick=33us"], "--max-time must be a whole number of ticks, not 20ms"),
-    (["--vary", "tick=33us"], "(method s, speed=5rad/s, tick=33us)"),
+    (["--vary", "tick=33us"], "(method auto, speed=5rad/s, tick=33us)"),
     (["--vary", "jitter=x"], "must be a number or one in %, not 'x'"),
     (["--vary", "jitter=0,0.7"], "--jitter must be "),
     (["--vary", "average=1,2", "--methods", "s"], "--average must be given with a method that has it: m"),
     (["--average", "2", "--methods", "s,t"], "--average must be given with a method that has it: m"),
-    (["--methods", "s,x"], "--methods must be of s, m, t, mt, rairan, track, or all, not 'x'"),
+    (["--methods", "s,x"], "--methods must be of auto, s, m, t, mt, rairan, track, or all, not 'x'"),
     (["--methods", "m:average=900"], "--average must be from 1 to 256, not 900 (method m:average=900, "),
     (["--vary", "seed=1..2000:2000", "--vary", "ppr=1..1000:1000"], "--vary must give at most 1000000 points, not "),
     (["--vary", "seed=1", "--seed", "2"], "--seed must be given or varied, not both"),
@@ -172,7 +178,10 @@ BAD = [
     (["--frobnicate"], "No such option"),
     (["--vary", "speed=1", "--tick", "1ms", "--plot", "x.png"], "--vary must be given together with --plot"),
     (["--axes", "speed,seed", "--plot", "x.png"], "--axes must be one or two of speed, tick, not 'speed,seed'"),
-    (["--from", "1s"], "--motion must last two ticks or more beyond --from, longer than 100ms (method s, speed=5rad/s"),
+    (
+        ["--from", "1s"],
+        "--motion must last two ticks or more beyond --from, longer than 100ms (method auto, speed=5rad/s",
+    ),
     (["--vary", "speed=1..1e999:3log"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
     (["--vary", "speed=1..1e999:3"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
     (["--vary", "speed=1e-200..1e200:3log"], "numbers, and factors between, below 1e308, not '1e-200..1e200:3log'"),

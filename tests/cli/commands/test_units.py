@@ -11,6 +11,7 @@ from support.command import run
 from support.nightly import only
 
 CORE = "--ppr 100 --clock 100kHz --tick 1ms --max-time 20ms".split()
+S = ["--method", "s"]
 MOTION = ["--motion", "ramp:0:40rad/s:60ms"]
 RAD_PER_S = {"rpm": math.pi / 30, "rev/s": 2 * math.pi}
 
@@ -28,7 +29,7 @@ def test_traces_summaries_and_comparisons(unit: str, tmp_path: Path, capsys: pyt
     for chosen, frac_bits in (("rad/s", "16"), (unit, "14")):
         unit_options = ["--unit", chosen, "--frac-bits", frac_bits]
         trace, table = tmp_path / f"{frac_bits}.csv", tmp_path / f"c{frac_bits}.csv"
-        assert run("simulate", *CORE, *MOTION, *unit_options, "--engine", "pysim", "--trace", trace) == 0
+        assert run("simulate", *CORE, *S, *MOTION, *unit_options, "--engine", "pysim", "--trace", trace) == 0
         assert run("compare", *CORE, *MOTION, *unit_options, "--methods", "m,difference", "--csv", table) == 0
         told[chosen] = capsys.readouterr().out
         assert set(re.findall(r"\b(?:rad/s|rev/s|rpm)(?=[\s)])", told[chosen])) == {chosen}
@@ -64,7 +65,9 @@ def test_figures_are_labelled(tmp_path: Path) -> None:
 
 
 def test_the_core_is_described_when_it_is_generated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = "--ppr 2500 --clock 100MHz --tick 100us --max-speed 4000rpm --unit rpm --velocity-width 18".split()
+    options = (
+        "--method s --ppr 2500 --clock 100MHz --tick 100us --max-speed 4000rpm --unit rpm --velocity-width 18".split()
+    )
     assert run("generate", *options, "-o", tmp_path) == 0
     rows = {
         line.split("  ")[0]: line.split("  ", 1)[1].strip()

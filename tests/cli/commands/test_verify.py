@@ -84,7 +84,7 @@ def test_a_difference_is_saved_with_the_command_that_replays_it(
 
 
 def test_motions_last_as_long_as_is_wanted_and_differ() -> None:
-    spec = spec_of(("--method", "m", "--ppr", "500", "--tick", "3", "--max-time", "1500"))
+    spec = spec_of(("--method", "m", "--ppr", "500", "--tick", "3clk", "--max-time", "1500clk"))
     some = list(motions(spec, 7, 500_000))
     assert [seed for seed, _ in some] == list(range(7, 7 + len(some)))
     assert 500_000 <= sum(trace.n_clocks for _, trace in some) < 2_000_000

@@ -13,7 +13,7 @@ COMMANDS = {
     "generate": ["generate", *CORE, "--loop"],
     "loop": ["loop", *CORE, "--methods", "s", "--motion", "ramp:0:20rad/s:20ms", "--seeds", "1"],
 }
-ACCEPTED = [["--kp", "0"], ["--velocity-filter", "NONE"], ["--observer", "20Hz"], ["--control-period", "2000"]]
+ACCEPTED = [["--kp", "0"], ["--velocity-filter", "NONE"], ["--observer", "20Hz"], ["--control-period", "2000clk"]]
 REFUSED = {
     ("--kv", "0"): "--kv must be greater than 0, not 0",
     ("--kv", "30/s"): "--kv must be a number, not '30/s'",

@@ -85,7 +85,7 @@ def test_files_and_options_mean_the_same(tmp_path: Path) -> None:
     text = """
 ppr = 500
 clock = "10MHz"
-tick = 200 # clocks
+tick = "200clk"
 jitter = 0.02
 index = true
 cancel = false
@@ -98,7 +98,7 @@ bounds = [true, false]
     line = {
         "core_ppr": "500",
         "core_clock": "10MHz",
-        "core_tick": "200",
+        "core_tick": "200clk",
         "jitter": "0.02",
         "core_index": True,
         "core_cancel": False,
@@ -111,7 +111,7 @@ bounds = [true, false]
     assert arguments(settings.first(), OPTIONS | {"speed": OPTIONS["tick"]}) == [
         "--ppr=500",
         "--clock=10MHz",
-        "--tick=200",
+        "--tick=200clk",
         "--jitter=0.02",
         "--index",
         "--no-cancel",
@@ -126,8 +126,8 @@ bounds = [true, false]
     ("text", "message"),
     [
         ("ppr = ", "must be TOML: Invalid value"),
-        ("cpr = 500", ": 'cpr' is no key of a sweep: keys must be of methods, from, "),
-        ("cpr = 500", ", illegal, seed, and [vary]"),
+        ("turns = 500", ": 'turns' is no key of a sweep: keys must be of methods, from, "),
+        ("turns = 500", ", illegal, seed, and [vary]"),
         ("tick = [1, 2]", "tick must be a text, a number, true or false, not [1, 2]: a list belongs into [vary]"),
         ("tick = 1979-05-27", "tick must be a text, a number, true or false, not datetime.date"),
         ("vary = 3", "vary must be a table of axes, not 3"),

@@ -11,11 +11,11 @@ from tachometry.sim.engines.pick import pick
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import METHODS, TachometerSpec, of_texts
 
-CORE = {"ppr": "25", "clock": "1MHz", "tick": "12", "max-time": "120", "frac-bits": "6", "bounds": "yes"}
+CORE = {"ppr": "25", "clock": "1MHz", "tick": "12clk", "max-time": "120clk", "frac-bits": "6", "bounds": "yes"}
 CASES: list[tuple[str, dict[str, str]]] = [
     ("s", {}),
     ("s", {"cancel": "no", "max-speed": "100000rpm"}),
-    ("s", {"max-time": "96000", "tick": "12", "frac-bits": "4"}),
+    ("s", {"max-time": "96000clk", "tick": "12clk", "frac-bits": "4"}),
     ("m", {}),
     ("m", {"average": "8"}),
     ("m", {"average": "16", "frac-bits": "4"}),
@@ -26,9 +26,9 @@ CASES: list[tuple[str, dict[str, str]]] = [
     ("mt", {"timer": "tick"}),
     ("mt", {"unit": "rev/s", "frac-bits": "2", "velocity-width": "12"}),
     ("rairan", {}),
-    ("rairan", {"estimate": "n1", "tick": "3", "max-time": "60"}),
+    ("rairan", {"estimate": "n1", "tick": "3clk", "max-time": "60clk"}),
     ("rairan", {"adaptive": "25%"}),
-    ("rairan", {"tick": "1", "max-time": "20"}),
+    ("rairan", {"tick": "1clk", "max-time": "20clk"}),
 ]
 
 

@@ -77,7 +77,7 @@ def test_after_the_maximum_time(max_ticks: int) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method(method: str) -> None:
     """By the golden models, whose outputs those of the hardware are; see tests/test_matrix.py."""
-    texts = {"ppr": "1", "clock": "1MHz", "tick": "5", "max-time": "30", "frac-bits": "4", "position-width": "8"}
+    texts = {"ppr": "1", "clock": "1MHz", "tick": "5clk", "max-time": "30clk", "frac-bits": "4", "position-width": "8"}
     for more in ({}, {"adaptive": "25%"} if method == "rairan" else {"external-tick": "yes"}):
         spec = of_texts(method, had_by(method, texts | more))
         assert manifest(spec)["stalled_after_ticks"] == 7

@@ -33,7 +33,7 @@ def test_counts_ticks_since_the_update() -> None:
 
 def check_age(method: str, **texts: str) -> None:
     """Ticks since the count, or the tick, that caused the update; those that fall between the two count as well."""
-    spec = of_texts(method, {"ppr": "1", "clock": "1MHz", "age": "yes", "frac-bits": "4", "max-time": "40"} | texts)
+    spec = of_texts(method, {"ppr": "1", "clock": "1MHz", "age": "yes", "frac-bits": "4", "max-time": "40clk"} | texts)
     found = lockstep(spec, stress(spec, 1, 40), PySim())
     assert found.n_mismatches == 0, found.first
     run, ticks = found.actual, found.actual.ticks.clock
@@ -47,12 +47,12 @@ def check_age(method: str, **texts: str) -> None:
 
 
 SHORT = [
-    ("s", {"tick": "1"}),
-    ("m", {"tick": "2", "average": "3", "velocity-width": "8"}),
-    ("t", {"tick": "4"}),
-    ("mt", {"tick": "4", "min-time": "8", "timer": "tick"}),
-    ("t", {"tick": "40", "max-time": "400"}),
-    ("rairan", {"tick": "1", "velocity-width": "8"}),
+    ("s", {"tick": "1clk"}),
+    ("m", {"tick": "2clk", "average": "3", "velocity-width": "8"}),
+    ("t", {"tick": "4clk"}),
+    ("mt", {"tick": "4clk", "min-time": "8clk", "timer": "tick"}),
+    ("t", {"tick": "40clk", "max-time": "400clk"}),
+    ("rairan", {"tick": "1clk", "velocity-width": "8"}),
 ]
 
 
@@ -63,7 +63,9 @@ def test_a_tick_between_cause_and_update_counts(method: str, texts: dict[str, st
 
 
 def test_with_a_filter_that_is_slower_than_a_tick() -> None:
-    spec = of_texts("s", {"ppr": "1", "clock": "1MHz", "tick": "4", "max-time": "40", "age": "yes", "lowpass": "1kHz"})
+    spec = of_texts(
+        "s", {"ppr": "1", "clock": "1MHz", "tick": "4clk", "max-time": "40clk", "age": "yes", "lowpass": "1kHz"}
+    )
     found = lockstep(spec, stress(spec, 1, 40), PySim())
     assert found.n_mismatches == 0, found.first
     assert found.actual.ticks["age"].max() > spec.latency.low_pass // 4

@@ -22,7 +22,7 @@ def edges(rng: np.random.Generator, n: int) -> np.ndarray:
 def counts(recording: Recording, sensor: str, decoding: int) -> tuple[np.ndarray, np.ndarray]:
     """Return counts of each tick, and the clocks at which the tick ended."""
     spec = of_texts(
-        "s", {"ppr": "36", "clock": "100kHz", "tick": str(TICK), "max-time": "5000", "decoding": str(decoding)}
+        "s", {"ppr": "36", "clock": "100kHz", "tick": f"{TICK}clk", "max-time": "5000clk", "decoding": str(decoding)}
     )
     ticks = golden.run(spec, PinTrace.of(other_sensors.converted(recording, sensor, spec), spec)).ticks
     return ticks.pulse_count, ticks.clock - spec.latency.tick - spec.latency.pin_to_count

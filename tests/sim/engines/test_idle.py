@@ -61,7 +61,7 @@ def check_core(spec: TachometerSpec) -> None:
 
 def test_ticks_of_two_clocks_have_nothing_to_skip() -> None:
     """Their counter is one bit, which has no name of its own."""
-    check_core(of_texts("s", {"ppr": "8", "tick": "2", "max-time": "6"}))
+    check_core(of_texts("s", {"ppr": "8", "tick": "2clk", "max-time": "6clk"}))
 
 
 def slow_shaft(method: str, **texts: str) -> tuple[TachometerSpec, PinTrace]:

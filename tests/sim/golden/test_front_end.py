@@ -10,7 +10,7 @@ from tachometry.sim.golden.sampling import external_windows, windows
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
 
-SMALL = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"}
+SMALL = {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk"}
 NONE = np.empty(0, dtype=np.int64)
 
 

@@ -20,7 +20,7 @@ from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.map import RegisterMap
 
 ROOMS = ("tachometry.spec.", "tachometry.sim.golden.", "tachometry.sim.signals.run", "tachometry.sim.studies.lockstep")
-SMALL = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100", "bounds": "yes", "lowpass": "1kHz"}
+SMALL = {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk", "bounds": "yes", "lowpass": "1kHz"}
 
 
 @cache

@@ -9,7 +9,7 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
 from tachometry.spec.registers.manifest import manifest
 
-CORE = {"ppr": "25", "clock": "1MHz", "tick": "16", "max-time": "160"}
+CORE = {"ppr": "25", "clock": "1MHz", "tick": "16clk", "max-time": "160clk"}
 RAD_PER_S = {"rpm": 2 * np.pi / 60, "rev/s": 2 * np.pi}
 UNITS = ("count/tick", *RAD_PER_S)
 OUTPUTS: tuple[dict[str, str], ...] = (
@@ -23,7 +23,7 @@ OUTPUTS: tuple[dict[str, str], ...] = (
 
 def spec_of(**options: str) -> TachometerSpec:
     """Return 6.25 rev/s are a count per tick."""
-    texts = CORE | {"tick": "1600", "max-time": "16000"}
+    texts = CORE | {"tick": "1600clk", "max-time": "16000clk"}
     return of_texts("s", texts | {name.replace("_", "-"): text for name, text in options.items()})
 
 

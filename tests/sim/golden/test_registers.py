@@ -12,7 +12,7 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import of_texts
 from tachometry.spec.registers.map import Field, RegisterMap
 
-CORE = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "40", "frac-bits": "4", "max-speed": "1e6rad/s"}
+CORE = {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "40clk", "frac-bits": "4", "max-speed": "1e6rad/s"}
 COUNTS = 400
 LAST_WORD = (1 << 32) - 1
 

@@ -7,7 +7,7 @@ from tachometry.sim.golden.standstill import with_stalled
 from tachometry.sim.signals.run import Table
 from tachometry.spec import of_texts
 
-SPEC = of_texts("s", {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "40"})  # four ticks
+SPEC = of_texts("s", {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "40clk"})  # four ticks
 
 
 @pytest.mark.parametrize(

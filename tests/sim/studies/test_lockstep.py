@@ -13,7 +13,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import CoreSpec, of_texts
 
-SPEC = of_texts("m", {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"})
+SPEC = of_texts("m", {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk"})
 LEVEL = quadrature(np.arange(100))
 TRACE = PinTrace(7 * np.arange(100), LEVEL & np.uint8(1), LEVEL >> np.uint8(1), 700)
 

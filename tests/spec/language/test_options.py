@@ -62,8 +62,8 @@ def test_defaults_are_those_of_python(method: str) -> None:
             assert spec.scale.rad_per_s_per_lsb < 7e-5
         else:
             assert spec.widths.frac_bits == (16 if unit == "count/tick" else 10)
-    texts = had_by(method, {"ppr": "20", "clock": "100MHz", "tick": "4", "max-time": "2000", "unit": "rpm"})
-    coarse = Timing(100_000_000, int(texts["tick"]), 500)
+    texts = had_by(method, {"ppr": "20", "clock": "100MHz", "tick": "4clk", "max-time": "2000clk", "unit": "rpm"})
+    coarse = Timing(100_000_000, int(texts["tick"].removesuffix("clk")), 500)
     assert of_texts(method, texts) == made(encoder=Encoder(20), timing=coarse, unit="rpm")
     assert of_texts(method, texts).widths.frac_bits < 10  # as many as there can be
     if not made.facts.own_ticks:
@@ -97,9 +97,13 @@ def test_every_option_does_what_it_says() -> None:
         cancel=False,
         reciprocal_source="table",
     )
-    assert {about.name for about in (*common_options(), *own_options("s"))} - {"dt", "frac-bits"} == {
-        word.split("=")[0] for word in texts.split()
-    }
+    assert {about.name for about in (*common_options(), *own_options("s"))} - {
+        "dt",
+        "frac-bits",
+        "lines",
+        "cpr",
+        "pwm",
+    } == {word.split("=")[0] for word in texts.split()}
 
 
 def test_what_help_shows_and_what_pairwise_tests_take() -> None:
@@ -114,7 +118,7 @@ def test_what_help_shows_and_what_pairwise_tests_take() -> None:
         "decoding": "4",
         "timer": "clock",
         "min-time": "a tick",
-        "tick": "20us",
+        "tick": "20us, or as long as the method needs at this clock",
     }
     options = {about.name: about for method in METHODS for about in (*common_options(), *own_options(method))}
     assert [options[name].tested for name in ("cancel", "index", "bound-decay", "timer")] == [
@@ -133,10 +137,10 @@ def test_none_is_leaving_it_out() -> None:
 @pytest.mark.parametrize(
     ("method", "texts", "message"),
     [
-        ("x", {}, "method must be one of s, m, t, mt, rairan, track, not 'x'"),
+        ("x", {}, "method must be one of auto, s, m, t, mt, rairan, track, not 'x'"),
         ("s", {}, "ppr must be given"),
         ("s", PPR | {"average": "2"}, "average must not be given with method s: it is for m"),
-        ("s", PPR | {"min-time": "2"}, "min_time must not be given with method s: it is for mt"),
+        ("s", PPR | {"min-time": "2clk"}, "min_time must not be given with method s: it is for mt"),
         ("m", PPR | {"timer": "tick"}, "timer must not be given with method m: it is for t and mt"),
         ("m", PPR | {"colour": "red"}, "colour must not be given with method m: there is no such option"),
         ("m", PPR | {"average": "1e3"}, "average must be a whole number, not '1e3'"),
@@ -147,7 +151,7 @@ def test_none_is_leaving_it_out() -> None:
         ("s", PPR | {"max-tick-period": "40us"}, "max_tick_period must be given together with --external-tick"),
         ("s", PPR | {"index-reset": "yes"}, "index_reset must be given together with --index"),
         ("s", PPR | {"max-time": "30us"}, "max_time must be a whole number of ticks, not 30us (1.5); nearest: "),
-        ("s", PPR | {"tick": "0"}, "tick must be longer than 0, not 0"),
+        ("s", PPR | {"tick": "0clk"}, "tick must be longer than 0, not 0"),
     ],
 )
 def test_errors_name_the_parameter(method: str, texts: dict[str, str], message: str) -> None:
@@ -188,7 +192,7 @@ def test_a_manifest_says_which_core_it_is(bus: str, tmp_path: Path, monkeypatch:
         core,
         LoopSpec(tachometer=core, gains="inputs"),
         LoopSpec(
-            tachometer=of_texts("track", PPR | {"tick": "6001", "max-time": "600100", "max-memory": "5ms"}),
+            tachometer=of_texts("track", PPR | {"tick": "6001clk", "max-time": "600100clk", "max-memory": "5ms"}),
             gains="inputs",
         ),
         LoopSpec(tachometer=core, gains="inputs", observer=Fraction(50, 3), velocity_filter=Fraction(0)),
@@ -213,8 +217,8 @@ def test_what_is_no_manifest_is_refused(tmp_path: Path) -> None:
     options = of_texts("s", PPR).options
     for more, message in (
         ({"later": "1"}, "later must not be given with method s: there is no such option"),
-        ({"method": "x"}, "method must be one of s, m, t, mt, rairan, track, not 'x'"),
-        ({"tick": "0"}, "tick must be longer than 0"),
+        ({"method": "x"}, "method must be one of auto, s, m, t, mt, rairan, track, not 'x'"),
+        ({"tick": "0clk"}, "tick must be longer than 0"),
         ({"method": "m", "axes": "2"}, "method must be s together with --axes, not m"),
     ):
         with pytest.raises(ParameterError, match=f"^{message}"):

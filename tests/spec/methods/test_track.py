@@ -38,7 +38,7 @@ def test_the_memory_in_a_loop_follows_from_its_gain() -> None:
 
 
 def with_tick(cycles: int, multiplier: str) -> TrackTachometer:
-    return core(tick=str(cycles), max_time=str(500 * cycles), multiplier=multiplier)
+    return core(tick=f"{cycles}clk", max_time=f"{500 * cycles}clk", multiplier=multiplier)
 
 
 @pytest.mark.parametrize("multiplier", ["serial", "block"])

@@ -6,7 +6,7 @@ from tachometry.spec import of_texts
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
 from tachometry.spec.registers.map import RegisterMap
 
-SPEC = of_texts("m", {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"})
+SPEC = of_texts("m", {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk"})
 # A word of data, its bytes, the address; AXI4-Lite has 3 bits of protection and 2 of response (ARM IHI 0022).
 LINES = {
     "native": "> reg_address:word reg_read reg_write reg_write_data:32 < reg_read_data:32 reg_error",

@@ -8,7 +8,7 @@ from support.options import had_by
 from tachometry.spec import METHODS, ParameterError, of_texts
 from tachometry.spec.registers.manifest import check_module_name, manifest
 
-BASE = {"ppr": "8", "clock": "1MHz", "tick": "20", "max-time": "200", "frac-bits": "5"}
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "20clk", "max-time": "200clk", "frac-bits": "5"}
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -11,7 +11,7 @@ from tachometry.spec.registers.demo import DemoMap, demo_map, demo_ports
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import Field, RegisterMap
 
-BASE = {"ppr": "8", "clock": "1MHz", "tick": "10", "max-time": "100"}
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk"}
 
 
 def map_of(method: str = "s", **texts: str) -> RegisterMap:

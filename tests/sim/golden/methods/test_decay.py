@@ -37,7 +37,7 @@ def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> T
 
 def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> list[Update]:
     """Return those of the naive model."""
-    words = {"clock": str(100 * TICK), "tick": str(TICK), "max-time": str(TICK * MAX_TICKS), "ppr": "25"}
+    words = {"clock": str(100 * TICK), "tick": f"{TICK}clk", "max-time": f"{TICK * MAX_TICKS}clk", "ppr": "25"}
     words |= {"timer": spec.timer, "frac-bits": str(spec.widths.frac_bits), "edge-error": str(spec.bound.edge_error)}
     settings = Settings("t", words | {"bound-decay": "yes" if spec.bound_decay else "no"})
     front = Front(n_clocks, counts)

@@ -44,7 +44,7 @@ def test_to_the_letter_it_is_table_1_at_every_ts(dt: int) -> None:
 
 def check_description(spec: RairanTachometer, step: np.ndarray) -> list[Update]:
     """Hold every update and every end of dt against the description; these updates."""
-    words = {"dt": str(spec.timing.tick_cycles), "max-time": str(spec.timing.tick_cycles * spec.timing.max_ticks)}
+    words = {"dt": f"{spec.timing.tick_cycles}clk", "max-time": f"{spec.timing.tick_cycles * spec.timing.max_ticks}clk"}
     words |= {"estimate": spec.estimate, "frac-bits": str(spec.widths.frac_bits)}
     words |= {"bound-decay": "yes" if spec.bound_decay else "no"}
     words |= {} if spec.adaptive is None else {"adaptive": str(spec.adaptive)}

@@ -50,7 +50,7 @@ def test_the_papers_sequences(name: str, cancel: bool) -> None:
 
 def definition(m_e: list[int], max_ticks: int, cancel: bool) -> list[tuple[int, int, bool, bool, int]]:
     """Return those of the naive model; S rests if nothing was counted in a forced window."""
-    words = {"tick": "16", "max-time": str(16 * max_ticks), "cancel": "yes" if cancel else "no"}
+    words = {"tick": "16clk", "max-time": f"{16 * max_ticks}clk", "cancel": "yes" if cancel else "no"}
     found = s_updates(Settings("s", words), [Tick(i, number, False, 0, not number) for i, number in enumerate(m_e)])
     quiet = [not any(m_e[max(one.cause - one.interval, 0) : one.cause + 1]) for one in found]
     return [

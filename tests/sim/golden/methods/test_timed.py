@@ -63,7 +63,7 @@ def test_times_in_external_ticks_are_counted_in_ticks(method: str) -> None:
 
 
 def test_a_short_maximum_time_in_external_ticks_is_no_longer() -> None:
-    spec = of_texts("t", EXTERNAL | {"tick": "50", "max-time": "100"})
+    spec = of_texts("t", EXTERNAL | {"tick": "50clk", "max-time": "100clk"})
     updates = golden.run(spec, counting(300, 50, 10**6)).updates
     assert set(np.diff(updates.clock).tolist()) == {2 * 50}
     assert set(updates.interval.tolist()) == {2}
@@ -74,9 +74,9 @@ def test_a_short_maximum_time_in_external_ticks_is_no_longer() -> None:
 @pytest.mark.parametrize("seed", only([0], range(3)))
 def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
     """They come at every second to twentieth clock: windows stay open, and zeros take the divider."""
-    spec = of_texts(method, EXTERNAL | {"tick": "40", "max-time": "120", "bounds": "yes", "frac-bits": "4"})
+    spec = of_texts(method, EXTERNAL | {"tick": "40clk", "max-time": "120clk", "bounds": "yes", "frac-bits": "4"})
     rng = np.random.default_rng(seed)
-    trace = stress(of_texts(method, {"ppr": "500", "tick": "12", "max-time": "36"}), seed, 60)
+    trace = stress(of_texts(method, {"ppr": "500", "tick": "12clk", "max-time": "36clk"}), seed, 60)
     trace = trace.with_tick_in(np.cumsum(rng.integers(2, rng.choice([4, 21]), trace.n_clocks // 4)))
     assert isinstance(spec, TimedTachometer)
     found = lockstep(spec, trace, PySim())

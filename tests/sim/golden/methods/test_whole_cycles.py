@@ -81,7 +81,7 @@ def test_no_window_is_longer_than_one_of_twice_the_minimum_time() -> None:
 
 
 def test_at_x1_nothing_changes() -> None:
-    texts = {"ppr": "500", "decoding": "1", "tick": "40", "max-time": "4000", "min-time": "200"}
+    texts = {"ppr": "500", "decoding": "1", "tick": "40clk", "max-time": "4000clk", "min-time": "200clk"}
     trace = VirtualEncoder(500, jitter=0.3).record(parse_motion("sine:900rad/s:50Hz:40ms")).recording.place(48_000_000)
     runs = [golden.run(of_texts("mt", texts | {"whole-cycles": one}), trace).updates for one in ("yes", "no")]
     assert len(runs[0]) > 100
