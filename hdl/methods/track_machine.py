@@ -14,14 +14,13 @@ from tachometry.spec.formats.tracking_code import (
     HOW_BITS,
     INPUTS,
     OUTPUTS,
-    QUICK,
     Instruction,
     Jump,
     Left,
     Program,
     Source,
-    Start,
 )
+from tachometry.spec.formats.tracking_units import QUICK, Start
 
 _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
 
@@ -174,23 +173,24 @@ class TrackMachine(wiring.Component):
         total = Signal(signed(WIDTH))
         minus = Signal()
         carry = Signal()
-        used = (now.left == Left.SUM) | ((now.left == Left.LEAST) & negative) | ((now.left == Left.MOST) & ~negative)
-        # Where no word is meant one is read that is 0, and so is an input where none is.
+        least_or_sum, most_or_sum = Value.cast(now.left)
+        used = Mux(negative, least_or_sum, most_or_sum)
+        # Where no word is meant one is read that is 0, and so is an input where none is; it is a first term.
         from_unit = Signal()
         given = Signal(signed(WIDTH), reset_less=True)
         with m.If(~hold):
             m.d.sync += [from_unit.eq(coming.source == Source.UNIT), given.eq(0)]
             with m.If(coming.source == Source.INPUT):
                 m.d.sync += given.eq(self._inputs()[coming.word[:3]])
-        m.d.comb += right.eq(read.data | Mux(from_unit, unit.result, given))
         flipped = (right ^ minus.replicate(WIDTH))[:WIDTH]
         m.d.comb += [
-            left.eq(Mux(used, sum_, 0)),
+            left.eq(Mux(used, sum_, 0) | given),
+            right.eq(read.data | Mux(from_unit, unit.result, 0)),
             minus.eq(now.subtract ^ (now.by_sign & sign)),
             carry.eq(minus ^ (from_unit & unit.up)),
             total.eq((Cat(C(1, 1), left).as_signed() + Cat(carry, flipped).as_signed()) >> 1),
         ]
-        with m.If(go & (now.jump == Jump.NEVER)):
+        with m.If(go):
             m.d.sync += sum_.eq(total)
         with m.If(go & now.keep):
             m.d.sync += sign.eq(total[-1])

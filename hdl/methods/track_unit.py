@@ -17,16 +17,19 @@ from tachometry.spec.formats.tracking import (
     EXP_INDEX,
     GAIN_STEPS,
     GAINS,
+    GAINS_FROM,
     LOG_BITS,
     LOG_INDEX,
     POWER_BITS,
     RESULT_BITS,
     WIDTH,
 )
-from tachometry.spec.formats.tracking_code import BY_FACTOR, HOW_BITS, Program, Start
+from tachometry.spec.formats.tracking_code import BY_FACTOR, HOW_BITS, Program
+from tachometry.spec.formats.tracking_units import Small, Start
 
 TABLE_BITS = 18
 _LOW = CHANCE_BITS - DROPPED  # zeros below a product
+_GAIN_LOW = LOG_BITS - (GAIN_STEPS - 1).bit_length()
 _TOP = CHANCE_BITS + WIDTH  # bits of what is shifted, unless it is a product
 
 
@@ -57,6 +60,8 @@ class Unit(wiring.Component):
     def __init__(self, program: Program) -> None:
         self._program = program
         self._bits = program.form.factor_bits
+        self.factor = Signal(self.factor_bits, reset_less=True)
+        self.places = Signal(6, reset_less=True)
         super().__init__(
             {
                 "begin": In(1),
@@ -71,12 +76,7 @@ class Unit(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        bits = self._bits
-        doing = Signal(Start)
-        how = Signal(HOW_BITS)
-        self.doing = doing
-        self.factor = Signal(bits, reset_less=True)
-        self.places = Signal(6, reset_less=True)
+        self.doing, self.how_done = doing, how = Signal(Start), Signal(HOW_BITS)
         m.d.sync += [doing.eq(self.start), how.eq(self.how)]
         # The number of the event, its bits reversed.
         self.chance = Signal(CHANCE_BITS)
@@ -88,34 +88,21 @@ class Unit(wiring.Component):
         m.submodules.tables = tables = Memory(shape=TABLE_BITS, depth=1 << (len(values) - 1).bit_length(), init=values)
         self.table = tables.read_port()
         # The place in a table of gains: 16 an octave, from X = 1/4 on.
-        low = LOG_BITS - (GAIN_STEPS - 1).bit_length()
-        place = Signal(9)
-        gain = Signal(range(GAINS))
-        m.d.comb += [
-            place.eq((~self.sum)[low : low + 9] - 2 * GAIN_STEPS),
-            gain.eq(Mux(place >= GAINS, GAINS - 1, place)),
-        ]
-        first_gains = (len(values) - 3 * GAINS) // GAINS
-        self.gain_address = Cat(gain, (how[:2] + first_gains)[:3])
+        place = (~self.sum)[_GAIN_LOW : _GAIN_LOW + 9]
+        beyond = place[8] | (place[7] & place[5:7].any())  # beyond the last
+        gain = Mux(beyond, GAINS_FROM - 1, place[: GAINS.bit_length() - 1])
+        self.gain_address = Cat(gain, (how[:2] + (len(values) - 3 * GAINS) // GAINS)[:3])
         self.power_address = self.sum[LOG_BITS - EXP_INDEX : LOG_BITS]
-        # How far powers, products, and all others, go to the right.
-        named = Signal(6)
-        shifts = (*self._program.shifts, *[0] * ((1 << HOW_BITS) - len(self._program.shifts)))
-        m.d.comb += named.eq(Array(C(shift, 6) for shift in shifts)[how])
-        places = Signal(signed(11))
-        whole = self.sum[LOG_BITS : LOG_BITS + 9].as_signed()
-        m.d.comb += places.eq(RESULT_BITS - whole)
-        nothing = places[6:-1].any() & ~places[-1]
-        self.of_power = Mux(places[-1] | ~places.any(), 1, places[:6] | nothing.replicate(6))
-        self.of_product = (named + _LOW - self.places)[:6]
-        self.of_shift = Mux(how == BY_FACTOR, self.places, named)
-        # What is shifted.
-        size = (self.sum ^ ((doing == Start.LOG) & self.sum[-1]).replicate(WIDTH))[:WIDTH]
-        self.of_sum = Cat(C(0, CHANCE_BITS), size)
-        above = CHANCE_BITS + RESULT_BITS - POWER_BITS
-        self.of_table = Cat(C(0, above), self.table.data[:POWER_BITS], C(1, 1))
+        self.whole = self.sum[LOG_BITS : LOG_BITS + 9].as_signed()
+        shifts = self._program.shifts
+        self.shifts = (*shifts, *[(Start.OVER, 0)] * ((1 << HOW_BITS) - len(shifts)))
         self._work(m)
         return m
+
+    @property
+    def factor_bits(self) -> int:
+        """Bits that the factor is kept in."""
+        return self._bits
 
     def _work(self, m: Module) -> None:
         raise NotImplementedError
@@ -123,11 +110,6 @@ class Unit(wiring.Component):
     def log_address(self, shifted: Value) -> Value:
         """Return where the logarithm stands of what is behind the leading one at bit 8."""
         return Cat(shifted[CHANCE_BITS - LOG_INDEX : CHANCE_BITS], C((1 << EXP_INDEX) >> LOG_INDEX, 10 - LOG_INDEX))
-
-    def beyond(self, shifted: Value, step: int, factor: Value) -> Value:
-        """Tell whether the leading one is `step` places or more above where it belongs."""
-        of_log, of_factor = (shifted[place + step : _TOP].any() for place in (CHANCE_BITS, self._bits - 1))
-        return Mux(factor, of_factor, of_log)
 
     @staticmethod
     def too_large(product: Value) -> Value:
@@ -140,10 +122,23 @@ class QuickUnit(Unit):
     """A multiplier of the FPGA, and a barrel shifter in two stages; `tracking_code.QUICK` has its times."""
 
     def _work(self, m: Module) -> None:
-        bits, doing = self._bits, self.doing
+        bits, doing, how = self._bits, self.doing, self.how_done
         width = WIDTH + bits + _LOW
+        # How far powers, products, and all others, go to the right.
+        named = Signal(6)
+        places = Signal(signed(11))
+        m.d.comb += [named.eq(Array(C(shift, 6) for _, shift in self.shifts)[how]), places.eq(RESULT_BITS - self.whole)]
+        nothing = places[6:-1].any() & ~places[-1]
+        by_power = Mux(places[-1] | ~places.any(), 1, places[:6] | nothing.replicate(6))
+        by_product = (named + _LOW - self.places)[:6]
+        by_shift = Mux(how == BY_FACTOR, self.places, named)
+        # What is shifted.
+        size = (self.sum ^ ((doing == Start.LOG) & self.sum[-1]).replicate(WIDTH))[:WIDTH]
+        above = CHANCE_BITS + RESULT_BITS - POWER_BITS
         left = Signal(3)
         last = Signal(Start)
+        raised = Signal()
+        power = Signal(POWER_BITS + 1, reset_less=True)
         latencies = Array(C(max(getattr(self._program.times, item.name.lower(), 1) - 1, 0), 3) for item in Start)
         m.d.comb += self.busy.eq(left.any())
         m.d.sync += [left.eq(Mux(left.any(), left - 1, latencies[self.start])), last.eq(doing)]
@@ -152,25 +147,28 @@ class QuickUnit(Unit):
         of_power = Signal(6)
         m.d.sync += [
             product.eq(self.sum * self.factor),
-            of_product.eq(self.of_product),
-            of_power.eq(self.of_power),
+            of_product.eq(by_product),
+            raised.eq(last == Start.EXP),
+            power.eq(Cat(self.table.data[:POWER_BITS], C(1, 1))),
         ]
+        with m.If(doing == Start.EXP):
+            m.d.sync += of_power.eq(by_power)
         # First stage: by 32, 16 and 8.
-        multiplied, raised = last == Start.TIMES, last == Start.EXP
+        multiplied = last == Start.TIMES
         finds, factor = (doing == Start.LOG) | (doing == Start.BY), doing == Start.BY
         value = Signal(signed(width))
-        places = Signal(6)
+        distance = Signal(6)
         m.d.comb += [
             value.eq(
                 Mux(
                     multiplied,
                     Cat(C(0, _LOW), product).as_signed(),
-                    Mux(raised, Cat(self.of_table, C(0, 1)).as_signed(), self.of_sum.as_signed()),
+                    Mux(raised, Cat(C(0, above), power, C(0, 1)).as_signed(), Cat(C(0, CHANCE_BITS), size).as_signed()),
                 )
             ),
-            places.eq(Mux(multiplied, of_product, Mux(raised, of_power, self.of_shift))),
+            distance.eq(Mux(multiplied, of_product, Mux(raised, of_power, by_shift))),
         ]
-        half, count = self._stage(m, value, places, finds, factor, (5, 4, 3))
+        half, count = self._stage(m, value, distance, finds, factor, (5, 4, 3))
         # Second stage: by 4, 2 and 1.
         second = Signal(signed(width), reset_less=True)
         rest = Signal(3)
@@ -182,7 +180,7 @@ class QuickUnit(Unit):
         may_be_large = Signal()
         m.d.sync += [
             second.eq(half),
-            rest.eq(places),
+            rest.eq(distance),
             high.eq(count[3:]),
             second_finds.eq(finds),
             second_factor.eq(factor),
@@ -221,6 +219,11 @@ class QuickUnit(Unit):
                 self.up.eq(0),
             ]
 
+    def beyond(self, shifted: Value, step: int, factor: Value) -> Value:
+        """Tell whether the leading one is `step` places or more above where it belongs."""
+        of_log, of_factor = (shifted[place + step : _TOP].any() for place in (CHANCE_BITS, self._bits - 1))
+        return Mux(factor, of_factor, of_log)
+
     def _stage(
         self, m: Module, value: Value, places: Value, finds: Value, factor: Value, of: tuple[int, ...]
     ) -> tuple[Value, Signal]:
@@ -240,117 +243,149 @@ class State(Enum):
     """Lists what the small unit does."""
 
     RESTS = 0
-    MULTIPLIES = 1
-    SHIFTS = 2
-    LOOKS_UP = 3
+    READS = 1  # a power from the table
+    ADDS = 2
+    SHIFTS = 3
 
 
 class SmallUnit(Unit):
-    """One register that is shifted by 16, by 4 or by 1 a clock, and adds for products; see `small_times`."""
+    """One register that takes what is added at its top, and goes to the right by 2 or by 8 places; see `Small`.
+
+    A product takes two bits of the factor a clock, as a digit 0, 1, 2 or −1. All else is added once: as it is; twice if
+    it goes to the right by an odd number of places; its bits inverted if its logarithm is meant and it is negative.
+    """
+
+    @property
+    def factor_bits(self) -> int:
+        return 2 * Small(self._program.form).digits
 
     def _work(self, m: Module) -> None:
-        bits, doing = self._bits, self.doing
-        width = WIDTH + bits + _LOW
+        bits, doing, table = self._bits, self.doing, self.table.data
+        small = Small(self._program.form)
+        low, width = small.low, small.low + WIDTH
         state = Signal(State)
         work = Signal(signed(width), reset_less=True)
         operand = Signal(signed(WIDTH), reset_less=True)
-        # Places to be shifted, by 1, 4 and 16; where the leading one is sought, those that it was.
-        digits = [Signal(2, name=f"by_{step}", reset_less=True) for step in (1, 4, 16)]
-        steps = Signal(range(bits), reset_less=True)
-        begins = (doing != Start.NONE) & (doing != Start.CHANCE)
-        m.d.comb += [
-            self.busy.eq(begins | (state != State.RESTS)),
-            self.result.eq(work[CHANCE_BITS : CHANCE_BITS + WIDTH].as_signed()),
-        ]
-        with m.If(doing == Start.TIMES):
-            m.d.sync += operand.eq(self.sum)
-        is_log, is_factor, is_product, is_power = (
-            Signal(name=f"was_{name}", reset_less=True) for name in ("log", "factor", "product", "power")
+        steps = Signal(range(small.digits + 1), reset_less=True)
+        pairs = Signal(signed(6), reset_less=True)  # of places that it went; below 0 those that it is still to go
+        names = ("log", "factor", "product", "read", "doubled", "nothing")
+        is_log, is_factor, is_product, is_read, doubled, nothing = (
+            Signal(name=f"is_{name}", reset_less=True) for name in names
         )
+        begins = (doing != Start.NONE) & (doing != Start.CHANCE)
+        reads, adds, shifts = (state == item for item in (State.READS, State.ADDS, State.SHIFTS))
+        # What is added next: a digit of the factor, which turns meanwhile, or all at once.
+        before, owed, minus, multiplies, code = Signal(), Signal(), Signal(), Signal(), Signal(2)
+        how = self.how_done
+        named_odd = Array(C(shift % 2, 1) for _, shift in self.shifts)[how]
+        finds = (doing == Start.LOG) | (doing == Start.BY)
+        by_factor = how == BY_FACTOR
+        whole = self.whole
+        too_small = whole[-1] & ~whole[4:-1].all()
+        too_large = ~whole[-1] & (whole[6:-1].any() | (whole[5] & whole[2:5].any()))  # at least 2^36
+        odd = Mux(doing == Start.EXP, ~whole[0] & ~too_large, Mux(by_factor, self.places[0], named_odd)) & ~finds
+        now_doubled = Mux(begins, odd, doubled)
+        digits = Mux(now_doubled, Cat(before, self.factor[0]), self.factor[:2])
+        digit = Signal(3)  # 4 is a digit 0 that owes
+        m.d.comb += [
+            multiplies.eq(Mux(begins, doing == Start.TIMES, adds & is_product & (steps != small.digits))),
+            digit.eq(Cat(digits[0] ^ owed, digits[1] ^ (digits[0] & owed), digits.all() & owed)),
+        ]
+        once = Mux(begins, Mux(finds & self.sum[-1], 3, 1 + odd), Mux(nothing, 0, 1 + doubled))
+        m.d.sync += [
+            code.eq(Mux(multiplies, digit[:2], once) & (begins | reads | multiplies).replicate(2)),
+            owed.eq(multiplies & (digit[2] | digit[:2].all())),
+            minus.eq(multiplies & digit[:2].all()),
+            before.eq(multiplies & self.factor[1]),
+            steps.eq(Mux(multiplies, steps + 1, 0)),
+        ]
+        addend = Signal(signed(WIDTH + 2))
+        with m.Switch(code):
+            with m.Case(1):
+                m.d.comb += addend.eq(operand)
+            with m.Case(2):
+                m.d.comb += addend.eq(operand << 1)
+            with m.Case(3):
+                m.d.comb += addend.eq(~operand)
+        total = Signal(signed(WIDTH + 2))
+        m.d.comb += total.eq((Cat(C(1, 1), work[low:]).as_signed() + Cat(minus, addend).as_signed()) >> 1)
+        # Where it goes.
+        by_8, by_2, ends, large = (Signal(name=name) for name in ("by_8", "by_2", "ends", "large"))
+        beyond_8, beyond_2 = (
+            Mux(is_factor, work[bits - 1 + step :].any(), is_log & work[CHANCE_BITS + step :].any()) for step in (8, 2)
+        )
+        m.d.comb += [
+            by_8.eq(shifts & ((pairs[-1] & ~(pairs[2:].all() & pairs[:2].any())) | beyond_8)),
+            by_2.eq(shifts & ~by_8 & (pairs[-1] | beyond_2)),
+            ends.eq(shifts & ~by_8 & ~by_2),
+            large.eq(ends & is_product & self.too_large(work)),
+        ]
+        with m.If(adds | by_8 | by_2):
+            m.d.sync += work.eq(Mux(by_8, work >> 8, Cat(work[2:low], total)))
+        with m.If(begins):
+            m.d.sync += work.eq(0)
+        with m.If(large):
+            m.d.sync += work[CHANCE_BITS : CHANCE_BITS + RESULT_BITS].eq(0)
+            m.d.sync += work[CHANCE_BITS + RESULT_BITS].eq(1)
+            m.d.sync += work[CHANCE_BITS + RESULT_BITS + 1 : CHANCE_BITS + WIDTH].eq(work[-1].replicate(WIDTH))
+        # How many pairs of places it is to go: those of what is done, and those that the operand or the factor says.
+        named = Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[how]
+        more, up = Signal(6), Signal()
+        with m.If(~begins):
+            m.d.comb += more.eq(Mux(by_8, 4, 1))
+        with m.Elif(doing == Start.EXP):
+            m.d.comb += [more.eq(Mux(too_small | whole[6:].any() & ~whole[-1], 31, whole[1:7])), up.eq(whole[0])]
+        with m.Elif(doing == Start.TIMES):
+            m.d.comb += more.eq(self.places[1:])
+        with m.Elif((doing == Start.OVER) & by_factor):
+            m.d.comb += [more.eq(Cat(~self.places[1:], C(1, 1))), up.eq(~self.places[0])]
+        with m.If(begins | by_8 | by_2):
+            m.d.sync += pairs.eq((Cat(C(1, 1), Mux(begins, named, pairs)) + Cat(up, more)) >> 1)
         with m.If(begins):
             m.d.sync += [
                 is_log.eq(doing == Start.LOG),
                 is_factor.eq(doing == Start.BY),
                 is_product.eq(doing == Start.TIMES),
-                is_power.eq(doing == Start.EXP),
+                is_read.eq((doing == Start.LOG) | (doing == Start.GAIN)),
+                nothing.eq(too_small),
+                doubled.eq(odd),
+                self.up.eq(0),
             ]
-        finds = Signal()
-        shifts, multiplies, looks = (state == item for item in (State.SHIFTS, State.MULTIPLIES, State.LOOKS_UP))
-        one, near, far = taken = [Signal(name=f"shifts_{step}") for step in (1, 4, 16)]
-        beyond = [Signal(name=f"beyond_{step}", reset_less=True) for step in (1, 4, 16)]
-        ends = Signal()
-        large = Signal()
-        too_large = Signal()
-        m.d.comb += [
-            finds.eq(is_log | is_factor),
-            *(
-                go.eq(shifts & Mux(finds, flag, digit.any()))
-                for go, flag, digit in zip(taken, beyond, digits, strict=True)
-            ),
-            ends.eq(shifts & ~one & ~near & ~far),
-            large.eq(ends & is_product & too_large),
-        ]
-        # A bit of the factor a clock; without it, it is a shift by 1.
-        total = Signal(signed(WIDTH + 1))
-        m.d.comb += total.eq(work[_LOW + bits :].as_signed() + Mux(multiplies & work[_LOW], operand, 0))
-        # What is loaded: the sum, a factor, what a table has, or the greatest product.
-        of_sum = begins & (doing != Start.TIMES)
-        found = Cat(self.table.data[:LOG_BITS], Mux(is_log, Cat(*digits), self.table.data[LOG_BITS:]))
-        load = (
-            (self.of_sum.as_signed() & of_sum.replicate(width))
-            | ((Cat(C(0, _LOW), self.factor)) & (begins & (doing == Start.TIMES)).replicate(width))
-            | (self.of_table & (looks & is_power).replicate(width))
-            | (Cat(C(0, CHANCE_BITS), found) & (looks & ~is_power).replicate(width))
-        )
-        choice = Signal(2)
-        m.d.comb += choice.eq(Mux(begins | looks, 3, Mux(far, 2, near & ~far)))
-        following = Signal(signed(width))
-        with m.Switch(choice):
-            with m.Case(0):
-                m.d.comb += following.eq(Cat(work[1 : _LOW + bits], total))
-            with m.Case(1):
-                m.d.comb += following.eq(work >> 4)
-            with m.Case(2):
-                m.d.comb += following.eq(work >> 16)
-            with m.Case(3):
-                m.d.comb += following.eq(load)
-        # How far it is to be shifted is known as soon as what is shifted.
-        of_factor = Mux(begins, doing == Start.BY, is_factor)
-        with m.If(begins | looks | multiplies | one | near | far):
-            m.d.sync += [work.eq(following), too_large.eq(self.too_large(following))]
-            for flag, step in zip(beyond, (1, 4, 16), strict=True):
-                m.d.sync += flag.eq(self.beyond(following, step, of_factor))
-        with m.If(large):
-            m.d.sync += work[: CHANCE_BITS + RESULT_BITS].eq(0)
-            m.d.sync += work[CHANCE_BITS + RESULT_BITS].eq(1)
-            m.d.sync += work[CHANCE_BITS + RESULT_BITS + 1 :].eq(work[-1].replicate(width))
-        with m.If(begins):
-            given = Mux(doing == Start.EXP, self.of_power, Mux(doing == Start.TIMES, self.of_product, self.of_shift))
-            given = Mux((doing == Start.LOG) | (doing == Start.BY), 0, given)
-            m.d.sync += Cat(*digits).eq(given)
-        with m.Elif(shifts):
-            for digit, go, not_yet in zip(digits, taken, (far | near, far, C(0, 1)), strict=True):
-                with m.If(go & ~not_yet):
-                    m.d.sync += digit.eq(Mux(finds, digit + 1, digit - 1))
-        m.d.comb += self.table.addr.eq(
-            Mux(
-                doing == Start.EXP,
-                self.power_address,
-                Mux(doing == Start.GAIN, self.gain_address, self.log_address(work)),
-            )
-        )
-        with m.If(looks | ends):
-            m.d.sync += self.up.eq((work[:CHANCE_BITS] + self.chance)[-1] & ~large & ~looks)
+        with m.If(reads):
+            m.d.sync += operand.eq(Cat(C(0, small.table_place), table[:POWER_BITS], C(1, 1)))
+        with m.Elif(begins):
+            m.d.sync += operand.eq(self.sum)
+        # What comes out.
+        with m.If(ends & ~is_log):
+            m.d.sync += self.up.eq((work[:CHANCE_BITS] + self.chance)[-1] & ~large)
         with m.If(ends & is_factor):
-            m.d.sync += [self.factor.eq(work), self.places.eq(Cat(*digits))]
-        m.d.sync += steps.eq(Mux(multiplies, steps - 1, bits - 1))
+            m.d.sync += [
+                self.factor.eq(Cat(work[0] & ~work[bits], work[1 : bits + 1])),
+                self.places.eq(Cat(work[bits], pairs[:5])),
+            ]
+        with m.Elif(multiplies):
+            m.d.sync += self.factor.eq(self.factor.rotate_right(2))
+        leading = work[CHANCE_BITS + 1]  # the leading one is there, or one below
+        found = Cat(table[:LOG_BITS], Mux(is_log, Cat(leading, pairs[:5]), table[LOG_BITS:]))
+        kept = work[CHANCE_BITS:]
+        m.d.comb += [
+            self.busy.eq(begins | (state != State.RESTS)),
+            self.result.eq(Cat(Mux(is_read, found, kept[:TABLE_BITS]), kept[TABLE_BITS:WIDTH]).as_signed()),
+            self.table.en.eq(begins | ends),
+            self.table.addr.eq(
+                Mux(
+                    doing == Start.EXP,
+                    self.power_address,
+                    Mux(doing == Start.GAIN, self.gain_address, self.log_address(Mux(leading, work >> 1, work))),
+                )
+            ),
+        ]
         with m.If(begins):
-            looked_up = (doing == Start.EXP) | (doing == Start.GAIN)
-            begun = Mux(doing == Start.TIMES, State.MULTIPLIES, State.SHIFTS)
-            m.d.sync += state.eq(Mux(looked_up, State.LOOKS_UP, begun))
-        with m.Elif(multiplies & (steps == 0)):
+            begun = Mux(doing == Start.EXP, State.READS, State.ADDS)
+            m.d.sync += state.eq(Mux(doing == Start.GAIN, State.RESTS, begun))
+        with m.Elif(reads):
+            m.d.sync += state.eq(State.ADDS)
+        with m.Elif(adds & ~multiplies):
             m.d.sync += state.eq(State.SHIFTS)
         with m.Elif(ends):
-            m.d.sync += state.eq(Mux(is_log, State.LOOKS_UP, State.RESTS))
-        with m.Elif(looks):
-            m.d.sync += state.eq(Mux(is_power, State.SHIFTS, State.RESTS))
+            m.d.sync += state.eq(State.RESTS)

@@ -29,6 +29,7 @@ DROPPED = 5  # no product is shifted by less
 LOG_INDEX, EXP_INDEX = 7, 8  # bits of the index of the tables of log2 and of 2^x
 GAIN_STEPS, GAIN_OCTAVES = 16, 8  # entries of a table of gains: an octave has 16
 GAINS = GAIN_STEPS * GAIN_OCTAVES
+GAINS_FROM = 2 * GAIN_STEPS  # they begin at X = 1/4
 POWER_BITS = 17  # fraction bits of a power in its table
 MOST_NUMBER_BITS = 11  # of the counts of a tick that an event takes
 

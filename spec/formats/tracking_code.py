@@ -10,22 +10,18 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 
-from tachometry.spec.formats.tracking import (
-    LOGS,
-    POWER_BITS,
-    POWERS,
-    Tracking,
-)
+from tachometry.spec.formats.tracking import GAINS_FROM, LOGS, POWER_BITS, POWERS, Tracking
 from tachometry.spec.formats.tracking_listing import LISTING
+from tachometry.spec.formats.tracking_units import Start, Times
 
 
 class Left(IntEnum):
     """Lists the left operands of the adder."""
 
     ZERO = 0
-    SUM = 1
-    LEAST = 2  # min(sum, 0)
-    MOST = 3  # max(sum, 0)
+    LEAST = 1  # min(sum, 0): the sum if that is negative
+    MOST = 2  # max(sum, 0): the sum if not
+    SUM = 3
 
 
 class Source(IntEnum):
@@ -35,19 +31,6 @@ class Source(IntEnum):
     UNIT = 1
     INPUT = 2
     WORD = 3
-
-
-class Start(IntEnum):
-    """Lists what an instruction begins with the sum."""
-
-    NONE = 0
-    LOG = 1
-    EXP = 2
-    OVER = 3
-    GAIN = 4
-    BY = 5
-    TIMES = 6
-    CHANCE = 7
 
 
 class Jump(IntEnum):
@@ -210,36 +193,6 @@ def _same(stored: str, read: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Times:
-    """Clocks from the begin of an operation of the unit until its result can be used.
-
-    Parameters
-    ----------
-    log, exp, over, gain, by, times : int
-        At most.
-    """
-
-    log: int
-    exp: int
-    over: int
-    gain: int
-    by: int
-    times: int
-
-    def of(self, instruction: Instruction) -> int:
-        """Return those of what an instruction begins; 0: nothing."""
-        return getattr(self, instruction.start.name.lower(), 0)
-
-
-QUICK = Times(log=4, exp=4, over=3, gain=3, by=2, times=4)
-
-
-def small_times(factor_bits: int) -> Times:
-    """Return those of the small unit: places of a shift are taken by 16, by 4 and by 1."""
-    return Times(log=11, exp=13, over=7, gain=3, by=9, times=factor_bits + 10)
-
-
-@dataclass(frozen=True)
 class Program:
     """The program of a tracking recursion on a machine, its words, and its clocks.
 
@@ -288,7 +241,7 @@ class Program:
             one = code[place]
             if one.needs_unit:
                 clock = max(clock, free)
-            if begun := self.times.of(one):
+            if begun := self.times.of(one.start):
                 free = clock + begun
             clock += 1
             if ends(one):
@@ -326,28 +279,30 @@ class Program:
         return {name: number for number, name in enumerate(self.words)} | chosen | {"": 0}
 
     @cached_property
-    def shifts(self) -> tuple[int, ...]:
-        """The shifts that instructions name, by number."""
-        found = {self._shift(one) for one in self.code.instructions}
-        return tuple(sorted(shift for shift in found if shift is not None))
+    def shifts(self) -> tuple[tuple[Start, int], ...]:
+        """The operations of the unit that shift, and by how much, by number."""
+        return tuple(sorted({found for one in self.code.instructions if (found := self._shift(one))}))
 
-    def _shift(self, one: Instruction) -> int | None:
-        if one.start == Start.TIMES:
-            return self.form.shifts[one.how]
-        return int(one.how) if one.start == Start.OVER and one.how != "by" else None
+    def _shift(self, one: Instruction) -> tuple[Start, int] | None:
+        if one.start in (Start.NONE, Start.CHANCE, Start.GAIN) or one.how == "by":
+            return None
+        return one.start, self.form.shifts[one.how] if one.start == Start.TIMES else int(one.how or 0)
 
     def number(self, one: Instruction) -> int:
         """Return the number of the shift or of the table of an instruction; what `by` says has the last one."""
         if one.start == Start.GAIN:
             return int(one.how)
         shift = self._shift(one)
-        return BY_FACTOR if one.how == "by" else 0 if shift is None else self.shifts.index(shift)
+        return BY_FACTOR if one.how == "by" else self.shifts.index(shift) if shift else 0
 
     @cached_property
     def tables(self) -> tuple[int, ...]:
         """The tables of the unit: powers less their leading bit, logarithms, gains."""
         powers = [power - (1 << POWER_BITS) for power in POWERS]
-        return (*powers, *LOGS, *(gain for gains in self.form.gains for gain in gains))
+        turned = (
+            gains[-GAINS_FROM:] + gains[:-GAINS_FROM] for gains in self.form.gains
+        )  # so their index is one of log2
+        return (*powers, *LOGS, *(gain for gains in turned for gain in gains))
 
 
 HOW_BITS = 4

@@ -5,7 +5,7 @@ One line is one chain of the adder, from left to right: `word = first term, furt
     + w, - w      add, subtract               s+ w, s- w    with the sign that `keep` kept
     lo+ w, hi+ w  min(sum, 0) + w, max(sum, 0) + w          min w, max w  the lesser, the greater
     sum           as first term: go on from the line before
-    ~             the result of the unit, read before it begins anew      $x     an input of the tick
+    ~             the result of the unit, read before it begins anew      $x     an input of the tick, as first term
     o@last, o@up, o@down   the offset of the last count's edge, of the edge above and below the position
     o@m1, o@m2, o@m3       of the last count if n mod 4 ≥ 1, of that before if ≥ 2, of the third if = 3, else 0
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum
@@ -31,8 +31,8 @@ reset:                                  # before the first tick
     since = zero
 tick:
     after = minus_one
-    since = since + $length min most_since
-    quiet = quiet + $length min most
+    since = $length + since min most_since
+    quiet = $length + quiet min most
     if empty goto silent
     quiet = $last
     if several goto many
@@ -62,6 +62,8 @@ known:
     phase - two
     if neg goto young
     dt = since - tau max clock log
+    moved = $moved
+    room = $counts + half
     log_dt = ~
     dt by
     times a half_velocity
@@ -76,7 +78,7 @@ known:
 event:
     P = p + ~
     w exp                               # memory grows by g·min(dt, T)
-    edge = raw - $moved
+    edge = raw - moved
     e = c - P
     log_dt - log_T + log_4096
     if neg goto full
@@ -88,7 +90,7 @@ grown:
     if several goto mean
 located:
     e keep log
-    zero s+ e - half - $counts
+    zero s+ e - room
     if pos goto slip
     log_e = ~
     e - mu over 2
@@ -115,7 +117,7 @@ sized:
     a = a s+ ~
     log_X gain 0
     log_e + log_X + ~ exp
-    p = P - $moved s+ ~
+    p = P - moved s+ ~
     a keep log
     phase = two
     after = one
@@ -258,11 +260,12 @@ slip:                                   # counts were lost or added
     if pos goto begin
     log_dt + log_4 - log_T - one
     if pos goto begin
-    p = c - $moved
+    p = c - moved
     goto show
 first:
-    p = c - $moved
-    edge = raw - $moved
+    moved = $moved
+    p = c - moved
+    edge = raw - moved
     since = tau
     phase = one
     v = zero
@@ -277,15 +280,16 @@ young:
     phase - one
     if neg goto first
     dt = since - tau max clock log
+    moved = $moved
     log_dt = ~
 begin:
     e = c - p keep log
     slips = zero
     ~ + of_velocity - log_dt exp
     phase = two
-    edge = raw - $moved
+    edge = raw - moved
     since = tau
-    p = c - $moved
+    p = c - moved
     v = zero s+ ~
     vs = v
     a = zero
@@ -304,8 +308,8 @@ same:                                   # the same edge again: no event, unless 
     ~ keep
     zero s+ ~ - quarter
     if pos goto event
-    edge = edge - $moved
-    p = p - $moved
+    edge = edge - moved
+    p = p - moved
     goto show
 silent:
     quiet - forget

@@ -17,7 +17,8 @@ from tachometry.spec.core.timing import Timing, parse_clocks
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
-from tachometry.spec.formats.tracking_code import QUICK, Program, small_times
+from tachometry.spec.formats.tracking_code import Program
+from tachometry.spec.formats.tracking_units import QUICK, Small
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
@@ -253,7 +254,7 @@ class TrackTachometer(TachometerSpec):
         """The program of the datapath from a tick to the update."""
         latency = self.latency
         delay = latency.pin_to_count + latency.tick + FETCH_CLOCKS + latency.low_pass + latency.output
-        serial = Program(self.form, small_times(self.form.factor_bits), delay)
+        serial = Program(self.form, Small(self.form).times, delay)
         fits = self.times.has_room(serial.all_clocks + FETCH_CLOCKS)
         return (
             serial

@@ -11,7 +11,7 @@ from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.spec import MTachometer, RairanTachometer, STachometer, TachometerSpec, TrackTachometer
-from tachometry.spec.formats.tracking_code import QUICK
+from tachometry.spec.formats.tracking_units import QUICK
 from tachometry.spec.methods.timed import TimedTachometer
 
 STATES = ("00", "10", "11", "01")

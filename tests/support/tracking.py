@@ -10,7 +10,8 @@ from tachometry.sim.golden.methods.track import Windows
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import CHANCE_BITS, GAIN_STEPS, GAINS, LOG_BITS, PLACE_BITS, WIDTH
-from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Jump, Left, Program, Source, Start
+from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Jump, Left, Program, Source
+from tachometry.spec.formats.tracking_units import Start
 
 
 class OverflowOfWord(Exception):
@@ -134,7 +135,8 @@ def motions(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tu
     form, times = spec.form, spec.times
     lengths = np.full(n_ticks, form.tick_cycles)
     if form.external:
-        lengths = rng.integers(times.min_tick_cycles, form.longest_tick + 1, n_ticks)
+        shortest = max(times.min_tick_cycles, form.longest_tick // 16)  # so few motions depend on the program's clocks
+        lengths = rng.integers(shortest, form.longest_tick + 1, n_ticks)
     last = np.cumsum(lengths) - 1
     tick, most = form.tick_cycles, min(form.max_count / form.tick_cycles, 1 / 4)
     clocks, steps, now = [np.empty(0)], [np.empty(0)], 0

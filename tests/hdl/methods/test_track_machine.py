@@ -16,6 +16,7 @@ from tachometry.spec.methods.track import FETCH_CLOCKS
 
 CORES = {
     "serial": core(multiplier="serial", clock="12MHz", tick="200us", max_speed="500rad/s", max_time="8ms"),
+    "long": core(multiplier="serial", tick="20ms", max_speed="20rad/s"),
     "block": core(multiplier="block", external_tick="yes", max_tick_period="683us", ppr="81000"),
 }
 NAMES = ("number", "times", "places", "last", "moved", "kind", "down", "end", "length")

@@ -18,7 +18,7 @@ CORES = [
     core(max_memory="5ms"),
 ]
 # Motions that meet every instruction.
-MOTIONS = [(CORES[0], 1, 1100), (CORES[1], 4, 300), (CORES[1], 5, 300), (CORES[2], 3, 300), (CORES[3], 6, 300)]
+MOTIONS = [(CORES[0], 1, 1100), (CORES[1], 4, 300), (CORES[2], 3, 300), (CORES[3], 6, 300)]
 
 
 def run(spec: TrackTachometer, seed: int, n_ticks: int) -> Counter[int]:

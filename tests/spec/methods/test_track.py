@@ -7,7 +7,8 @@ from support.tracking import core
 
 from tachometry.spec import ParameterError, TrackTachometer, of_options, with_loop
 from tachometry.spec.formats.tracking import GREATEST_ACCELERATION, WIDTH
-from tachometry.spec.formats.tracking_code import FIRST_CHOSEN, QUICK
+from tachometry.spec.formats.tracking_code import FIRST_CHOSEN
+from tachometry.spec.formats.tracking_units import QUICK, Small
 
 
 def test_ends_of_ranges() -> None:
@@ -74,7 +75,8 @@ def test_words_hold_the_greatest_speed_and_acceleration(options: dict[str, str],
     assert acceleration * 2**form.acceleration_bits <= most
     assert (form.longest_tick << form.time_bits) < 1 << form.factor_bits
     assert form.most_number * (form.longest_tick - 1) < 1 << form.times_bits
-    assert all(0 <= shift < 64 for shift in spec.program.shifts)
+    assert all(0 <= shift < 64 for _, shift in spec.program.shifts)
+    assert all(Small(form).pairs(*shift) <= 32 for shift in spec.program.shifts)  # six bits, signed
     assert len(spec.program.shifts) < 15  # each has a number of four bits, the last of which is another
     assert all(abs(value) < 1 << WIDTH - 1 for value in spec.program.words.values())
     assert len(spec.program.words) <= FIRST_CHOSEN

@@ -1,0 +1,118 @@
+"""The units of the tracking machine: the operations they begin, and how many clocks these take."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from tachometry.spec.formats.tracking import CHANCE_BITS, POWER_BITS, RESULT_BITS, WIDTH, Tracking
+
+
+class Start(IntEnum):
+    """Lists what an instruction begins with the sum."""
+
+    NONE = 0
+    LOG = 1
+    EXP = 2
+    OVER = 3
+    GAIN = 4
+    BY = 5
+    TIMES = 6
+    CHANCE = 7
+
+
+@dataclass(frozen=True)
+class Times:
+    """Clocks from the begin of an operation of the unit until its result can be used.
+
+    Parameters
+    ----------
+    log, exp, over, gain, by, times : int
+        At most.
+    """
+
+    log: int
+    exp: int
+    over: int
+    gain: int
+    by: int
+    times: int
+
+    def of(self, start: Start) -> int:
+        """Return those of what begins; 0: nothing."""
+        return getattr(self, start.name.lower(), 0)
+
+
+QUICK = Times(log=4, exp=5, over=3, gain=3, by=2, times=4)
+
+
+@dataclass(frozen=True)
+class Small:
+    """Says how the small unit works: what is added at the top of its register goes right by 2 or by 8 places a clock.
+
+    Parameters
+    ----------
+    form : Tracking
+    """
+
+    form: Tracking
+
+    extra = 4  # places that a product goes beyond those that are asked for, as it stays below 2^36
+
+    @property
+    def digits(self) -> int:
+        """Digits of a factor, of two bits; it may be doubled, and the last digit takes what the others owe."""
+        return (self.form.factor_bits + 2) // 2 + 1
+
+    @property
+    def low(self) -> int:
+        """Bits of the register below those that are added to."""
+        return 2 * self.digits + self.extra
+
+    @property
+    def least_pairs(self) -> int:
+        """Pairs of places from where a number is added to where it is the result."""
+        return (self.low - 2 - CHANCE_BITS) // 2
+
+    @property
+    def table_place(self) -> int:
+        """Place of the last bit of a power among those that are added."""
+        return max(0, self._power_place - self.low + 1)
+
+    @property
+    def _power_place(self) -> int:
+        return CHANCE_BITS + RESULT_BITS - POWER_BITS  # of the last bit of 2^36
+
+    @property
+    def power_places(self) -> int:
+        """Places that 2^0 goes."""
+        return RESULT_BITS + self.low - 2 + self.table_place - self._power_place
+
+    def pairs(self, start: Start, shift: int) -> int:
+        """Return the pairs of places that an operation goes at least, of 2^0 or by a factor without places."""
+        if start == Start.EXP:
+            return (self.power_places + 1) // 2
+        return (shift + 1) // 2 + (self.extra // 2 if start == Start.TIMES else self.least_pairs)
+
+    @property
+    def times(self) -> Times:
+        """Clocks of its operations."""
+        named = max(self.form.shifts.values()) + self.extra
+        power = max(self._steps((self.power_places - whole + 1) // 2) for whole in range(-16, RESULT_BITS))
+        over = max(self._steps(self.least_pairs + (places + 1) // 2) for places in range(CHANCE_BITS + 2))
+        product = max(map(self._steps, range((named + 1) // 2 + 1)))
+        log, factor = (
+            max(self._seeks(leading, end) for leading in range(WIDTH - 1))
+            for end in (CHANCE_BITS, self.form.factor_bits - 1)
+        )
+        return Times(log=4 + log, exp=5 + power, over=4 + over, gain=2, by=4 + factor, times=3 + self.digits + product)
+
+    @staticmethod
+    def _steps(pairs: int) -> int:
+        return pairs // 4 + pairs % 4
+
+    def _seeks(self, leading: int, end: int) -> int:
+        """Return the steps until a leading one is at a place, or one above."""
+        place, pairs, steps = self.low - 2 + leading, -self.least_pairs, 0
+        while pairs < 0 or place >= end + 2:
+            far = pairs <= -4 or place >= end + 8
+            place, pairs, steps = place - (8 if far else 2), pairs + (4 if far else 1), steps + 1
+        return steps
