@@ -70,6 +70,46 @@ class IdleSum(Idle):
 
 
 @dataclass(frozen=True)
+class IdleEcho(Idle):
+    """A register that is made anew in every clock of what moves, and that is not moved on.
+
+    Nothing reads it in clocks that are skipped, nor in the one behind them.
+
+    Parameters
+    ----------
+    path : str
+    """
+
+    path: str
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        return (self.path,)
+
+
+@dataclass(frozen=True)
+class IdleProduct(Idle):
+    """A product of `hdl.control.product.SerialProduct`, on whose steps nothing depends until the last two.
+
+    Parameters
+    ----------
+    total, factor, left, word : str
+        `word` stands still as long as the product goes on.
+    """
+
+    total: str
+    factor: str
+    left: str
+    word: str
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        return (self.total, self.factor, self.left)
+
+
+@dataclass(frozen=True)
 class IdleDivision(Idle):
     """A division of `spec.formats.reciprocal.DividedReciprocal`, on whose steps nothing depends until it is done.
 

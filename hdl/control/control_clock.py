@@ -4,6 +4,8 @@ from amaranth import Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+
 
 class ControlClock(wiring.Component):
     """Strobes every `period` clocks, for the first time in clock `first` after reset.
@@ -25,6 +27,11 @@ class ControlClock(wiring.Component):
     def __init__(self, first: int, period: int, *, tells: bool = False) -> None:
         self._first, self._period = first, period
         super().__init__({"tick": Out(1), **({"coming": Out(1)} if tells else {})})
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """Registers that a simulation may move on."""
+        return (IdleCounter("left", -1, (0,)),)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -9,6 +9,7 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleProduct
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
 from tachometry.spec.control.form import GAINS, GUARD_BITS, ControlForm, Term
@@ -121,6 +122,12 @@ class Controller(wiring.Component):
                 **gains,
             }
         )
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """Registers that a simulation may move on."""
+        names = ("product.product", "product.factor", "product.left", "word")
+        return (IdleProduct(*names),) if self._multiplier == "serial" else ()
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

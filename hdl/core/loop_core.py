@@ -3,6 +3,7 @@
 from amaranth import Module
 from amaranth.lib import wiring
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleEcho, IdleSum, idle_of
 from tachometry.hdl.control.command_generator import CommandGenerator
 from tachometry.hdl.control.control_clock import ControlClock
 from tachometry.hdl.control.controller import Controller
@@ -45,6 +46,12 @@ class LoopCore(wiring.Component):
     def spec(self) -> LoopSpec:
         """The spec that this core was built from."""
         return self._spec
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """Registers that a simulation may move on."""
+        boxes = {name: getattr(self, name) for name in ("tachometer", "control_clock", "controller")}
+        return (IdleSum("sigma_delta.left"), IdleEcho("sigma_delta.drive"), *idle_of(boxes))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -8,12 +8,13 @@ whether it has changed; and a model that is local to the loop, so that the compi
 import importlib.util
 import re
 import sys
+from collections.abc import Mapping
 from importlib.metadata import version as version_of
 from pathlib import Path
 
 from amaranth.back import rtlil
 
-from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, IdleDivision, IdleSum
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, IdleDivision, IdleEcho, IdleProduct, IdleSum
 from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
@@ -103,6 +104,12 @@ def mangled(name: str) -> str:
     return f"p_{name.replace('_', '__').replace('.', '_2e_')}"
 
 
+def plain(wire: str) -> str:
+    """Return the name of a signal within boxes; a box that is called as a signal beside it has a number in CXXRTL."""
+    name = re.sub(r"_24_\d+(?=_2e_)", "", wire.removeprefix("p_"))
+    return name.replace("_2e_", ".").replace("__", "_")
+
+
 class Cxxrtl(CompiledEngine):
     """Is the fastest engine; it needs a C++ compiler.
 
@@ -157,35 +164,41 @@ class State:
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
 
 
-def _moving(idle: Idle) -> tuple[str, str]:
-    """Return the object of idle.h that moves registers on, and what stands before the struct `Model`."""
-    wires = ", ".join(f"top.{mangled(path)}" for path in idle.paths)
+def _moving(idle: Idle, names: Mapping[str, str]) -> tuple[str, str]:
+    """Return the use of the object of idle.h that moves registers on, and what stands before the struct `Model`."""
+    wires = ", ".join(f"top.{names[path]}" for path in idle.paths)
     match idle:
+        case IdleEcho():
+            return "true", ""
         case IdleSum():
-            return f"Adds{{{wires}}}", ""
+            return f"use(Adds{{{wires}}})", ""
+        case IdleProduct(word=word):
+            return f"use(Multiplies{{{wires}, top.{names[word]}}})", ""
         case IdleDivision(m=m, steps=steps):
-            return f"Divides{{{wires}, top.{mangled(m)}, {steps}}}", ""
+            return f"use(Divides{{{wires}, top.{names[m]}, {steps}}})", ""
         case IdleCounter(step=step, stops=stops, order=()):
-            return f"Counts{{{wires}, {step}, {{{', '.join(map(str, stops))}}}}}", ""
+            return f"use(Counts{{{wires}, {step}, {{{', '.join(map(str, stops))}}}}})", ""
         case IdleCounter(path, order=order):
             name = f"{mangled(path)}_order"
-            return f"Follows{{{wires}, {name}}}", f"static const Order {name}{{{', '.join(map(str, order))}}};"
+            return f"use(Follows{{{wires}, {name}}})", f"static const Order {name}{{{', '.join(map(str, order))}}};"
     raise TypeError(idle)
 
 
 def _idle(design: Design, state: State) -> dict[str, str]:
     """Return what of the struct `Model` skips clocks, and what stands before it."""
-    moved = {mangled(path) for idle in design.idle for path in idle.paths}
-    assert moved <= state.flip_flops.keys(), f"no such signals: {moved - state.flip_flops.keys()}"
-    if not moved:
+    names = {plain(wire): wire for wire in state.flip_flops}
+    paths = {path for idle in design.idle for path in idle.paths}
+    assert paths <= names.keys(), f"no such signals: {paths - names.keys()}"
+    if not paths:
         return {"orders": "", "busy": "true", "moving": "true", "forget": ""}
+    moved = {names[path] for path in paths}
     changing = [f"top.{wire}.next != top.{wire}.curr" for wire in state.flip_flops if wire not in moved]
     written = [f"changes(top.{memory})" for memory in state.written]
-    moving, orders = zip(*map(_moving, design.idle), strict=True)
+    moving, orders = zip(*(_moving(idle, names) for idle in design.idle), strict=True)
     return {
         "orders": "\n".join(orders),
         "busy": " || ".join(["strobe()", *changing, *written]),
-        "moving": " && ".join(f"use({one})" for one in moving),
+        "moving": " && ".join(moving),
         "forget": " ".join(f"top.{memory}.write_queue.clear();" for memory in state.written),
     }
 

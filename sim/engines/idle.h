@@ -38,6 +38,34 @@ template <size_t width> struct Adds : Moves<width> {
 };
 template <size_t width> Adds(wire<width> &) -> Adds<width>;
 
+// A product, a bit of the factor a clock, until one is left.
+template <size_t width, size_t factor_width, size_t left_width> struct Multiplies {
+  Moves<width> total;
+  Moves<factor_width> factor;
+  Moves<left_width> left;
+  Moves<width> word;
+  static int64_t whole(uint64_t value) { return extended(int64_t(value), width, true); }
+  uint64_t after(int64_t clocks) const {
+    int64_t sum = whole(total.now()), added = whole(word.now());
+    for (int64_t k = 0; k < clocks; k++) sum = (sum + (factor.now() >> k & 1 ? added : 0)) >> 1;
+    return uint64_t(sum) & total.mask;
+  }
+  int64_t clocks() const {
+    if (left.stands() && factor.stands() && total.stands()) return ANY;
+    bool goes = left.now() > 1 && left.next() == left.now() - 1 && factor.next() == factor.now() >> 1;
+    return goes && total.next() == after(1) ? int64_t(left.now()) - 1 : 0;
+  }
+  void move_on(int64_t clocks) {
+    if (left.stands()) return;
+    total.set(after(clocks));
+    factor.set(factor.now() >> clocks);
+    left.set(left.now() - clocks);
+  }
+};
+template <size_t width, size_t factor_width, size_t left_width>
+Multiplies(wire<width> &, wire<factor_width> &, wire<left_width> &, wire<width> &)
+    -> Multiplies<width, factor_width, left_width>;
+
 // States in an order of their own, to the last of them.
 struct Order {
   std::vector<uint16_t> states, place;
