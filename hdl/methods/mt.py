@@ -1,10 +1,11 @@
 """The M/T method."""
 
-from amaranth import Module, Mux, Signal, Value, ValueLike
+from amaranth import Module, Mux, Signal, Value, ValueLike, signed
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
+from tachometry.spec.language.units import signed_width
 
 
 class MTMethod(TimedDatapath):
@@ -21,6 +22,7 @@ class MTMethod(TimedDatapath):
     def __init__(self, spec: MTTachometer) -> None:
         super().__init__(spec)
         self._min_periods = spec.form.min_periods
+        self._most_travelled = spec.form.most_travelled
         self._patient_periods = spec.form.patient_periods
         self._cycle_counts = spec.form.cycle_counts
 
@@ -35,7 +37,7 @@ class MTMethod(TimedDatapath):
         spec, timer = self._spec, self.gap_timer
         length = Signal(spec.widths.interval, init=1)
         late = Signal()
-        travelled = Signal.like(self.quotient_velocity.dividend)
+        travelled = Signal(signed(signed_width(self._most_travelled)), reset_less=True)
         total = Signal.like(travelled)
         ends = Signal()
         opens = Signal()

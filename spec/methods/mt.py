@@ -40,6 +40,16 @@ class MTForm(TimedForm["MTTachometer"]):
         return max(self.patient_periods, late) + self.max_periods
 
     @property
+    def most_travelled(self) -> int:
+        """Greatest distance of a window in counts, times the timer periods in a tick.
+
+        Counts come only until one closes the window, which one does that is later than its least length: in each timer
+        period up to that, and in the one in which it ends.
+        """
+        per_period = self.spec.widths.max_count if self.on_lattice else self.timer_periods
+        return (self.max_interval - self.max_periods + 1) * per_period
+
+    @property
     def remembered_periods(self) -> int:
         # The open window, whose length may wrap, ends with a count; then comes the next window.
         return (1 << self.spec.widths.interval) + self.max_periods + self.max_interval + 2

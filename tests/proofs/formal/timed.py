@@ -7,6 +7,7 @@ from proofs.formal.probes import STANDSTILL_PROBES, counting, within
 from proofs.formal.prove import Proof
 
 from tachometry.spec import MTTachometer, TTachometer
+from tachometry.spec.language.units import signed_width
 
 _TIMED_PROBES = {
     "core_step": "decoder.step",
@@ -74,6 +75,7 @@ def timed(
         "FLAGS": int(spec.form.flags_range),
         "INTEGER_BITS": spec.form.max_quotient.bit_length() + 1,
         "QUOTIENT_BITS": spec.form.quotient_bits,
+        "TRAVELLED_WIDTH": signed_width(spec.form.most_travelled) if isinstance(spec, MTTachometer) else 1,
         "INTERVAL_WIDTH": spec.widths.interval,
         "FRAC_BITS": spec.widths.frac_bits,
         "DIVISION_CLOCKS": spec.form.division_clocks,

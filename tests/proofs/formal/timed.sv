@@ -18,6 +18,7 @@ module timed #(
     parameter SATURATES = 1,
     parameter FLAGS = 1,          // there is an out_of_range
     parameter INTEGER_BITS = 3,   // of any quotient of half counts
+    parameter TRAVELLED_WIDTH = 8,  // bits of the way of an M/T window
     parameter QUOTIENT_BITS = 6,  // that the divider makes after the sign
     parameter INTERVAL_WIDTH = 5,
     parameter FRAC_BITS = 4,
@@ -312,7 +313,7 @@ module timed #(
     if (MT) begin : mt
       wire [I-1:0] core_length;
       wire core_late;
-      wire signed [I+Q-1:0] core_travelled;
+      wire signed [TRAVELLED_WIDTH-1:0] core_travelled;
       assign late = UPSET && CYCLE > 1 ? core_late : (UPSET ? core_length : length) > MIN_PERIODS;
       always @* begin
         lemma_length: assert (length >= 1 && (!opened || (length <= PATIENCE + age && core_length == length
