@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from support.pipes import read
 
 from tachometry.cli.files import Outputs
 
@@ -118,7 +119,7 @@ def in_a_child(folder: Path, work: Callable[[Outputs], None]) -> tuple[int, int]
             os._exit(0)
     os.close(ready[1])
     os.close(let[0])
-    assert os.read(ready[0], 1) == b"."
+    assert read(ready[0]) == b"."
     os.close(ready[0])
     return child, let[1]
 

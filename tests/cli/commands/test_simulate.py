@@ -345,7 +345,7 @@ def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signa
     ):
         time.sleep(0.01)
     process.send_signal(end)
-    out, err = process.communicate()
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 130, err
     told = re.fullmatch(r"tachometry: interrupted after (\d+) of 20000000 clocks\n", err)
     assert told is not None, err

@@ -90,7 +90,7 @@ def kept(result: Path) -> list[str]:
 def wait_for(rows: int, result: Path, sweep: subprocess.Popen[str]) -> None:
     """Until so many are kept; the sweep has not ended by then."""
     while len(kept(result)) < rows:
-        assert sweep.poll() is None, sweep.communicate()
+        assert sweep.poll() is None, sweep.communicate(timeout=600)
         time.sleep(0.01)
 
 
@@ -113,7 +113,7 @@ def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
         before = points_in(kept(result))
         os.kill(int(victim), signal.SIGKILL)
         trace.let(2 * POINTS)
-        out, err = sweep.communicate()
+        out, err = sweep.communicate(timeout=600)
     assert (sweep.returncode, err) == (0, "")
     assert f"{POINTS} points, {POINTS} of them run in " in out
     points = pq.read_table(result)["point"].to_pylist()
@@ -137,7 +137,7 @@ def test_the_sweep_is_interrupted_while_its_processes_start(end: signal.Signals,
             assert sweep.poll() is None
             time.sleep(0.001)
         os.killpg(sweep.pid, end)
-        out, err = sweep.communicate()
+        out, err = sweep.communicate(timeout=600)
     assert (sweep.returncode, out, err) == (130, "", f"tachometry: interrupted after 0 of {POINTS} points\n")
     assert not list(tmp_path.iterdir())
 
@@ -150,7 +150,7 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
     traces[0].let(10)
     wait_for(10, result, sweep)
     os.killpg(sweep.pid, signal.SIGINT)
-    out, err = sweep.communicate()
+    out, err = sweep.communicate(timeout=600)
     first = pq.read_table(result)["point"].to_pylist()
     assert len(first) == 10
     told = f"tachometry: interrupted after 10 of {POINTS} points, kept in {result}\n"
@@ -161,7 +161,7 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
     traces[1].let(10)
     wait_for(10, result, sweep)
     os.kill(sweep.pid, signal.SIGKILL)
-    sweep.communicate()
+    sweep.communicate(timeout=600)
     second = points_in(kept(result))
     assert pq.read_table(result)["point"].to_pylist() == first
     with result.with_name(".r.parquet.new").open("a") as file:
@@ -169,7 +169,7 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
 
     sweep = begun(result, trace=traces[2])
     traces[2].let(POINTS)
-    out, err = sweep.communicate()
+    out, err = sweep.communicate(timeout=600)
     assert (sweep.returncode, err) == (0, "")
     assert len(second) == 10
     assert f"{POINTS} points, {POINTS - 20} of them run in " in out
@@ -184,7 +184,7 @@ def test_the_sweep_is_interrupted_and_killed_and_goes_on(tmp_path: Path) -> None
 
     # The same, but for nothing in between.
     whole = tmp_path / "whole.parquet"
-    begun(whole, "--jobs", "1").communicate()
+    begun(whole, "--jobs", "1").communicate(timeout=600)
     assert whole.read_bytes() == result.read_bytes()
 
 

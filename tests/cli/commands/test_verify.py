@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from support.command import run
 from support.nightly import nightly
+from support.pipes import read
 
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.methods import m as golden_m
@@ -130,10 +131,10 @@ def test_workers_end_with_a_command_that_is_killed() -> None:
             os._exit(1)
     os.close(begun[1])
     os.close(alive[1])
-    assert os.read(begun[0], 1) + os.read(begun[0], 1) == b".."
+    assert read(begun[0]) + read(begun[0]) == b".."
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    assert os.read(alive[0], 1) == b""  # until the last of those who have its other end is gone
+    assert read(alive[0]) == b""  # until the last of those who have its other end is gone
     os.close(begun[0])
     os.close(alive[0])
 

@@ -45,7 +45,8 @@ def test_every_numerator_and_interval(tmp_path: Path, frac_bits: int, cancel: bo
     assert frac_bits != 4 or np.count_nonzero(ties) > 1000
 
 
-@pytest.mark.parametrize("source", ["serial", "table"])
+# Every source is tried above.
+@pytest.mark.parametrize("source", only(["serial"], ["serial", "table"]))
 @pytest.mark.parametrize("max_speed", only(["150rad/s"], ["1000rad/s", "150rad/s", "2000rad/s"]))
 def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source: str) -> None:
     """All m_s and N, which have 6 bits, 3 and 7: an odd number of bits is a digit more."""
@@ -56,7 +57,7 @@ def test_every_quotient_of_the_reference(tmp_path: Path, max_speed: str, source:
     assert np.array_equal(got, (base << 16) + round_quotient(n, 2 * m, 16))
 
 
-@pytest.mark.parametrize("source", ["serial", "table"])
+@pytest.mark.parametrize("source", only(["table"], ["serial", "table"]))
 @pytest.mark.parametrize("towards", only([-1], [-1, 1]))  # up is the mirror of down
 def test_every_bound(tmp_path: Path, source: str, towards: int) -> None:
     """Rounded down and up: at 4 fraction bits many quotients need no rounding at all."""

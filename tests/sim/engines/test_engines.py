@@ -7,17 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from amaranth.back import rtlil
 from support.lockstep import random_case
 from support.nightly import nightly, only
 
+from tachometry.hdl import Tachometer
 from tachometry.sim import build, golden
 from tachometry.sim.engines.compiled import CompiledEngine
+from tachometry.sim.engines.cxxrtl import translate
 from tachometry.sim.engines.engine import Engine, Interrupted
 from tachometry.sim.engines.pick import ENGINES, NAMES, pick, present
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import compare
-from tachometry.spec import METHODS, Encoder, MTachometer, STachometer, TachometerSpec, Timing
+from tachometry.spec import METHODS, Encoder, MTachometer, STachometer, Timing
 
 COMPILED = [name for name in ENGINES if name != "pysim"]
 SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
@@ -94,14 +97,14 @@ def test_memory_and_python_calls_do_not_grow_with_clocks(name: str) -> None:
 @pytest.mark.parametrize("name", only(["pysim", "cxxrtl"], ENGINES))  # compiled engines share their driver
 def test_an_interrupt_brings_what_was_simulated(name: str, tmp_path: Path) -> None:
     def ctrl_c(done: int) -> None:
-        if done > 25_000:
+        if done > 3000:
             raise KeyboardInterrupt
 
     trace = turning(2_000_000)
     with pytest.raises(Interrupted) as stop:
         pick(name).run(SPEC, trace, vcd=tmp_path / "v.vcd", window=(100, 200), progress=ctrl_c)
     run = stop.value.run
-    assert 25_000 < run.n_clocks < 2_000_000
+    assert 3000 < run.n_clocks < 2_000_000
     assert compare(golden.run(SPEC, trace.until(run.n_clocks)), run) == (0, [])
     assert (tmp_path / "v.gtkw").exists()
 
@@ -153,17 +156,12 @@ def test_every_engine_is_one() -> None:
         assert isinstance(engine, PySim | CompiledEngine)
 
 
-def test_every_method_has_a_core_that_settles_at_once() -> None:
+# It has memory that can be written; a core that does not settle would differ from the golden model.
+@pytest.mark.parametrize("method", only(["track"], METHODS))
+def test_every_method_has_a_core_that_settles_at_once(method: str) -> None:
     """Else CXXRTL would have to evaluate it more than once a clock; long words and writable memory included."""
-    from amaranth.back import rtlil
-
-    from tachometry.hdl import Tachometer
-    from tachometry.sim.engines.cxxrtl import translate
-
-    for method in METHODS.values():
-        spec: TachometerSpec = method(
-            encoder=Encoder(100), timing=Timing(100_000, 1000, 10), bounds=method.facts.bounds, age=True
-        )
-        text = translate(rtlil.convert(Tachometer(spec), name="top", emit_src=False))
-        assert "bool converged = true;" in text
-        assert "debug" not in text.split("bool p_top::eval")[1]
+    facts = METHODS[method].facts
+    spec = METHODS[method](encoder=Encoder(100), timing=Timing(100_000, 1000, 10), bounds=facts.bounds, age=True)
+    text = translate(rtlil.convert(Tachometer(spec), name="top", emit_src=False))
+    assert "bool converged = true;" in text
+    assert "debug" not in text.split("bool p_top::eval")[1]
