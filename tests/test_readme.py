@@ -58,7 +58,7 @@ def test_every_shell_command(whole: bool, tmp_path: Path, monkeypatch: pytest.Mo
             if "." in file and whole:
                 assert (tmp_path / "build" / "demo" / file).stat().st_size > 0, file
     if whole:
-        check_picture(ROOT / "docs/demo.png", tmp_path / "build/demo/ramp.png")
+        check_picture(ROOT / "docs/demo.png", tmp_path / "build/demo/methods.png")
 
 
 def check_picture(shown: Path, made: Path) -> None:
@@ -77,11 +77,11 @@ def test_make_demo_is_what_the_test_runs() -> None:
 
 
 def test_demo_without_a_compiler(tmp_path: Path) -> None:
-    """Neither that of the system nor ziglang's; some of the ramp, as Amaranth's simulator is slow."""
+    """Neither that of the system nor ziglang's; a moment of the motion, as Amaranth's simulator is slow."""
     (tmp_path / "docs").symlink_to(ROOT / "docs")
     tools = tmp_path / "tools"
     tools.mkdir()
-    for tool in ("sh", "cmp"):
+    for tool in ("sh", "cmp", "cat"):
         (tools / tool).symlink_to(str(shutil.which(tool)))
     (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['ziglang'] = None\n")
     environment = {name: value for name, value in os.environ.items() if name != "CXX"}
@@ -90,7 +90,7 @@ def test_demo_without_a_compiler(tmp_path: Path) -> None:
     done = subprocess.run(["sh", "docs/demo.sh"], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "pysim" in done.stdout + done.stderr
-    assert (tmp_path / "build" / "demo" / "ramp.csv").stat().st_size > 0
+    assert (tmp_path / "build" / "demo" / "drive.csv").stat().st_size > 0
 
 
 def test_python_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

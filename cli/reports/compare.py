@@ -57,6 +57,11 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
     heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay")
     print_table((*heads, *(_SIZE if sizes else ())), rows)
     console = stdout_console()
+    if len(ranked := sorted((row.rms, row.name) for row in scores if row.rms is not None)) > 1:
+        (least, best), (second, other) = ranked[:2]
+        times = f", {second / least:.2g} times as much" if least else ""
+        shown = f"{best} has the least error, {unit.of(least):.3g} {unit.name}; {other} is next{times}"
+        console.print(Text(shown))
     console.print()
     for row in scores:
         tried = f"; best of {comparison.n_tried[row.name]} settings" if row.name in comparison.n_tried else ""

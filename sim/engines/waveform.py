@@ -1,19 +1,28 @@
 """Waveforms are written as VCD, with a GTKWave save file that shows them as an engineer wants to see them."""
 
+from collections.abc import Iterator, Mapping
+from heapq import merge
+from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
 
+import numpy as np
+from numpy.typing import NDArray
 from vcd import VCDWriter
 from vcd.gtkw import GTKWFlag, GTKWSave
 
 _SCOPE = "tachometer"
+MOST_EDGES = 1 << 16  # clocks of a waveform that shows its clock
+
+Change = tuple[int, str]  # picoseconds, and lines of the file
+Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times in seconds, and values from then on
 
 
 class Waveform:
     """Writes sampled signals to `path`, and beside it a save file with the suffix `.gtkw`.
 
-    Signals are those of the clock that begins at the time stamp; `clk` itself is left out, it would be nearly all of
-    the file. Use as a context manager.
+    Signals are those of the clock that begins at the time stamp; `clk` itself comes with `add_curves`, as it would be
+    nearly all of a long file. Use as a context manager.
 
     Parameters
     ----------
@@ -76,3 +85,56 @@ class Waveform:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self._file.close()
+
+
+def add_curves(path: Path, clock_hz: int, window: tuple[int, int], curves: Mapping[str, Curve]) -> None:
+    """Add real signals to a waveform and its save file, which show them as curves; and `clk`, if it is not too long.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file that a `Waveform` has written.
+    clock_hz : int
+    window : int, int
+        First clock, and the one behind the last.
+    curves : mapping of str to (float64 array, float64 array)
+        By name.
+    """
+    begin, end = (clock * 10**12 // clock_hz for clock in window)
+    added: list[Iterator[Change]] = []
+    declared = []
+    for name, (seconds, values) in curves.items():
+        added.append(_values(name, np.rint(seconds * 1e12).astype(np.int64), values, begin, end))
+        declared.append(f"$var real 64 {name} {name} $end\n")
+    if window[1] - window[0] <= MOST_EDGES:
+        edges = range(2 * window[0], 2 * window[1])
+        added.append((edge * 10**12 // (2 * clock_hz), f"{1 - edge % 2}clk\n") for edge in edges)
+        declared.insert(0, "$var wire 1 clk clk $end\n")
+    head, _, body = path.read_text(encoding="ascii").partition("$upscope")
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        last = -1
+        file.write(f"{head}{''.join(declared)}$upscope{body.partition('#')[0]}")
+        for time, text in merge(_changes(body), *added, key=itemgetter(0)):
+            file.write(text if time == last else f"#{time}\n{text}")
+            last = time
+    with path.with_suffix(".gtkw").open("a", newline="\n") as file:
+        save = GTKWSave(file)
+        for name in curves:
+            save.trace(f"{_SCOPE}.{name}", datafmt="real", extraflags=GTKWFlag.analog_step)
+            for _ in range(4):
+                save.blank(analog_extend=True)
+
+
+def _values(name: str, time: NDArray[np.int64], values: NDArray[np.float64], begin: int, end: int) -> Iterator[Change]:
+    """Yield values of a curve, the first of them that which holds at the begin."""
+    first = max(int(np.searchsorted(time, begin, side="right")) - 1, 0)
+    for at, value in zip(np.maximum(time[first:], begin).tolist(), values[first:].tolist(), strict=True):
+        if at < end:
+            yield at, f"r{value:.9g} {name}\n"
+
+
+def _changes(body: str) -> Iterator[Change]:
+    """Yield what a file of `Waveform` has behind its declarations."""
+    for part in body.split("\n#")[1:]:
+        time, _, text = part.partition("\n")
+        yield int(time), f"{text}\n" if text and not text.endswith("\n") else text

@@ -1,4 +1,4 @@
-"""The figure of a comparison shows all velocities, and the error of each."""
+"""The figure of a comparison shows all velocities, and the error of each; the least error is on a yellow ground."""
 
 from pathlib import Path
 
@@ -30,13 +30,14 @@ def _draw(
     instants: FloatArray,
     true_speed: TrueSpeed | None,
 ) -> Figure:
-    heights = {"velocity": 3.2} | ({curve.name: 0.8 for curve in curves} if true_speed else {})
+    heights = {"velocity": 2.6} | ({curve.name: 0.55 for curve in curves} if true_speed else {})
     figure, panels = place_panels(spec, heights, "Comparison")
     unit = spec.scale.shown_unit
     truth = unit.of(true_speed(instants)) if true_speed else None
     values = [unit.of(curve.estimate.at(instants)) for curve in curves]
     # What goes up and down most is drawn behind, as it would bury the others.
     calmest = sorted(range(len(curves)), key=lambda place: float(np.sum(np.abs(np.diff(values[place])))))
+    least = min((result.rms for result in scores if result.rms is not None), default=None)
     for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
         held = values[place]
         kept = columns(instants, held)
@@ -46,7 +47,7 @@ def _draw(
             color=colour,
             linewidth=0.7,
             drawstyle="steps-post",
-            label=in_words(curve.name),
+            label=_words(curve).partition(":")[0],
             zorder=2 - calmest.index(place) / 100,
         )
         if truth is None:
@@ -55,14 +56,24 @@ def _draw(
         kept = columns(instants, error)
         axes.axhline(0, color="0.6", linewidth=0.7)
         axes.plot(instants[kept], error[kept], color=colour, linewidth=0.6)
-        words = f"{curve.name}: {curve.what}"
-        axes.text(0.005, 0.86, words, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
-        axes.text(
-            0.995, 0.86, f"RMS {unit.of(result.rms):.3g} {unit.name}", transform=axes.transAxes, ha="right", fontsize=7
-        )
+        axes.text(0.005, 0.84, _words(curve), transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
+        words = f"RMS {unit.of(result.rms):.3g} {unit.name}"
+        if result.rms == least:
+            axes.set_facecolor("#fff4c2")
+            words = f"least error: {words}"
+        axes.text(0.995, 0.84, words, transform=axes.transAxes, ha="right", fontsize=8, weight="bold")
     if truth is not None:
         kept = columns(instants, truth)
-        panels["velocity"].plot(instants[kept], truth[kept], color="black", linewidth=0.9, label="shaft (true)")
+        # A broad band, from which a curve that is wrong stands out.
+        panels["velocity"].plot(
+            instants[kept],
+            truth[kept],
+            color="0.82",
+            linewidth=5,
+            zorder=1.5,
+            label="shaft (true)",
+            solid_capstyle="butt",
+        )
         # Most of all errors set the scale; what leaves the panel is a spike.
         reach = np.percentile([unit.of(result.max) for result in scores if result.max is not None], 60)
         for curve in curves:
@@ -77,3 +88,9 @@ def _draw(
     last.set_xlabel(f"time (s){below}")
     last.set_xlim(instants[0], instants[-1])
     return figure
+
+
+def _words(curve: Curve) -> str:
+    """Return what a curve is: a method of a core, or what others use."""
+    words = in_words(curve.name)
+    return curve.what if words == curve.name else words

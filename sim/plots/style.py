@@ -41,7 +41,7 @@ _METADATA: dict[str, dict[str, None]] = {
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 # Of lines that are compared, and of what a run has.
-COLOURS = ("#2a78c8", "#2e6b3e", "#7b3fa0", "#00838f", "#5d4037", "#d9730d", "#b3261e", "#c2185b", "#827717", "0.45")
+COLOURS = ("#2a78c8", "#d9730d", "#2e6b3e", "#b3261e", "#7b3fa0", "#00838f", "#5d4037", "#c2185b", "#827717", "0.45")
 ESTIMATE, ERROR, COUNT, FORCED = "#2a78c8", "#b3261e", "#2e6b3e", "#d9730d"
 
 # Inches.

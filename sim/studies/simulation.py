@@ -10,6 +10,7 @@ import numpy as np
 
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.engines.pick import pick
+from tachometry.sim.engines.waveform import Curve, add_curves
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
 from tachometry.sim.signals.progress import Bar
@@ -134,7 +135,21 @@ def simulate(
     known = [None] * len(recordings) if truths is None else truths
     each = enumerate(zip(recordings, known, strict=True))
     axes = tuple(_axis(spec, found.actual, number, *of) for number, of in each)
+    if vcd is not None:
+        add_curves(vcd, spec.timing.clock_hz, (shown[0], min(shown[1], found.actual.n_clocks)), _curves(axes))
     return Simulation(spec, chosen.name + missing, trace.n_clocks, found, axes)
+
+
+def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
+    """Return measured and true speeds for a waveform, as numbers with the unit in their names."""
+    found = {}
+    for number, axis in enumerate(axes):
+        unit = axis.spec.scale.shown_unit
+        end = f"_{unit.suffix}" + (f"_{number}" if len(axes) > 1 else "")
+        found[f"measured{end}"] = axis.held.time, unit.of(axis.held.velocity_rad_s)
+        if axis.truth is not None:
+            found[f"true{end}"] = axis.held.time, unit.of(axis.truth.true_speed(axis.held.time))
+    return found
 
 
 @singledispatch

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -362,3 +363,30 @@ def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture
     rows = summary(capsys.readouterr().out)
     assert int(rows["edges swallowed"].split()[0]) > 0
     assert rows["mismatches"] == "0"
+
+
+def test_waveform_has_the_clock_and_curves_of_both_speeds(tmp_path: Path) -> None:
+    core = "--method s --ppr 500 --clock 1MHz --tick 100us --max-speed 400rad/s --engine pysim".split()
+    motion = f"--motion ramp:0:100rad/s:8ms --vcd {tmp_path / 'w.vcd'} --vcd-from 5ms --vcd-to 6ms".split()
+    assert run("simulate", *core, *motion, "--trace", tmp_path / "t.csv") == 0
+    text = (tmp_path / "w.vcd").read_text()
+    times = [int(time) for time in re.findall(r"^#(\d+)$", text, re.MULTILINE)]
+    assert times == sorted(set(times))
+    assert text.count("\n1clk\n") == text.count("\n0clk\n") == 1000
+    measured, true = (
+        [(int(time), float(value)) for time, value in changes(text, f"{name}_rad_s")] for name in ("measured", "true")
+    )
+    assert [time for time, _ in measured] == [time for time, _ in true]
+    assert len(measured) == 11  # what held before, and ten ticks
+    assert all(value == pytest.approx(100 * time / 8e9, abs=1.3) for time, value in true)
+    with (tmp_path / "t.csv").open() as file:
+        shown = {float(row["velocity_rad_s"]) for row in csv.DictReader(file)}
+    assert all(any(value == pytest.approx(one, rel=1e-6) for one in shown) for _, value in measured)
+    assert "tachometer.true_rad_s" in (tmp_path / "w.gtkw").read_text()
+
+
+def changes(text: str, name: str) -> Iterator[tuple[str, str]]:
+    """Yield times and values of a real signal of a waveform."""
+    for part in text.split("\n#")[1:]:
+        for value in re.findall(rf"^r(\S+) {name}$", part, re.MULTILINE):
+            yield part.split("\n")[0], value
