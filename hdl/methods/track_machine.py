@@ -129,7 +129,10 @@ class TrackMachine(wiring.Component):
             shape=layout.size, depth=depth, init=[_encoded(program, one, layout) for one in code]
         )
         m.submodules.words = words = Memory(
-            shape=signed(WIDTH), depth=1 << ADDRESS_BITS, init=list(program.words.values())
+            shape=signed(WIDTH),
+            depth=1 << ADDRESS_BITS,
+            init=list(program.words.values()),
+            attrs={"no_rw_check": 1},  # the program reads no word in the clock in which it is written
         )
         fetch = rom.read_port()
         read = words.read_port()

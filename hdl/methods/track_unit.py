@@ -5,6 +5,8 @@ logarithm is the number of places until the leading one is at bit 8, and a table
 number from a table, shifted.
 """
 
+from collections.abc import Sequence
+
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.enum import Enum
@@ -30,7 +32,6 @@ from tachometry.spec.formats.tracking_units import Small, Start
 TABLE_BITS = 18
 _LOW = CHANCE_BITS - DROPPED  # zeros below a product
 _GAIN_LOW = LOG_BITS - (GAIN_STEPS - 1).bit_length()
-_TOP = CHANCE_BITS + WIDTH  # bits of what is shifted, unless it is a product
 
 
 class Unit(wiring.Component):
@@ -134,62 +135,53 @@ class QuickUnit(Unit):
         by_shift = Mux(how == BY_FACTOR, self.places, named)
         # What is shifted.
         size = (self.sum ^ ((doing == Start.LOG) & self.sum[-1]).replicate(WIDTH))[:WIDTH]
-        above = CHANCE_BITS + RESULT_BITS - POWER_BITS
         left = Signal(3)
         last = Signal(Start)
-        raised = Signal()
-        power = Signal(POWER_BITS + 1, reset_less=True)
         latencies = Array(C(max(getattr(self._program.times, item.name.lower(), 1) - 1, 0), 3) for item in Start)
         m.d.comb += self.busy.eq(left.any())
         m.d.sync += [left.eq(Mux(left.any(), left - 1, latencies[self.start])), last.eq(doing)]
+        # A product; or a power, a clock later, so that its last bit is that of 2^36.
         product = Signal(signed(WIDTH + bits), reset_less=True)
-        of_product = Signal(6)
-        of_power = Signal(6)
-        m.d.sync += [
-            product.eq(self.sum * self.factor),
-            of_product.eq(by_product),
-            raised.eq(last == Start.EXP),
-            power.eq(Cat(self.table.data[:POWER_BITS], C(1, 1))),
-        ]
-        with m.If(doing == Start.EXP):
-            m.d.sync += of_power.eq(by_power)
+        distance = Signal(6, reset_less=True)
+        multiplied, raised = last == Start.TIMES, Signal()
+        power = Cat(C(0, CHANCE_BITS + RESULT_BITS - POWER_BITS - _LOW), self.table.data[:POWER_BITS], C(1, 1))
+        m.d.sync += [raised.eq(last == Start.EXP), product.eq(Mux(last == Start.EXP, power, self.sum * self.factor))]
+        with m.If((doing == Start.TIMES) | (doing == Start.EXP)):
+            m.d.sync += distance.eq(Mux(doing == Start.EXP, by_power, by_product))
         # First stage: by 32, 16 and 8.
-        multiplied = last == Start.TIMES
         finds, factor = (doing == Start.LOG) | (doing == Start.BY), doing == Start.BY
+        ready = multiplied | raised
         value = Signal(signed(width))
-        distance = Signal(6)
-        m.d.comb += [
-            value.eq(
-                Mux(
-                    multiplied,
-                    Cat(C(0, _LOW), product).as_signed(),
-                    Mux(raised, Cat(C(0, above), power, C(0, 1)).as_signed(), Cat(C(0, CHANCE_BITS), size).as_signed()),
-                )
-            ),
-            distance.eq(Mux(multiplied, of_product, Mux(raised, of_power, by_shift))),
+        places = Signal(6)
+        begin = bits - 1 - CHANCE_BITS  # from here on a factor is too large
+        groups = [
+            Mux(factor, size[begin + place : begin + place + 8].any(), size[place : place + 8].any())
+            for place in range(8, WIDTH, 8)
         ]
-        half, count = self._stage(m, value, distance, finds, factor, (5, 4, 3))
-        # Second stage: by 4, 2 and 1.
+        m.d.comb += [
+            value.eq(Mux(ready, Cat(C(0, _LOW), product).as_signed(), Cat(C(0, CHANCE_BITS), size).as_signed())),
+            places.eq(Mux(ready, distance, Mux(finds, Cat(C(0, 3), self.highest([C(0, 1), *groups])), by_shift))),
+        ]
         second = Signal(signed(width), reset_less=True)
-        rest = Signal(3)
-        high = Signal(3)
-        second_finds = Signal()
-        second_factor = Signal()
+        # Second stage: by 4, 2 and 1.
+        rest = Signal(6, reset_less=True)
+        second_finds, second_factor = Signal(), Signal()
         ends = Signal()
         is_log = Signal()
         may_be_large = Signal()
         m.d.sync += [
-            second.eq(half),
-            rest.eq(distance),
-            high.eq(count[3:]),
+            second.eq(self.shifted(m, value, places, (5, 4, 3))),
+            rest.eq(places),
             second_finds.eq(finds),
             second_factor.eq(factor),
             is_log.eq(doing == Start.LOG),
-            ends.eq(multiplied | raised | (doing == Start.OVER)),
+            ends.eq(ready | (doing == Start.OVER)),
             may_be_large.eq(multiplied),
         ]
-        shifted, count = self._stage(m, second, rest, second_finds, second_factor, (2, 1, 0))
-        whole = Cat(count[:3], high)
+        ranges = (second[place : place + 8] for place in (bits - 1, CHANCE_BITS))
+        last_places = Mux(second_finds, self.highest([*Mux(second_factor, *ranges)]), rest[:3])
+        shifted = self.shifted(m, second, last_places, (2, 1, 0))
+        whole = Cat(last_places[:3], rest[3:])
         with m.If(second_factor):
             m.d.sync += [self.factor.eq(shifted), self.places.eq(whole)]
         log_whole = Signal(6)
@@ -219,24 +211,23 @@ class QuickUnit(Unit):
                 self.up.eq(0),
             ]
 
-    def beyond(self, shifted: Value, step: int, factor: Value) -> Value:
-        """Tell whether the leading one is `step` places or more above where it belongs."""
-        of_log, of_factor = (shifted[place + step : _TOP].any() for place in (CHANCE_BITS, self._bits - 1))
-        return Mux(factor, of_factor, of_log)
+    @staticmethod
+    def highest(flags: Sequence[Value]) -> Value:
+        """Return the index of the last flag that is set, among at most eight; 0 if none is."""
+        flags = [*flags, *[C(0, 1)] * (8 - len(flags))]
+        far = Cat(flags[4:]).any()
+        middle = Mux(far, flags[6] | flags[7], ~far & (flags[2] | flags[3]))
+        near = flags[7] | (~flags[6] & (flags[5] | (~flags[4] & (flags[3] | (~flags[2] & flags[1])))))
+        return Cat(near, middle, far)
 
-    def _stage(
-        self, m: Module, value: Value, places: Value, finds: Value, factor: Value, of: tuple[int, ...]
-    ) -> tuple[Value, Signal]:
-        """Shift by some powers of two; what comes out, and by how much."""
-        count = Signal(6, name=f"count_{of[0]}")
+    @staticmethod
+    def shifted(m: Module, value: Value, places: Value, of: tuple[int, ...]) -> Value:
+        """Return a value shifted by some powers of two."""
         for place in of:
-            step = 1 << place
-            taken = Signal(name=f"shifts_{step}")
-            m.d.comb += taken.eq(Mux(finds, self.beyond(value, step, factor), places[place]))
-            shifted = Signal(signed(len(value)), name=f"by_{step}")
-            m.d.comb += [shifted.eq(Mux(taken, value >> step, value)), count[place].eq(taken)]
-            value = shifted
-        return value, count
+            following = Signal(signed(len(value)), name=f"by_{1 << place}")
+            m.d.comb += following.eq(Mux(places[place], value >> (1 << place), value))
+            value = following
+        return value
 
 
 class State(Enum):
