@@ -174,7 +174,7 @@ learn:                                  # nothing below is in a hurry
     change = e + ~
 short:
     change keep
-    noises = noises + noises_one min noises_most
+    noises = noises + noises_one min noises_most max noises_first
     sum min noises_offset by
     w = D + D + D
     zero s+ change - D min w over by
@@ -254,7 +254,8 @@ mean:
     ~ + log_64 - log_n exp
     e = zero s+ ~
     goto located
-slip:                                   # counts were lost or added
+slip:                                   # counts were lost or added, or the offset was upset
+    o@last = o@last min quarter max minus_quarter
     slips = slips + one
     sum - three
     if pos goto begin
@@ -312,7 +313,8 @@ same:                                   # the same edge again: no event, unless 
     p = p - moved
     goto show
 silent:
-    quiet - forget
+    quiet = quiet max zero
+    sum - forget
     if pos goto rest
     phase - two
     if neg goto nothing

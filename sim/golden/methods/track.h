@@ -105,6 +105,7 @@ struct Recursion {
     int64_t log_e = log2(e);
     if (std::abs(e) >= k.half + n * k.count) {
       slips++;
+      offsets[kind] = std::max(-k.quarter, std::min(offsets[kind], k.quarter));
       if (slips >= 3 || log_dt + k.log_4 - log_memory - 1 >= 0) return begin(at, raw, tau, dt, log_dt);
       p = at - moved;
       return emit(ahead(), place());

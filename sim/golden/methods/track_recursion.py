@@ -162,6 +162,7 @@ class Recursion:
         log_e = log2(e)
         if abs(e) >= k["half"] + (n << PLACE_BITS):
             self.slips += 1
+            self.offsets[kind] = max(-k["quarter"], min(self.offsets[kind], k["quarter"]))
             if self.slips >= 3 or log_dt + k["log_4"] - self.log_memory - 1 >= 0:
                 return self._begin(at, raw, tau, dt, log_dt)
             self.p = at - self._moved

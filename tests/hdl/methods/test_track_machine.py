@@ -10,8 +10,10 @@ from support.simulate import Player, clock_by_clock
 from support.tracking import Interpreter, core, windows
 
 from tachometry.hdl.methods import track_machine
+from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking_code import OUTPUTS
+from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction
+from tachometry.spec.formats.tracking_units import Start
 from tachometry.spec.methods.track import FETCH_CLOCKS
 
 CORES = {
@@ -55,3 +57,23 @@ def rows_of(spec: TrackTachometer, seed: int, n_ticks: int) -> list[tuple[int, .
 def test_machine(name: str) -> None:
     spec = CORES[name]
     assert check(spec, rows_of(spec, 1, 1000), compiled.clock_by_clock) > 400
+
+
+@pytest.mark.parametrize("name", CORES)
+def test_gains_end_with_their_table(name: str) -> None:
+    """From X = 1/4 down to 2^-13, beyond the last entry, which then stands for all."""
+    program = CORES[name].program
+    unit = track_machine.TrackMachine(program).unit
+    rows: list[dict[str, int]] = []
+    right, clocks = [], 8
+    for log_x in range(-2 * 4096 - 1, -13 * 4096, -1777):
+        for number in range(3):
+            how = program.number(Instruction(start=Start.GAIN, how=str(number)))
+            # The sum comes with the clock after the start.
+            rows += [{"start": Start.GAIN, "how": how}, *[{"start": Start.NONE, "sum": log_x}] * (clocks - 1)]
+            state = Recursion(program.form, program.lead)
+            state.log_share = log_x
+            right.append(state._gain(number))
+    seen = clock_by_clock(unit, rows, ["result", "busy"])[clocks - 1 :: clocks]
+    assert [row["result"] for row in seen] == right
+    assert not any(row["busy"] for row in seen)

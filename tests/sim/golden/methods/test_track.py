@@ -1,5 +1,9 @@
 """The golden tracking method: its twins in C++ and in Python, and where the recursion of before did not settle."""
 
+from collections.abc import Iterable
+from copy import deepcopy
+from itertools import product
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -7,6 +11,7 @@ from support.nightly import nightly, only
 from support.tracking import core, windows
 
 from tachometry.sim import build, golden
+from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods import track
 from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.sim.signals.recording import PinTrace, quadrature
@@ -122,3 +127,47 @@ def test_a_constant_speed_is_settled_upon(start: str) -> None:
         trace = trace_of(*places(start, spec.timing.tick_cycles / counts_per_tick))
         velocity = golden.run(spec, trace).updates.velocity[-300:] / 2.0**spec.widths.frac_bits
         assert np.abs(velocity) == pytest.approx(np.full(300, counts_per_tick), rel=2e-3), counts_per_tick
+
+
+WORDS = ("noise", "noises", "turn", 0, 1, 2, 3)  # what outlives a rest; numbers are those of offsets
+_SETTLED, _RIGHT, _END = 900, 1300, 2400  # counts until an upset, after which all is right again, that are played
+
+
+def check_upsets(words: Iterable[str | int], bits: Iterable[int]) -> None:
+    """Flip bits of what outlives a rest: 1,300 counts later the velocity is right to 1e-3, and it stays so."""
+    spec = core(max_speed="400rad/s")
+    n = _SETTLED + _END
+    gap = 3 * spec.timing.tick_cycles
+    disc = np.resize(np.array([0.1, -0.05, 0.02, -0.07]) * gap, n)
+    clock = np.round(np.arange(1, n + 1) * gap + disc).astype(np.int64)
+    none = np.empty(0, np.int64)
+    steps = Steps(clock, np.ones(n, np.int8), none, none, none)
+    last = np.arange(spec.timing.tick_cycles - 1, clock[-1], spec.timing.tick_cycles)
+    rows = list(track.Windows.of(steps, last, spec.form.most_number).rows())
+    state = Recursion(spec.form, spec.program.lead)
+    for row in rows[: 3 * _SETTLED]:
+        state.tick(*row)
+    right = pytest.approx(np.full(3 * (_END - _RIGHT) - 9, 2.0**spec.form.velocity_out / 3), rel=1e-3)
+    for word, bit in product(words, bits):
+        upset = deepcopy(state)
+        if isinstance(word, int):
+            upset.offsets[word] = flipped(upset.offsets[word], bit)
+        else:
+            setattr(upset, word, flipped(getattr(upset, word), bit))
+        shown = [upset.tick(*row)[0] for row in rows[3 * _SETTLED : 3 * (_SETTLED + _END) - 9]]
+        assert np.array(shown[3 * _RIGHT :]) == right, (word, bit)
+
+
+def flipped(value: int, bit: int) -> int:
+    """Return a word of which a bit is another."""
+    word = (value ^ 1 << bit) & ((1 << WIDTH) - 1)
+    return word - (word >> WIDTH - 1 << WIDTH)
+
+
+def test_an_offset_that_was_upset_is_learned_anew() -> None:
+    check_upsets([2], [WIDTH - 2])
+
+
+@nightly  # an offset of many counts is what cannot be learned away
+def test_all_that_is_learned_is_right_again() -> None:
+    check_upsets(WORDS, range(WIDTH))
