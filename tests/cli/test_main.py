@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from support.command import run
-from support.nightly import only
+from support.nightly import only_rows
 
 from tachometry.cli.files import writable_caches
 from tachometry.cli.reports.streams import printable
@@ -76,16 +76,22 @@ def test_ctrl_c_during_an_import(module: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-# One handler is that of all three.
-@pytest.mark.parametrize("stop", only(["SIGTERM"], ["SIGINT", "SIGTERM", "SIGHUP"]))
+COMMANDS = {
+    "generate": (["generate", "--ppr", "9", "-o", "out"], "tachometry.cli.commands.generate.export"),
+    "simulate": ([*SIMULATE, "--trace", "out/t.csv"], "tachometry.cli.options.outputs.write_trace"),
+}
+
+
+# Every signal has one handler, whatever the command.
 @pytest.mark.parametrize(
-    ("words", "where"),
-    [
-        (["generate", "--ppr", "9", "-o", "out"], "tachometry.cli.commands.generate.export"),
-        ([*SIMULATE, "--trace", "out/t.csv"], "tachometry.cli.options.outputs.write_trace"),
-    ],
+    ("stop", "command"),
+    only_rows(
+        [("SIGINT", "generate"), ("SIGTERM", "simulate"), ("SIGHUP", "generate")],
+        [(stop, command) for stop in ("SIGINT", "SIGTERM", "SIGHUP") for command in COMMANDS],
+    ),
 )
-def test_whatever_stops_a_command_leaves_nothing(stop: str, words: list[str], where: str, tmp_path: Path) -> None:
+def test_whatever_stops_a_command_leaves_nothing(stop: str, command: str, tmp_path: Path) -> None:
+    words, where = COMMANDS[command]
     code = STOPPED.format(stop=stop, where=where)
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (130, "tachometry: interrupted\n")
