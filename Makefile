@@ -30,7 +30,7 @@ $(VENV)/.made:
 	@touch $@
 
 $(LINKED): pyproject.toml $(VENV)/.made
-	$(PIP) -e . $$(command -v c++ g++ clang++ >/dev/null || echo ziglang)
+	$(PIP) -e '.[plot]' $$(command -v c++ g++ clang++ >/dev/null || echo ziglang)
 	@rm -f build/.linked-* && touch $@
 
 $(VENV)/.test $(VENV)/.size $(VENV)/.docs: $(VENV)/.%: $(LINKED)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.option import GroupedCommand, option, output_folder
+from tachometry.cli.options.option import GroupedCommand, check_plots, option, output_folder
 from tachometry.cli.reports.figures import print_figures
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.progress import Progress
@@ -57,6 +57,7 @@ def figures(only: str, hdl: bool, directory: Path) -> int:
 
     Equal options give equal files. Exit status 1 if hardware and golden model differ.
     """
+    check_plots("tachometry figures")
     from tachometry.sim.figures.drawing import write_claims, write_data, write_figure
     from tachometry.sim.figures.lab import Lab
 

@@ -1,6 +1,7 @@
 """Options that commands share, and how they are shown and explained."""
 
 import functools
+import importlib.util
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,8 @@ from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of, read_options
+
+_PICTURES = (".png", ".pdf", ".svg")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -255,9 +258,17 @@ def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | N
         if path is not None and path.suffix.lower() not in allowed:
             names = ", ".join(allowed[:-1]) + " or " * (len(allowed) > 1) + allowed[-1]
             raise click.BadParameter(f"file must end in {names}, not {str(path)!r}")
+        if path is not None and path.suffix.lower() in _PICTURES:
+            check_plots(parameter.opts[0])
         return path
 
     return check
+
+
+def check_plots(what: str) -> None:
+    """Refuse with an OSError, before any work is done, what cannot be drawn."""
+    if importlib.util.find_spec("matplotlib") is None:
+        raise OSError(f"{what} needs Matplotlib: pip install 'tachometry[plot]'")
 
 
 def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:

@@ -1,11 +1,14 @@
 """Help and version: what an engineer sees first."""
 
+import importlib.util
 import re
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
+from support.command import run
 
 from tachometry.cli.main import main
 from tachometry.spec import METHODS, common_options, own_options
@@ -136,3 +139,16 @@ finally:
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("line", ["plan --ppr 9 --plot p.png", "figures -o out", "plan --ppr 9 --csv c.csv"])
+def test_pictures_without_matplotlib_are_refused_before_any_work(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "matplotlib" else real(name))
+    monkeypatch.chdir(tmp_path)
+    assert run(*line.split()) == (0 if line.endswith("csv") else 2)
+    if not line.endswith("csv"):
+        assert "needs Matplotlib: pip install 'tachometry[plot]'" in capsys.readouterr().err
+        assert list(tmp_path.iterdir()) == []
