@@ -132,6 +132,30 @@ class IdleDivision(Idle):
         return (self.digits, self.less_one)
 
 
+@dataclass(frozen=True)
+class IdleRounds(Idle):
+    """A core that goes round its slots; rounds are alike as long as no pin, strobe or word of a memory changes.
+
+    Parameters
+    ----------
+    slot : str
+        Register that is 0 at the beginning of a round.
+    clocks : int
+        Of a round.
+    moving : tuple of Idle
+        What moves from round to round, as the others do from clock to clock.
+    """
+
+    slot: str
+    clocks: int
+    moving: tuple[Idle, ...]
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        return tuple(path for one in self.moving for path in one.paths)
+
+
 @runtime_checkable
 class HasIdle(Protocol):
     """A box with such registers."""

@@ -40,9 +40,9 @@ class Rounds(wiring.Component):
 
     def __init__(self, slots: int, rounds: int, warm_up: int, external: tuple[int, int] | None = None) -> None:
         self._slots = slots
-        self._rounds = rounds
         self._warm_up = warm_up
-        self._external = external
+        # A round is a clock of this box.
+        self.sampling_clock = SamplingClock(rounds) if external is None else ExternalTick(*external, synchronous=True)
         outside = {"tick_in": In(1), "tick_error": Out(1)} if external else {}
         super().__init__(
             {
@@ -56,10 +56,7 @@ class Rounds(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         ends = Signal()
-        # A round is a clock of this box.
-        clock = (
-            SamplingClock(self._rounds) if self._external is None else ExternalTick(*self._external, synchronous=True)
-        )
+        clock = self.sampling_clock
         m.submodules.sampling_clock = EnableInserter(ends)(clock)
         if isinstance(clock, ExternalTick):
             high = Signal()

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from amaranth import Module, Signal, Value
 from amaranth.lib import wiring
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleRounds, idle_of
 from tachometry.hdl.axes.axes_datapath import AxesDatapath
 from tachometry.hdl.axes.axis_counters import AxisCounters, of_slot
 from tachometry.hdl.axes.axis_filter import AxisFilter
@@ -52,6 +53,12 @@ class AxesTachometer(wiring.Component):
     def spec(self) -> AxesSpec:
         """The spec that this core was built from."""
         return self._spec
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """Rounds that a simulation may skip, until the last one of a tick."""
+        moving = idle_of({"rounds.sampling_clock": self.rounds.sampling_clock})
+        return (IdleRounds("rounds.slot", self._spec.slots, moving),) if moving else ()
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

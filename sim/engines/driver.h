@@ -67,8 +67,9 @@ ENTRY __attribute__((flatten)) void tachometer_run(void *home, Job *job) {
         model.outputs(row + 1);
       }
       int64_t idle = job->every_clock ? 0 : model.idle();
+      if (idle > until - clock) idle = until - clock;
+      idle -= idle % Model::ROUND;
       if (idle > 1) {
-        if (idle > until - clock) idle = until - clock;
         model.move_on(idle);
         clock += idle - 1;
         job->skipped += idle - 1;

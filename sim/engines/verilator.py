@@ -36,6 +36,7 @@ struct Model {{
   void outputs(int64_t *row) const {{ {outputs} }}
   void shown(uint32_t *words) const {{ {shown} }}
   void edge() {{ top.clk = 1; top.eval(); }}
+  static constexpr int64_t ROUND = 1;
   int64_t idle() const {{ return 0; }}
   void move_on(int64_t) {{}}
 }};

@@ -14,9 +14,10 @@ from tachometry.hdl.core.tachometer import Tachometer
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.compiled import Design, Play
 from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.pairs import configurations, spec_of
-from tachometry.spec import METHODS, TachometerSpec, of_texts
+from tachometry.spec import METHODS, AxesSpec, STachometer, TachometerSpec, of_texts
 from tachometry.spec.control import AnySpec, LoopSpec
 
 
@@ -85,6 +86,15 @@ def slow(method: str) -> tuple[TachometerSpec, PinTrace]:
 def test_slow_shafts(method: str) -> None:
     """Nearly all of their clocks are skipped."""
     assert check(*slow(method)) > 0.8
+
+
+def test_many_axes() -> None:
+    """Their rounds are skipped, also where edges at the beginning of a round are few rounds apart."""
+    axis = of_texts("s", {"ppr": "16", "clock": "1MHz", "tick": "1ms", "max-time": "9ms"})
+    assert isinstance(axis, STachometer)
+    distances = ([4000, 8, 12, 16, 20, 24, 28], [9000, 7000, 5], [1000, 20_001], [30_000])
+    each = tuple(turning(list(one), 60, 0) for one in distances)
+    assert check(AxesSpec(tachometer=axis, axes=4), AxesTrace.of(each)) > 0.8
 
 
 def test_a_loop_in_gates() -> None:
