@@ -53,6 +53,14 @@ def methods_with(name: str) -> list[str]:
     return [method for method in METHODS if any(about.name == name for about in own_options(method))]
 
 
+def method_named(text: str) -> str:
+    """Return the name of a method as it is in the table, of `MT`, `M/T`, `s` or `tracking`; else the text."""
+    plain = text.strip().lower().replace("/", "")
+    titles = {spec.facts.title.lower().replace("/", ""): name for name, spec in METHODS.items()}
+    name = titles.get(plain, plain)
+    return name if name in METHODS or name == AUTO else text
+
+
 def spec_class(method: str) -> type[TachometerSpec]:
     """Return the spec of a method; ParameterError if there is none of this name."""
     if method not in METHODS:
@@ -83,6 +91,7 @@ def of_texts(
         If the method has no such option, or a text is not what it must be.
     """
     given = {name: text for name, text in texts.items() if text is not None}
+    method = method_named(method)
 
     def made(name: str) -> TachometerSpec:
         return _with_tick(given, lambda texts: _of_method(name, texts), within)
@@ -264,6 +273,7 @@ __all__ = [
     "Timing",
     "TrackTachometer",
     "common_options",
+    "method_named",
     "methods_with",
     "of_manifest",
     "of_options",

@@ -93,7 +93,7 @@ def told(capsys: pytest.CaptureFixture[str]) -> str:
 
 @pytest.mark.parametrize("command", ["generate", "plan", "simulate", "replay", "compare", "sweep", "verify"])
 def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(command, "--help") == 0
+    assert run("help", command) == 0
     text = " ".join(told(capsys).split())
     if command not in ("compare", "verify"):
         assert "--doubled / --no-doubled Everything is measured twice, which changes nothing." in text

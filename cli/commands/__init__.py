@@ -1,9 +1,12 @@
 """The command `tachometry` with all of its commands, and what their errors say."""
 
+import os
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 
 import click
+from click.shell_completion import shell_complete
 
 from tachometry.cli.files import DISK, writable_caches
 from tachometry.cli.options.option import message_of
@@ -22,7 +25,10 @@ COMMANDS = {
     "build": "Build a core for a board: a bitstream, or a project for the vendor's tools.",
     "program": "Load a bitstream into a board.",
     "monitor": "Show, record and test what a board measures, also a simulated one.",
+    "completion": "Let the shell complete commands and options.",
+    "help": "Say all there is to say of a command, or of one of its options.",
 }
+_COMPLETE = "_TACHOMETRY_COMPLETE"  # the variable that click's scripts of the shells set
 
 
 def load(name: str) -> click.Command:
@@ -40,6 +46,15 @@ class _Commands(click.Group):
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
         return load(name) if name in COMMANDS else None
 
+    def resolve_command(
+        self, context: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], COMMANDS, n=2)
+            guess = f" Did you mean {' or '.join(near)}?" if near else ""
+            context.fail(f"No such command {args[0]!r}.{guess}")
+        return super().resolve_command(context, args)
+
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
@@ -51,7 +66,7 @@ class Refused(Exception):
 
 @click.group(
     cls=_Commands,
-    no_args_is_help=False,
+    invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
 Examples:
@@ -61,7 +76,8 @@ Examples:
       --motion ramp:0:40rad/s:500ms --plot ramp.png --save-capture ramp.sr
   tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv
 
-`tachometry COMMAND --help` explains a command and all of its options.""",
+tachometry COMMAND -h has what most need, --help all options, and
+tachometry help COMMAND all there is to say.""",
 )
 @click.version_option(package_name="tachometry", message="%(prog)s %(version)s")
 @click.pass_context
@@ -74,6 +90,9 @@ def cli(context: click.Context) -> None:
     Exit status: 0 success, 1 hardware and golden model differ, 2 error, 70 a fault of tachometry itself, 130
     interrupted, 141 nobody reads the output.
     """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+        return
     context.with_resource(writable_caches())
 
 
@@ -85,6 +104,8 @@ def run(args: Sequence[str]) -> int:
     Refused
         If it is wrong, or cannot be done here.
     """
+    if instruction := os.environ.get(_COMPLETE):
+        return shell_complete(cli, {}, "tachometry", _COMPLETE, instruction)
     try:
         # Not `cli.main()`: it puts an empty line before the one on Ctrl-C.
         with cli.make_context("tachometry", list(args)) as context:

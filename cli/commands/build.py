@@ -56,7 +56,7 @@ Examples:
 @option(
     "Files",
     "--bus",
-    type=click.Choice(_SERIAL),
+    type=click.Choice(_SERIAL, case_sensitive=False),
     default=_SERIAL[0],
     help="How the registers are read; "
     + "; ".join(f"{name}: {BUSES[name].help}" for name in _SERIAL)

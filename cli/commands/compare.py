@@ -93,12 +93,16 @@ Examples:
     help="Also measure the cores on an ECP5: COMB, FF, Fmax. It takes half a minute a core, and needs the extra "
     "`size`.",
 )
-@output("--plot", suffixes=(".png", ".pdf"), help="Figure of all velocities and of the error of each; .png or .pdf.")
+@output(
+    "--plot",
+    suffixes=(".png", ".pdf", ".svg"),
+    help="Figure of all velocities and of the error of each.",
+)
 @output("--csv", help="CSV with a row per method: the table.")
 @output(
     "--tradeoff",
-    suffixes=(".png", ".pdf", ".csv"),
-    help="Figure of error over delay, .png or .pdf, with a curve per method: those of all settings of the float "
+    suffixes=(".png", ".pdf", ".svg", ".csv"),
+    help="Figure of error over delay, with a curve per method: those of all settings of the float "
     "models, of m over --average, and of mt over --min-time, than which no other has both less error and less delay. "
     "The error is that of --motion, such as a constant speed with a real disc. The delay is that of another motion "
     "with an ideal encoder, whose speed goes to and fro between half the RMS speed of --motion and all of it, 10 times "

@@ -86,14 +86,14 @@ Examples:
 @option(
     "Files",
     "--testbench",
-    type=click.Choice(["cocotb"]),
+    type=click.Choice(["cocotb"], case_sensitive=False),
     help="Also write a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. Without a "
     "--motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the core.",
 )
 @option(
     "Files",
     "--bus",
-    type=click.Choice(["none", *BUSES]),
+    type=click.Choice(["none", *BUSES], case_sensitive=False),
     help="Give the core registers on a bus: "
     + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
     + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
@@ -110,7 +110,7 @@ Examples:
     "Files",
     "--for",
     "target",
-    type=click.Choice(["none", *TARGETS]),
+    type=click.Choice(["none", *TARGETS], case_sensitive=False),
     default="none",
     help="Also write what a framework needs; "
     + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())

@@ -72,8 +72,8 @@ Examples:
 )
 @output(
     "--plot",
-    suffixes=(".png", ".pdf"),
-    help="Figure, .png or .pdf: speed, error and current of the run with the first seed, or of several loops what the "
+    suffixes=(".png", ".pdf", ".svg"),
+    help="Figure: speed, error and current of the run with the first seed, or of several loops what the "
     "table has, over the first axis.",
 )
 @output("--log", help="CSV of the run with the first seed of the only loop: a row every 100 µs.")

@@ -43,7 +43,7 @@ Examples:
     metavar="LIST",
     help="Methods to compare beside each other: all, or names with commas between, with options as in m:average=10.",
 )
-@output("--plot", suffixes=(".png", ".pdf"), help="Figure of resolution and measurement time; .png or .pdf.")
+@output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of resolution and measurement time.")
 @output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")
 def plan(
     spec: TachometerSpec,

@@ -77,7 +77,7 @@ Examples:
 @option(
     "Sweep",
     "--engine",
-    type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"]),
+    type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"], case_sensitive=False),
     help="Also run the hardware, as simulate does, in lockstep with the golden model. [default: only the golden model, "
     "which the hardware equals bit for bit]",
 )
@@ -100,12 +100,12 @@ Examples:
     suffixes=(".parquet",),
     help="Parquet with a row per point. Points that are in it already do not run again.",
 )
-@output("--plot", suffixes=(".png", ".pdf"), help="Heat map over two axes, a panel per method; .png or .pdf.")
+@output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Heat map over two axes, a panel per method.")
 @option("Outputs", "--axes", metavar="X,Y", help="Axes of the heat map. [default: the first two]")
 @option(
     "Outputs",
     "--metric",
-    type=click.Choice(list(METRICS)),
+    type=click.Choice(list(METRICS), case_sensitive=False),
     default="relative-error",
     metavar="METRIC",
     help=f"What the heat map shows, the median over all other axes: {', '.join(METRICS)}.",

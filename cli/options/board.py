@@ -16,7 +16,7 @@ class _BoardChoice(click.Choice[str]):
     name = "board"
 
     def __init__(self) -> None:
-        super().__init__([*BOARDS])
+        super().__init__([*BOARDS], case_sensitive=False)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return BOARDS[super().convert(value, param, ctx)]

@@ -42,7 +42,7 @@ _OPTIONS = [
     option(
         _CAPTURE,
         "--sensor",
-        type=click.Choice(["quadrature", "pulses", "step-dir"]),
+        type=click.Choice(["quadrature", "pulses", "step-dir"], case_sensitive=False),
         default="quadrature",
         help="What was captured. pulses: only line A, as of a tooth wheel, which always turns forward; --decoding 2 "
         "counts all edges, 1 the rising ones. step-dir: each rise of line A is a step, forward where line B is high; "

@@ -14,7 +14,7 @@ _OPTIONS = [
     option(
         _SIMULATION,
         "--engine",
-        type=click.Choice(["auto", "pysim", "cxxrtl", "verilator", "cxxrtl-every-clock"]),
+        type=click.Choice(["auto", "pysim", "cxxrtl", "verilator", "cxxrtl-every-clock"], case_sensitive=False),
         default="auto",
         help="What simulates the hardware: pysim is Amaranth's simulator and runs some 10,000 clocks a second; "
         "cxxrtl is compiled and runs 10,000,000 and more, but needs a C++ compiler and some seconds for a new core; "

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from tachometry.cli.options.core import Make, Texts, own_texts
 from tachometry.cli.options.option import message_of
-from tachometry.spec import AUTO, METHODS, TachometerSpec
+from tachometry.spec import AUTO, METHODS, TachometerSpec, method_named
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,8 @@ def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, s
     """
     methods: list[tuple[str, str | None, Texts]] = []
     for name in (word.strip() for word in text.split(",")):
-        method, *words = name.split(":")
+        word, *words = name.split(":")
+        method = method_named(word)
         if method in METHODS or method == AUTO:
             methods.append((name, method, own_texts(method, words)))
         elif method in others:

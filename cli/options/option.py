@@ -3,6 +3,7 @@
 import functools
 import importlib.util
 import os
+import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,10 @@ from typing import Any, TypeVar
 
 import click
 from click.core import ParameterSource
+from click.shell_completion import CompletionItem
 
+from tachometry.cli.options.guesses import meant
+from tachometry.cli.options.help import line, needed
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 from tachometry.spec.language import option as declaration
@@ -94,6 +98,13 @@ class Option(click.Option):
         self.metavar = metavar() if callable(metavar) else metavar
         return super().get_help_record(ctx)
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        _, metavar = self._texts
+        shown = metavar() if callable(metavar) else metavar
+        if shown is None or not shown.startswith("["):
+            return super().shell_complete(ctx, incomplete)
+        return [CompletionItem(word) for word in shown.strip("[]").split("|") if word.startswith(incomplete)]
+
 
 class Later(click.Option):
     """Stands for options that are known when the command runs.
@@ -114,16 +125,84 @@ def later(name: str, make: Callable[[], Sequence[click.Option]]) -> Callable[[Co
     return click.option(f"--{name}", cls=Later, make=make, hidden=True)
 
 
+LONG = "tachometry.long"  # of a context: its help has all sentences
+_MOST_LINES = 100  # of --help
+
+
+def _within(block: str) -> list[str]:
+    """Return lines of a paragraph that are no longer than those of --help."""
+    return [part for line in block.splitlines() for part in textwrap.wrap(line, 79) or [""]]
+
+
+def _show_short(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        assert isinstance(ctx.command, GroupedCommand)
+        click.echo(ctx.command.short(ctx))
+        ctx.exit()
+
+
+SHORT = click.Option(
+    ["-h", "short"], is_flag=True, is_eager=True, expose_value=False, hidden=True, callback=_show_short
+)
+
+
 class GroupedCommand(click.Command):
-    """A command whose help lists its options under the headings of their groups."""
+    """A command whose help lists its options under the headings of their groups, a line each.
+
+    With -h it is the ten that most need. `tachometry help COMMAND` has all sentences.
+    """
+
+    def __init__(self, *args: Any, **attributes: Any) -> None:
+        super().__init__(*args, **attributes)
+        self.context_settings.setdefault("help_option_names", ["--help"])
+        self.params.append(SHORT)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         try:
             with options_named():
                 return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            names = [name for one in self.get_params(ctx) if one is not SHORT for name in one.opts]
+            near = meant(error.option_name, names)
+            message = f"No such option {error.option_name!r}." + (f" Did you mean {' or '.join(near)}?" if near else "")
+            raise click.UsageError(message, error.ctx or ctx) from None
         except click.UsageError as error:
             error.ctx = error.ctx or ctx  # the parser does not say of which command an option has no argument
             raise
+
+    def short(self, ctx: click.Context) -> str:
+        """Return the help of -h: the options that most need, and an example."""
+        options = [one for one in self.get_params(ctx) if isinstance(one, click.Option)]
+        example = (self.epilog or "").partition("Examples:\n")[2].split("\n  tachometry ")[0]
+        records = filter(None, (one.get_help_record(ctx) for one in needed(options)))
+        return "\n".join(
+            [
+                *self._head(ctx),
+                *map(line, records),
+                *(["", "Example:", example.strip("\n")] if example else []),
+                "",
+                f"{ctx.command_path} --help has all options in a line each.",
+                f"{(ctx.parent or ctx).command_path} help {self.name} has all there is to say.",
+            ]
+        )
+
+    def _head(self, ctx: click.Context) -> list[str]:
+        """Return the usage, and the first paragraph of what the command does."""
+        paragraph = " ".join((self.help or "").split("\n\n")[0].split())
+        return [self.get_usage(ctx), "", *textwrap.wrap(paragraph, 78, initial_indent="  ", subsequent_indent="  "), ""]
+
+    def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        if ctx.meta.get(LONG):
+            super().format_help(ctx, formatter)
+            return
+        lines = self._head(ctx)
+        for heading, records in self._groups(ctx).items():
+            lines += [f"{heading}:", *map(line, records)]
+        last = f"{(ctx.parent or ctx).command_path} help {self.name} [--OPTION] has all there is to say."
+        for block in (self.epilog or "").replace("\b\n", "").split("\n\n"):
+            if len(lines) + len(block.splitlines()) + 3 <= _MOST_LINES:
+                lines += ["", *_within(block)]
+        formatter.write("\n".join([*lines, "", last]) + "\n")
 
     def invoke(self, ctx: click.Context) -> Any:
         with options_named():
@@ -136,14 +215,18 @@ class GroupedCommand(click.Command):
         return parameters
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        for heading, records in self._groups(ctx).items():
+            with formatter.section(heading):
+                formatter.write_dl(records, col_max=26)
+
+    def _groups(self, ctx: click.Context) -> dict[str, list[tuple[str, str]]]:
+        """Return names and sentences of all options, by the headings of their groups."""
         groups: dict[str, list[tuple[str, str]]] = {}
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx)
             if record is not None:
                 groups.setdefault(getattr(parameter, "group", "Other"), []).append(record)
-        for heading, records in groups.items():
-            with formatter.section(heading):
-                formatter.write_dl(records, col_max=26)
+        return groups
 
 
 def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Command]:
@@ -274,6 +357,8 @@ def check_plots(what: str) -> None:
 def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
     """Decorate a command with an option that names a file to be written, with one of some suffixes."""
     callback = _suffix(*suffixes) if suffixes else None
+    if len(suffixes) > 1 and suffixes[0] not in help:
+        help = f"{help} {', '.join(suffixes[:-1])} or {suffixes[-1]}."
     return option(_OUTPUTS, name, type=FilePath(), metavar="FILE", callback=callback, help=help)
 
 

@@ -19,8 +19,8 @@ _OPTIONS = [
     ),
     output(
         "--plot",
-        suffixes=(".png", ".pdf"),
-        help="Figure of velocity, error, pulse numbers and measurement times; .png or .pdf.",
+        suffixes=(".png", ".pdf", ".svg"),
+        help="Figure of velocity, error, pulse numbers and measurement times.",
     ),
     output(
         "--trace",

@@ -8,7 +8,7 @@ import click
 
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.motion import ENCODER_OPTIONS
-from tachometry.cli.options.option import GroupedCommand, options_named
+from tachometry.cli.options.option import SHORT, GroupedCommand, options_named
 from tachometry.cli.options.settings import arguments, of_command_line, of_file
 
 # Gives what the options of the encoder make.
@@ -17,7 +17,7 @@ ENCODER = click.command("sweep")(ENCODER_OPTIONS(lambda encoder, motion: (encode
 
 def by_name(command: click.Command) -> dict[str, click.Option]:
     """Return the options of a command by their names, without dashes."""
-    options = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
+    options = [one for one in command.params if isinstance(one, click.Option) and one is not SHORT]
     return {option.opts[0].lstrip("-"): option for option in options}
 
 
@@ -46,9 +46,14 @@ class VaryingCommand(GroupedCommand):
         return [*own, *(option for option in self._points().values() if option not in own)]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        raw, _, _ = self.make_parser(ctx).parse_args(list(args))
+        if ctx.resilient_parsing:
+            return super().parse_args(ctx, args)
+        try:
+            raw, _, _ = self.make_parser(ctx).parse_args(list(args))
+        except click.UsageError:
+            return super().parse_args(ctx, args)  # which says what is wrong
         help_option = self.get_help_option(ctx)
-        if help_option is not None and raw.get(help_option.name or ""):
+        if raw.get("short") or (help_option is not None and raw.get(help_option.name or "")):
             return super().parse_args(ctx, args)
         options = by_name(self) | self._points()
         file = raw.get("file")

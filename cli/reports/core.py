@@ -1,14 +1,13 @@
 """`generate` and `plan` print what a core is, what it measures, and how wide and late its outputs are."""
 
 import math
-from fractions import Fraction
 
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.sim.studies.plan import Plan
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
-from tachometry.spec.language.units import SPEED, SpeedUnit, format_time, plural
+from tachometry.spec.language.units import SPEED, SpeedUnit, plural, short_time
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import WORD
@@ -113,8 +112,3 @@ def _standstill(spec: TachometerSpec) -> str:
 def speed_text(rad_per_s: float) -> str:
     """Return a speed in all units."""
     return " = ".join(f"{SpeedUnit(unit).of(rad_per_s):.6g} {unit}" for unit in SPEED)
-
-
-def short_time(seconds: Fraction | float) -> str:
-    """Return a time to four digits."""
-    return format_time(Fraction(f"{float(seconds):.4g}"))

@@ -1,9 +1,9 @@
 """`generate` prints these lines of a core with a control loop."""
 
-from tachometry.cli.reports.core import configuration, registers_row, short_time
+from tachometry.cli.reports.core import configuration, registers_row
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.language.units import plural
+from tachometry.spec.language.units import plural, short_time
 
 
 def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 
 from rich.text import Text
 
-from tachometry.cli.reports.core import configuration, short_time
+from tachometry.cli.reports.core import configuration
 from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
 from tachometry.sim.studies.plan import Plan
 from tachometry.spec import TachometerSpec
-from tachometry.spec.language.units import SpeedUnit
+from tachometry.spec.language.units import SpeedUnit, short_time
 
 
 def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:

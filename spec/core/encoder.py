@@ -24,6 +24,13 @@ def _of_counts(what: str, text: str, known: Mapping[str, Any]) -> int:
     return counts // decoding
 
 
+def _factor(what: str, text: str) -> int:
+    factors = {form.format(factor): factor for factor in (1, 2, 4) for form in ("{}", "x{}", "{}x")}
+    if (word := text.strip().lower()) not in factors:
+        raise ParameterError(what, f"must be 1, 2 or 4, or x1, x2 or x4, not {text!r}")
+    return factors[word]
+
+
 @dataclass(frozen=True)
 class Encoder:
     """A two-line incremental encoder and how its edges are counted.
@@ -60,7 +67,9 @@ class Encoder:
     )
     decoding: int = option(
         4,
-        "Counts per pulse: 4 counts every edge, 2 both edges of A, 1 the edges of A while B is low.",
+        "Counts per pulse: 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is low.",
+        parse=_factor,
+        shown="4",
         metavar="[4|2|1]",
         group=_GROUP,
         tests=("", "2", "1"),
@@ -68,7 +77,7 @@ class Encoder:
 
     def __post_init__(self) -> None:
         if self.decoding not in (1, 2, 4):
-            raise ParameterError("decoding", f"must be 1, 2 or 4, not {self.decoding}")
+            raise ParameterError("decoding", f"must be 1, 2 or 4, or x1, x2 or x4, not {self.decoding}")
         if not 1 <= self.counts_per_rev <= _MOST:
             raise ParameterError(
                 "pulses_per_rev",

@@ -251,6 +251,7 @@ def read_options(
     values: dict[str, Any] = {}
     for about in sorted(read.values(), key=lambda one: one.parse_at is not None):  # which needs what others say
         text = texts.get(about.name, about.text or "")
+        text = next((choice for choice in about.choices if choice.lower() == text.strip().lower()), text)
         if about.parse_at is None:
             values[about.field] = about.parse(about.parameter, text)
         else:

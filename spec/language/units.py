@@ -92,7 +92,7 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
     """
     number = text.strip()
     match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None
-    unit = plain_unit(match[3]) or default if match else ""
+    unit = _in_table(plain_unit(match[3]), units) or default if match else ""
     if match is None or unit not in units:
         names = ", ".join(filter(None, units))
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
@@ -108,6 +108,16 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
 def plain_unit(unit: str) -> str:
     """Return the name of a unit in the tables, such as `us` for `µs`."""
     return re.sub("^[µμ]", "u", unit)
+
+
+def _in_table(unit: str, units: Units) -> str:
+    """Return a unit as its table has it, whatever its case is, but where M would be taken for m, mega for milli."""
+    if unit in units:
+        return unit
+    alike = [
+        name for name in units if name.lower() == unit.lower() and (name[:1] != "m" or unit[:1] == "m" or name == "ms")
+    ]
+    return alike[0] if len(alike) == 1 else unit
 
 
 def read_exactly(what: str, text: str, units: Units, default: str = "", also: str = "") -> Fraction:
@@ -226,6 +236,18 @@ def format_time(seconds: Fraction) -> str:
         if seconds >= size:
             return f"{float(seconds / size):.9g}{unit}"
     return f"{float(seconds):.9g}s"
+
+
+def short_time(seconds: Fraction | float) -> str:
+    """Return a time to four digits."""
+    return format_time(Fraction(f"{float(seconds):.4g}"))
+
+
+def next_written_time(clocks: int, clock_hz: int) -> str:
+    """Return the next time of so many clocks or more that is written in few digits; else the clocks."""
+    written = (written_time(number, clock_hz) for number in range(clocks, 2 * clocks))
+    short = (text for text in written if len(text) <= len("12.25ms") and not text.endswith(CLOCKS))
+    return next(short, f"{clocks}{CLOCKS}")
 
 
 def plural(number: int, what: str) -> str:

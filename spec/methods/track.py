@@ -22,7 +22,7 @@ from tachometry.spec.formats.tracking_units import QUICK, Small
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
-from tachometry.spec.language.units import format_time
+from tachometry.spec.language.units import format_time, next_written_time, short_time, written_time
 
 FETCH_CLOCKS = 3  # to fetch the first instruction, to read its word, and to hold the result
 NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quarter of what is left at constant speed
@@ -209,10 +209,13 @@ class TrackTachometer(TachometerSpec):
             raise ParameterError("bounds", f"must not be given with method {self.method}: no window encloses its speed")
         shortest = self.times.min_tick_cycles
         if self.timing.tick_cycles < shortest:
+            given = written_time(self.timing.tick_cycles, self.timing.clock_hz)
+            typed = next_written_time(shortest, self.timing.clock_hz)
+            other = "--multiplier block" if self.multiplier == "serial" else "--method mt"
             raise ParameterError(
-                "tick_cycles",
-                f"must be at least {shortest} ({format_time(self.times.seconds(shortest))}) with method {self.method} "
-                f"here, not {self.timing.tick_cycles}",
+                "tick",
+                f"must be longer for method {self.method}, which takes {short_time(self.times.seconds(shortest))} at "
+                f"{self.timing.clock_hz / 1e6:g} MHz, not {given}: try --tick {typed} or {other}",
                 f"needs a tick of {shortest} clocks",
             )
 

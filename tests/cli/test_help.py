@@ -102,7 +102,7 @@ OUTPUTS = "--vcd --plot --trace --counts --save-capture".split()
 def test_every_option_is_explained(
     command: str, options: list[str], groups: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = shown(capsys, command, "--help")
+    text = shown(capsys, "help", command)
     words = text.replace(",", " ").split()
     for option in [*CORE, *options, *(["--method"] if command not in ("sweep", "loop") else [])]:
         assert option in words
@@ -114,7 +114,7 @@ def test_every_option_is_explained(
 
 
 def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture[str]) -> None:
-    text = re.sub(r"(?<=-edge)- (?=error)", "-", " ".join(shown(capsys, "plan", "--help").split()))
+    text = re.sub(r"(?<=-edge)- (?=error)", "-", " ".join(shown(capsys, "help", "plan").split()))
     for method in METHODS:
         assert f"{method} {METHODS[method].facts.summary}" in text
         for about in own_options(method):

@@ -20,7 +20,7 @@ def _is_short(method: str, texts: dict[str, str]) -> bool:
     try:
         of_texts(method, texts)
     except ParameterError as error:
-        if error.parameter != "tick_cycles" or not error.rest.startswith("must be at least"):
+        if not error.brief.startswith("needs a tick"):
             raise
         return True
     return False

@@ -51,7 +51,7 @@ def test_merged_edges_are_those_beyond_the_first_of_a_clock() -> None:
 
 
 def test_a_speed_that_is_cut_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("plan", "--ppr", "500", "--clock", "1MHz", "--max-speed", "100000rpm") == 0
+    assert run("plan", "--ppr=500", "--clock=1MHz", "--tick=20us", "--max-speed", "100000rpm") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "note greatest speed cut from 100000rpm to 30000rpm: 20 counts per tick is the most" in told
 
