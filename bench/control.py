@@ -16,9 +16,14 @@ from tachometry.sim.figures.tsuji_loops import SOLUTIONS, Cosine, deviation, sol
 from tachometry.sim.plots.usable_gain import Found, save_usable_gains
 from tachometry.sim.studies.loops.control import Outcome, Task, each_seed, mean, outcome_of
 from tachometry.sim.studies.loops.gate_check import check
-from tachometry.sim.studies.loops.usable_gain import IDEAL, KINDS, REAL, TICKS, setting, usable, variants
+from tachometry.sim.studies.loops.usable_gain import IDEAL, KINDS, REAL, TASK, TICKS, setting, usable, variants
 
 DISCS = {"ideal disc": IDEAL, "real disc": REAL}
+SLOW = {
+    "0": "constant:0:1200ms",
+    "2 rad/s": "ramp:0:2rad/s:300ms+constant:2:900ms",
+    "10 rad/s": "ramp:0:10rad/s:300ms+constant:10:900ms",
+}
 SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}
 
 
@@ -81,6 +86,7 @@ def in_gates(seeds: Sequence[int], jobs: int) -> str:
         "S, as in Fig. 15, k_v = 50, 10 s each": cosine,
         "S, 39 rad/s, k_v = 80, 1.2 s each": held,
         "M/T, 39 rad/s, k_v = 80, 1.2 s each": setting(KINDS[2], 80.0, 20e-6, REAL),
+        "tracking, 39 rad/s, k_v = 80, 1.2 s each": setting(KINDS[-1], 80.0, 20e-6, REAL),
     }
     rows = []
     for name, one in loops.items():
@@ -107,6 +113,21 @@ def solutions(seeds: Sequence[int], jobs: int) -> str:
     return markdown(("T_s", "(a)", "(b)", "(c)"), rows)
 
 
+def slow_shafts(seeds: Sequence[int], jobs: int) -> str:
+    """Return a shaft that rests, or turns slowly, under the load: real disc, ticks of 20 µs, usable gains."""
+    rows = []
+    tracking = KINDS[-1]
+    ways = ((KINDS[0], 95.1), (KINDS[2], 95.1), (tracking, 113.1), (replace(tracking, filtered=True), 113.1))
+    for speed, motion in SLOW.items():
+        row = [speed]
+        for kind, kv in ways:
+            task = replace(TASK, motion=parse_motion(motion))
+            row.append(cell(outcome_of(replace(setting(kind, kv, 20e-6, REAL), task=task), seeds, jobs)))
+        rows.append(row)
+    heads = ("speed", *(kind.name for kind, _ in ways[:-1]), "tracking, with a filter")
+    return markdown(heads, rows, left=range(len(heads)))
+
+
 def accelerations(seeds: Sequence[int], jobs: int) -> str:
     """Return tracking, real disc, ticks of 20 µs: the disturbance from the velocity, and from the measured
     acceleration.
@@ -126,6 +147,7 @@ TABLES = {
     "weights": weights,
     "assumptions": assumptions,
     "solutions": solutions,
+    "slow": slow_shafts,
     "acceleration": accelerations,
     "gates": in_gates,
 }

@@ -38,7 +38,7 @@ def test_a_row_and_a_mark_for_every_gain_that_is_usable(tmp_path: Path, monkeypa
 def test_mismatches_of_all_seeds_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "check", lambda one, seed: Checked(1000, seed, FINE, FINE))
     rows = bench.in_gates(range(6), 1).splitlines()[2:]
-    assert len(rows) == 3
+    assert len(rows) == 4
     for line in rows:
         assert line.split(" | ")[1:] == ["6000", "15", "0.1234", "0.1234", "0.3", "0.3 |"]
 
@@ -57,3 +57,18 @@ def test_an_observer_of_the_acceleration_has_the_same_gains(monkeypatch: pytest.
     for velocity, acceleration in zip(asked[::2], asked[1::2], strict=True):
         assert velocity == ("track", "SYNCHRONISED", *acceleration[2:])
         assert acceleration[:2] == ("track", "ACCELERATION")
+
+
+def test_slow_shafts_are_those_of_three_methods(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def outcome(one: Any, seeds: Any, jobs: Any) -> Outcome:
+        asked.append((one.task.motion.speed(one.task.motion.duration), one.spec.method, one.gains.filter))
+        return FINE
+
+    monkeypatch.setattr(bench, "outcome_of", outcome)
+    rows = bench.slow_shafts(range(6), 1).splitlines()[2:]
+    assert [row.split(" | ")[0] for row in rows] == ["| 0", "| 2 rad/s", "| 10 rad/s"]
+    assert [float(speed) for speed, *_ in asked[::4]] == [0, 2, 10]
+    assert [method for _, method, _ in asked[:4]] == ["s", "mt", "track", "track"]
+    assert [rate for *_, rate in asked[2:4]] == [float("inf"), 226.2]
