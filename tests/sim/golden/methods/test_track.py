@@ -168,6 +168,6 @@ def test_an_offset_that_was_upset_is_learned_anew() -> None:
     check_upsets([2], [WIDTH - 2])
 
 
-@nightly  # an offset of many counts is what cannot be learned away
+@nightly  # an offset of many counts is what could not be learned away; here also those about a count, and some of all
 def test_all_that_is_learned_is_right_again() -> None:
-    check_upsets(WORDS, range(WIDTH))
+    check_upsets(WORDS, (*range(0, WIDTH, 5), *range(18, 22), WIDTH - 2, WIDTH - 1))
