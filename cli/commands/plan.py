@@ -77,7 +77,7 @@ def plan(
                 save_plan_plot(path, spec, plans.line, unit)
             else:
                 save_plans_plot(path, spec, plans.lines, unit)
-    print_plan(spec, plans.table, unit)
+    print_plan(spec, plans, unit)
     if methods is not None:
         print_plans(plans.tables, named.left_out, unit)
     return 0

@@ -3,7 +3,7 @@
 import math
 
 from tachometry.cli.reports.terminal import print_rows
-from tachometry.sim.studies.plan import Plan
+from tachometry.sim.studies.plan import Plans
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
@@ -13,9 +13,10 @@ from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import WORD
 
 
-def print_core(spec: TachometerSpec, ends: Plan, bus: str = "none") -> None:
-    """Print the configuration of a core, what it measures at the ends of its range, and its registers on a bus."""
-    print_rows([*configuration(spec), *_resolution(spec, ends), *([] if bus == "none" else [registers_row(spec, bus)])])
+def print_core(spec: TachometerSpec, plans: Plans, bus: str = "none") -> None:
+    """Print the configuration of a core, its errors at worst and at the ends, and its registers on a bus."""
+    registers = [] if bus == "none" else [registers_row(spec, bus)]
+    print_rows([*configuration(spec), *_resolution(spec, plans), *registers])
 
 
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
@@ -74,9 +75,30 @@ def _full_scale(spec: TachometerSpec) -> str:
     return f"{held}, counted is up to {counted:.6g} {spec.scale.shown_unit.name}"
 
 
-def _resolution(spec: TachometerSpec, ends: Plan) -> list[tuple[str, str]]:
+def worst_error(spec: TachometerSpec, plans: Plans) -> list[tuple[str, str]]:
+    """Return the row that says how great the error may be at constant speed, and where; none if it is not known."""
+    if (worst := plans.worst) is None:
+        return []
+    unit = typed_unit(spec)
+    (speed,), (resolution,), (time,) = worst.speed, worst.resolution, worst.measurement_time
+    error = resolution + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
+    at = f"{unit.of(speed):.6g} {unit.name}, measured in {short_time(float(time))}"
+    speeds = f"{unit.of(plans.low):.4g} to {unit.of(plans.high):.6g} {unit.name}"
+    shown = f"{unit.of(error):.4g} {unit.name} at {at}; at constant speeds from {speeds}, with an ideal disc"
+    return [("worst error", shown)]
+
+
+def typed_unit(spec: TachometerSpec) -> SpeedUnit:
+    """Return the unit to show speeds in: that of --unit, else that of --max-speed, else rad/s."""
+    if spec.unit == NATIVE and spec.max_speed is not None:
+        return SpeedUnit(spec.max_speed.unit)
+    return spec.scale.shown_unit
+
+
+def _resolution(spec: TachometerSpec, plans: Plans) -> list[tuple[str, str]]:
     """Return what the equations of the method promise at the ends of its range."""
-    unit, rows = spec.scale.shown_unit, []
+    unit, ends = typed_unit(spec), plans.ends
+    rows = worst_error(spec, plans)
     columns = zip(("low", "high"), ends.speed, ends.resolution, ends.measurement_time, strict=True)
     for name, speed, resolution, time in columns:
         if math.isnan(resolution):

@@ -5,16 +5,17 @@ from collections.abc import Mapping
 
 from rich.text import Text
 
-from tachometry.cli.reports.core import configuration
+from tachometry.cli.reports.core import configuration, worst_error
 from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
-from tachometry.sim.studies.plan import Plan
+from tachometry.sim.studies.plan import Plan, Plans
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import SpeedUnit, short_time
 
 
-def print_plan(spec: TachometerSpec, expected: Plan, unit: str) -> None:
-    """Print the configuration of a core and its plan, speeds in `unit`."""
-    print_rows(configuration(spec))
+def print_plan(spec: TachometerSpec, plans: Plans, unit: str) -> None:
+    """Print the configuration of a core, its worst error and its plan, speeds in `unit`."""
+    expected = plans.table
+    print_rows([*configuration(spec), *worst_error(spec, plans)])
     per_unit = SpeedUnit(unit).rad_per_s
     heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
     rows = []

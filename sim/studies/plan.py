@@ -132,6 +132,19 @@ class Plans:
         """Those of the methods at the same speeds."""
         return {name: plan_at(spec, self.table.speed) for name, spec in self.methods.items()}
 
+    @property
+    def ends(self) -> Plan:
+        """The plan of the core at the least and the greatest speed."""
+        return plan_at(self.spec, [self.low, self.high])
+
+    @property
+    def worst(self) -> Plan | None:
+        """The plan at the speed where the error may be greatest; None where nothing is known of the method."""
+        resolution = self.line.resolution
+        if np.isnan(resolution).all():
+            return None
+        return plan_at(self.spec, self.line.speed[np.nanargmax(resolution)])
+
     @cached_property
     def line(self) -> Plan:
         """The plan of the core at all speeds that a line can show."""

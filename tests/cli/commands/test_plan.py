@@ -82,6 +82,28 @@ def test_speeds_from_one_count_in_the_maximum_time_to_the_greatest(capsys: pytes
         assert update_by == "alteration"
 
 
+@pytest.mark.parametrize("method", ["s", "mt", "track"])
+def test_the_worst_error_is_told_with_where_it_is(
+    method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No row of the CSV has a greater one, in the unit of the greatest speed that was typed."""
+    core = ["--ppr", "500", "--max-speed", "3000rpm", "--method", method]
+    assert run("plan", *core, "--csv", tmp_path / "p.csv") == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("worst error"))
+    match = re.match(
+        r"worst error +(\S+) rpm at (\S+) rpm, measured in .* from \S+ to 3000 rpm, with an ideal disc", line
+    )
+    assert match is not None
+    with (tmp_path / "p.csv").open() as file:
+        rows = [(float(row["resolution_rad_s"]), float(row["speed_rad_s"])) for row in csv.DictReader(file)]
+    greatest = max(value for value, _ in rows if not math.isnan(value))
+    worst, speed = (float(match[number]) * math.pi / 30 for number in (1, 2))
+    assert worst == pytest.approx(greatest, rel=0.1)
+    assert any(value > 0.999 * greatest and at == pytest.approx(speed, rel=1e-4) for value, at in rows)
+    assert run("generate", *core, "-o", tmp_path / "core") == 0
+    assert " ".join(line.split()) in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_multiple_of_the_unit_velocity_is_forced(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("plan", *OPTIONS, "--speeds", "0.5:1500rpm") == 0
     _, heads, rows = tables(capsys.readouterr().out)
@@ -191,7 +213,7 @@ finally:
         ("--speeds 1e-9:1rpm", "--speeds must be at least 1.5e-06rpm, not '1e-9:1rpm'"),
         ("--max-speed 1e999rpm", "--max-speed must be of a size from 1e-30 to 1e30, not '1e999rpm'"),
         ("--max-time 1us", "--max-time must be a whole number of ticks"),
-        ("--plot {new}/p.svg", "Invalid value for '--plot': file must end in .png or .pdf, not '{new}/p.svg'"),
+        ("--plot {new}/p.gif", "Invalid value for '--plot': file must end in .png, .pdf or .svg, not '{new}/p.gif'"),
         ("--plot {new}/p.png --csv {new}/p.png", "--plot and --csv must be different files, not both {new}/p.png"),
         ("--csv {new}/..", "--csv must be a file, which"),
         ("--plot {new}/p.png --csv {new}/../file/p.csv", "file/p.csv: Not a directory"),

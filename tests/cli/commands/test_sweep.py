@@ -189,7 +189,7 @@ BAD = [
     (["--jobs", "0"], "--jobs must be at least 1, not 0"),
     (["--jobs", "2", "--scheduler", "tcp://x:1"], "--jobs must not be given together with --scheduler"),
     (["--results", "x.csv"], "file must end in .parquet"),
-    (["--results", "x.parquet", "--plot", "s.toml"], "file must end in .png or .pdf"),
+    (["--results", "x.parquet", "--plot", "s.toml"], "file must end in .png, .pdf or .svg"),
     (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1 does not answer: "),
     (["--scheduler", "here"], "--scheduler here does not answer: "),
 ]
