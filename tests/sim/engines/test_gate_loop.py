@@ -105,5 +105,5 @@ def test_a_check_counts_what_differs(monkeypatch: pytest.MonkeyPatch) -> None:
     found = check(short, 1)
     assert (found.ticks, found.mismatches) == (3_999, 0)
     assert found.gates.rms == pytest.approx(found.double.rms, rel=0.05)
-    monkeypatch.setattr(Control, "update", lambda self, velocity: None)  # no velocity at all
+    monkeypatch.setattr(Control, "update", lambda self, velocity, **more: None)  # no velocity at all
     assert check(short, 1).mismatches > 3_999
