@@ -13,13 +13,13 @@ from tachometry.spec.formats.tracking_units import QUICK, Small
 
 def test_ends_of_ranges() -> None:
     assert [core(fine_bits=bits).fine_bits for bits in ("1", "16")] == [1, 16]
-    assert [core(max_memory=time).max_memory for time in ("960", "20us", "4s")] == [960, 960, 192_000_000]
+    assert [core(max_memory=time).max_memory for time in ("960clk", "20us", "4s")] == [960, 960, 192_000_000]
     assert core().max_memory is None
     for name, text, allowed in (
         ("fine_bits", "0", "from 1 to 16, not 0"),
         ("fine_bits", "17", "from 1 to 16, not 17"),
-        ("max_memory", "959", "from 20us, a tick, to 4s, not 19.9791667us"),
-        ("max_memory", "192000001", "from 20us, a tick, to 4s, not 4.00000002s"),
+        ("max_memory", "959clk", "from 20us, a tick, to 4s, not 19.9791667us"),
+        ("max_memory", "192000001clk", "from 20us, a tick, to 4s, not 4.00000002s"),
         ("multiplier", "large", "^multiplier must be auto, serial or block, not 'large'"),
     ):
         with pytest.raises(ParameterError, match=allowed):
