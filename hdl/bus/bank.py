@@ -10,10 +10,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.counter import SaturatingCounter
 from tachometry.hdl.bus.native import native_port
-from tachometry.spec.language.port import INDEX, UPDATE
 from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
-
-_EVENTS = {"updated": UPDATE, "indexed": INDEX}  # flags that say that there was a strobe since the capture before
 
 
 class RegisterBank(wiring.Component):
@@ -53,7 +50,7 @@ class RegisterBank(wiring.Component):
                 "capture": In(1),
                 "clear": Out(1),
                 **{port.name: In(signed(port.width) if port.signed else port.width) for port in registers.ports},
-                **{name: In(1) for name in registers.spec.ports.strobes},
+                **{name: In(1) for name in (*registers.strobes, *registers.events.values(), "overflow")},
                 "written": Out(1),
                 **{name: Out(shape, init=init) for name, (shape, init) in _shapes(registers.settings).items()},
                 **{field.port: In(_shape(field)) for field in registers.live},
@@ -90,9 +87,9 @@ class RegisterBank(wiring.Component):
     def _captured(self, m: Module, capture: Signal) -> tuple[dict[str, Value], Value]:
         """Return what was captured, by names, and whether an update is lost: the one before it was not captured."""
         taken: dict[str, Value] = {port.name: getattr(self, port.name) for port in self._map.ports}
-        waiting = {flag: Signal(name=f"{flag}_waits") for flag, strobe in _EVENTS.items() if hasattr(self, strobe)}
+        waiting = {flag: Signal(name=f"{flag}_waits") for flag in self._map.events}
         for flag, waits in waiting.items():
-            taken[flag] = waits | getattr(self, _EVENTS[flag])
+            taken[flag] = waits | getattr(self, self._map.events[flag])
             m.d.sync += waits.eq(taken[flag] & ~capture)
         captured: dict[str, Value] = {
             name: Signal.like(Value.cast(value), name=f"captured_{name}", reset_less=False)
@@ -100,7 +97,7 @@ class RegisterBank(wiring.Component):
         }
         with m.If(capture):
             m.d.sync += [captured[name].eq(value) for name, value in taken.items()]
-        return captured, waiting["updated"] & self.velocity_valid
+        return captured, waiting["updated"] & self.velocity_valid if "updated" in waiting else Const(0)
 
     def _answer(self, m: Module, shown: dict[str, Value]) -> None:
         """Answer a read a clock later; an address without a register reads 0."""

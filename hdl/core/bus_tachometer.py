@@ -9,8 +9,10 @@ from tachometry.hdl.bus.bridge import Bridge, NativeBridge
 from tachometry.hdl.bus.spi import SpiBridge
 from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.bus.wishbone import WishboneBridge
+from tachometry.hdl.core.axes_registers import AxesRegisterCore
 from tachometry.hdl.core.register_core import RegisterCore
 from tachometry.hdl.wires.ports import hand_through, members
+from tachometry.spec.registers.axes import AxesMap
 from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.map import RegisterMap
 
@@ -51,7 +53,7 @@ class BusTachometer(wiring.Component):
     """
 
     def __init__(self, registers: RegisterMap, bus: Bus) -> None:
-        self.core = RegisterCore(registers)
+        self.core = AxesRegisterCore(registers) if isinstance(registers, AxesMap) else RegisterCore(registers)
         self.bridge = bridge_on(registers, bus)
         super().__init__(members((*registers.core_ports, *bus.ports(registers))))
 

@@ -54,7 +54,7 @@ def export(
     ------
     ValueError
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
-        the target needs another bus or another core; if a core of many axes is to have either.
+        the target needs another bus or another core; if the bus cannot reach all registers.
     """
     on = bus_of(bus_for(target, bus), baud)
     check_core(target, spec)

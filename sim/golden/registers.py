@@ -69,15 +69,19 @@ class GoldenBank:
             port.name for port in registers.ports if port.held_by == UPDATE and port.unit and port.name != "velocity"
         }
         self._tables = golden.tables(registers.spec, trace)
-        ticks = self._tables[TICK]
-        strobes = {
-            "decode_errors": self._tables["decode_error"].clock,
-            "overflows": ticks.clock[ticks.overflow],
-            "tick_errors": self._tables["tick_error"].clock,
-        }
         self._strobes: tuple[str, ...] = (TICK, UPDATE, INDEX)
         self._swallowed = decoded(registers.spec, trace).swallowed
-        self._events = {name: clocks for name, clocks in strobes.items() if name in registers.counted}
+        self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
+        self._follow(self._tables[TICK].overflow)
+
+    def _follow(self, overflow: np.ndarray) -> None:
+        """Find the clocks of what is counted; `overflow` is a column of the ticks."""
+        strobes = {
+            "decode_errors": self._tables["decode_error"].clock,
+            "overflows": self._tables[TICK].clock[overflow],
+            **({"tick_errors": self._tables["tick_error"].clock} if "tick_error" in self._tables else {}),
+        }
+        self._events = {name: clocks for name, clocks in strobes.items() if name in self._map.counted}
 
     def answers(self, accesses: Sequence[Access], captures: Iterable[int] = ()) -> list[tuple[int | None, bool]]:
         """Return data and error of each access, in the order of their clocks; `captures` are clocks of the input
@@ -130,19 +134,25 @@ class GoldenBank:
             row = int(np.searchsorted(table.clock, clock, side="right")) - 1
             for name, column in table.columns.items():
                 taken[name] = int(column[row]) if row >= 0 else 0
-        since = {strobe: self._count(self._tables[strobe].clock, before, clock) for strobe in (UPDATE, INDEX)}
-        taken |= {"updated": int(since[UPDATE] > 0), "indexed": int(since[INDEX] > 0)}
+        taken |= {flag: int(self._count(clocks, before, clock) > 0) for flag, clocks in self._happened.items()}
+        taken |= self._of_clock(clock)
+        updates = self._tables[UPDATE].clock
+        self._known = clock >= updates[0] if len(updates) else False
+        self._captured = taken
+        self._captures.append(clock)
+
+    def _of_clock(self, clock: int) -> dict[str, int]:
+        """Return what a capture takes that is no row of a strobe."""
         ticks, updates = self._tables[TICK].clock, self._tables[UPDATE]
         caused = updates.cause[updates.clock <= clock]
         age = self._count(ticks, int(caused[-1]) if len(caused) else -1, clock)
-        taken["time"] = clock % (1 << WORD)
-        taken["age"] = min(age, self._map.spec.timing.max_ticks)
         # The core is cleared in the clock after.
         glitches = self._count(self._swallowed, self._cleared + 1, clock)
-        taken["swallowed_edges"] = 2 * min(glitches, (1 << 15) - 1)
-        self._known = clock >= updates.clock[0] if len(updates) else False
-        self._captured = taken
-        self._captures.append(clock)
+        return {
+            "time": clock % (1 << WORD),
+            "age": min(age, self._map.spec.timing.max_ticks),
+            "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
+        }
 
     @staticmethod
     def _count(clocks: np.ndarray, after: int, until: int) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
-from tachometry.spec.registers.frames import QUIET_BITS, SPI_SCK_CYCLES
+from tachometry.spec.registers.frames import QUIET_BITS, SPI_ADDRESS_WIDTH, SPI_SCK_CYCLES, UART_ADDRESS_WIDTH
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.manifest import described_port, manifest
 from tachometry.spec.registers.map import WORD, RegisterMap
@@ -32,6 +32,8 @@ class Bus:
         Inputs that are not of the clock domain.
     baud : int
         Bits a second on a line without a clock; 0 if the bus has none.
+    address_bits : int
+        Bits of the address of a word in its frames; 0 if it has no frames.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Bus:
     idle: Mapping[str, int] = field(default_factory=dict)
     asynchronous: tuple[str, ...] = ()
     baud: int = 0
+    address_bits: int = 0
 
     def bit_cycles(self, clock_hz: int) -> int:
         """Return clocks of a bit on a line without a clock.
@@ -57,7 +60,18 @@ class Bus:
         return cycles
 
     def ports(self, registers: RegisterMap) -> tuple[Port, ...]:
-        """Return ports that it adds to a core with these registers."""
+        """Return ports that it adds to a core with these registers.
+
+        Raises
+        ------
+        ParameterError
+            If its frames do not reach all of them.
+        """
+        words = 1 << self.address_bits
+        if self.address_bits and len(registers.registers) >= words:
+            raise ParameterError(
+                "bus", f"must be another than {self.name} for {len(registers.registers)} registers: it has {words - 1}"
+            )
         width = registers.address_width - (WORD // 8 - 1).bit_length() * self.words
         return tuple(
             Port(port.name, port.direction, port.width or width, help=port.help) for port in (CAPTURE, *self.lines)
@@ -163,6 +177,7 @@ BUSES = {
                 ),
             ),
             idle={"spi_cs_n": 1},
+            address_bits=SPI_ADDRESS_WIDTH,
             asynchronous=("spi_sck", "spi_mosi", "spi_cs_n"),
         ),
         Bus(
@@ -179,6 +194,7 @@ BUSES = {
             idle={"uart_rx": 1},
             asynchronous=("uart_rx",),
             baud=DEFAULT_BAUD,
+            address_bits=UART_ADDRESS_WIDTH,
         ),
     )
 }

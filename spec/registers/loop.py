@@ -9,6 +9,8 @@ from tachometry.spec.control.form import GAINS
 from tachometry.spec.control.ports import CONTROL, CURRENT, GAIN_PORTS, loop_entries
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
+from tachometry.spec.methods.axes import AxesSpec
+from tachometry.spec.registers.axes import AxesMap
 from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
 
 _MODE, _POSITION = "generator_mode", "command_position"
@@ -142,9 +144,12 @@ def registers_of(spec: AnySpec) -> RegisterMap:
     ParameterError
         If it can have none.
     """
-    if spec.axes is not None:
-        raise ParameterError("bus", "must not be given together with axes: registers and targets are for one axis")
     return RegisterMap(spec.tachometer)
+
+
+@registers_of.register
+def _(spec: AxesSpec) -> RegisterMap:
+    return AxesMap(spec.tachometer, spec)
 
 
 @registers_of.register

@@ -189,7 +189,22 @@ class RegisterMap:
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Outputs of the core that are captured."""
-        return tuple(port for port in self.spec.ports.outputs if port.held_by in _LIVE and not port.is_strobe)
+        return tuple(port for port in self.core.ports.outputs if port.held_by in _LIVE and not port.is_strobe)
+
+    @property
+    def strobes(self) -> tuple[str, ...]:
+        """Strobes that the bank follows."""
+        return tuple(self.spec.ports.strobes)
+
+    @cached_property
+    def events(self) -> dict[str, str]:
+        """Flags that say that something has happened since the capture before, each with the input that says it."""
+        return {"updated": UPDATE, "indexed": INDEX} if self.spec.index else {"updated": UPDATE}
+
+    @cached_property
+    def status(self) -> tuple[Register, ...]:
+        """Registers of flags."""
+        return tuple(register for register in self.registers if register.name.split("_")[0] == "STATUS")
 
     @property
     def settings(self) -> tuple[Field, ...]:
@@ -280,7 +295,12 @@ class RegisterMap:
         yield "COUNTERS", "What went wrong since reset or CONTROL.clear; not captured.", tuple(counters), {}
 
     def _captured(self) -> Iterable[Draft]:
-        values = [port for port in self.ports if port.width > 1]
+        yield from self._window(self.ports, "", captures=True)
+
+    def _window(self, ports: Iterable[Port], suffix: str, *, captures: bool) -> Iterable[Draft]:
+        """Return captured registers of these ports, whose names have this end."""
+        ports = tuple(ports)
+        values = [port for port in ports if port.width > 1]
         for port in values:
             more = {"captured": True}
             words = range(0, port.width, WORD)
@@ -297,19 +317,20 @@ class RegisterMap:
                     shift=word,
                 )
                 first = port is values[0] and not word
-                yield name, f"{low}{port.help}", (field,), {**more, "captures": first}
+                yield name, f"{low}{port.help}", (field,), {**more, "captures": first and captures}
             if port is values[0]:
-                yield "STATUS", "Flags of what was captured.", tuple(self._flags()), more
+                flags = tuple(self._flags(ports, suffix))
+                yield f"STATUS{suffix}", "Flags of what was captured.", flags, more
 
     def _added(self) -> Iterable[Draft]:
         """Return what a design around the core adds."""
         return ()
 
-    def _flags(self) -> Iterable[Field]:
-        events = {"updated": "There was an update of the velocity since the capture before."}
-        if self.spec.index:
-            events["indexed"] = "There was an index since the capture before."
-        flags = [*events.items()] + [(port.name, port.help) for port in self.ports if port.width == 1]
+    def _flags(self, ports: Iterable[Port], suffix: str) -> Iterable[Field]:
+        events = {f"updated{suffix}": "There was an update of the velocity since the capture before."}
+        events[f"indexed{suffix}"] = "There was an index since the capture before."
+        flags = [(name, help) for name, help in events.items() if name in self.events]
+        flags += [(port.name, port.help) for port in ports if port.width == 1]
         for place, (name, help) in enumerate(flags):
             yield Field(name, 1, place, help, port="" if name in events else name)
 

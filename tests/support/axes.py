@@ -4,6 +4,8 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.axes import AxesTrace
@@ -31,6 +33,11 @@ def motions(spec: AxesSpec, n_clocks: int = 2000) -> AxesTrace:
     """
     each = [stress(spec.tachometer, seed=7 + axis, n_edges=5 + 3 * axis) for axis in range(spec.axes)]
     high = [replace(trace, z=None if trace.z is None else 1 - trace.z) for trace in each]
+    if spec.tachometer.external_tick:
+        # Early ones, late ones, some that come much too early or not at all.
+        cycles = spec.timing.tick_cycles
+        apart = np.random.default_rng(8).choice([2, cycles - 9, cycles, cycles + 7, 5 * cycles], n_clocks // cycles)
+        high = [replace(trace, tick_in=None).with_tick_in(np.cumsum(apart)) for trace in high]
     return AxesTrace.of(high).until(n_clocks)
 
 

@@ -1,19 +1,19 @@
 """A module for LiteX: the core with its registers on the Wishbone bus of a SoC."""
 
 from tachometry.hdl.export.render import render_files
-from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.registers.map import RegisterMap
+from tachometry.spec.control import AnySpec
+from tachometry.spec.registers.loop import registers_of
 
 
-def litex(spec: TachometerSpec, name: str, verilog: str) -> dict[str, str]:
+def litex(spec: AnySpec, name: str, verilog: str) -> dict[str, str]:
     """Return the text of `NAME_litex.py` by its name.
 
     Parameters
     ----------
-    spec : TachometerSpec
+    spec : TachometerSpec or AxesSpec
     name : str
         Of the Verilog module.
     verilog : str
         The core, which the module reads from the file beside it.
     """
-    return render_files(["NAME_litex.py"], name, spec=spec, registers=RegisterMap(spec))
+    return render_files(["NAME_litex.py"], name, spec=spec.tachometer, registers=registers_of(spec))

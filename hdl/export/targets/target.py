@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from tachometry.hdl.export.targets.litex import litex
 from tachometry.hdl.export.targets.rio import rio
-from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError
 
@@ -22,16 +22,19 @@ class Target:
         The bus that the core has for it.
     files : callable
         Texts by file name, of the spec, the name and the Verilog of the core.
+    axes : bool
+        Cores of many axes can go into it.
     """
 
     help: str
     bus: str
-    files: Callable[[TachometerSpec, str, str], dict[str, str]]
+    files: Callable[[Any, str, str], dict[str, str]]
+    axes: bool
 
 
 TARGETS = {
-    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", "none", rio),
-    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", "wishbone", litex),
+    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", "none", rio, axes=False),
+    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", "wishbone", litex, axes=True),
 }
 
 
@@ -53,11 +56,14 @@ def bus_for(target: str, bus: str | None) -> str:
 
 def check_core(target: str, spec: AnySpec) -> None:
     """Refuse a core that is not for this target, with a ParameterError."""
-    if target in TARGETS and spec is not spec.tachometer:
-        other, whom = ("loop", "a tachometer alone") if spec.axes is None else ("axes", "one axis")
-        raise ParameterError("target", f"must not be given together with {other}: targets are for {whom}")
+    if target not in TARGETS or spec is spec.tachometer:
+        return
+    if spec.axes is None:
+        raise ParameterError("target", "must not be given together with loop: targets are for a tachometer alone")
+    if not TARGETS[target].axes:
+        raise ParameterError("target", f"must be another than {target} with axes: its plugin is for one encoder each")
 
 
 def target_files(target: str, spec: AnySpec, name: str, verilog: str) -> dict[str, str]:
     """Return texts by file name, of the name and the Verilog of the core; none without a target."""
-    return TARGETS[target].files(spec.tachometer, name, verilog) if target in TARGETS else {}
+    return TARGETS[target].files(spec, name, verilog) if target in TARGETS else {}

@@ -113,8 +113,9 @@ def test_verilog_without_warnings(words: tuple[str, ...], tmp_path: Path) -> Non
         ("--axes 4 --method m", "--method must be s together with --axes, not m"),
         ("--axes 4 --age", "--age must not be given together with axes: "),
         ("--axes 8 --tick 1us --max-time 1ms", "--tick, in clocks, must be a multiple of a number from 8 to 64, "),
-        ("--axes 4 --bus spi", "--bus must not be given together with axes: "),
-        ("--axes 4 --for rio", "--for must not be given together with axes: "),
+        ("--axes 4 --bus apb", "--parallel must be given together with axes and a bus: "),
+        ("--axes 64 --parallel --bus spi", "--bus must be another than spi for 324 registers: it has 127"),
+        ("--axes 4 --for rio", "--for must be another than rio with axes: "),
     ],
 )
 def test_what_is_refused(words: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -139,3 +140,18 @@ def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch:
     monkeypatch.setattr(study, "AXES", AXES[2:3])
     assert run("verify", "--methods", "s", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out") == 0
     assert rows(capsys)[1].split()[:3] == ["s", "pysim", "1"]
+
+
+def test_registers_of_every_axis(tmp_path: Path) -> None:
+    """The driver reads all axes of one capture, and is C99; nothing is beside the windows."""
+    core = "--ppr 25 --clock 1MHz --tick 100us --max-time 400us --axes 3 --parallel --name axes".split()
+    assert run("generate", *core, "--for", "litex", "-o", tmp_path) == 0
+    driver = (tmp_path / "axes_driver.h").read_text()
+    assert all(f"now->velocity_{axis} = axes_signed_32(velocity_{axis});" in driver for axis in range(3))
+    assert all(f"now->stalled_{axis} = (status_{axis} & " in driver for axis in range(3))
+    (tmp_path / "main.c").write_text('#include "axes_driver.h"\n')
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only"]
+    subprocess.run(["cc", *strict, "main.c"], cwd=tmp_path, check=True)
+    assert "reg [2:0] a" in (tmp_path / "axes_tb.sv").read_text()
+    assert '    "a": 3,\n' in (tmp_path / "axes_litex.py").read_text()
+    lint(["axes.v"], "axes", tmp_path)

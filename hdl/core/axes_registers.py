@@ -1,0 +1,61 @@
+"""A core of many axes with its registers, on a native port."""
+
+from amaranth import Cat, Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
+
+from tachometry.hdl.bus.bank import RegisterBank
+from tachometry.hdl.bus.native import native_port
+from tachometry.hdl.core.axes_tachometer import AxesTachometer
+from tachometry.hdl.wires.ports import follow, members
+from tachometry.spec.registers.axes import AxesMap
+
+
+class AxesRegisterCore(wiring.Component):
+    """A core of many axes, with its registers; see `RegisterCore`.
+
+    Parameters
+    ----------
+    registers : AxesMap
+
+    Members
+    -------
+    `core_ports` of the registers, less `clk` and `rst`, and
+
+    bus : In(native_port)
+    capture : In(1)
+        Captures in every clock in which it is high.
+    """
+
+    def __init__(self, registers: AxesMap) -> None:
+        self._map = registers
+        self.tachometer = AxesTachometer(registers.axes)
+        self.bank = RegisterBank(registers)
+        super().__init__(
+            {
+                **members(registers.core_ports),
+                "bus": In(native_port(registers.address_width - 2)),
+                "capture": In(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        core, bank, spec = self.tachometer, self.bank, self._map.axes
+        m.submodules.tachometer, m.submodules.bank = core, bank
+        wiring.connect(m, wiring.flipped(self.bus), bank.bus)
+        follow(m, core, self, (port.name for port in spec.ports.pins))
+        follow(m, self, core, (port.name for port in spec.ports.outputs))
+        follow(m, bank, core, (*(port.name for port in self._map.ports), *self._map.strobes))
+        whose = {"updated": (core.velocity_valid, core.axis)}
+        if spec.tachometer.index:
+            whose["indexed"] = (core.index_valid, core.index_axis)
+        overflows = []
+        for axis in range(spec.axes):
+            overflows.append(getattr(core, f"overflow_{axis}") & (core.axis == axis))
+            m.d.comb += [
+                getattr(bank, f"{event}_now_{axis}").eq(strobe & (number == axis))
+                for event, (strobe, number) in whose.items()
+            ]
+        m.d.comb += [bank.capture.eq(self.capture), bank.overflow.eq(Cat(overflows).any())]
+        return m

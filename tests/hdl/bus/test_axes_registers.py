@@ -1,0 +1,51 @@
+"""Registers of many axes against their golden model, and a driver in C that reads those of every axis at once."""
+
+import pytest
+from hdl.bus.test_bank import random_accesses
+from support.axes import motions, small
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.core import axes_registers
+from tachometry.sim.golden.axes_registers import GoldenAxesBank
+from tachometry.spec import AxesSpec
+from tachometry.spec.registers.axes import AxesMap
+
+
+@pytest.mark.parametrize(
+    ("seed", "spec"),
+    [
+        (5, small(3, parallel=True, index=True)),
+        (4, small(2, parallel=True, most=None, velocity_width=9, external_tick=True, position_width=40)),
+    ],
+)
+def test_registers_are_those_of_the_golden_model(seed: int, spec: AxesSpec) -> None:
+    registers = AxesMap(spec.tachometer, spec)
+    trace = motions(spec, 1500)
+    accesses, captures = random_accesses(registers, seed, trace.n_clocks)
+    rows: list[dict[str, int]] = [{"capture": 0, "bus.read": 0, "bus.write": 0} for _ in range(trace.n_clocks)]
+    names = [pin.name for pin in spec.ports.pins]
+    for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[name].tolist() for name in names), strict=True):
+        rows[clock] |= dict(zip(names, levels, strict=True))
+    for clock in captures:
+        rows[clock]["capture"] = 1
+    for access in accesses:
+        kind = {"bus.read": 1} if access.data is None else {"bus.write": 1, "bus.write_data": access.data}
+        rows[access.clock] |= {"bus.address": access.address, **kind}
+    seen = clock_by_clock(axes_registers.AxesRegisterCore(registers), rows, ["bus.read_data", "bus.error"])
+    answers = GoldenAxesBank(registers, trace).answers(accesses, captures)
+    assert len({data for data, _ in answers}) > 25
+    for access, (data, error) in zip(accesses, answers, strict=True):
+        row = seen[access.clock + 1]
+        assert (row["bus.read_data"], bool(row["bus.error"])) == (data, error), access
+
+
+def test_every_axis_has_a_window_of_the_same_size() -> None:
+    spec = small(3, parallel=True, index=True)
+    registers = AxesMap(spec.tachometer, spec)
+    windows = [[one for one in registers if one.name.endswith(f"_{axis}")] for axis in range(3)]
+    assert [one.offset - windows[0][0].offset for one in windows[2]] == [
+        2 * (windows[1][0].offset - windows[0][0].offset) + one.offset - windows[0][0].offset for one in windows[0]
+    ]
+    names = [[one.name[:-2] for one in window] for window in windows]
+    assert names[0] == names[1] == names[2]
+    assert [one.name for one in registers if one.captures] == ["VELOCITY_0"]
